@@ -1,0 +1,504 @@
+"""body.toml: what a person may write about one body, checked, with every mistake named by its key.
+
+`load_body` returns the settings in SI: every length of the file, given in `length_unit`, has become metres. The
+build and CAD meshers are handed the file's own numbers (`BodySettings.raw`), in the file's own unit.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from .data import Array, Material, UserError
+from .mesh import UNITS
+
+_LENGTH = "length"  # metadata that marks a number as a length in the file's unit
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _finite_vector(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(float(v) if isinstance(v, int | float) and not isinstance(v, bool) else v for v in value)
+    return value
+
+
+def _float(value: Any) -> Any:
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
+Positive = Annotated[float, BeforeValidator(_float), Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_nan=False)]
+Length = Annotated[Number, _LENGTH]
+PositiveLength = Annotated[Positive, _LENGTH]
+Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)]
+Point = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
+Box = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
+Directions = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=64)]
+
+
+class Model(BaseModel):
+    """Strict, frozen, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class FaceRule(Model):
+    """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways."""
+
+    name: Name
+    label: str | None = None
+    colour: Annotated[tuple[int, int, int], BeforeValidator(_tuple)] | None = None
+    box: Box | None = None
+    surfaces: Annotated[tuple[int, ...], BeforeValidator(_tuple)] | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> FaceRule:
+        ways = [k for k in ("label", "colour", "box", "surfaces") if getattr(self, k) is not None]
+        if len(ways) != 1:
+            raise ValueError(f"face '{self.name}' needs exactly one of label, colour, box, surfaces; it has {ways or 'none'}")
+        return self
+
+
+class Geometry(Model):
+    """Where the body comes from: exactly one of build (a script), cad (STEP, BREP, IGES) or mesh (a file)."""
+
+    build: str | None = None
+    cad: str | None = None
+    mesh: str | None = None
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Geometry:
+        sources = [k for k in ("build", "cad", "mesh") if getattr(self, k)]
+        if len(sources) != 1:
+            raise ValueError(f"needs exactly one of build, cad, mesh; it has {sources or 'none'}")
+        return self
+
+
+class Meshing(Model):
+    """Target element size (length_unit) and local sizes by face name."""
+
+    size: Annotated[Positive | None, _LENGTH] = None
+    order: Literal[1, 2] = 2
+    local: dict[str, Positive] = Field(default_factory=dict)
+
+
+class MaterialSettings(Model):
+    """Isotropic (young, poisson) or orthotropic (young, poisson, shear as three numbers each, with axes)."""
+
+    name: str = "material"
+    density: Positive
+    young: Positive | Numbers
+    poisson: Annotated[float, BeforeValidator(_float), Field(gt=-1, lt=0.5)] | Numbers
+    shear: Numbers | None = None
+    axes: Annotated[tuple[Vector, Vector, Vector], BeforeValidator(_finite_vector)] | None = None
+    expansion: Number | Numbers = 0.0
+    temperature: Numbers | None = None
+    modulus_factor: Numbers | None = None
+    unusual: bool = False
+
+    @model_validator(mode="after")
+    def _consistent(self) -> MaterialSettings:
+        if isinstance(self.young, tuple):
+            for key in ("young", "poisson", "shear"):
+                value = getattr(self, key)
+                if not isinstance(value, tuple) or len(value) != 3:
+                    raise ValueError(f"an orthotropic material needs three numbers for {key}")
+        elif self.shear is not None or isinstance(self.poisson, tuple):
+            raise ValueError("an isotropic material has one young, one poisson and no shear")
+        if (self.temperature is None) != (self.modulus_factor is None):
+            raise ValueError("temperature and modulus_factor come together")
+        if self.temperature is not None:
+            if len(self.temperature) != len(self.modulus_factor or ()):
+                raise ValueError("temperature and modulus_factor must have the same length")
+            if any(b <= a for a, b in zip(self.temperature[:-1], self.temperature[1:], strict=True)):
+                raise ValueError("temperature must rise from entry to entry")
+            if min(self.modulus_factor or (1,)) <= 0:
+                raise ValueError("modulus_factor must be positive")
+        if isinstance(self.expansion, tuple) and len(self.expansion) != 3:
+            raise ValueError("expansion is one number or three along the material axes")
+        return self
+
+    def material(self) -> Material:
+        """The `Material` in body axes."""
+        from .fem.operators import isotropic, orthotropic
+
+        axes = None if self.axes is None else np.array([np.array(a) / np.linalg.norm(a) for a in self.axes])
+        if isinstance(self.young, tuple):
+            try:
+                C = orthotropic(np.array(self.young), np.array(self.poisson), np.array(self.shear), axes)
+            except ValueError as error:
+                raise UserError(f"[material]: {error}; check the ratios nu_ij and moduli") from error
+        else:
+            assert isinstance(self.poisson, float)
+            C = isotropic(self.young, self.poisson)
+        alpha = np.broadcast_to(np.asarray(self.expansion, dtype=float), 3)
+        R = np.eye(3) if axes is None else axes
+        strain = R.T @ np.diag(alpha) @ R
+        voigt = np.array([strain[0, 0], strain[1, 1], strain[2, 2], 2 * strain[0, 1], 2 * strain[1, 2], 2 * strain[0, 2]])
+        table = None
+        if self.temperature is not None:
+            table = np.column_stack([self.temperature, self.modulus_factor or ()])
+        return Material(self.density, C, voigt, table, self.name)
+
+
+class Temperature(Model):
+    """Reference (stress free) and actual temperature, K: uniform, or a CSV file of x, y, z, T (length_unit, K)."""
+
+    reference: Positive = 293.15
+    uniform: Positive | None = None
+    file: str | None = None
+
+
+class Support(Model):
+    """A face, or a point set, whose displacement is held in the named body directions."""
+
+    face: Name
+    directions: Directions = "xyz"
+
+
+class Rotation(Model):
+    """Rotation about an axis and the speeds to analyse.
+
+    prestress: ``nonlinear`` (equilibrium at speed by Newton, then the tangent), ``linear`` (one linear solution),
+    ``none`` (K as the book prints it in Eq. (2.3-29), with the softening term only: frequencies fall with speed).
+    """
+
+    axis: Vector = (0.0, 1.0, 0.0)
+    point: Point = (0.0, 0.0, 0.0)
+    speeds_rpm: Numbers = (0.0,)
+    prestress: Literal["nonlinear", "linear", "none"] = "nonlinear"
+    spin_softening: bool = True
+    engine_orders: Annotated[tuple[int, ...], BeforeValidator(_tuple)] = ()
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Rotation:
+        if not any(self.axis):
+            raise ValueError("axis has no length")
+        if not self.speeds_rpm or min(self.speeds_rpm) < 0 or list(self.speeds_rpm) != sorted(set(self.speeds_rpm)):
+            raise ValueError("speeds_rpm must be one or more rising numbers, none negative")
+        return self
+
+
+class Load(Model):
+    """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a face or point (N)."""
+
+    kind: Literal["gravity", "pressure", "force"]
+    face: Name | None = None
+    point: Point | None = None
+    value: Number | None = None
+    vector: Vector | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Load:
+        if self.kind == "pressure" and (self.face is None or self.value is None):
+            raise ValueError("a pressure needs face and value (Pa, positive pushes into the body)")
+        if self.kind == "gravity" and self.vector is None:
+            raise ValueError("gravity needs vector (m/s2)")
+        if self.kind == "force" and (self.vector is None or (self.face is None) == (self.point is None)):
+            raise ValueError("a force needs vector (N) and either face or point")
+        return self
+
+
+class InterfaceSettings(Model):
+    """A contact patch. t2: direction whose projection on the patch becomes the second tangent; n points outwards."""
+
+    name: Name
+    face: Name
+    role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
+    partner: str = ""
+    sector_shift: Literal[-1, 0, 1] = 0
+    t2: Vector = (0.0, 0.0, 1.0)
+
+
+class Excitation(Model):
+    """Unit load: a force along `direction` (N) at a point or spread over a face, or `pressure` on a face (1 Pa)."""
+
+    name: Name
+    point: Point | None = None
+    face: Name | None = None
+    direction: Vector | None = None
+    pressure: bool = False
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Excitation:
+        if (self.point is None) == (self.face is None):
+            raise ValueError("needs either point or face")
+        if self.pressure and (self.face is None or self.direction is not None):
+            raise ValueError("pressure = true needs a face and no direction")
+        if not self.pressure and (self.direction is None or not any(self.direction)):
+            raise ValueError("needs a direction that is not zero (or pressure = true)")
+        return self
+
+
+class Monitor(Model):
+    """Displacement read-out along body directions at a point."""
+
+    name: Name
+    point: Point
+    directions: Directions = "xyz"
+
+
+class Gauge(Model):
+    """Strain gauge: normal strain along `direction` at a point."""
+
+    name: Name
+    point: Point
+    direction: Vector
+
+
+class Modes(Model):
+    """How many modes, or up to which frequency (Hz; count is then the upper limit)."""
+
+    count: Annotated[int, Field(ge=1, le=2000)] = 20
+    max_frequency: Positive | None = None
+    certify: bool = True
+    solver: Literal["auto", "pardiso", "superlu"] = "auto"
+
+
+class Damping(Model):
+    """Modal damping: one ratio, a table of ratios per mode, or Rayleigh D = alpha M + beta K (Sextro Eq. (2.4-3))."""
+
+    ratio: NotNegative | None = None
+    table: Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)] | None = None
+    alpha: NotNegative | None = None
+    beta: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Damping:
+        given = [self.ratio is not None, self.table is not None, self.alpha is not None or self.beta is not None]
+        if sum(given) > 1:
+            raise ValueError("give one of ratio, table, or alpha and beta")
+        return self
+
+    @property
+    def source(self) -> str:
+        if self.table is not None:
+            return "table"
+        if self.alpha is not None or self.beta is not None:
+            return f"rayleigh alpha={self.alpha or 0.0:g} 1/s beta={self.beta or 0.0:g} s"
+        return "ratio"
+
+    def ratios(self, omega: Array) -> Array:
+        """(m,) damping ratios D_j of Sextro Eq. (2.4-13); rigid modes get 0."""
+        safe = np.where(omega > 0, omega, np.inf)
+        if self.table is not None:
+            tail = self.table[-1] if self.table else 0.0
+            padded = [*self.table, *[tail] * len(omega)][: len(omega)]
+            return np.where(omega > 0, padded, 0.0)
+        if self.alpha is not None or self.beta is not None:
+            return 0.5 * ((self.alpha or 0.0) / safe + (self.beta or 0.0) * omega)
+        return np.where(omega > 0, self.ratio or 0.0, 0.0)
+
+
+class Output(Model):
+    """What the modal file holds beside frequencies and rows."""
+
+    shapes: bool = True
+    patch_shapes: bool = True
+    gauss: bool = True
+    nodal_stress: bool = True
+
+
+class BodySettings(Model):
+    """A whole body.toml."""
+
+    name: Name
+    description: str = ""
+    length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
+    reduction: Literal["eigenmodes"] = "eigenmodes"
+    free: bool = False
+    geometry: Geometry
+    mesh: Meshing = Field(default_factory=Meshing)
+    material: MaterialSettings
+    temperature: Temperature = Field(default_factory=Temperature)
+    supports: Annotated[tuple[Support, ...], BeforeValidator(_tuple)] = ()
+    rotation: Rotation = Field(default_factory=Rotation)
+    loads: Annotated[tuple[Load, ...], BeforeValidator(_tuple)] = ()
+    interfaces: Annotated[tuple[InterfaceSettings, ...], BeforeValidator(_tuple)] = ()
+    excitations: Annotated[tuple[Excitation, ...], BeforeValidator(_tuple)] = ()
+    monitors: Annotated[tuple[Monitor, ...], BeforeValidator(_tuple)] = ()
+    gauges: Annotated[tuple[Gauge, ...], BeforeValidator(_tuple)] = ()
+    modes: Modes = Field(default_factory=Modes)
+    damping: Damping = Field(default_factory=Damping)
+    output: Output = Field(default_factory=Output)
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _names_once(self) -> BodySettings:
+        for kind in ("interfaces", "excitations", "monitors", "gauges"):
+            names = [item.name for item in getattr(self, kind)]
+            twice = {n for n in names if names.count(n) > 1}
+            if twice:
+                raise ValueError(f"{kind}: the name '{twice.pop()}' is used twice")
+        return self
+
+
+def load_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises:
+        UserError: missing, unreadable or not TOML.
+    """
+    try:
+        with open(path, "rb") as file:
+            return tomllib.load(file)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: is not valid TOML ({error}); correct that place") from error
+
+
+def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[str, Any]:
+    """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
+    for text in assignments:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise UserError(f"--set {text}: write --set key.subkey=value")
+        try:
+            parsed = tomllib.loads(f"v = {value}")["v"]
+        except tomllib.TOMLDecodeError:
+            parsed = value
+        place: Any = table
+        *parents, last = key.strip().split(".")
+        for parent in parents:
+            if isinstance(place, list):
+                place = _entry(place, parent, key, path)
+                continue
+            place = place.setdefault(parent, {})
+            if not isinstance(place, dict | list):
+                raise UserError(f"--set {key}: '{parent}' in {path} is not a table")
+        if isinstance(place, list):
+            raise UserError(f"--set {key}: name the entry and its key, as in interfaces.NAME.face=...")
+        place[last] = parsed
+    return table
+
+
+def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
+    for number, item in enumerate(items):
+        if isinstance(item, dict) and name in (item.get("name"), item.get("face"), str(number)):
+            return item
+    raise UserError(f"--set {key}: {path} has no entry '{name}' there")
+
+
+def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[BodySettings, dict[str, Any]]:
+    """Read and check a body file.
+
+    Args:
+        path: of the body.toml. assignments: ``--set`` texts.
+
+    Returns:
+        The settings in SI (lengths in metres), and the file's own table (lengths in its own unit).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    path = Path(path)
+    raw = override(load_toml(path), assignments or [], path)
+    settings = validate(BodySettings, raw, path)
+    return _to_metres(settings, UNITS[settings.length_unit]), raw
+
+
+def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
+    """Check a table against a settings model; one sentence a mistake."""
+    try:
+        return model.model_validate(raw)
+    except ValidationError as error:
+        lines = [_sentence(e, model) for e in error.errors(include_url=False)]
+        raise UserError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from error
+
+
+def _sentence(error: Any, model: type[BaseModel]) -> str:
+    where = [str(p) for p in error["loc"] if not str(p).startswith(("function-", "tuple[", "constrained", "float"))]
+    key = ".".join(where) or "the file"
+    kind, given = error["type"], error.get("input")
+    if kind == "extra_forbidden":
+        known = _known_keys(model, error["loc"][:-1])
+        close = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
+        hint = f"did you mean '{close[0]}'?" if close else f"known keys: {', '.join(known)}"
+        return f"{key}: unknown key; {hint}"
+    if kind == "missing":
+        return f"{key}: is missing; add it"
+    message = error["msg"].removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    shown = "" if isinstance(given, dict | BaseModel) or kind == "value_error" else f" (it is {given!r})"
+    return f"{key}: {message}{shown}; correct it"
+
+
+def _known_keys(model: Any, location: tuple[Any, ...]) -> list[str]:
+    for part in location:
+        if isinstance(part, int) or part not in getattr(model, "model_fields", {}):
+            continue
+        model = _model_in(model.model_fields[part].annotation) or model
+    return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        if (found := _model_in(argument)) is not None:
+            return found
+    return None
+
+
+def _to_metres(model: Any, scale: float) -> Any:
+    """Multiply every number marked as a length, at any depth."""
+    if isinstance(model, tuple):
+        return tuple(_to_metres(m, scale) for m in model)
+    if not isinstance(model, BaseModel):
+        return model
+    update = {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if _is_length(field):
+            update[name] = _scaled(value, scale)
+        elif name == "local":
+            update[name] = {k: v * scale for k, v in value.items()}
+        else:
+            update[name] = _to_metres(value, scale)
+    return model.model_copy(update=update)
+
+
+def _is_length(field: Any) -> bool:
+    return _LENGTH in field.metadata or f"'{_LENGTH}'" in str(field.annotation)
+
+
+def _scaled(value: Any, scale: float) -> Any:
+    if value is None:
+        return None
+    return tuple(v * scale for v in value) if isinstance(value, tuple) else value * scale
+
+
+def implausible(settings: BodySettings, size: float) -> list[str]:
+    """Warnings about values that suggest a unit mistake (suppressed by material.unusual = true).
+
+    Args:
+        size: largest extent of the body, m.
+    """
+    found = []
+    m = settings.material
+    if not m.unusual:
+        if not 300 <= m.density <= 25000:
+            found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
+        stiff = max(m.young) if isinstance(m.young, tuple) else m.young
+        if not 1e5 <= stiff <= 1.3e12:
+            found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
+    if not 1e-3 <= size <= 50:
+        found.append(
+            f"the body is {size:g} m long; is length_unit = \"{settings.length_unit}\" right? "
+            "(material.unusual = true silences warnings of this kind)"
+        )
+    return [] if m.unusual else found

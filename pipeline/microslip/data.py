@@ -1,0 +1,259 @@
+"""The nouns of microslip: frozen dataclasses of plain arrays in SI units. No numerics live here.
+
+Changing one is ``dataclasses.replace``. Conventions (frames, signs, orders) stand in ``docs/conventions.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
+"""Order of the six strain and stress components (Sextro Eqs. (2.2-17), (2.2-19); the same as VTK's)."""
+
+
+class UserError(Exception):
+    """A mistake in the input. Its text is one sentence naming file, key, what is wrong and what to do."""
+
+
+class NotConverged(Exception):
+    """A solve or a check that did not succeed although the input is well formed (exit code 1)."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Linear elastic material.
+
+    Attributes:
+        density: mass density, kg/m3.
+        elasticity: (6, 6) Hooke matrix H of Sextro Eq. (2.2-18) in the order `VOIGT` with engineering shear,
+            in body axes, Pa, at the reference temperature.
+        expansion: (6,) thermal strain per kelvin in the same order (engineering shear), 1/K.
+        temperature_table: (t, 2) temperature in K and the factor on `elasticity` at that temperature;
+            linear between the entries, constant outside. ``None``: the modulus does not depend on temperature.
+        name: for reports.
+    """
+
+    density: float
+    elasticity: Array
+    expansion: Array
+    temperature_table: Array | None = None
+    name: str = "material"
+
+    def modulus_factor(self, temperature: Array) -> Array:
+        """Factor on `elasticity` at the given temperatures (K), any shape."""
+        if self.temperature_table is None:
+            return np.ones_like(temperature)
+        return np.interp(temperature, self.temperature_table[:, 0], self.temperature_table[:, 1])
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A volume mesh with named faces.
+
+    Attributes:
+        points: (n, 3) reference positions, m.
+        cells: cell type (meshio's names: ``tetra10``, ``hexahedron20``, ...) -> (e, k) point indices,
+            0-based, in VTK's node order.
+        faces: face name -> {facet type (``triangle6``, ``quad8``, ...): (f, k) point indices}; the facets are
+            ordered so that their normal points out of the body.
+        point_sets: set name -> point indices.
+        node_id: (n,) numbers of the points in the file the mesh came from.
+    """
+
+    points: Array
+    cells: Mapping[str, Indices]
+    faces: Mapping[str, Mapping[str, Indices]] = field(default_factory=dict)
+    point_sets: Mapping[str, Indices] = field(default_factory=dict)
+    node_id: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def n_points(self) -> int:
+        return len(self.points)
+
+    @property
+    def n_cells(self) -> int:
+        return sum(len(c) for c in self.cells.values())
+
+    def face_points(self, name: str) -> Indices:
+        """Sorted indices of the points on a face, or of a point set of that name."""
+        if name in self.faces:
+            return np.unique(np.concatenate([f.ravel() for f in self.faces[name].values()]))
+        return np.unique(self.point_sets[name])
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One contact patch of a body and its six rows (Sextro Eqs. (5.1-6), (5.1-8)).
+
+    Attributes:
+        origin: (3,) area centre of the patch, m, body axes.
+        rotation: (3, 3), rows n (outward normal of this body), t1, t2: ``x_interface = rotation @ x_body``.
+        rows: (6, m) translations u_n, u_t1, u_t2 and rotations about the same axes, per unit of each
+            generalised coordinate.
+        fit_residual: (m,) 1: root-mean-square displacement of the patch that its best rigid motion leaves,
+            over the root-mean-square displacement of the patch.
+        points: (p, 3) quadrature points of the patch, m. areas: (p,) m2 (their sum is the area).
+        normals: (p, 3) outward unit normals.
+        shapes: (p, 3, m) displacement of the points, body axes. May be empty (0 points) if not stored.
+        role: ``left``, ``right``, ``ground``, ``load`` or ``bolt``. partner: name of the facing interface.
+        sector_shift: +1 if the partner belongs to the next blade, -1 previous, 0 the same body or ground.
+    """
+
+    origin: Array
+    rotation: Array
+    rows: Array
+    fit_residual: Array
+    points: Array
+    areas: Array
+    normals: Array
+    shapes: Array
+    role: str = "ground"
+    partner: str = ""
+    sector_shift: int = 0
+
+
+@dataclass(frozen=True)
+class StressSet:
+    """Strain and stress of every generalised coordinate at a set of places (Sextro Eqs. (2.4-16), (2.4-17)).
+
+    Attributes:
+        location: ``gauss`` or ``nodal-averaged``.
+        points: (s, 3) m. strain: (s, 6, m) engineering shear. stress: (s, 6, m) Pa per unit coordinate.
+        static_stress: (s, 6) stress of the static state at speed, Pa (zeros without load).
+        weights: (s,) volume that belongs to the place, m3.
+    """
+
+    location: str
+    points: Array
+    strain: Array
+    stress: Array
+    static_stress: Array
+    weights: Array
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Named rows on the generalised coordinates: ``values = rows @ q`` for read-outs, ``rows.T @ f`` for forces.
+
+    Attributes:
+        rows: (r, m). labels: r texts. unit: of one row times a unit coordinate's displacement.
+        point: (3,) m, where it acts (mean point for distributed loads). distance: how far the point asked for
+            was from the body, m (0 when inside).
+        static: (r,) what the rows read in the static state at speed (zeros for force rows).
+    """
+
+    rows: Array
+    labels: tuple[str, ...]
+    unit: str
+    point: Array
+    distance: float = 0.0
+    static: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """Static compliance over ALL interface, load and monitor rows, and the part the kept modes hold.
+
+    Attributes:
+        labels: r texts ``interface:right:n``, ``excitation:...``, ``monitor:...``.
+        static: (r, r) displacement of row i under a unit force on row j, full model (inertia relief, i.e. the
+            elastic part about the rigid motion, when the body is free).
+        modal: (r, r) sum of T_i T_j / omega^2 over the kept elastic modes.
+        inertia_relief: True if the body is free.
+    """
+
+    labels: tuple[str, ...]
+    static: Array
+    modal: Array
+    inertia_relief: bool
+
+    @property
+    def residual(self) -> Array:
+        """(r, r) what the modes leave out; to be added by a contact or a residual-flexibility method."""
+        return self.static - self.modal
+
+
+@dataclass(frozen=True)
+class ModalGroup:
+    """The reduced body at one rotation speed (and one nodal diameter).
+
+    Attributes:
+        speed: rotation speed, rad/s. harmonic: nodal diameter (0 for a body without cyclic symmetry).
+        omega: (m,) angular eigenfrequencies, rad/s, ascending; rigid modes are exactly 0.
+        kind: m texts: ``rigid`` or ``normal`` (other reduction methods add theirs).
+        damping_ratio: (m,) D_j of Sextro Eq. (2.4-13).
+        M_r, K_r, C_r, G_r: (m, m) reduced matrices; G_r is skew, for the given speed (Eq. (2.3-29)).
+        phi: (n, 3, m) shapes, kg^-1/2, in the mesh's point order. May be empty.
+        interfaces, excitations, monitors, gauges: see the classes; gauge rows read strain.
+        compliance: truncation check.
+        stresses: location -> `StressSet`.
+        u_static: (n, 3) static displacement at speed, m.
+        checks: name -> number (orthogonality, backward error, certified count, ...).
+        prestress: ``none``, ``linear`` or ``nonlinear``: how K was made. harmonic: nodal diameter.
+        spin_softening: whether -Omega^2 M P is in K.
+    """
+
+    speed: float
+    omega: Array
+    kind: tuple[str, ...]
+    damping_ratio: Array
+    M_r: Array
+    K_r: Array
+    C_r: Array
+    G_r: Array
+    phi: Array
+    interfaces: Mapping[str, Interface]
+    excitations: Mapping[str, Rows]
+    monitors: Mapping[str, Rows]
+    gauges: Mapping[str, Rows]
+    compliance: Compliance
+    stresses: Mapping[str, StressSet]
+    u_static: Array
+    checks: Mapping[str, float]
+    prestress: str = "none"
+    harmonic: int = 0
+    spin_softening: bool = True
+
+    @property
+    def frequency(self) -> Array:
+        """(m,) Hz."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def n_modes(self) -> int:
+        return len(self.omega)
+
+
+@dataclass(frozen=True)
+class ModalBasis:
+    """Everything a modal file holds: the body, its mesh, and a `ModalGroup` per speed (and nodal diameter).
+
+    Attributes:
+        name: of the body. mesh: in SI. groups: (speed index, nodal diameter) -> group.
+        mass: kg. centre: (3,) m. inertia: (3, 3) kg m2 about the centre, body axes (Eqs. (2.3-32) to (2.3-34)).
+        rotation_axis, rotation_point: (3,) unit vector and a point of the axis, m.
+        damping_source: text that says where the ratios come from (``ratio``, ``rayleigh``, ``table``).
+        free: True if no support holds the body.
+        reduction: name of the method.
+        provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
+    """
+
+    name: str
+    mesh: Mesh
+    groups: Mapping[tuple[int, int], ModalGroup]
+    mass: float
+    centre: Array
+    inertia: Array
+    rotation_axis: Array
+    rotation_point: Array
+    damping_source: str
+    free: bool
+    reduction: str
+    provenance: Mapping[str, str]

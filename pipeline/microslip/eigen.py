@@ -1,0 +1,356 @@
+"""Factorisation, shift-invert Lanczos and the inertia certificate, with one door for direct solvers.
+
+Backends: ``pardiso`` (Intel MKL through pypardiso; x86-64 Linux and Windows) and ``superlu`` (SciPy; installs
+everywhere). `DirectSolver.analyse` is done once per sparsity pattern and reused for every shift and speed.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from .data import Array, NotConverged
+
+MatVec = Callable[[Array], Array]
+
+
+class DirectSolver:
+    """L D L^T of symmetric matrices that share one sparsity pattern (given by their upper triangles)."""
+
+    name = "none"
+
+    def factorise(self, upper: sp.csr_matrix) -> None:
+        """Factorise; the first call also analyses the pattern, later ones must have the same pattern."""
+        raise NotImplementedError
+
+    def solve(self, b: Array) -> Array:
+        """Solve for one (n,) or several (n, r) right-hand sides."""
+        raise NotImplementedError
+
+    def negative(self) -> int:
+        """Number of negative eigenvalues of the factorised matrix (Sylvester's law of inertia)."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Release memory."""
+
+
+class Pardiso(DirectSolver):
+    """MKL PARDISO, real symmetric indefinite (mtype -2), no scaling, no matching, no refinement."""
+
+    name = "pardiso"
+
+    def __init__(self) -> None:
+        import pypardiso
+
+        self._mkl = pypardiso.PyPardisoSolver(mtype=-2)
+        # 1: take these settings; 2: METIS; 8: no refinement; 10: pivot perturbation 1e-8; 11, 13: no scaling and
+        # matching; 18: count non-zeros; 21: 1x1 and 2x2 pivots. PyPardiso's default (iparm 1 = 0) refines twice.
+        for i, value in {1: 1, 2: 2, 8: 0, 10: 8, 11: 0, 13: 0, 18: -1, 21: 1, 24: 0}.items():
+            self._mkl.set_iparm(i, value)
+        self._upper: sp.csr_matrix | None = None
+        self._ia = self._ja = np.zeros(0, dtype=np.int32)
+
+    def factorise(self, upper: sp.csr_matrix) -> None:
+        first = self._upper is None
+        self._upper = upper
+        if first:
+            self._ia, self._ja = upper.indptr.astype(np.int32) + 1, upper.indices.astype(np.int32) + 1
+        self._call(12 if first else 22, np.zeros(upper.shape[0]))
+
+    def solve(self, b: Array) -> Array:
+        return self._call(33, np.asfortranarray(b, dtype=float))
+
+    def negative(self) -> int:
+        return int(self._mkl.get_iparm(23))
+
+    def close(self) -> None:
+        if self._upper is not None:
+            self._call(-1, np.zeros(self._upper.shape[0]))
+            self._upper = None
+
+    def _call(self, phase: int, b: Array) -> Array:
+        assert self._upper is not None
+        x = np.zeros_like(b)
+        error = ctypes.c_int32(0)
+        solver = self._mkl
+
+        def number(value: int):  # noqa: ANN202
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def pointer(array: Array, kind: type):  # noqa: ANN202
+            return array.ctypes.data_as(ctypes.POINTER(kind))
+
+        solver._mkl_pardiso(
+            pointer(solver.pt, ctypes.c_int64), number(1), number(1), number(solver.mtype), number(phase),
+            number(self._upper.shape[0]), pointer(self._upper.data, ctypes.c_double),
+            pointer(self._ia, ctypes.c_int32), pointer(self._ja, ctypes.c_int32), pointer(solver.perm, ctypes.c_int32),
+            number(1 if b.ndim == 1 else b.shape[1]), pointer(solver.iparm, ctypes.c_int32), number(0),
+            pointer(b, ctypes.c_double), pointer(x, ctypes.c_double), ctypes.byref(error),
+        )  # fmt: skip
+        if error.value == -2:
+            raise NotConverged("the sparse solver ran out of memory; use a coarser mesh or a machine with more memory")
+        if error.value:
+            raise NotConverged(f"the sparse solver PARDISO failed with error {error.value} in phase {phase}")
+        return x
+
+
+class SuperLU(DirectSolver):
+    """SciPy's SuperLU in symmetric mode; the inertia count falls back on QDLDL when rows were exchanged."""
+
+    name = "superlu"
+
+    def __init__(self) -> None:
+        self._lu: spla.SuperLU | None = None
+        self._upper: sp.csr_matrix | None = None
+
+    def factorise(self, upper: sp.csr_matrix) -> None:
+        self._upper = upper
+        whole = (upper + sp.triu(upper, 1).T).tocsc()
+        try:
+            self._lu = spla.splu(
+                whole, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+        except RuntimeError as error:
+            raise NotConverged(f"the sparse solver met a singular matrix ({error}); the body is not held") from error
+        except MemoryError as error:
+            raise NotConverged("the sparse solver ran out of memory; use a coarser mesh") from error
+
+    def solve(self, b: Array) -> Array:
+        assert self._lu is not None
+        return self._lu.solve(b)
+
+    def negative(self) -> int:
+        assert self._lu is not None and self._upper is not None
+        if np.array_equal(self._lu.perm_r, self._lu.perm_c):
+            return int((self._lu.U.diagonal() < 0).sum())
+        import qdldl
+
+        return int((np.asarray(qdldl.Solver(self._upper.tocsc(), upper=True).factors()[1]) < 0).sum())
+
+    def close(self) -> None:
+        self._lu = None
+
+
+BACKENDS: dict[str, type[DirectSolver]] = {"pardiso": Pardiso, "superlu": SuperLU}
+
+
+@cache
+def available_backends() -> tuple[str, ...]:
+    """Names of the backends that start on this machine, fastest first."""
+    found = []
+    for name, backend in BACKENDS.items():
+        try:
+            backend()
+            found.append(name)
+        except (ImportError, OSError):
+            continue
+    return tuple(found)
+
+
+def new_solver(name: str = "auto") -> DirectSolver:
+    """A fresh direct solver: ``auto`` takes the fastest backend there is."""
+    return BACKENDS[available_backends()[0] if name == "auto" else name]()
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """The lowest eigenpairs of K x = lambda M x.
+
+    Attributes:
+        values: (m,) ascending, (rad/s)^2. vectors: (n, m) M-orthonormal.
+        certified: True if the inertia count at `upper_shift` found exactly m eigenvalues below it.
+        upper_shift: (rad/s)^2, between the last value returned and the next one.
+        refound: how many members Lanczos had missed and a second search found.
+        backward_error: (m,) |K x - lambda M x| over |K| |x| + |lambda| |M| |x|.
+        orthogonality: largest entry of |X^T M X - 1|.
+        solves: right-hand sides solved.
+    """
+
+    values: Array
+    vectors: Array
+    certified: bool
+    upper_shift: float
+    refound: int
+    backward_error: Array
+    orthogonality: float
+    solves: int
+
+
+@dataclass
+class Pencil:
+    """K x = lambda M x on the free degrees of freedom.
+
+    Attributes:
+        shifted: s -> upper triangle of K - s M, always with the same pattern.
+        K, M: products with an (n,) or (n, r) array.
+        n: degrees of freedom. k_norm, m_norm: infinity norms of K and M (for backward errors).
+        solver: keeps the analysis between shifts. solves: right-hand sides solved so far.
+    """
+
+    shifted: Callable[[float], sp.csr_matrix]
+    K: MatVec
+    M: MatVec
+    n: int
+    k_norm: float
+    m_norm: float
+    solver: DirectSolver
+    solves: int = 0
+
+    def solve(self, b: Array) -> Array:
+        """Solve with the matrix that was factorised last, counting."""
+        self.solves += 1 if b.ndim == 1 else b.shape[1]
+        return self.solver.solve(b)
+
+
+def search(
+    pencil: Pencil, count: int, shift: float = 0.0, tolerance: float = 1e-10, rigid: Array | None = None
+) -> Spectrum:
+    """At least the `count` lowest eigenpairs by shift-invert Lanczos, not yet certified.
+
+    A cluster at the upper end is kept whole: the count is enlarged until a gap follows, so that no member of a
+    pair is cut off. The solver is left factorised at `shift`, for the static solutions that follow.
+
+    Args:
+        pencil: K and M; M positive definite. shift: (rad/s)^2; 0 for a held body, negative for a free one.
+        tolerance: of ARPACK. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
+
+    Raises:
+        NotConverged: Lanczos failed.
+    """
+    pencil.solver.factorise(pencil.shifted(shift))
+    known = np.zeros((pencil.n, 0)) if rigid is None else rigid
+    zeros = np.zeros(known.shape[1])
+    extra, before = 2, pencil.solves
+    while True:
+        wanted = min(count + extra, pencil.n) - len(zeros)
+        values, vectors = _lanczos(pencil, max(wanted, 1), shift, tolerance, known)
+        values, vectors = np.concatenate([zeros, values]), np.hstack([known, vectors])
+        keep, upper = _gap(values, count)
+        if keep or len(values) >= pencil.n:
+            break
+        extra *= 4
+    keep = keep or len(values)
+    return _finish(pencil, values[:keep], vectors[:, :keep], False, upper, 0, pencil.solves - before)
+
+
+def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: float = 1e-10) -> Spectrum:
+    """Count the eigenvalues below the upper end of the band (Sturm) and search again for any that are missing.
+
+    Args:
+        pencil, shift, tolerance: as given to `search`. found: its result.
+
+    Returns:
+        The complete spectrum, `certified`, with `refound` members that Lanczos had missed.
+
+    Raises:
+        NotConverged: the count cannot be met.
+    """
+    before = pencil.solves
+    values, vectors = found.values, found.vectors
+    for _ in range(6):
+        below = _count_below(pencil, found.upper_shift, values)
+        if below == len(values):
+            refound = len(values) - len(found.values)
+            return _finish(
+                pencil, values, vectors, True, found.upper_shift, refound, found.solves + pencil.solves - before
+            )
+        if below < len(values):
+            raise NotConverged(
+                f"{len(values)} eigenvalues were returned below {np.sqrt(abs(found.upper_shift)) / 2 / np.pi:.6g} Hz "
+                f"but only {below} exist; the factorisation is inaccurate (very thin or badly shaped elements?)"
+            )
+        pencil.solver.factorise(pencil.shifted(shift))
+        more, fresh = _lanczos(pencil, below - len(values), shift, tolerance, vectors)
+        inside = more < found.upper_shift
+        values, vectors = np.concatenate([values, more[inside]]), np.hstack([vectors, fresh[:, inside]])
+        order = np.argsort(values, kind="stable")
+        values, vectors = values[order], vectors[:, order]
+    raise NotConverged("the spectrum could not be certified complete: ask for a few modes more or fewer")
+
+
+def _count_below(pencil: Pencil, upper: float, values: Array) -> int:
+    pencil.solver.factorise(pencil.shifted(upper))
+    return pencil.solver.negative()
+
+
+def _finish(
+    pencil: Pencil, values: Array, vectors: Array, certified: bool, upper: float, refound: int, solves: int
+) -> Spectrum:
+    vectors = _orthonormal(pencil, vectors)
+    KX, MX = pencil.K(vectors), pencil.M(vectors)
+    values = np.einsum("ij,ij->j", vectors, KX)
+    size = np.abs(vectors).max(axis=0)
+    residual = np.abs(KX - MX * values).max(axis=0)
+    backward = residual / (size * (pencil.k_norm + np.abs(values) * pencil.m_norm))
+    gram = vectors.T @ MX
+    worst = float(np.abs(gram - np.eye(len(values))).max()) if len(values) else 0.0
+    return Spectrum(values, vectors, certified, upper, refound, backward, worst, solves)
+
+
+def _orthonormal(pencil: Pencil, X: Array) -> Array:
+    """Symmetric (Loewdin) M-orthonormalisation: moves every vector as little as possible."""
+    gram = X.T @ pencil.M(X)
+    w, Q = np.linalg.eigh(0.5 * (gram + gram.T))
+    return X @ (Q / np.sqrt(w)) @ Q.T
+
+
+def _gap(values: Array, count: int) -> tuple[int, float]:
+    """How many values to keep, at least `count`, and a shift in the gap after them; 0 if no gap was seen."""
+    for keep in range(max(count, 1), len(values)):
+        low, high = values[keep - 1], values[keep]
+        if high - low > 1e-5 * abs(high):
+            return keep, 0.5 * (low + high)
+    return 0, values[-1] * (1 + 1e-4) + 1.0
+
+
+def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: Array) -> tuple[Array, Array]:
+    """ARPACK in shift-invert mode with a fixed start vector; the columns of `known` are projected out."""
+    n = pencil.n
+    M_known = pencil.M(known) if known.shape[1] else known
+
+    def inverse(b: Array) -> Array:
+        b = b.reshape(-1)
+        if not known.shape[1]:
+            return pencil.solve(b)
+        x = pencil.solve(b - M_known @ (known.T @ b))
+        return x - known @ (M_known.T @ x)
+
+    if count >= n - 1 or n < 200:
+        return _dense(pencil, count, known)
+    start = inverse(pencil.M(np.random.default_rng(2007 + known.shape[1]).standard_normal(n)))
+    try:
+        values, vectors = spla.eigsh(
+            spla.LinearOperator((n, n), matvec=lambda x: pencil.K(x.reshape(-1)), dtype=float),
+            k=count,
+            M=spla.LinearOperator((n, n), matvec=lambda x: pencil.M(x.reshape(-1)), dtype=float),
+            sigma=shift,
+            OPinv=spla.LinearOperator((n, n), matvec=inverse, dtype=float),
+            ncv=min(n - 1, max(2 * count + 1, 20)),
+            v0=start,
+            tol=tolerance,
+            maxiter=5000,
+        )
+    except spla.ArpackError as error:
+        raise NotConverged(f"Lanczos did not converge ({error}); ask for fewer modes or improve the mesh") from error
+    order = np.argsort(values, kind="stable")
+    return values[order], vectors[:, order]
+
+
+def _dense(pencil: Pencil, count: int, known: Array) -> tuple[Array, Array]:
+    """Tiny problems, where Lanczos has no room: dense generalised eigenproblem on the complement of `known`."""
+    eye = np.eye(pencil.n)
+    K, M = pencil.K(eye), pencil.M(eye)
+    if known.shape[1]:
+        heavy = M @ known
+        top = np.abs(K).max() * 1e3
+        K = K + top * heavy @ heavy.T / np.abs(np.diag(M)).max()
+    values, vectors = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (M + M.T), subset_by_index=(0, min(count, len(K)) - 1))
+    return values, vectors

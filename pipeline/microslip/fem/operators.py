@@ -1,0 +1,216 @@
+"""Mass, stiffness, geometric stiffness and internal force as arrays over the sparsity pattern.
+
+Every stiffness is the form  integral of dH : A : H  with H the displacement gradient and a tensor A:
+A = C for the stress-free body, A = F C F^T + S (times identity) for the tangent at a deformed state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..data import Array, Indices
+from .discretise import Block, Discretisation
+
+_BATCH = 2048
+_PAIR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # tensor index pair -> Voigt index (xx yy zz xy yz xz)
+
+
+def isotropic(young: float, poisson: float) -> Array:
+    """(6, 6) Hooke matrix, Pa, of Sextro Eq. (2.2-18)."""
+    lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    mu = young / (2 * (1 + poisson))
+    C = np.diag([2 * mu] * 3 + [mu] * 3)
+    C[:3, :3] += lam
+    return C
+
+
+def orthotropic(young: Array, poisson: Array, shear: Array, axes: Array | None = None) -> Array:
+    """(6, 6) Hooke matrix of an orthotropic material in body axes.
+
+    Args:
+        young: (3,) E1, E2, E3, Pa. poisson: (3,) nu12, nu23, nu13 (strain in the second under stress along the
+            first). shear: (3,) G12, G23, G13, Pa. axes: (3, 3) rows = material axes in body axes.
+
+    Raises:
+        ValueError: constants that are not thermodynamically admissible (the matrix is not positive definite).
+    """
+    e1, e2, e3 = young
+    n12, n23, n13 = poisson
+    S = np.zeros((6, 6))
+    S[:3, :3] = [[1 / e1, -n12 / e1, -n13 / e1], [-n12 / e1, 1 / e2, -n23 / e2], [-n13 / e1, -n23 / e2, 1 / e3]]
+    S[3:, 3:] = np.diag(1 / np.asarray(shear, dtype=float))
+    if np.linalg.eigvalsh(S).min() <= 0:
+        raise ValueError("orthotropic constants are not positive definite")
+    C = np.linalg.inv(S)
+    if axes is None:
+        return C
+    R = np.asarray(axes, dtype=float)
+    return from_tensor(np.einsum("pi,qj,rk,sl,pqrs->ijkl", R, R, R, R, to_tensor(C), optimize=True))
+
+
+def to_tensor(C: Array) -> Array:
+    """(6, 6) Hooke matrix -> (3, 3, 3, 3) elasticity tensor."""
+    return C[_PAIR[:, :, None, None], _PAIR[None, None]]
+
+
+def from_tensor(C: Array) -> Array:
+    """(3, 3, 3, 3) elasticity tensor -> (6, 6) Hooke matrix."""
+    i = np.array([0, 1, 2, 0, 1, 0])
+    j = np.array([0, 1, 2, 1, 2, 2])
+    return C[i[:, None], j[:, None], i[None], j[None]]
+
+
+def to_symmetric(voigt: Array) -> Array:
+    """(..., 6) stress -> (..., 3, 3) tensor."""
+    return voigt[..., _PAIR]
+
+
+def _batches(block: Block) -> Iterator[slice]:
+    for start in range(0, len(block.cells), _BATCH):
+        yield slice(start, start + _BATCH)
+
+
+def _scatter(into: Array, positions: Indices, values: Array) -> None:
+    """Add (e, k, k, c) values into (p + 1, c) at their positions (the last row collects the lower triangle)."""
+    flat = positions.reshape(-1)
+    count = len(flat)
+    select = sp.csc_matrix(
+        (np.ones(count), flat.astype(np.int32), np.arange(count + 1, dtype=np.int32)), shape=(len(into), count)
+    )
+    into += select @ values.reshape(count, -1)
+
+
+def mass(d: Discretisation, density: float) -> Array:
+    """(p,) consistent mass over the pattern, kg; the full matrix is this times the 3 x 3 identity.
+
+    M of Sextro Eq. (2.3-29), with the quadrature of the discretisation.
+    """
+    out = np.zeros((d.pattern.size + 1, 1))
+    for block, positions in zip(d.blocks, d.positions, strict=True):
+        products = np.einsum("qa,qb->qab", block.N, block.N).reshape(len(block.N), -1)
+        _scatter(out, positions, density * (block.dx @ products))
+    return out[:-1, 0]
+
+
+def stiffness(d: Discretisation, elasticity: Array, factor: list[Array] | None = None) -> Array:
+    """(p, 3, 3) stiffness of the stress-free body, N/m: K_N of Sextro Eq. (2.3-17).
+
+    Args:
+        elasticity: (6, 6) Hooke matrix, Pa. factor: per block (e, q) factor on it (temperature), or None.
+    """
+    out = np.zeros((d.pattern.size + 1, 9))
+    for i, (block, positions) in enumerate(zip(d.blocks, d.positions, strict=True)):
+        weight = block.dx if factor is None else block.dx * factor[i]
+        k = block.cells.shape[1]
+        for s in _batches(block):
+            g = np.ascontiguousarray(block.grad[s].transpose(0, 3, 2, 1)).reshape(-1, 3 * k, block.dx.shape[1])
+            H = np.matmul(g * weight[s][:, None, :], g.transpose(0, 2, 1))
+            _scatter(out, positions[s], H.reshape(-1, k, 3, k, 3).transpose(0, 1, 3, 2, 4))
+    # K_kl = C_kilj H_ij : one 9 x 9 matrix for all pairs
+    weave = to_tensor(elasticity).transpose(1, 3, 0, 2).reshape(9, 9)
+    return (out[:-1] @ weave).reshape(-1, 3, 3)
+
+
+def tangent(d: Discretisation, A: list[Array]) -> Array:
+    """(p, 3, 3) stiffness for a general tensor A_kIlJ at each quadrature point.
+
+    Args:
+        A: per block (e, q, 3, 3, 3, 3), Pa: derivative of the first Piola-Kirchhoff stress with respect to the
+            displacement gradient.
+    """
+    out = np.zeros((d.pattern.size + 1, 9))
+    for block, positions, a in zip(d.blocks, d.positions, A, strict=True):
+        k, q = block.cells.shape[1], block.dx.shape[1]
+        for s in _batches(block):
+            g = block.grad[s] * block.dx[s][:, :, None, None]
+            first = np.matmul(g.transpose(0, 1, 3, 2), a[s].transpose(0, 1, 3, 2, 4, 5).reshape(-1, q, 3, 27))
+            left = first.reshape(-1, q, k, 9, 3).transpose(0, 2, 3, 1, 4).reshape(-1, 9 * k, 3 * q)
+            right = block.grad[s].reshape(-1, 3 * q, k)
+            K = np.matmul(left, right).reshape(-1, k, 9, k).transpose(0, 1, 3, 2)
+            _scatter(out, positions[s], K)
+    return out[:-1].reshape(-1, 3, 3)
+
+
+def stress_stiffness(d: Discretisation, stress: list[Array]) -> Array:
+    """(p,) geometric stiffness of a stress state, N/m; the full matrix is this times the 3 x 3 identity.
+
+    K_sigma,ab = integral of grad N_a . S grad N_b (Bathe, Finite Element Procedures, 6.2.3); the book has no
+    geometric stiffness, see docs/errata.md.
+
+    Args:
+        stress: per block (e, q, 6), Pa.
+    """
+    out = np.zeros((d.pattern.size + 1, 1))
+    for block, positions, sigma in zip(d.blocks, d.positions, stress, strict=True):
+        k, q = block.cells.shape[1], block.dx.shape[1]
+        for s in _batches(block):
+            S = to_symmetric(sigma[s]) * block.dx[s][:, :, None, None]
+            left = np.matmul(S, block.grad[s]).reshape(-1, 3 * q, k)
+            _scatter(out, positions[s], np.matmul(left.transpose(0, 2, 1), block.grad[s].reshape(-1, 3 * q, k)))
+    return out[:-1, 0]
+
+
+def spin_projector(axis: Array) -> Array:
+    """(3, 3) P = 1 - n n^T, so that omega x (omega x r) = -Omega^2 P r. axis: unit vector."""
+    return np.eye(3) - np.outer(axis, axis)
+
+
+def skew(vector: Array) -> Array:
+    """(3, 3) matrix of the cross product, the tilde of Sextro Eq. (2.1-5)."""
+    x, y, z = vector
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
+
+
+def displacement_gradient(block: Block, u: Array) -> Array:
+    """(e, q, 3, 3) H_kI = du_k/dX_I for nodal displacements (n, 3) in m."""
+    return np.matmul(u[block.cells].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))
+
+
+def green_strain(H: Array, nonlinear: bool = True) -> Array:
+    """(..., 6) Green-Lagrange strain of a displacement gradient, engineering shear; linear strain if asked."""
+    E = 0.5 * (H + np.swapaxes(H, -1, -2))
+    if nonlinear:
+        E = E + 0.5 * np.matmul(np.swapaxes(H, -1, -2), H)
+    return engineering(E)
+
+
+def engineering(E: Array) -> Array:
+    """(..., 3, 3) symmetric strain tensor -> (..., 6) with engineering shear (Sextro Eq. (2.2-19))."""
+    return np.stack(
+        [E[..., 0, 0], E[..., 1, 1], E[..., 2, 2], 2 * E[..., 0, 1], 2 * E[..., 1, 2], 2 * E[..., 0, 2]], axis=-1
+    )
+
+
+def internal_force(d: Discretisation, stress: list[Array], H: list[Array] | None) -> Array:
+    """(n, 3) nodal forces of a second Piola-Kirchhoff stress (per block (e, q, 6)), N.
+
+    H: displacement gradients per block for F = 1 + H, or None for the undeformed geometry.
+    """
+    f = np.zeros((d.mesh.n_points, 3))
+    for i, block in enumerate(d.blocks):
+        P = to_symmetric(stress[i]) * block.dx[..., None, None]
+        if H is not None:
+            P = np.matmul(np.eye(3) + H[i], P)
+        nodal = np.einsum("eqkI,eqIa->eak", P, block.grad, optimize=True)
+        np.add.at(f, block.cells.reshape(-1), nodal.reshape(-1, 3))
+    return f
+
+
+def tangent_tensor(elasticity: Array, factor: Array | None, H: Array | None, stress: Array) -> Array:
+    """(e, q, 3, 3, 3, 3) A_kIlJ = F_ki C_iIjJ F_lj + delta_kl S_IJ (St Venant-Kirchhoff; Bathe 6.2.3)."""
+    C = to_tensor(elasticity)
+    shape = stress.shape[:-1]
+    if H is None:
+        A = np.broadcast_to(C, (*shape, 3, 3, 3, 3)).copy()
+    else:
+        F = np.eye(3) + H
+        A = np.einsum("eqki,iIjJ,eqlj->eqkIlJ", F, C, F, optimize=True)
+    if factor is not None:
+        A *= factor[..., None, None, None, None]
+    S = to_symmetric(stress)
+    for k in range(3):
+        A[..., k, :, k, :] += S
+    return A

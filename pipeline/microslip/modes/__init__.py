@@ -1,0 +1,5 @@
+"""Equilibrium at speed, eigenmodes, static answers, strain and stress modes, interface rows."""
+
+from .compute import modal_basis
+
+__all__ = ["modal_basis"]

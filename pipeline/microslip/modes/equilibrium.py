@@ -1,0 +1,253 @@
+"""The static state of a rotating, heated, loaded body, and the stiffness about it.
+
+The book's Eq. (2.3-28) keeps only the centrifugal softening: taken literally frequencies fall with speed. Here
+the state is solved for with finite displacements (St Venant-Kirchhoff material, load following r + u, dead
+pressures) and the tangent is taken about it: A = F C F^T + S, minus Omega^2 M P (docs/errata.md, docs/modes.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data import Array, Indices, Material, NotConverged, UserError
+from ..eigen import DirectSolver
+from ..fem.discretise import Discretisation, FreeUpper
+from ..fem.operators import (
+    displacement_gradient,
+    green_strain,
+    internal_force,
+    mass,
+    spin_projector,
+    stiffness,
+    stress_stiffness,
+    tangent,
+    tangent_tensor,
+)
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """A discretised body with everything that does not depend on speed.
+
+    Attributes:
+        d: the discretisation. material. factor: per block (e, q) modulus over reference modulus, or None.
+        thermal_strain: per block (e, q, 6), or None. M: (p,) scalar mass over the pattern, kg. M_full: (n, n).
+        K0: (p, 3, 3) stiffness of the stress-free body, N/m. free: map to the free degrees of freedom.
+        dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
+        spin_softening: whether -Omega^2 M P is part of K.
+    """
+
+    d: Discretisation
+    material: Material
+    factor: list[Array] | None
+    thermal_strain: list[Array] | None
+    M: Array
+    M_full: object
+    K0: Array
+    free: FreeUpper
+    fixed: Indices
+    dead_load: Array
+    axis: Array
+    point: Array
+    spin_softening: bool = True
+
+    @property
+    def loaded(self) -> bool:
+        """True if something acts on the body at rest."""
+        return self.thermal_strain is not None or bool(np.any(self.dead_load))
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """Equilibrium and the stiffness about it.
+
+    Attributes:
+        u: (n, 3) m. H: per block displacement gradients (e, q, 3, 3), None if the reference geometry is used.
+        stress: per block (e, q, 6) second Piola-Kirchhoff stress, Pa. K: (p, 3, 3) stiffness about the state with
+        the centrifugal softening, N/m. prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton.
+    """
+
+    u: Array
+    H: list[Array] | None
+    stress: list[Array]
+    K: Array
+    prestress: str
+    iterations: int = 0
+
+
+def make_model(
+    d: Discretisation, material: Material, free: FreeUpper, fixed: Indices, axis: Array, point: Array,
+    temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
+) -> BodyModel:  # fmt: skip
+    """Assemble what does not depend on speed. temperature: (n,) K at the nodes, or None for the reference."""
+    factor = strain = None
+    if temperature is not None:
+        at = [np.einsum("qk,ek->eq", b.N, temperature[b.cells]) for b in d.blocks]
+        if material.temperature_table is not None:
+            factor = [material.modulus_factor(t) for t in at]
+        if np.any(material.expansion):
+            strain = [(t - reference)[..., None] * material.expansion for t in at]
+    M = mass(d, material.density)
+    return BodyModel(
+        d, material, factor, strain, M, d.pattern.full(M), stiffness(d, material.elasticity, factor), free, fixed,
+        dead_load, axis / np.linalg.norm(axis), point, spin_softening,
+    )  # fmt: skip
+
+
+def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
+    """Per block (e, q, 6) stress of a strain, less the thermal strain, Pa."""
+    out = []
+    for i, e in enumerate(strain):
+        elastic = e if model.thermal_strain is None else e - model.thermal_strain[i]
+        s = elastic @ model.material.elasticity.T
+        out.append(s if model.factor is None else s * model.factor[i][..., None])
+    return out
+
+
+def softening(model: BodyModel, speed: float) -> Array:
+    """(p, 3, 3) -Omega^2 M P of Sextro Eq. (2.3-29)."""
+    return -(speed**2) * model.M[:, None, None] * spin_projector(model.axis)
+
+
+def centrifugal_force(model: BodyModel, speed: float, u: Array) -> Array:
+    """(n, 3) Omega^2 M P (x + u - point), N."""
+    position = model.d.mesh.points + u - model.point
+    return speed**2 * (model.M_full @ (position @ spin_projector(model.axis)))  # type: ignore[operator]
+
+
+def equilibrium(
+    model: BodyModel, speed: float, prestress: str, solver: DirectSolver, start: StaticState | None = None,
+    report: Report = lambda _: None,
+) -> StaticState:  # fmt: skip
+    """The static state at a speed and the stiffness about it.
+
+    Args:
+        speed: rad/s. prestress: ``none``, ``linear`` or ``nonlinear``. solver: keeps its analysis.
+        start: a neighbouring state to begin Newton from.
+
+    Raises:
+        UserError: the body is unstable at this speed (negative stiffness).
+        NotConverged: Newton did not converge.
+    """
+    n = model.d.mesh.n_points
+    zero = [np.zeros((*b.dx.shape, 6)) for b in model.d.blocks]
+    if speed == 0 and not model.loaded:
+        return StaticState(np.zeros((n, 3)), None, zero, model.K0, prestress)
+    soft = softening(model, speed) if model.spin_softening else 0.0
+    if prestress == "none":
+        return StaticState(np.zeros((n, 3)), None, zero, model.K0 + soft, prestress)
+    if prestress == "linear":
+        return _linear(model, speed, solver, soft)
+    return _newton(model, speed, solver, start, report)
+
+
+def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | float) -> StaticState:
+    """One linear solution; then K_u (displaced geometry) + K_sigma + softening, as CalculiX's PERTURBATION step."""
+    n = model.d.mesh.n_points
+    force = model.dead_load + centrifugal_force(model, speed, np.zeros((n, 3)))
+    if model.thermal_strain is not None:
+        relaxed = stress_of(model, [np.zeros_like(e) for e in model.thermal_strain])
+        force = force - internal_force(model.d, relaxed, None)
+    solver.factorise(model.free.matrix(model.K0))
+    u = np.zeros(3 * n)
+    u[model.free.free] = solver.solve(force.reshape(-1)[model.free.free])
+    u = u.reshape(n, 3)
+    H = [displacement_gradient(b, u) for b in model.d.blocks]
+    stress = stress_of(model, [green_strain(h, nonlinear=False) for h in H])
+    K = _tangent(model, H, stress) + soft
+    return StaticState(u, H, stress, K, "linear")
+
+
+def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
+    factor = model.factor or [None] * len(H)
+    A = [tangent_tensor(model.material.elasticity, f, h, s) for f, h, s in zip(factor, H, stress, strict=True)]
+    return tangent(model.d, A)
+
+
+def _newton(
+    model: BodyModel, speed: float, solver: DirectSolver, start: StaticState | None, report: Report
+) -> StaticState:
+    """Full Newton; where it fails the load is applied in halved steps from the last good state."""
+    rest = np.zeros((model.d.mesh.n_points, 3))
+    if start is not None:
+        try:
+            return _newton_at(model, speed, 1.0, solver, start.u)
+        except NotConverged:
+            report("static state: starting again from rest")
+    good, level, step, total = rest, 0.0, 1.0, 0
+    while level < 1.0:
+        target = min(level + step, 1.0)
+        try:
+            state = _newton_at(model, speed, target, solver, good)
+        except NotConverged:
+            step *= 0.5
+            if step < 1 / 64:
+                raise
+            continue
+        total += state.iterations
+        report(f"static state: {100 * target:.0f} % of the load after {total} Newton steps")
+        good, level = state.u, target
+    return replace(state, iterations=total)
+
+
+def _newton_at(
+    model: BodyModel, speed: float, level: float, solver: DirectSolver, u: Array
+) -> StaticState:
+    """Newton at a share `level` of all loads. Ends when a step is below 1e-9 of u, or small and no longer falling."""
+    n, free = model.d.mesh.n_points, model.free.free
+    omega = speed * np.sqrt(level)
+    soft = softening(model, omega)
+    if model.thermal_strain is not None and level < 1:
+        model = replace(model, thermal_strain=[level * e for e in model.thermal_strain])
+    steps: list[float] = []
+    for _ in range(25):
+        H = [displacement_gradient(b, u) for b in model.d.blocks]
+        stress = stress_of(model, [green_strain(h) for h in H])
+        K = _tangent(model, H, stress)
+        if steps and (steps[-1] < 1e-9 or (len(steps) > 1 and steps[-1] < 1e-5 and steps[-1] > 0.3 * steps[-2])):
+            return StaticState(u, H, stress, K + soft if model.spin_softening else K, "nonlinear", len(steps))
+        outer = level * model.dead_load + centrifugal_force(model, omega, u)
+        residual = (outer - internal_force(model.d, stress, H)).reshape(-1)[free]
+        solver.factorise(model.free.matrix(K + soft))
+        if (negative := solver.negative()) and len(steps) > 3:
+            raise UserError(
+                f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has "
+                f"{negative} negative directions: buckling or centrifugal divergence); lower the speed or the loads"
+            )
+        change = np.zeros(3 * n)
+        change[free] = solver.solve(residual)
+        u = u + change.reshape(n, 3)
+        steps.append(float(np.abs(change).max() / max(np.abs(u).max(), 1e-300)))
+        if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * np.ptp(model.d.mesh.points, axis=0).max():
+            break
+    raise NotConverged(_no_equilibrium(speed))
+
+
+def _no_equilibrium(speed: float) -> str:
+    return (
+        f"no static equilibrium was found at {speed * 30 / np.pi:.6g} rpm; lower the speed or the loads, or use "
+        'rotation.prestress = "linear" to see whether the state is plausible'
+    )
+
+
+def linear_stiffness(model: BodyModel, state: StaticState) -> Array:
+    """(p, 3, 3) K0 + K_sigma: the textbook's linear prestress without the displaced geometry, for comparison."""
+    return model.K0 + stress_stiffness(model.d, state.stress)[:, None, None] * np.eye(3)
+
+
+def cauchy(state: StaticState, block: int) -> Array:
+    """(e, q, 6) Cauchy stress F S F^T / det F, Pa (the stress itself where the reference geometry is used)."""
+    if state.H is None:
+        return state.stress[block]
+    from ..fem.operators import to_symmetric
+
+    F = np.eye(3) + state.H[block]
+    S = to_symmetric(state.stress[block])
+    sigma = np.matmul(np.matmul(F, S), np.swapaxes(F, -1, -2)) / np.linalg.det(F)[..., None, None]
+    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    return sigma[..., i, j]

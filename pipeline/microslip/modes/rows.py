@@ -1,0 +1,220 @@
+"""Rows on the nodal displacements: interfaces, loads, monitors, gauges.
+
+A row set is a sparse matrix B (r, 3n) on u = (u_x1, u_y1, u_z1, u_x2, ...): ``B @ u`` reads, ``B.T @ f`` loads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from ..data import Array, Indices, Mesh, UserError
+from ..fem.discretise import face_blocks, shape_functions
+from ..fem.operators import engineering, skew
+from ..topology import CELL_TYPES
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A contact or load face as rows.
+
+    Attributes:
+        origin: (3,) area centre, m. rotation: (3, 3) rows n, t1, t2. B: (6, 3n) area-weighted rigid fit in that
+            frame. points: (p, 3) m. areas: (p,) m2. normals: (p, 3). N: (p, n) shape functions at the points.
+    """
+
+    origin: Array
+    rotation: Array
+    B: sp.csr_matrix
+    points: Array
+    areas: Array
+    normals: Array
+    N: sp.csr_matrix
+
+    def fit_residual(self, phi: Array) -> Array:
+        """(m,) share of the patch's motion that no rigid motion explains, for shapes (n, 3, m)."""
+        u = (self.N @ phi.reshape(phi.shape[0], -1)).reshape(len(self.points), 3, -1)
+        rigid = self.B @ phi.reshape(-1, phi.shape[2])
+        t = self.rotation.T @ rigid[:3]
+        w = self.rotation.T @ rigid[3:]
+        r = self.points - self.origin
+        fit = t[None] + np.cross(w.T[:, None, :], r[None], axis=2).transpose(1, 2, 0)
+        left = np.sqrt(np.einsum("p,pim->m", self.areas, (u - fit) ** 2))
+        whole = np.sqrt(np.einsum("p,pim->m", self.areas, u**2))
+        return np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
+
+
+def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
+    """Area-weighted, work-conjugate rigid fit of a face (Sextro Eqs. (5.1-6), (5.1-8)).
+
+    The six rows minimise the area integral of |u - t - w x r|^2, so a rigid motion is reproduced exactly and
+    ``B.T f`` is the linear traction field with resultant f.
+
+    Args:
+        t2: direction whose projection on the face becomes the second tangent. name: for messages.
+
+    Raises:
+        UserError: t2 along the normal; a patch whose points lie on a line.
+    """
+    blocks = face_blocks(mesh, face)
+    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
+    vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
+    areas = np.linalg.norm(vectors, axis=1)
+    N = _interpolation(mesh.n_points, [(b.facets, b.N) for b in blocks])
+    total = areas.sum()
+    origin = areas @ points / total
+    rotation = _frame(vectors.sum(axis=0), t2, areas, points, name)
+    r = points - origin
+    J = np.einsum("p,pij->ij", areas, np.einsum("pk,pk->p", r, r)[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None])
+    if np.linalg.cond(J) > 1e9:
+        raise UserError(f"interface '{name}': the points of face '{face}' lie on a line, so it has no rotation; pick a face with area")
+    # weights (6, p, 3): translation and J^-1 (r x u), turned into the interface frame
+    W = np.empty((6, len(points), 3))
+    W[:3] = rotation[:, None, :] * (areas / total)[None, :, None]
+    cross = np.array([skew(v) for v in r])  # r x u = cross @ u
+    W[3:] = np.einsum("ij,pjk->ipk", rotation @ np.linalg.inv(J), cross) * areas[None, :, None]
+    B = sp.vstack([_expand(N, W[i]) for i in range(6)]).tocsr()
+    return Patch(origin, rotation, B, points, areas, vectors / areas[:, None], N)
+
+
+def _frame(normal: Array, t2: Array, areas: Array, points: Array, name: str) -> Array:
+    if np.linalg.norm(normal) < 1e-6 * areas.sum():
+        raise UserError(f"interface '{name}': the face closes on itself and has no mean normal; split it")
+    n = normal / np.linalg.norm(normal)
+    t2 = np.asarray(t2, dtype=float)
+    flat = t2 - n * (n @ t2)
+    if np.linalg.norm(flat) < 1e-3 * np.linalg.norm(t2):
+        raise UserError(f"interfaces.{name}.t2: {t2.tolist()} is along the normal of the face; choose a direction in its plane")
+    t2 = flat / np.linalg.norm(flat)
+    return np.array([n, np.cross(t2, n), t2])
+
+
+def _interpolation(n: int, parts: list[tuple[Indices, Array]]) -> sp.csr_matrix:
+    """(p, n) shape functions of facets (f, k) at quadrature points (q, k), p running over f then q."""
+    rows, cols, values, start = [], [], [], 0
+    for facets, N in parts:
+        f, k = facets.shape
+        q = len(N)
+        rows.append(np.repeat(start + np.arange(f * q), k))
+        cols.append(np.repeat(facets, q, axis=0).ravel())
+        values.append(np.tile(N, (f, 1)).ravel())
+        start += f * q
+    shape = (start, n)
+    return sp.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=shape)
+
+
+def _expand(N: sp.csr_matrix, weights: Array) -> sp.csr_matrix:
+    """(1, 3n) row  sum_p weights_p . u(x_p)."""
+    nodal = N.T @ weights
+    return sp.csr_matrix(nodal.reshape(1, -1))
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where a point lies in the mesh.
+
+    Attributes:
+        nodes: (k,) points of its cell. N: (k,). grad: (3, k) 1/m. point: (3,) m, the place used.
+        distance: m from the place asked for (0 inside).
+    """
+
+    nodes: Indices
+    N: Array
+    grad: Array
+    point: Array
+    distance: float
+
+
+@dataclass
+class Locator:
+    """Finds the cell and reference coordinates of points (Newton on the curved map of the nearest cells)."""
+
+    mesh: Mesh
+    _cells: list[tuple[str, Array, cKDTree]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for cell_type, cells in self.mesh.cells.items():
+            centre = self.mesh.points[cells[:, : CELL_TYPES[cell_type].corners]].mean(axis=1)
+            self._cells.append((cell_type, centre, cKDTree(centre)))
+
+    def find(self, point: Array, what: str) -> Location:
+        """Locate a point; if it is outside, the nearest place of the body.
+
+        Raises:
+            UserError: further from the body than 2 % of the body's size.
+        """
+        point = np.asarray(point, dtype=float)
+        best: Location | None = None
+        for cell_type, centre, tree in self._cells:
+            _, near = tree.query(point, k=min(48, len(centre)))
+            for cell in np.atleast_1d(near):
+                found = self._in_cell(cell_type, self.mesh.cells[cell_type][cell], point)
+                if best is None or found.distance < best.distance - 1e-15:
+                    best = found
+                if best.distance == 0.0:
+                    return best
+        assert best is not None
+        size = np.ptp(self.mesh.points, axis=0).max()
+        if best.distance > 0.02 * size:
+            raise UserError(
+                f"{what}: the point {point.tolist()} m lies {best.distance:.4g} m outside the body (nearest place "
+                f"{best.point.round(6).tolist()} m); correct it, or check length_unit"
+            )
+        return best
+
+    def _in_cell(self, cell_type: str, nodes: Indices, point: Array) -> Location:
+        kind = CELL_TYPES[cell_type]
+        x = self.mesh.points[nodes]
+        xi = kind.reference[: kind.corners].mean(axis=0)
+        for _ in range(25):
+            N, dN = shape_functions(cell_type, xi[None])
+            step = np.linalg.lstsq((dN[0] @ x).T, point - N[0] @ x, rcond=None)[0]
+            xi = _clamp(xi + step, kind.corners)
+            if np.abs(step).max() < 1e-13:
+                break
+        N, dN = shape_functions(cell_type, xi[None])
+        place = N[0] @ x
+        distance = float(np.linalg.norm(point - place))
+        if distance < 1e-9 * np.ptp(x, axis=0).max():
+            distance = 0.0
+        return Location(nodes, N[0], np.linalg.solve(dN[0] @ x, dN[0]), place, distance)
+
+
+def _clamp(xi: Array, corners: int) -> Array:
+    """Nearest reference coordinates inside the cell (tetrahedron: onto the simplex)."""
+    if corners == 8:
+        return np.clip(xi, 0.0, 1.0)
+    inside = np.maximum(xi, 0.0)
+    total = inside.sum()
+    return inside if total <= 1 else _onto_simplex(xi)
+
+
+def _onto_simplex(xi: Array) -> Array:
+    """Euclidean projection on {x >= 0, sum x = 1}."""
+    ordered = np.sort(xi)[::-1]
+    excess = np.cumsum(ordered) - 1
+    last = np.flatnonzero(ordered - excess / np.arange(1, len(xi) + 1) > 0)[-1]
+    return np.maximum(xi - excess[last] / (last + 1), 0.0)
+
+
+def point_rows(n: int, place: Location, directions: Array) -> sp.csr_matrix:
+    """(r, 3n) displacement at a place along unit directions (r, 3)."""
+    rows = np.zeros((len(directions), n * 3))
+    for i, direction in enumerate(directions):
+        rows[i].reshape(n, 3)[place.nodes] = place.N[:, None] * direction
+    return sp.csr_matrix(rows)
+
+
+def gauge_row(n: int, place: Location, direction: Array) -> sp.csr_matrix:
+    """(1, 3n) normal strain at a place along a unit direction: d . grad(u) . d."""
+    row = np.zeros((n, 3))
+    row[place.nodes] = (place.grad.T @ direction)[:, None] * direction
+    return sp.csr_matrix(row.reshape(1, -1))
+
+
+def strain_of(grad_u: Array) -> Array:
+    """(..., 6) small strain of displacement gradients (..., 3, 3)."""
+    return engineering(0.5 * (grad_u + np.swapaxes(grad_u, -1, -2)))

@@ -1,0 +1,106 @@
+"""Strain and stress of every mode (Sextro Eqs. (2.4-16), (2.4-17)) at Gauss points and smoothed to the nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..data import Array, StressSet
+from ..fem.discretise import Block
+from ..fem.operators import engineering
+from ..topology import CELL_TYPES
+from .equilibrium import BodyModel, StaticState, cauchy
+
+
+def modal_strain(block: Block, phi: Array, H: Array | None) -> Array:
+    """(e, q, 6, m) strain of shapes (n, 3, m): sym(F^T grad phi), the small strain where H is None.
+
+    About a deformed state this is the change of the Green strain per unit modal coordinate.
+    """
+    e, q = block.dx.shape
+    out = np.empty((e, q, 6, phi.shape[2]))
+    for j in range(phi.shape[2]):
+        g = np.matmul(phi[block.cells, :, j].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))
+        if H is not None:
+            g = np.matmul(np.swapaxes(np.eye(3) + H, -1, -2), g)
+        out[..., j] = engineering(0.5 * (g + np.swapaxes(g, -1, -2)))
+    return out
+
+
+def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
+    """Strain and stress at the integration points, cells in the mesh's order."""
+    strain = [modal_strain(b, phi, state.H[i] if state.H else None) for i, b in enumerate(model.d.blocks)]
+    stress = [_hooke(model, i, s) for i, s in enumerate(strain)]
+    points = [np.einsum("qk,eki->eqi", b.N, model.d.mesh.points[b.cells]) for b in model.d.blocks]
+    static = [cauchy(state, i) for i in range(len(model.d.blocks))]
+    m = phi.shape[2]
+    return StressSet(
+        "gauss",
+        np.concatenate([p.reshape(-1, 3) for p in points]),
+        np.concatenate([s.reshape(-1, 6, m) for s in strain]),
+        np.concatenate([s.reshape(-1, 6, m) for s in stress]),
+        np.concatenate([s.reshape(-1, 6) for s in static]),
+        np.concatenate([b.dx.reshape(-1) for b in model.d.blocks]),
+    )
+
+
+def _hooke(model: BodyModel, block: int, strain: Array) -> Array:
+    e, q, _, m = strain.shape
+    stress = np.matmul(model.material.elasticity, strain.reshape(-1, 6, m)).reshape(e, q, 6, m)
+    return stress if model.factor is None else stress * model.factor[block][:, :, None, None]
+
+
+def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
+    """Extrapolation from integration points to nodes: (n, e q) matrix of volume-weighted sums, and (n,) volumes.
+
+    In each cell a linear (tetrahedron) or trilinear (brick) field is fitted by least squares to the values at
+    the integration points and evaluated at the nodes; nodes average their cells by volume.
+    """
+    kind = CELL_TYPES[block.cell_type]
+    at, nodes = _polynomials(block.at, kind.corners), _polynomials(kind.reference, kind.corners)
+    extrapolate = nodes @ np.linalg.pinv(at)  # (k, q)
+    e, q = block.dx.shape
+    k = len(nodes)
+    volume = block.dx.sum(axis=1)
+    data = volume[:, None, None] * extrapolate
+    rows = np.broadcast_to(block.cells[:, :, None], (e, k, q))
+    cols = np.broadcast_to((np.arange(e) * q)[:, None, None] + np.arange(q), (e, k, q))
+    matrix = sp.csr_matrix((data.ravel(), (rows.ravel(), cols.ravel())), shape=(n_points, e * q))
+    weights = np.bincount(block.cells.ravel(), np.repeat(volume, k), minlength=n_points)
+    return matrix, weights
+
+
+def _polynomials(x: Array, corners: int) -> Array:
+    ones = np.ones(len(x))
+    if corners == 4:
+        columns = [ones, x[:, 0], x[:, 1], x[:, 2]]
+        return np.column_stack(columns if len(x) > 1 else columns[:1])
+    a, b, c = x.T
+    return np.column_stack([ones, a, b, c, a * b, b * c, a * c, a * b * c])
+
+
+def nodal_set(model: BodyModel, gauss: StressSet) -> StressSet:
+    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``)."""
+    n, m = model.d.mesh.n_points, gauss.strain.shape[2]
+    strain, stress, static = np.zeros((n, 6 * m)), np.zeros((n, 6 * m)), np.zeros((n, 6))
+    weights, start = np.zeros(n), 0
+    for block in model.d.blocks:
+        stop = start + block.dx.size
+        S, w = smoother(block, n)
+        strain += S @ gauss.strain[start:stop].reshape(-1, 6 * m)
+        stress += S @ gauss.stress[start:stop].reshape(-1, 6 * m)
+        static += S @ gauss.static_stress[start:stop]
+        weights += w
+        start = stop
+    share = gauss.weights.sum() * weights / weights.sum()
+    w = weights[:, None]
+    return StressSet(
+        "nodal-averaged", model.d.mesh.points, (strain / w).reshape(n, 6, m), (stress / w).reshape(n, 6, m),
+        static / w, share,
+    )  # fmt: skip
+
+
+def von_mises(stress: Array) -> Array:
+    """(...,) equivalent stress of (..., 6), Pa."""
+    xx, yy, zz, xy, yz, xz = np.moveaxis(stress, -1, 0)
+    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * (xy**2 + yz**2 + xz**2))

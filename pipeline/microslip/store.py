@@ -1,0 +1,128 @@
+"""Files that are complete or absent, their hashes, and the rule that decides whether a product is up to date.
+
+A product ``X`` may have a sidecar ``X.json`` with the hash of exactly the inputs and settings it was made from
+(key ``inputs``) and with what changes from run to run (time, commit). The product itself holds nothing volatile.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from .data import UserError
+
+
+@contextlib.contextmanager
+def complete_or_absent(path: Path | str) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; on success it is synced and renamed onto `path`, else removed.
+
+    Raises:
+        UserError: if the folder is missing, not writable, or the disk is full.
+    """
+    path = Path(path)
+    temporary: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        os.chmod(temporary, 0o666 & ~_umask())
+        _sync(temporary)
+        os.replace(temporary, path)
+        temporary = None
+        _sync(path.parent)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise UserError(
+            f"{path}: cannot be written ({os.strerror(error.errno)}); nothing was changed, "
+            "free some space or choose another folder"
+        ) from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    current = os.umask(0)
+    os.umask(current)
+    return current
+
+
+def _sync(path: Path) -> None:
+    """Flush a file, or a folder's entries, to the disk (folders cannot be opened on Windows)."""
+    if path.is_dir() and os.name == "nt":
+        return
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a text file, complete or absent."""
+    with complete_or_absent(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def hash_file(path: Path | str) -> str:
+    """SHA-256 of a file's bytes, as hexadecimal text."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def hash_settings(settings: Any) -> str:
+    """SHA-256 of anything that JSON can hold, independent of key order."""
+    text = json.dumps(settings, sort_keys=True, separators=(",", ":"), default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def sidecar_path(product: Path | str) -> Path:
+    """Where the sidecar of a product stands."""
+    product = Path(product)
+    return product.with_name(product.name + ".json")
+
+
+def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
+    """True if `product` exists, is what its sidecar describes, and was made from these `inputs`."""
+    product = Path(product)
+    try:
+        note = json.loads(sidecar_path(product).read_text())
+        return note["inputs"] == hash_settings(inputs) and note["product"] == hash_file(product)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def note_product(product: Path | str, inputs: Mapping[str, Any], **more: Any) -> None:
+    """Write the sidecar of a finished product: hashes, and what is volatile (UTC time, git commit)."""
+    note = {
+        "inputs": hash_settings(inputs),
+        "product": hash_file(product),
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        **git_state(Path(__file__).parent),
+        **more,
+    }
+    write_text(sidecar_path(product), json.dumps(note, indent=1, sort_keys=True) + "\n")
+
+
+def git_state(folder: Path) -> dict[str, Any]:
+    """Commit and whether the tree is dirty, or nothing outside a checkout."""
+    try:
+        def ask(*words: str) -> str:
+            return subprocess.run(
+                ["git", "-C", str(folder), *words], capture_output=True, text=True, check=True, timeout=10
+            ).stdout.strip()
+
+        return {"commit": ask("rev-parse", "HEAD"), "dirty": bool(ask("status", "--porcelain", "-uno"))}
+    except (OSError, subprocess.SubprocessError):
+        return {}

@@ -1,0 +1,80 @@
+"""Cell types microslip assembles: their corner nodes, facets and node orders (all in VTK's order).
+
+VTK's order equals meshio's, CalculiX's (C3D4, C3D8, C3D10, C3D20) and, after a permutation found from the
+reference coordinates, scikit-fem's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .data import Array
+
+_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+_HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_TET_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+_HEX_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
+)
+# Corners of each facet, ordered so that the normal points out of the cell.
+_TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+_HEX_FACETS = ((3, 0, 4, 7), (1, 2, 6, 5), (0, 1, 5, 4), (2, 3, 7, 6), (0, 3, 2, 1), (4, 5, 6, 7))
+
+
+@dataclass(frozen=True)
+class CellType:
+    """One cell type. `reference` is (k, 3) in the unit tetrahedron or unit cube; `facets` are local node tuples."""
+
+    name: str
+    corners: int
+    reference: Array
+    edges: tuple[tuple[int, int], ...]
+    facet_type: str
+    facets: tuple[tuple[int, ...], ...]
+    order: int
+
+
+def _edge_number(edges: tuple[tuple[int, int], ...], a: int, b: int) -> int:
+    return next(i for i, e in enumerate(edges) if set(e) == {a, b})
+
+
+def _quadratic_facets(
+    facets: tuple[tuple[int, ...], ...], edges: tuple[tuple[int, int], ...], corners: int, centres: bool
+) -> tuple[tuple[int, ...], ...]:
+    result = []
+    for number, facet in enumerate(facets):
+        ring = [*facet, facet[0]]
+        middle = tuple(corners + _edge_number(edges, a, b) for a, b in zip(ring[:-1], ring[1:], strict=True))
+        centre = (corners + len(edges) + number,) if centres else ()
+        result.append((*facet, *middle, *centre))
+    return tuple(result)
+
+
+def _midpoints(corners: Array, groups: tuple[tuple[int, ...], ...]) -> Array:
+    return np.array([corners[list(g)].mean(axis=0) for g in groups])
+
+
+def _cell_types() -> dict[str, CellType]:
+    tet_mid = np.vstack([_TET_CORNERS, _midpoints(_TET_CORNERS, _TET_EDGES)])
+    hex_mid = np.vstack([_HEX_CORNERS, _midpoints(_HEX_CORNERS, _HEX_EDGES)])
+    hex_full = np.vstack([hex_mid, _midpoints(_HEX_CORNERS, _HEX_FACETS), [[0.5, 0.5, 0.5]]])
+    tet_quad = _quadratic_facets(_TET_FACETS, _TET_EDGES, 4, False)
+    hex_quad8 = _quadratic_facets(_HEX_FACETS, _HEX_EDGES, 8, False)
+    hex_quad9 = _quadratic_facets(_HEX_FACETS, _HEX_EDGES, 8, True)
+    types = (
+        CellType("tetra", 4, _TET_CORNERS, _TET_EDGES, "triangle", _TET_FACETS, 1),
+        CellType("tetra10", 4, tet_mid, _TET_EDGES, "triangle6", tet_quad, 2),
+        CellType("hexahedron", 8, _HEX_CORNERS, _HEX_EDGES, "quad", _HEX_FACETS, 1),
+        CellType("hexahedron20", 8, hex_mid, _HEX_EDGES, "quad8", hex_quad8, 2),
+        CellType("hexahedron27", 8, hex_full, _HEX_EDGES, "quad9", hex_quad9, 2),
+    )
+    return {t.name: t for t in types}
+
+
+CELL_TYPES = _cell_types()
+"""Cell type name -> `CellType`, for every type that can be assembled."""
+
+FACET_CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+"""Facet type -> number of corner nodes."""
