@@ -3,12 +3,23 @@
 Axes: x circumferential (through the blade's thickness), y chord, z radial; clamped at z = 0, plate on top.
 Arrangement 1: contacts on the plate's ends at x = +-plate_circumferential / 2; bending is normal to them.
 Arrangement 2: contacts on the plate's faces at y = +-plate_chord / 2; bending is tangential to them.
+
+The book gives no dimensions. These were fitted to its printed 14.1, 159.55 and 540.61 Hz; blade_length is the
+free blade below the plate, which adds plate_thickness on top (a blade of 475 mm with the plate in it has 14.34 Hz,
+this one 14.06, 158.8 and 537.7 Hz on a fine mesh). A structured mesh with two elements through the thickness and
+thin layers at clamp and plate: at the default size f1 to f3 lie 0.03, 0.09 and 0.15 % above the converged values.
 """
+
+from collections.abc import Callable
+from typing import Any
 
 import gmsh
 import numpy as np
-from microslip.cad import checked, name_body, name_face, run, surfaces_where
+
+from microslip.cad import checked, name_body, name_face, positive_size, run, surfaces_where
 from microslip.data import UserError
+
+Tiles = list[tuple[int, int]]  # gmsh's (dimension, tag)
 
 DEFAULTS = {  # mm
     "arrangement": 1,
@@ -22,18 +33,26 @@ DEFAULTS = {  # mm
     "contact_height": 5.0,  # radial
 }
 ARRANGEMENT_2 = {"contact_width": 20.0}
+SIZE = 8.0  # mm, default element size
+THROUGH = 2  # elements through the blade's thickness, at least
+MOST_ALONG = 5000  # elements along one edge
+END_LAYERS = (0.3, 0.6, 0.9)  # heights of the layers next to clamp and plate, in thicknesses
 
 
-def draw(parameters: dict, mesh: dict) -> None:
+def draw(parameters: dict[str, Any], mesh: dict[str, Any]) -> None:
     p = settled(parameters)
-    size = mesh.get("size", 6.0)
+    if mesh.get("local"):
+        raise UserError("mesh.local has no effect on the blade's structured mesh; change mesh.size")
+    if mesh.get("size") is None:
+        mesh["size"] = SIZE
+    size = positive_size("mesh.size", mesh["size"])
     base = section(p, size)
     extrude_blade_and_plate(p, base, size)
     name_surfaces(p)
     name_body()
 
 
-def settled(parameters: dict) -> dict:
+def settled(parameters: dict[str, Any]) -> dict[str, Any]:
     """All parameters, checked against each other."""
     arrangement = parameters.get("arrangement", 1)
     if arrangement not in (1, 2):
@@ -52,7 +71,7 @@ def settled(parameters: dict) -> dict:
     return p
 
 
-def section(p: dict, size: float) -> list[int]:
+def section(p: dict[str, Any], size: float) -> list[int]:
     """The plate's rectangle at z = blade_length, cut along blade and contacts; structured mesh."""
     x, y = [p["thickness"], p["plate_circumferential"]], [p["chord"], p["plate_chord"]]
     (y if p["arrangement"] == 1 else x).append(p["contact_width"])
@@ -65,71 +84,90 @@ def section(p: dict, size: float) -> list[int]:
     tags = [tag for _, tag in gmsh.model.occ.fragment(tiles, [])[0]]
     gmsh.model.occ.synchronize()
     for _, curve in gmsh.model.getEntities(1):
-        gmsh.model.mesh.setTransfiniteCurve(curve, 1 + count(gmsh.model.occ.getMass(1, curve), size))
+        length = gmsh.model.occ.getMass(1, curve)
+        least = THROUGH if abs(length - p["thickness"]) < 1e-6 * length else 1
+        gmsh.model.mesh.setTransfiniteCurve(curve, 1 + max(least, count(length, size)))
     for tag in tags:
         gmsh.model.mesh.setTransfiniteSurface(tag, "Alternate")
     return tags
 
 
 def both_signs(widths: list[float]) -> list[float]:
-    return sorted({s * w / 2 for w in widths for s in (-1, 1)})
+    return sorted({round(s * w / 2, 9) for w in widths for s in (-1, 1)})
 
 
 def count(length: float, size: float) -> int:
     """Elements along a length."""
+    if length > MOST_ALONG * size:
+        raise UserError(f"mesh.size = {size:g} puts {length / size:.1g} elements along {length:g}; is it in length_unit?")
     return max(1, int(np.ceil(length / size - 1e-6)))
 
 
-def extrude_blade_and_plate(p: dict, base: list[int], size: float) -> None:
+def extrude_blade_and_plate(p: dict[str, Any], base: list[int], size: float) -> None:
     """The plate upwards (in three steps where the contact is lower), the blade down to the clamp."""
     rim = (p["plate_thickness"] - p["contact_height"]) / 2
     tiles = [(2, tag) for tag in base]
     blade = [t for t in tiles if inside_blade(p, np.array(gmsh.model.occ.getCenterOfMass(*t)))]
-    step(blade, -p["blade_length"], size)
+    step(blade, -p["blade_length"], blade_layers(p, size))
     for height in (rim, p["contact_height"], rim):
         if height > 1e-9 * p["plate_thickness"]:
-            tiles = step(tiles, height, size)
+            tiles = step(tiles, height, [height / (n := count(height, size))] * n)
     gmsh.model.occ.synchronize()
 
 
-def inside_blade(p: dict, centre: np.ndarray) -> bool:
+def inside_blade(p: dict[str, Any], centre: np.ndarray) -> bool:
     return bool(abs(centre[0]) < p["thickness"] / 2 and abs(centre[1]) < p["chord"] / 2)
 
 
-def step(tiles: list[tuple[int, int]], height: float, size: float) -> list[tuple[int, int]]:
-    """Extrude in layers; returns the surfaces at the far end."""
-    made = gmsh.model.occ.extrude(tiles, 0, 0, height, numElements=[count(abs(height), size)])
+def blade_layers(p: dict[str, Any], size: float) -> list[float]:
+    """Heights of the element layers along the blade: thin where stress concentrates, at both ends."""
+    ends = [fraction * p["thickness"] for fraction in END_LAYERS]
+    middle = p["blade_length"] - 2 * sum(ends)
+    if middle < size or max(ends) > size:
+        ends, middle = [], p["blade_length"]
+    layers = count(middle, size)
+    return ends + [middle / layers] * layers + ends[::-1]
+
+
+def step(tiles: Tiles, height: float, layers: list[float]) -> Tiles:
+    """Extrude by `height` in layers; returns the surfaces at the far end."""
+    ends = np.cumsum(layers) / np.sum(layers)
+    made = gmsh.model.occ.extrude(tiles, 0, 0, height, numElements=[1] * len(layers), heights=list(ends))
     return [made[i - 1] for i, (dim, _) in enumerate(made) if dim == 3]
 
 
-def name_surfaces(p: dict) -> None:
+Test = Callable[[np.ndarray, np.ndarray], bool]  # of centre (3,) and box (2, 3) of a surface
+
+
+def name_surfaces(p: dict[str, Any]) -> None:
     """Clamp, the two big blade faces, the plate's top, the two contacts."""
-    low = p["blade_length"]
-    middle, top = low + p["plate_thickness"] / 2, low + p["plate_thickness"]
+    low, top = p["blade_length"], p["blade_length"] + p["plate_thickness"]
     near = 1e-6 * top
-    across, along = (0, 1) if p["arrangement"] == 1 else (1, 0)
-    reach = p["plate_circumferential" if p["arrangement"] == 1 else "plate_chord"] / 2
-    half = np.array([p["contact_width"], p["contact_height"]]) / 2 + near
+    name_face("clamp", surfaces_where(on_plane(2, 0.0, near)))
+    name_face("plate_top", surfaces_where(on_plane(2, top, near)))
+    for name, x in (("pressure_side", p["thickness"] / 2), ("suction_side", -p["thickness"] / 2)):
+        side = on_plane(0, x, near)
+        name_face(name, [tag for tag in surfaces_where(side) if tag in surfaces_where(below(low))])
+    normal, reach = (0, p["plate_circumferential"]) if p["arrangement"] == 1 else (1, p["plate_chord"])
+    middle = np.array([0.0, 0.0, (low + top) / 2])
+    middle[normal] = reach / 2
+    half = np.full(3, p["contact_width"] / 2)
+    half[[normal, 2]] = 0.0, p["contact_height"] / 2
+    name_face("contact_right", surfaces_where(within(middle, half + near)))
+    middle[normal] *= -1
+    name_face("contact_left", surfaces_where(within(middle, half + near)))
 
-    def plane(axis: int, value: float):
-        return lambda centre, box: np.ptp(box[:, axis]) < near and abs(centre[axis] - value) < near
 
-    def side(x: float):
-        return lambda centre, box: plane(0, x)(centre, box) and centre[2] < low
+def on_plane(axis: int, value: float, near: float) -> Test:
+    return lambda _, box: bool((np.abs(box[:, axis] - value) < near).all())
 
-    def contact(value: float):
-        def holds(centre, box):
-            offset = np.abs(box[:, [along, 2]] - [0, middle])
-            return plane(across, value)(centre, box) and bool((offset <= half).all())
 
-        return holds
+def below(height: float) -> Test:
+    return lambda centre, _: bool(centre[2] < height)
 
-    name_face("clamp", surfaces_where(plane(2, 0.0)))
-    name_face("plate_top", surfaces_where(plane(2, top)))
-    name_face("pressure_side", surfaces_where(side(p["thickness"] / 2)))
-    name_face("suction_side", surfaces_where(side(-p["thickness"] / 2)))
-    name_face("contact_right", surfaces_where(contact(reach)))
-    name_face("contact_left", surfaces_where(contact(-reach)))
+
+def within(middle: np.ndarray, half: np.ndarray) -> Test:
+    return lambda _, box: bool((np.abs(box - middle) <= half).all())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,40 @@
+"""Command line of the CAD route; see the package's docstring."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import gmsh
+
+from microslip.cad.drawing import default_size, finish, guarded, name_body, positive_size, read_settings
+from microslip.cad.faces import name_picked, table
+from microslip.cad.solids import load
+
+
+def mesh_cad(settings_file: str, out: str) -> None:
+    """Read geometry.cad, name the faces that geometry.faces picks, mesh."""
+    settings = read_settings(settings_file)
+    geometry, unit = settings.get("geometry", {}), settings.get("length_unit", "m")
+    marks = load(Path(settings["folder"]) / geometry.get("cad", ""), unit)
+    name_picked(geometry.get("faces", []), marks)
+    name_body()
+    mesh = dict(settings.get("mesh", {}))
+    size = mesh["size"] = default_size() if mesh.get("size") is None else mesh["size"]
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)  # elements around a full circle, as far as
+    gmsh.option.setNumber("Mesh.MeshSizeMin", positive_size("mesh.size", size) / 3)
+    finish(mesh, out)
+
+
+def main(arguments: list[str]) -> None:
+    """Command line: SETTINGS OUT, or --list FILE UNIT."""
+    if len(arguments) == 3 and arguments[0] == "--list":
+        guarded(lambda: print(table(Path(arguments[1]), arguments[2])), arguments[1])
+    elif len(arguments) == 2:
+        guarded(lambda: mesh_cad(*arguments), arguments[0])
+    else:
+        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

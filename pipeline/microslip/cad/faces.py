@@ -1,0 +1,84 @@
+"""Choosing the faces of an imported body: the rules of [[geometry.faces]], and a table to write them from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import gmsh
+import numpy as np
+
+from microslip.cad.drawing import boundary_surfaces, name_face, surfaces_where, warn
+from microslip.cad.marks import Marks, short_name
+from microslip.cad.solids import load
+from microslip.data import UserError
+
+
+def name_picked(rules: Sequence[dict[str, Any]], marks: Marks) -> None:
+    """Name the surfaces that each rule picks; rules of the same name add up."""
+    named: dict[str, list[int]] = {}
+    for rule in rules:
+        picked = pick(rule, marks)
+        if not picked:
+            way = {k: v for k, v in rule.items() if k != "name" and v is not None}
+            raise UserError(f"geometry.faces: no surface answers to {way} of face {rule.get('name')!r}; the file "
+                            f"has {len(marks)} surfaces, list them with: microslip info FILE")
+        named.setdefault(str(rule.get("name")), []).extend(picked)
+    owner: dict[int, str] = {}
+    for name, tags in named.items():
+        for tag in sorted(set(tags)):
+            if tag in owner:
+                warn(f"surface {tag} belongs to the faces {owner[tag]!r} and {name!r}")
+            owner[tag] = name
+        name_face(name, tags)
+
+
+def pick(rule: dict[str, Any], marks: Marks) -> list[int]:
+    """Boundary surfaces that answer to a rule: label (whole, else a part of it), colour, box or surface tags."""
+    tags = [tag for tag in boundary_surfaces() if tag in marks]
+    if rule.get("label") is not None:
+        whole = [tag for tag in tags if marks[tag][0] == rule["label"]]
+        return whole or [tag for tag in tags if rule["label"] in marks[tag][0]]
+    if rule.get("colour") is not None:
+        wanted = np.array(rule["colour"])
+        return [t for t in tags if (c := marks[t][1]) is not None and np.abs(wanted - c).max() <= 1]
+    if rule.get("surfaces") is not None:
+        return [tag for tag in tags if tag in rule["surfaces"]]
+    if rule.get("box") is not None:
+        low, high = np.reshape(rule["box"], (2, 3))
+        near = 1e-6 * np.linalg.norm(high - low) + 2e-7  # OpenCASCADE widens boxes by 1e-7
+        return surfaces_where(lambda _, box: bool((box[0] >= low - near).all() and (box[1] <= high + near).all()))
+    raise UserError(f"geometry.faces: face {rule.get('name')!r} needs one of label, colour, box, surfaces")
+
+
+def table(path: Path, unit: str) -> str:
+    """Solids and boundary surfaces of a CAD file, to choose faces from."""
+    marks = load(path, unit)
+    head = f"{'surface':>7} {'kind':<21} {'area':>10}  {'centre':<32} {'normal':<20} {'colour':<12} label"
+    solids = [solid_line(tag) for _, tag in gmsh.model.getEntities(3)]
+    faces = [face_line(tag, *marks.get(tag, ("", None))) for tag in boundary_surfaces()]
+    return "\n".join([f"{path.name}, lengths in {unit}", *solids, head, *faces])
+
+
+def solid_line(tag: int) -> str:
+    """One solid of the table."""
+    name = short_name(3, tag)
+    volume, centre = gmsh.model.occ.getMass(3, tag), numbers(gmsh.model.occ.getCenterOfMass(3, tag))
+    return f"solid {tag}: volume {volume:.6g}, centre {centre}  {name}".rstrip()
+
+
+def face_line(tag: int, label: str, colour: tuple[int, int, int] | None) -> str:
+    """One surface of the table; planes with their outward normal."""
+    kind, area = gmsh.model.getType(2, tag), gmsh.model.occ.getMass(2, tag)
+    normal = ""
+    if kind == "Plane":
+        corner = gmsh.model.getParametrizationBounds(2, tag)[0]
+        normal = numbers(np.round(gmsh.model.getNormal(tag, corner), 3))
+    centre, paint = numbers(gmsh.model.occ.getCenterOfMass(2, tag)), ",".join(map(str, colour or ()))
+    return f"{tag:>7} {kind:<21} {area:>10.4g}  {centre:<32} {normal:<20} {paint:<12} {label}".rstrip()
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Short decimals."""
+    return " ".join(f"{0.0 if abs(v) < 1e-9 else v:.5g}" for v in values)
