@@ -1,0 +1,62 @@
+# The file graph: geometry/% -> meshes/%.msh -> build/%/basis.h5 -> build/%/report.html (with pipeline/cases/%.toml).
+# Each stage decides by the hash of its inputs whether there is work to do; make only calls it.
+
+BODIES   := blade shroud pendulum half-pipe
+PYTHON   := .venv/bin/python
+RUN      := $(PYTHON) -m microslip
+READY    := .venv/.ready
+SOURCES  := $(shell find pipeline/microslip -name '*.py')
+
+export OMP_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)
+unexport DISPLAY
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-all lint docs bench clean distclean
+
+help: ## list the verbs
+	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+	@echo "bodies:       $(BODIES)   (make blade, blade-mesh, blade-modes)"
+
+setup: $(READY) ## virtual environment, locked packages, system libraries
+
+$(READY): requirements.lock pyproject.toml pipeline/setup.sh
+	@sh pipeline/setup.sh
+
+all: $(BODIES) ## every body to its report
+
+$(BODIES): %: build/%/report.html
+$(BODIES:%=%-mesh): %-mesh: meshes/%.msh
+$(BODIES:%=%-modes): %-modes: build/%/basis.h5
+
+meshes/%.msh: geometry/%/body.toml geometry/%/build.py $(SOURCES) | $(READY)
+	@$(RUN) mesh geometry/$*
+
+build/%/basis.h5: meshes/%.msh geometry/%/body.toml $(SOURCES) | $(READY)
+	@$(RUN) modes geometry/$*
+
+build/%/report.html: build/%/basis.h5 $(wildcard pipeline/cases/*.toml) $(SOURCES) | $(READY)
+	@$(RUN) run geometry/$*
+
+test: $(READY) ## the quick tests, under ten minutes on two cores
+	@$(PYTHON) -m pytest -n 2 --dist loadfile
+
+test-all: $(READY) ## also the slow ones and the peers (CalculiX, if it is installed)
+	@$(PYTHON) -m pytest -n 2 --dist loadfile -m "slow or not slow"
+
+lint: $(READY) ## ruff and mypy
+	@.venv/bin/ruff check .
+	@.venv/bin/mypy
+
+docs: $(READY) ## the studies and pictures of docs/ (minutes)
+	@$(PYTHON) docs/make_pictures.py
+
+bench: $(READY) ## timings against CalculiX and NGSolve (minutes)
+	@$(PYTHON) benchmarks/modal.py
+
+clean: ## remove products
+	rm -rf build meshes/*.msh meshes/*.json
+
+distclean: clean ## and the environment
+	rm -rf .venv

@@ -1,0 +1,5 @@
+"""``python -m microslip``."""
+
+from .cli import entry
+
+entry()

@@ -1,0 +1,290 @@
+"""The command line: one verb per stage. Exit codes: 0 done, 1 check failed or not converged, 2 bad input, 130."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, CycloptsError, Parameter
+
+from . import __version__
+from .data import NotConverged, UserError
+from .progress import progress
+
+app = App(
+    name="microslip",
+    help="Modal bases of elastic bodies for vibration with friction contacts: from CAD to a file solvers can trust.",
+    version=__version__,
+)
+
+Set = Annotated[list[str], Parameter(name="--set", negative="", help="override a setting: key.subkey=value")]
+Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), negative="", help="say nothing but errors")]
+Force = Annotated[bool, Parameter(negative="", help="do the work even if the products are up to date")]
+Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
+
+PACKAGE = Path(__file__).parent
+
+
+def _bodies() -> Path:
+    """The folder of bodies that travel with the package (a checkout's geometry/ in development)."""
+    inside = PACKAGE / "bodies"
+    return inside if inside.is_dir() else PACKAGE.parents[1] / "geometry"
+
+
+def _cases() -> Path:
+    inside = PACKAGE / "cases"
+    return inside if inside.is_dir() else PACKAGE.parent / "cases"
+
+
+@app.command
+def init(name: str, folder: Path | None = None) -> None:
+    """Copy a runnable body (and its case) to start from.
+
+    Args:
+        name: blade, shroud, pendulum or half-pipe; `own` for a commented body.toml around your own CAD file or mesh.
+        folder: where to; ./NAME if not given.
+    """
+    known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
+    if name not in known:
+        raise UserError(f"init {name}: there is no such body; choose one of {', '.join(known)}")
+    target = folder or Path(name)
+    if target.exists() and any(target.iterdir() if target.is_dir() else [target]):
+        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for source in sorted((_bodies() / name).iterdir()):
+            if source.is_file():
+                shutil.copyfile(source, target / source.name)
+        if (_cases() / f"{name}.toml").is_file():
+            shutil.copyfile(_cases() / f"{name}.toml", target / "case.toml")
+    except OSError as error:
+        raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
+    print(f"{target}: ready. Look at {target / 'body.toml'}, then: microslip run {target}")
+
+
+@app.command
+def mesh(body: Path, *, output: Output = None, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+    """Draw and mesh a body (gmsh runs in a process of its own).
+
+    Args:
+        body: a body.toml or the folder that holds it.
+    """
+    from .workflow import load_mesh, mesh_stage, open_job
+
+    job = open_job(body, set_)
+    with progress(f"mesh {job.settings.name}", quiet) as report:
+        path = mesh_stage(job, output, force, report)
+        grid, warnings = load_mesh(job, path)
+    _warn(warnings)
+    print(f"{path}: {grid.n_points} points, {grid.n_cells} cells, faces {', '.join(sorted(grid.faces)) or 'none'}")
+
+
+@app.command
+def modes(body: Path, *, output: Output = None, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+    """Mesh if needed, then compute the modal file of a body.
+
+    Args:
+        body: a body.toml or the folder that holds it.
+    """
+    from .basis import read_basis
+    from .workflow import basis_summary, modes_stage, open_job
+
+    job = open_job(body, set_)
+    with progress(f"modes of {job.settings.name}", quiet) as report:
+        path, warnings = modes_stage(job, output, force, report)
+    _warn(warnings)
+    if not quiet:
+        print("\n".join(basis_summary(read_basis(path))))
+    print(path)
+
+
+@app.command
+def run(path: Path, *, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+    """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
+
+    Args:
+        path: a body.toml, the folder that holds it, or a case.toml.
+    """
+    from .workflow import find_body, is_case, open_job, report_stage, response_stage, run_body
+    from .case import load_case
+    from .workflow import modes_stage
+
+    if is_case(path):
+        case, _ = load_case(path, set_)
+        job = open_job(find_body(path, case.body, Path(".")))
+        with progress(f"run {case.name}", quiet) as report:
+            modes_stage(job, force=False, report=report)
+            folder = job.build_folder if case.name == job.settings.name else job.root / "build" / case.name
+            summary, converged = response_stage(path, job.basis_file, folder, set_, force, report)
+            page = report_stage(job, summary, force, report) if folder == job.build_folder else folder / "response.csv"
+    else:
+        job = open_job(path, set_)
+        with progress(f"run {job.settings.name}", quiet) as report:
+            page, converged = run_body(job, force, report)
+    print(page)
+    if not converged:
+        raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+
+
+@app.command
+def check(file: Path, *, quiet: Quiet = False) -> None:
+    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate.
+
+    Args:
+        file: a basis.h5.
+    """
+    from .basis import check_basis, read_basis
+
+    findings = check_basis(read_basis(file))
+    failed = [c for c in findings if not c.passed]
+    for c in findings if not quiet else failed:
+        mark = "ok  " if c.passed else "FAIL"
+        print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
+    if failed:
+        raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
+    print(f"{file}: all {len(findings)} checks passed")
+
+
+@app.command
+def export(file: Path, *, to: str, output: Output = None) -> None:
+    """Write a modal file in another program's format.
+
+    Args:
+        file: a basis.h5.
+        to: mat (MATLAB, Octave), vtu (ParaView).
+    """
+    from .basis import read_basis
+    from .exchange import WRITERS, writer
+
+    if to not in WRITERS:
+        raise UserError(f"export --to {to}: unknown format; choose one of {', '.join(sorted(WRITERS))}")
+    target = output or file.with_suffix(f".{to}")
+    writer(to)(read_basis(file), target)
+    print(target)
+
+
+@app.command
+def report(file: Path, *, output: Output = None, quiet: Quiet = False) -> None:
+    """Pictures and one self-contained page of a modal file.
+
+    Args:
+        file: a basis.h5.
+        output: the page; report.html beside the file if not given.
+    """
+    from . import pictures
+    from .basis import read_basis
+    from .report import write_report
+
+    basis = read_basis(file)
+    page = output or file.with_name("report.html")
+    with progress(f"report of {basis.name}", quiet) as tell:
+        reason = pictures.can_draw()
+        drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell)
+        write_report(basis, drawn, page, [f"The pictures are missing: {reason}"] if reason else [])
+    print(page)
+
+
+@app.command
+def info(file: Path, *, unit: str = "mm") -> None:
+    """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), or a body.toml.
+
+    Args:
+        file: basis.h5, a mesh, a STEP or BREP file, or a body.toml.
+        unit: unit of length of a mesh or CAD file.
+    """
+    from .mesh import UNITS
+
+    if not file.exists():
+        raise UserError(f"{file}: there is no such file; correct the path")
+    if unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    suffix = file.suffix.lower()
+    if suffix in (".h5", ".hdf5"):
+        from .basis import read_basis
+        from .workflow import basis_summary
+
+        print("\n".join(basis_summary(read_basis(file))))
+    elif suffix in (".step", ".stp", ".brep", ".iges", ".igs"):
+        _cad_info(file, unit)
+    elif suffix == ".toml" or file.is_dir():
+        from .workflow import open_job
+
+        job = open_job(file)
+        s = job.settings
+        print(f"{s.name}: {s.description}\nmesh {job.mesh_file}\nmodal file {job.basis_file}")
+        print(f"case {job.case_file or 'none: the chain ends at the report'}")
+    else:
+        from .mesh import mesh_problems, read_mesh
+
+        grid = read_mesh(file, unit)
+        size = (grid.points.max(axis=0) - grid.points.min(axis=0)).tolist()
+        kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
+        print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")
+        print(f"faces: {', '.join(sorted(grid.faces)) or 'none'}\npoint sets: {', '.join(sorted(grid.point_sets)) or 'none'}")
+        errors, warnings = mesh_problems(grid)
+        _warn(warnings)
+        if errors:
+            raise UserError("\n".join(f"{file}: {e}" for e in errors))
+
+
+def _cad_info(file: Path, unit: str) -> None:
+    import subprocess
+
+    done = subprocess.run(
+        [sys.executable, "-m", "microslip.cad", "--list", str(file), unit], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])},
+    )  # fmt: skip
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or ["no message"]
+        raise UserError(lines[-1])
+    print(done.stdout, end="")
+
+
+def _warn(warnings: list[str]) -> None:
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    try:
+        app(words, exit_on_error=False, print_error=False, result_action="return_value")
+        return 0
+    except CycloptsError as error:
+        return _fail(f"{error}; see microslip --help", 2)
+    except UserError as error:
+        return _fail(str(error), 2)
+    except NotConverged as error:
+        return _fail(str(error), 1)
+    except MemoryError:
+        return _fail("there is not enough memory; use a coarser mesh, fewer modes, or [output] gauss = false", 1)
+    except ModuleNotFoundError as error:
+        return _fail(_missing(error), 2)
+    except KeyboardInterrupt:
+        return _fail("interrupted; finished products are kept", 130)
+
+
+def _missing(error: ModuleNotFoundError) -> str:
+    extras = {"skfem": "fem", "meshio": "fem", "gmsh": "fem", "matplotlib": "viz", "pyvista": "viz", "vtk": "viz", "jax": "solve"}
+    extra = extras.get((error.name or "").split(".")[0])
+    if extra is None:
+        raise error
+    return f"this needs the package {error.name}, which is not installed; pip install 'microslip[{extra}]'"
+
+
+def _fail(text: str, code: int) -> int:
+    for line in text.splitlines():
+        print(f"error: {line}", file=sys.stderr)
+    return code
+
+
+def entry() -> None:
+    """Console script."""
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

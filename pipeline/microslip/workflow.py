@@ -1,0 +1,444 @@
+"""The chain body.toml -> mesh -> modal file -> friction response -> pictures and report.
+
+Each stage knows the inputs its product depends on and does nothing when they have not changed; `make` and
+``microslip run`` share this rule, so editing a normal force never remeshes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import __version__, store
+from .basis import read_basis, write_basis
+from .body import BodySettings, implausible, load_body, load_toml
+from .case import CaseResult, load_case, run_case
+from .data import Array, Mesh, ModalBasis, UserError
+from .mesh import UNITS, mesh_problems, read_mesh
+
+Report = Callable[[str], None]
+PACKAGE = Path(__file__).parent
+
+_READS_BY_GMSH = {".unv"}
+_MESH_CODE = ("cad",)
+_MODES_CODE = ("data.py", "topology.py", "mesh.py", "body.py", "eigen.py", "basis.py", "fem", "modes")
+_CASE_CODE = ("harmonic_balance.py", "case.py")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One body on its way through the chain: its file, settings in SI and as written, and where products go."""
+
+    path: Path
+    settings: BodySettings
+    raw: dict[str, Any]
+    root: Path
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+    @property
+    def mesh_file(self) -> Path:
+        """The mesh the body is assembled on: the product of its build or CAD file, or the user's own."""
+        own = self.settings.geometry.mesh
+        if own is not None and Path(own).suffix.lower() not in _READS_BY_GMSH:
+            return self.folder / own
+        return self.root / "meshes" / f"{self.settings.name}.msh"
+
+    @property
+    def build_folder(self) -> Path:
+        return self.root / "build" / self.settings.name
+
+    @property
+    def basis_file(self) -> Path:
+        return self.build_folder / "basis.h5"
+
+    @property
+    def case_file(self) -> Path | None:
+        """case.toml beside the body, or pipeline/cases/<name>.toml where the chain is run."""
+        for place in (self.folder / "case.toml", self.root / "pipeline" / "cases" / f"{self.settings.name}.toml"):
+            if place.is_file():
+                return place
+        return None
+
+
+def open_job(path: Path | str, assignments: list[str] | None = None, root: Path | str = ".") -> Job:
+    """Read a body file (or the body.toml in a folder).
+
+    Raises:
+        UserError: see `load_body`.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "body.toml"
+    settings, raw = load_body(path, assignments)
+    return Job(path, settings, raw, Path(root))
+
+
+def _code_hash(parts: tuple[str, ...]) -> str:
+    files = sorted(f for p in parts for f in ([PACKAGE / p] if (PACKAGE / p).is_file() else (PACKAGE / p).rglob("*.py")))
+    return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
+
+
+# mesh ------------------------------------------------------------------------------------------------------------
+
+
+def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report: Report = lambda _: None) -> Path:
+    """Build, or check that it is up to date, the mesh of a body. Returns its path.
+
+    gmsh runs in a process of its own, which leaves a file.
+
+    Raises:
+        UserError: what the mesher says, or a missing source.
+    """
+    geometry = job.settings.geometry
+    if geometry.mesh is not None and job.mesh_file == job.folder / geometry.mesh:
+        if not job.mesh_file.is_file():
+            raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
+        return job.mesh_file
+    product = output or job.mesh_file
+    source = job.folder / (geometry.build or geometry.cad or geometry.mesh or "")
+    if not source.is_file():
+        key = "build" if geometry.build else "cad" if geometry.cad else "mesh"
+        raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+    inputs = {
+        "geometry": job.raw["geometry"],
+        "mesh": job.raw.get("mesh", {}),
+        "unit": job.settings.length_unit,
+        "source": store.hash_file(source),
+        "code": _code_hash(_MESH_CODE),
+    }
+    if not force and store.is_up_to_date(product, inputs):
+        report(f"{product} is up to date")
+        os.utime(product)
+        return product
+    report(f"meshing {source.name}")
+    _run_mesher(job, source, product)
+    store.note_product(product, inputs)
+    return product
+
+
+def _run_mesher(job: Job, source: Path, product: Path) -> None:
+    settings = {**job.raw, "folder": str(job.folder.resolve())}
+    if job.settings.geometry.build:
+        command = [sys.executable, str(source.resolve())]
+    else:
+        command = [sys.executable, "-m", "microslip.cad"]
+    with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
+        table = Path(scratch) / "settings.json"
+        table.write_text(json.dumps(settings))
+        made = Path(scratch) / "mesh.msh"
+        paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+        done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+        if done.returncode or not made.is_file():
+            raise UserError(_mesher_failure(job, done))
+        temporary.write_bytes(made.read_bytes())
+
+
+def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
+    text = done.stderr.strip()
+    if "No module named 'gmsh'" in text:
+        return "gmsh is not installed, so nothing can be meshed; pip install 'microslip[fem]'"
+    if "error while loading shared libraries" in text or "cannot open shared object file" in text:
+        library = next((w for w in text.replace(":", " ").split() if w.startswith("lib") and ".so" in w), "a library")
+        return (
+            f"gmsh needs the system library {library}; type: "
+            "sudo apt-get install -y libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1 libegl1"
+        )
+    if done.returncode < 0:
+        return f"{job.path}: gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
+    if done.returncode == 2 and text:
+        return text if str(job.path) in text else f"{job.path}: {text}"
+    last = text.splitlines()[-1] if text else "no message"
+    return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
+
+
+def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: None) -> tuple[Mesh, list[str]]:
+    """Read the mesh of a body, name its faces by the body's rules, and pass the quality gates.
+
+    Returns:
+        The mesh and warnings.
+
+    Raises:
+        UserError: everything that would spoil a solution.
+    """
+    path = path or job.mesh_file
+    mesh = read_mesh(path, job.settings.length_unit)
+    if job.settings.geometry.mesh is not None:
+        mesh = _faces_by_rule(job, mesh)
+    errors, warnings = mesh_problems(mesh)
+    if errors:
+        raise UserError("\n".join(f"{path}: {e}" for e in errors))
+    size = float(np.ptp(mesh.points, axis=0).max())
+    warnings = [f"{path}: {w}" for w in warnings] + [f"{job.path}: {w}" for w in implausible(job.settings, size)]
+    return mesh, warnings
+
+
+def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
+    """Faces of a user's own mesh given by a box (named sets of the file are there already)."""
+    from dataclasses import replace
+
+    from .mesh import boundary_facets, faces_from_points
+
+    faces = dict(mesh.faces)
+    for rule in job.settings.geometry.faces:
+        if rule.box is None:
+            raise UserError(f"{job.path}: geometry.faces.{rule.name}: a mesh file has no labels or colours; use box")
+        low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
+        slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
+        inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
+        found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
+        if not found:
+            raise UserError(f"{job.path}: geometry.faces.{rule.name}: no facet of the surface lies in the box; widen it")
+        faces[rule.name] = found
+    return replace(mesh, faces=faces)
+
+
+# modes -----------------------------------------------------------------------------------------------------------
+
+
+def modes_stage(
+    job: Job, output: Path | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, list[str]]:
+    """Compute, or check that it is up to date, the modal file of a body. Returns its path and warnings.
+
+    Raises:
+        UserError, NotConverged: see `modes.modal_basis`.
+    """
+    mesh_file = mesh_stage(job, report=report)
+    product = output or job.basis_file
+    inputs = modes_inputs(job, mesh_file)
+    if not force and store.is_up_to_date(product, inputs):
+        report(f"{product} is up to date")
+        os.utime(product)
+        return product, []
+    from .modes import modal_basis
+
+    mesh, warnings = load_mesh(job, mesh_file)
+    for warning in warnings:
+        report(f"warning: {warning}")
+    temperature = nodal_temperature(job, mesh)
+    basis = modal_basis(mesh, job.settings, temperature, report, provenance(job, mesh_file))
+    report(f"writing {product}")
+    write_basis(product, basis)
+    store.note_product(product, inputs, warnings=warnings)
+    return product, warnings
+
+
+def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
+    """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
+    settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
+    inputs = {"settings": settings, "mesh": store.hash_file(mesh_file), "code": _code_hash(_MODES_CODE)}
+    if job.settings.geometry.mesh is not None:
+        inputs["faces"] = job.raw["geometry"].get("faces", [])
+    if job.settings.temperature.file:
+        inputs["temperature"] = store.hash_file(_temperature_file(job))
+    return inputs
+
+
+def provenance(job: Job, mesh_file: Path) -> dict[str, str]:
+    """What the file tells about its making, without anything that changes between identical runs."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {"microslip": __version__, "python": ".".join(map(str, sys.version_info[:2]))}
+    for package in ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "pypardiso"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    found["settings"] = json.dumps(job.raw, sort_keys=True, default=str)
+    found["settings_sha256"] = store.hash_settings(job.raw)
+    found["mesh_sha256"] = store.hash_file(mesh_file)
+    found["threads"] = os.environ.get("OMP_NUM_THREADS", "default")
+    found["material"] = job.settings.material.name
+    found["note"] = job.settings.note
+    return found
+
+
+def _temperature_file(job: Job) -> Path:
+    path = job.folder / (job.settings.temperature.file or "")
+    if not path.is_file():
+        raise UserError(f"{job.path}: temperature.file: there is no file {path}; correct the path")
+    return path
+
+
+def nodal_temperature(job: Job, mesh: Mesh) -> Array | None:
+    """(n,) temperature at the points, K, or None for the reference temperature.
+
+    A file of x, y, z, T is interpolated linearly; points outside its hull take the nearest value.
+    """
+    setting = job.settings.temperature
+    if setting.file is None:
+        return None if setting.uniform is None else np.full(mesh.n_points, setting.uniform)
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    path = _temperature_file(job)
+    try:
+        table = np.loadtxt(path, delimiter=",", comments="#", ndmin=2)
+    except ValueError as error:
+        raise UserError(f"{path}: must be lines of x, y, z, T ({error}); correct it") from error
+    if table.shape[1] != 4 or not np.isfinite(table).all() or (table[:, 3] <= 0).any():
+        raise UserError(f"{path}: must be lines of x, y, z, T with T in K above 0; correct it")
+    where = table[:, :3] * UNITS[job.settings.length_unit]
+    nearest = NearestNDInterpolator(where, table[:, 3])(mesh.points)
+    try:
+        linear = LinearNDInterpolator(where, table[:, 3])(mesh.points)
+    except Exception:  # the points span no volume: Qhull refuses
+        return nearest
+    return np.where(np.isnan(linear), nearest, linear)
+
+
+# response --------------------------------------------------------------------------------------------------------
+
+
+def response_stage(
+    case_path: Path, basis_file: Path, folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None,
+) -> tuple[dict[str, Any], bool]:  # fmt: skip
+    """Friction frequency response of a case: CSV, PNG and a summary (JSON) in `folder`.
+
+    Returns:
+        The summary, and whether every point converged.
+    """
+    settings, raw = load_case(case_path, assignments)
+    summary_file = folder / "response.json"
+    inputs = {"case": raw, "basis": store.hash_file(basis_file), "code": _code_hash(_CASE_CODE)}
+    pictures = {"response": folder / "pictures" / "response.png"}
+    if not force and store.is_up_to_date(summary_file, inputs) and all(p.is_file() for p in pictures.values()):
+        report(f"{summary_file} is up to date")
+        os.utime(summary_file)
+        summary = json.loads(summary_file.read_text())
+        return summary, summary["failed_points"] == 0
+    from .harmonic_balance import response_table
+    from .plots import response_picture
+
+    result = run_case(settings, read_basis(basis_file), case_path, report)
+    store.write_text(folder / "response.csv", response_table(result.responses))
+    with store.complete_or_absent(pictures["response"]) as temporary:
+        response_picture(result, temporary)
+    summary = summarise(result)
+    store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
+    store.note_product(summary_file, inputs)
+    return summary, summary["failed_points"] == 0
+
+
+def summarise(result: CaseResult) -> dict[str, Any]:
+    """Numbers of a case for the report and the terminal."""
+    from .harmonic_balance import peaks
+
+    rows = []
+    for normal, response in result.responses.items():
+        for frequency, amplitude in peaks(response):
+            rows.append({"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude})
+    failed = sum(int((~r.converged).sum()) for r in result.responses.values())
+    return {
+        "case": result.settings.name,
+        "description": result.settings.description,
+        "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
+        "resonances": rows,
+        "failed_points": failed,
+    }
+
+
+# report ----------------------------------------------------------------------------------------------------------
+
+
+def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report: Report) -> Path:
+    """Pictures and the self-contained page of a body."""
+    from . import pictures
+    from .report import write_report
+
+    product = job.build_folder / "report.html"
+    inputs = {
+        "basis": store.hash_file(job.basis_file),
+        "response": response,
+        "engine_orders": list(job.settings.rotation.engine_orders),
+        "code": _code_hash(("pictures.py", "pictures", "campbell.py", "report.py", "truncation.py", "plots.py")),
+    }
+    if not force and store.is_up_to_date(product, inputs):
+        report(f"{product} is up to date")
+        os.utime(product)
+        return product
+    basis = read_basis(job.basis_file)
+    remarks = _remarks(job)
+    drawn: dict[str, Path] = {}
+    reason = pictures.can_draw()
+    if reason is None:
+        drawn = pictures.draw_all(basis, job.build_folder / "pictures", report, list(job.settings.rotation.engine_orders))
+    else:
+        report(f"warning: no pictures of the body: {reason}")
+        remarks.append(f"The pictures of the body are missing: {reason}")
+    if response is not None:
+        drawn["friction response"] = job.build_folder / "pictures" / "response.png"
+    report("writing the report")
+    write_report(basis, drawn, product, remarks, response)
+    store.note_product(product, inputs)
+    return product
+
+
+def _remarks(job: Job) -> list[str]:
+    remarks = [job.settings.note] if job.settings.note else []
+    try:
+        remarks += json.loads(store.sidecar_path(job.basis_file).read_text()).get("warnings", [])
+    except (OSError, ValueError):
+        pass
+    return remarks
+
+
+def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> tuple[Path, bool]:
+    """The whole chain of a body, and of the case of the same name if there is one.
+
+    Returns:
+        The report's path, and whether every point of the response converged.
+    """
+    modes_stage(job, force=force, report=report)
+    response, converged = None, True
+    if job.case_file is not None:
+        response, converged = response_stage(job.case_file, job.basis_file, job.build_folder, None, force, report)
+    return report_stage(job, response, force, report), converged
+
+
+def is_case(path: Path) -> bool:
+    """True for a case file (it names a body), False for a body file."""
+    return path.is_file() and path.suffix == ".toml" and "body" in load_toml(path)
+
+
+def find_body(case_path: Path, name: str, root: Path) -> Path:
+    """The body.toml a case refers to: beside the case, in geometry/<name>/, or a folder of that name.
+
+    Raises:
+        UserError: if there is none.
+    """
+    for place in (case_path.parent, root / "geometry" / name, root / name):
+        if (place / "body.toml").is_file() and load_toml(place / "body.toml").get("name") == name:
+            return place / "body.toml"
+    raise UserError(f"{case_path}: body: no body.toml of a body '{name}' is beside it or in {root / 'geometry' / name}")
+
+
+def basis_summary(basis: ModalBasis) -> list[str]:
+    """What a modal file holds, in lines for the terminal."""
+    extent = np.ptp(basis.mesh.points, axis=0) * 1e3
+    lines = [
+        f"{basis.name}: {basis.mesh.n_points} points, {basis.mesh.n_cells} cells, mass {basis.mass:.6g} kg, "
+        f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm, reduction {basis.reduction}",
+    ]
+    for (_, harmonic), g in sorted(basis.groups.items()):
+        state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
+        proof = "certified complete" if g.checks.get("certified") else "NOT certified"
+        lines.append(f"{state}, nodal diameter {harmonic}: {g.n_modes} modes, {proof}")
+        lines += [
+            f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
+            for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, g.kind, strict=True))
+        ]
+    return lines
