@@ -58,7 +58,7 @@ def read_mesh(path: Path | str, unit: str) -> Mesh:
     return _assemble_mesh(points, cells, _named_facets(raw), _named_points(raw), path)
 
 
-def _read_raw(path: Path):  # noqa: ANN202 - meshio's own class
+def _read_raw(path: Path):
     import meshio
 
     if not path.is_file():
@@ -82,12 +82,20 @@ def _volume_cells(raw) -> tuple[dict[str, Indices], set[str]]:  # noqa: ANN001
     return {t: np.concatenate(b) for t, b in cells.items() if sum(map(len, b))}, foreign
 
 
+def _cell_sets(raw) -> dict[str, list]:  # noqa: ANN001
+    """Set name -> chosen cells of each block. meshio leaves the groups of gmsh's format 2.2 as numbers of cells."""
+    sets = {str(k): v for k, v in (raw.cell_sets or {}).items() if not str(k).startswith("gmsh:")}
+    numbers = (raw.cell_data or {}).get("gmsh:physical")
+    for name, (number, dimension) in ((raw.field_data or {}).items() if numbers is not None else ()):
+        chosen = [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in zip(raw.cells, numbers, strict=True)]
+        sets.setdefault(str(name), chosen)
+    return sets
+
+
 def _named_facets(raw) -> dict[str, list[Indices]]:  # noqa: ANN001
     """Set name -> corner points of its facets, (f, 3) or (f, 4) per cell block."""
     named: dict[str, list[Indices]] = {}
-    for name, per_block in (raw.cell_sets or {}).items():
-        if name.startswith("gmsh:"):
-            continue
+    for name, per_block in _cell_sets(raw).items():
         for block, chosen in zip(raw.cells, per_block, strict=False):
             if block.type in FACET_CORNERS and chosen is not None and len(chosen):
                 facets = np.asarray(block.data, dtype=np.int64)[np.asarray(chosen, dtype=np.int64)]
@@ -97,9 +105,7 @@ def _named_facets(raw) -> dict[str, list[Indices]]:  # noqa: ANN001
 
 def _named_points(raw) -> dict[str, Indices]:  # noqa: ANN001
     named = {str(k): np.unique(np.asarray(v, dtype=np.int64)) for k, v in (raw.point_sets or {}).items()}
-    for name, per_block in (raw.cell_sets or {}).items():
-        if name.startswith("gmsh:"):
-            continue
+    for name, per_block in _cell_sets(raw).items():
         for block, chosen in zip(raw.cells, per_block, strict=False):
             if block.type in _IGNORED and chosen is not None and len(chosen):
                 found = np.unique(np.asarray(block.data)[np.asarray(chosen, dtype=np.int64)])
