@@ -7,9 +7,12 @@ everywhere). `DirectSolver.analyse` is done once per sparsity pattern and reused
 from __future__ import annotations
 
 import ctypes
+import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import scipy.linalg
@@ -18,6 +21,7 @@ import scipy.sparse.linalg as spla
 
 from .data import Array, NotConverged
 
+TOLERANCE = 1e-9
 MatVec = Callable[[Array], Array]
 
 
@@ -48,6 +52,10 @@ class Pardiso(DirectSolver):
     name = "pardiso"
 
     def __init__(self) -> None:
+        # PyPardiso looks for MKL by asking the compiler and walking the environment; the wheel's place is known.
+        found = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
+        if found:
+            os.environ.setdefault("PYPARDISO_MKL_RT", str(found[0]))
         import pypardiso
 
         self._mkl = pypardiso.PyPardisoSolver(mtype=-2)
@@ -211,7 +219,7 @@ class Pencil:
 
 
 def search(
-    pencil: Pencil, count: int, shift: float = 0.0, tolerance: float = 1e-10, rigid: Array | None = None
+    pencil: Pencil, count: int, shift: float = 0.0, tolerance: float = TOLERANCE, rigid: Array | None = None
 ) -> Spectrum:
     """At least the `count` lowest eigenpairs by shift-invert Lanczos, not yet certified.
 
@@ -220,7 +228,7 @@ def search(
 
     Args:
         pencil: K and M; M positive definite. shift: (rad/s)^2; 0 for a held body, negative for a free one.
-        tolerance: of ARPACK. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
+        tolerance: residual of (K - shift M)^-1 M over its eigenvalue. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
 
     Raises:
         NotConverged: Lanczos failed.
@@ -241,7 +249,7 @@ def search(
     return _finish(pencil, values[:keep], vectors[:, :keep], False, upper, 0, pencil.solves - before)
 
 
-def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: float = 1e-10) -> Spectrum:
+def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: float = TOLERANCE) -> Spectrum:
     """Count the eigenvalues below the upper end of the band (Sturm) and search again for any that are missing.
 
     Args:
@@ -284,8 +292,8 @@ def _count_below(pencil: Pencil, upper: float, values: Array) -> int:
 def _finish(
     pencil: Pencil, values: Array, vectors: Array, certified: bool, upper: float, refound: int, solves: int
 ) -> Spectrum:
-    vectors = _orthonormal(pencil, vectors)
-    KX, MX = pencil.K(vectors), pencil.M(vectors)
+    vectors, MX = _orthonormal(pencil, vectors)
+    KX = pencil.K(vectors)
     values = np.einsum("ij,ij->j", vectors, KX)
     size = np.abs(vectors).max(axis=0)
     residual = np.abs(KX - MX * values).max(axis=0)
@@ -295,11 +303,15 @@ def _finish(
     return Spectrum(values, vectors, certified, upper, refound, backward, worst, solves)
 
 
-def _orthonormal(pencil: Pencil, X: Array) -> Array:
-    """Symmetric (Loewdin) M-orthonormalisation: moves every vector as little as possible."""
-    gram = X.T @ pencil.M(X)
+def _orthonormal(pencil: Pencil, X: Array) -> tuple[Array, Array]:
+    """X and M X, made M-orthonormal symmetrically (Loewdin), which moves every vector as little as possible."""
+    MX = pencil.M(X)
+    gram = X.T @ MX
+    if np.abs(gram - np.eye(len(gram))).max(initial=0.0) < 1e-13:
+        return X, MX
     w, Q = np.linalg.eigh(0.5 * (gram + gram.T))
-    return X @ (Q / np.sqrt(w)) @ Q.T
+    root = (Q / np.sqrt(w)) @ Q.T
+    return X @ root, MX @ root
 
 
 def _gap(values: Array, count: int) -> tuple[int, float]:
@@ -312,19 +324,74 @@ def _gap(values: Array, count: int) -> tuple[int, float]:
 
 
 def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: Array) -> tuple[Array, Array]:
+    """The `count` eigenpairs nearest above `shift`, outside the span of `known`, ascending.
+
+    Block Lanczos on (K - shift M)^-1 M with full reorthogonalisation: a direct solver gives several right-hand
+    sides for little more than one, a block sees repeated eigenvalues, and the basis stays small because
+    shift-invert separates the wanted end. Where the basis would need too much memory ARPACK restarts instead.
+    """
+    if count >= pencil.n - 1 or pencil.n < 200:
+        return _dense(pencil, count, known)
+    block = min(4, count)
+    limit = int(min(pencil.n - known.shape[1], max(4 * count, count + 60)) // block)
+    if 2 * limit * block * pencil.n > 6e8 or limit < 2:
+        return _arpack(pencil, count, shift, tolerance, known)
+    M_known = pencil.M(known) if known.shape[1] else known
+    Q = np.empty((pencil.n, (limit + 1) * block), order="F")
+    MQ = np.empty_like(Q)
+    T = np.zeros((Q.shape[1], Q.shape[1]))
+    start = np.random.default_rng(2007 + known.shape[1]).standard_normal((pencil.n, block))
+    W = _away_from(known, M_known, pencil.solve(pencil.M(start)))
+    Q[:, :block], MQ[:, :block], _ = _mass_qr(W, pencil.M(W))
+    wanted = min(count, limit * block)
+    for step in range(limit):
+        done = (step + 1) * block
+        last, new = slice(done - block, done), slice(done, done + block)
+        W = _away_from(known, M_known, pencil.solve(MQ[:, last]))
+        h = MQ[:, :done].T @ W
+        W -= Q[:, :done] @ h
+        correction = MQ[:, :done].T @ W
+        W -= Q[:, :done] @ correction
+        T[:done, last] = h + correction
+        Q[:, new], MQ[:, new], R = _mass_qr(W, pencil.M(W))
+        T[new, last] = R
+        if done < wanted + block:
+            continue
+        theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].T))
+        theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
+        if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():
+            values = shift + 1 / theta
+            order = np.argsort(values, kind="stable")
+            return values[order], (Q[:, :done] @ S)[:, order]
+    return _arpack(pencil, count, shift, tolerance, known)
+
+
+def _away_from(known: Array, M_known: Array, X: Array) -> Array:
+    return X - known @ (M_known.T @ X) if known.shape[1] else X
+
+
+def _mass_qr(W: Array, MW: Array) -> tuple[Array, Array, Array]:
+    """W = Q R with Q^T M Q = 1 from W and M W, by Cholesky twice (the second pass cleans what the first leaves)."""
+    total = np.eye(W.shape[1])
+    for _ in range(2):
+        gram = W.T @ MW
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        gram = gram / np.outer(scale, scale)
+        R = scipy.linalg.cholesky(0.5 * (gram + gram.T) + 1e-15 * np.eye(len(gram))) * scale
+        inverse = scipy.linalg.solve_triangular(R, np.eye(len(R)))
+        W, MW, total = W @ inverse, MW @ inverse, R @ total
+    return W, MW, total
+
+
+def _arpack(pencil: Pencil, count: int, shift: float, tolerance: float, known: Array) -> tuple[Array, Array]:
     """ARPACK in shift-invert mode with a fixed start vector; the columns of `known` are projected out."""
     n = pencil.n
     M_known = pencil.M(known) if known.shape[1] else known
 
     def inverse(b: Array) -> Array:
         b = b.reshape(-1)
-        if not known.shape[1]:
-            return pencil.solve(b)
-        x = pencil.solve(b - M_known @ (known.T @ b))
-        return x - known @ (M_known.T @ x)
+        return _away_from(known, M_known, pencil.solve(b))
 
-    if count >= n - 1 or n < 200:
-        return _dense(pencil, count, known)
     start = inverse(pencil.M(np.random.default_rng(2007 + known.shape[1]).standard_normal(n)))
     try:
         values, vectors = spla.eigsh(

@@ -244,17 +244,36 @@ def _pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen.Pen
     def K_times(x: Array) -> Array:
         return K_upper @ x + K_upper.T @ x - (diagonal * x.T).T
 
-    def M_times(x: Array) -> Array:
-        whole = np.zeros((3 * n, *x.shape[1:]))
-        whole[free.free] = x
-        return (M_full @ whole.reshape(n, -1)).reshape(whole.shape)[free.free]
+    M_times = _mass_product(model)
 
     def shifted(s: float) -> sp.csr_matrix:
         return sp.csr_matrix((K_upper.data - s * M_upper.data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
 
-    k_norm = (abs(K_upper) @ np.ones(len(diagonal)) + abs(K_upper.T) @ np.ones(len(diagonal))).max()
-    m_norm = 2 * abs(M_upper).sum(axis=1).max()
-    return eigen.Pencil(shifted, K_times, M_times, len(diagonal), float(k_norm), float(m_norm), solver)
+    return eigen.Pencil(shifted, K_times, M_times, len(diagonal), _norm(K_upper), _norm(M_upper), solver)
+
+
+def _mass_product(model: BodyModel) -> Callable[[Array], Array]:
+    """Products of the mass matrix on the free degrees of freedom with (n_free,) or (n_free, r) arrays."""
+    free, n = model.free.free, model.d.mesh.n_points
+    M: sp.csr_matrix = model.M_full  # type: ignore[assignment]
+    nodes = np.unique(free // 3)
+    if len(free) == 3 * len(nodes):  # whole points are held or free: no scattering needed
+        M_nodes = M if len(nodes) == n else M[nodes][:, nodes]
+        return lambda x: (M_nodes @ x.reshape(len(nodes), -1)).reshape(x.shape)
+
+    def product(x: Array) -> Array:
+        whole = np.zeros((3 * n, *x.shape[1:]))
+        whole[free] = x
+        return (M @ whole.reshape(n, -1)).reshape(whole.shape)[free]
+
+    return product
+
+
+def _norm(upper: sp.csr_matrix) -> float:
+    """Infinity norm of the symmetric matrix with this upper triangle (its diagonal counted twice)."""
+    size = np.abs(upper.data)
+    columns = np.bincount(upper.indices, size, minlength=upper.shape[0])
+    return float((np.add.reduceat(size, upper.indptr[:-1]) + columns).max())
 
 
 def _group(
