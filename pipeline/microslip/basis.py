@@ -2,24 +2,24 @@
 
 The layout is documented in ``docs/modal_file.md``. Everything is SI. Datasets are named and their dimensions too
 (HDF5 dimension scales), so that xarray shows ``phi (node, axis, mode)``; MATLAB and Octave see them reversed.
-Same inputs give the same bytes: nothing volatile is written.
+Same inputs give the same bytes: nothing volatile is written. The last line of the file is a seal (`hdf5.seal`), by
+which damage is found before HDF5 meets it.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 
+from .basis_checks import INTERFACE_ROWS, TOLERANCES, Check, check_basis
 from .data import (
     VOIGT,
     Array,
     Compliance,
+    Indices,
     Interface,
     Mesh,
     ModalBasis,
@@ -28,18 +28,14 @@ from .data import (
     StressSet,
     UserError,
 )
+from .hdf5 import inspect, put, put_scale, seal, seal_state
 from .store import complete_or_absent
+from .topology import CELL_TYPES, FACET_CORNERS
+
+__all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 
 FORMAT = "microslip-modal-basis"
 FORMAT_VERSION = "0.1"
-
-TOLERANCES = {
-    "orthogonality": 1e-9,
-    "backward_error": 1e-9,
-    "mass_error": 1e-8,
-    "certified": 1.0,
-}
-"""Limits the solver's numbers are held to by `check_basis` (``certified`` must be 1)."""
 
 CONVENTIONS = {
     "time": "exp(+i Omega t)",
@@ -51,9 +47,22 @@ CONVENTIONS = {
     "voigt": " ".join(VOIGT),
     "shear": "engineering (gamma = 2 eps)",
     "interface_frame": "rows of rotation: n (outward normal of this body), t1, t2; right-handed",
-    "interface_rows": "u_n u_t1 u_t2 phi_n phi_t1 phi_t2 in the interface frame",
+    "interface_rows": " ".join(INTERFACE_ROWS) + " in the interface's own frame; rotations are small, from an "
+    "area-weighted fit that is work-conjugate with the six forces",
+    "nodal_diameter": "a sector's right-handed neighbour about the rotation axis moves as the sector itself times "
+    "exp(+i k 2 pi / N)",
     "dimensions": "C order; MATLAB and Octave see the dimensions reversed",
 }
+
+_FACET_NODES = {"triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
+_DAMAGE = (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
+    NotImplementedError,
+)  # fmt: skip
+"""What h5py and numpy raise on content that is not what it should be."""
+
+
+# writing ---------------------------------------------------------------------------------------------------------
 
 
 def write_basis(path: Path | str, basis: ModalBasis) -> None:
@@ -62,40 +71,21 @@ def write_basis(path: Path | str, basis: ModalBasis) -> None:
     Raises:
         UserError: no permission, no space.
     """
-    with complete_or_absent(path) as temporary, h5py.File(temporary, "w", libver=("earliest", "v110")) as file:
-        _write_root(file, basis)
-        _write_mesh(file, basis.mesh)
-        node = file["mesh/node"]
-        for (speed, harmonic), group in sorted(basis.groups.items()):
-            where = file.require_group(f"speed_{speed}")
-            where.attrs["rpm"] = group.speed * 30 / np.pi
-            where.attrs["omega"] = group.speed
-            _write_group(where.create_group(f"nd_{harmonic}"), group, node, basis.rotation_axis)
-        first = basis.groups[min(basis.groups)]
-        _write_frames(file, first)
+    with complete_or_absent(path) as temporary:
+        with h5py.File(temporary, "w", libver=("earliest", "v110")) as file:
+            _write(file, basis)
+        seal(temporary)
 
 
-def _put(group: h5py.Group, name: str, data: Any, unit: str = "", dims: tuple[str, ...] = ()) -> h5py.Dataset:
-    data = np.asarray(data)
-    if data.dtype.kind == "U":
-        data = np.char.encode(data, "utf-8") if data.size else data.astype("S1")
-    dataset = group.create_dataset(name, data=data, track_times=False)
-    if unit:
-        dataset.attrs["unit"] = unit
-    for i, label in enumerate(dims):
-        dataset.dims[i].label = label
-    return dataset
-
-
-def _scale(group: h5py.Group, name: str, data: Any) -> h5py.Dataset:
-    scale = _put(group, name, data)
-    scale.make_scale(name)
-    return scale
-
-
-def _attach(dataset: h5py.Dataset, scales: Mapping[int, h5py.Dataset]) -> None:
-    for axis, scale in scales.items():
-        dataset.dims[axis].attach_scale(scale)
+def _write(file: h5py.File, basis: ModalBasis) -> None:
+    _write_root(file, basis)
+    _write_mesh(file, basis.mesh)
+    _write_frames(file, basis.groups[min(basis.groups)])
+    for (speed, harmonic), group in sorted(basis.groups.items()):
+        where = file.require_group(f"speed_{speed}")
+        where.attrs["rpm"] = group.speed * 30 / np.pi
+        where.attrs["Omega"] = group.speed
+        _write_group(where.create_group(f"nd_{harmonic}"), group, basis.rotation_axis)
 
 
 def _write_root(file: h5py.File, basis: ModalBasis) -> None:
@@ -106,37 +96,57 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> None:
     file.attrs["frame"] = "A: right-handed body axes of the mesh; see body.toml for where origin and axes lie"
     file.attrs["conventions"] = json.dumps(CONVENTIONS)
     file.attrs["reduction"] = basis.reduction
-    file.attrs["free"] = basis.free
+    file.attrs["free"] = int(basis.free)
     file.attrs["damping_source"] = basis.damping_source
+    put_scale(file, "axis", np.array(["x", "y", "z"]))
+    put_scale(file, "component", np.array(VOIGT))
+    put_scale(file, "frame_axis", np.array(["n", "t1", "t2"]))
+    put_scale(file, "interface_row", np.array(INTERFACE_ROWS))
     provenance = file.create_group("provenance")
     for key, value in sorted(basis.provenance.items()):
-        provenance.attrs[key] = value
+        provenance.attrs[key] = value.replace("\0", "")
     body = file.create_group("body")
-    _put(body, "mass", basis.mass, "kg")
-    _put(body, "centre", basis.centre, "m")
-    _put(body, "inertia", basis.inertia, "kg m^2")
+    put(body, "mass", basis.mass, "kg")
+    put(body, "centre", basis.centre, "m", scales=[file["axis"]])
+    put(body, "inertia", basis.inertia, "kg m^2", ("axis", "axis_"))
     rotation = file.create_group("rotation")
-    _put(rotation, "axis", basis.rotation_axis, "1")
-    _put(rotation, "point", basis.rotation_point, "m")
+    put(rotation, "direction", basis.rotation_axis, "1", scales=[file["axis"]])
+    put(rotation, "point", basis.rotation_point, "m", scales=[file["axis"]])
+    cyclic = file.create_group("cyclic")
+    cyclic.attrs["N"] = 1
+    cyclic.attrs["sector_angle"] = 2 * np.pi
 
 
 def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
     group = file.create_group("mesh")
     ids = mesh.node_id if len(mesh.node_id) else np.arange(1, mesh.n_points + 1)
-    node = _scale(group, "node", ids)
-    _attach(_put(group, "xyz", mesh.points, "m", ("node", "axis")), {0: node})
+    node = put_scale(group, "node", ids)
+    file["node"] = node  # the same dataset again, where every group below finds it
+    put(group, "xyz", mesh.points, "m", scales=[node, file["axis"]])
     cells = group.create_group("cells")
     cells.attrs["order"] = "VTK node order, 0-based positions in /mesh/node"
     for cell_type, connectivity in sorted(mesh.cells.items()):
-        _put(cells, cell_type, connectivity, dims=("cell", "corner"))
-    faces = group.create_group("groups")
-    for name, blocks in sorted(mesh.faces.items()):
-        face = faces.create_group(name)
-        for facet_type, facets in sorted(blocks.items()):
-            _put(face, facet_type, facets, dims=("facet", "corner"))
-    sets = group.create_group("point_sets")
-    for name, chosen in sorted(mesh.point_sets.items()):
-        _put(sets, name, chosen)
+        put(cells, cell_type, connectivity, dims=("cell", "corner"))
+    groups = group.create_group("groups")
+    groups.attrs["order"] = "nodes: ids as in /mesh/node; facets: VTK node order, 0-based positions in /mesh/node"
+    for name in sorted({*mesh.faces, *mesh.point_sets}):
+        where = groups.create_group(_escaped(name))
+        where.attrs["point_set"] = int(name in mesh.point_sets)
+        chosen = mesh.point_sets[name] if name in mesh.point_sets else mesh.face_points(name)
+        put(where, "nodes", ids[chosen], dims=("member",))
+        for facet_type, facets in sorted(mesh.faces.get(name, {}).items()):
+            put(where, facet_type, facets, dims=("facet", "corner"))
+
+
+def _escaped(name: str) -> str:
+    """A set's name as one HDF5 link name: no slash, not empty, not a dot alone."""
+    text = name.replace("%", "%25").replace("/", "%2F").replace("\0", "%00")
+    return "%2E" if text == "." else text or "%"
+
+
+def _unescaped(name: str) -> str:
+    text = name.replace("%2E", ".").replace("%2F", "/").replace("%00", "\0").replace("%25", "%")
+    return "" if name == "%" else text
 
 
 def _write_frames(file: h5py.File, group: ModalGroup) -> None:
@@ -145,98 +155,113 @@ def _write_frames(file: h5py.File, group: ModalGroup) -> None:
     where.attrs["order"] = json.dumps(list(group.interfaces))
     for name, item in group.interfaces.items():
         face = where.create_group(name)
-        face.attrs["role"], face.attrs["partner"], face.attrs["sector_shift"] = item.role, item.partner, item.sector_shift
-        _put(face, "origin", item.origin, "m")
-        _put(face, "rotation", item.rotation, "1", ("n_t1_t2", "axis"))
+        for key in ("role", "partner", "sector_shift"):
+            face.attrs[key] = getattr(item, key)
+        put(face, "origin", item.origin, "m", scales=[file["axis"]])
+        put(face, "rotation", item.rotation, "1", scales=[file["frame_axis"], file["axis"]])
         patch = face.create_group("patch")
-        _put(patch, "points", item.points, "m", ("point", "axis"))
-        _put(patch, "areas", item.areas, "m^2", ("point",))
-        _put(patch, "normals", item.normals, "1", ("point", "axis"))
+        point = put_scale(patch, "point", np.arange(1, len(item.points) + 1))
+        put(patch, "points", item.points, "m", scales=[point, file["axis"]])
+        put(patch, "areas", item.areas, "m^2", scales=[point])
+        put(patch, "normals", item.normals, "1", scales=[point, file["axis"]])
 
 
-def _write_group(group: h5py.Group, g: ModalGroup, node: h5py.Dataset, axis: Array) -> None:
+def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
+    file = group.file
     modes = group.create_group("modes")
-    mode = _scale(modes, "mode", np.arange(1, g.n_modes + 1))
+    mode = put_scale(modes, "mode", np.arange(1, g.n_modes + 1))
+    column = put_scale(modes, "mode_column", np.arange(1, g.n_modes + 1))
+    group["mode"] = mode
     for name, data, unit in (
         ("omega", g.omega, "rad/s"),
         ("frequency", g.frequency, "Hz"),
         ("damping_ratio", g.damping_ratio, "1"),
         ("kind", np.array(g.kind, dtype="U"), ""),
     ):
-        _attach(_put(modes, name, data, unit, ("mode",)), {0: mode})
-    for name in ("M_r", "K_r", "C_r", "G_r"):
-        _put(modes, name, getattr(g, name), dims=("mode", "mode_"))
+        put(modes, name, data, unit, scales=[mode])
+    for name, unit in (("M_r", "1"), ("K_r", "s^-2"), ("C_r", "s^-1"), ("G_r", "s^-1")):
+        put(modes, name, getattr(g, name), unit, scales=[mode, column])
     if g.phi.shape[0]:
-        _attach(_put(modes, "phi", g.phi, "kg^-1/2", ("node", "axis", "mode")), {0: node, 2: mode})
-    group.attrs["harmonic"] = g.harmonic
+        put(modes, "phi", g.phi, "kg^-1/2", scales=[file["node"], file["axis"], mode])
+    cyclic = group.create_group("cyclic")
+    cyclic.attrs["N"], cyclic.attrs["harmonic"], cyclic.attrs["real"] = 1, g.harmonic, 1
     _write_rows(group, g, mode)
-    row = _scale(group, "compliance_row", np.array(g.compliance.labels, dtype="U"))
+    labels = np.array(g.compliance.labels, dtype="U")
+    row, col = (put_scale(group, f"compliance_{k}", labels) for k in ("row", "column"))
     for name, matrix in (("compliance_static", g.compliance.static), ("compliance_modal", g.compliance.modal)):
-        where = _put(group, name, matrix, "displacement of the row per unit force of the column, SI", ("row", "column"))
-        _attach(where, {0: row, 1: row})
-    group["compliance_static"].attrs["inertia_relief"] = g.compliance.inertia_relief
+        put(group, name, matrix, "displacement of the row per unit force of the column, SI", scales=[row, col])
+    group["compliance_static"].attrs["inertia_relief"] = int(g.compliance.inertia_relief)
     for name, s in sorted(g.stresses.items()):
         _write_stress(group, name, s, mode)
-    _write_state(group, g, node, axis)
+    _write_state(group, g, axis)
     checks = group.create_group("checks")
     for name, value in sorted(g.checks.items()):
-        _put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
+        put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
 
 
 _ROW_FIELDS = {"excitation": "excitations", "monitor": "monitors", "gauge": "gauges"}
 
 
 def _write_rows(group: h5py.Group, g: ModalGroup, mode: h5py.Dataset) -> None:
+    file = group.file
     interfaces = group.create_group("interfaces")
     for name, item in g.interfaces.items():
         face = interfaces.create_group(name)
-        rows = _put(face, "T", item.rows, "kg^-1/2; last three m^-1 kg^-1/2", ("row", "mode"))
-        _attach(rows, {1: mode})
-        _attach(_put(face, "fit_residual", item.fit_residual, "1", ("mode",)), {0: mode})
+        put(face, "T", item.rows, "kg^-1/2; last three m^-1 kg^-1/2", scales=[file["interface_row"], mode])
+        put(face, "fit_residual", item.fit_residual, "1", scales=[mode])
         if item.shapes.shape[0]:
-            _attach(_put(face, "shapes", item.shapes, "kg^-1/2", ("point", "axis", "mode")), {2: mode})
-    for kind in ("excitation", "monitor", "gauge"):
+            patch = face.create_group("patch")
+            patch["point"] = file[f"interfaces/{name}/patch/point"]
+            put(patch, "shapes", item.shapes, "kg^-1/2", scales=[patch["point"], file["axis"], mode])
+    for kind, field in _ROW_FIELDS.items():
         where = group.create_group(kind)
-        where.attrs["order"] = json.dumps(list(getattr(g, _ROW_FIELDS[kind])))
-        for name, rows_ in getattr(g, _ROW_FIELDS[kind]).items():
+        where.attrs["order"] = json.dumps(list(getattr(g, field)))
+        for name, rows in getattr(g, field).items():
             item = where.create_group(name)
-            item.attrs["unit"] = rows_.unit
-            item.attrs["distance"] = rows_.distance
-            _put(item, "labels", np.array(rows_.labels, dtype="U"))
-            _put(item, "point", rows_.point, "m")
-            _put(item, "static", rows_.static)
-            _attach(_put(item, "T", rows_.rows, "", ("row", "mode")), {1: mode})
+            item.attrs["unit"] = rows.unit
+            item.attrs["distance"] = rows.distance
+            row = put_scale(item, "row", np.array(rows.labels, dtype="U"))
+            put(item, "point", rows.point, "m", scales=[file["axis"]])
+            put(item, "static", rows.static, rows.unit, scales=[row])
+            put(item, "T", rows.rows, scales=[row, mode])
 
 
-def _write_state(group: h5py.Group, g: ModalGroup, node: h5py.Dataset, axis: Array) -> None:
+def _write_state(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     """Rotation and the static state the modes are taken about."""
+    file = group.file
     where = group.create_group("rotation")
-    where.attrs["omega"] = g.speed * axis
+    where.attrs["Omega"] = g.speed * axis
     where.attrs["prestress"] = g.prestress
-    where.attrs["stress_stiffening"] = g.prestress in ("linear", "nonlinear")
-    where.attrs["spin_softening_in_K"] = g.spin_softening
-    where.attrs["gyroscopic_in_G_r"] = True
-    _attach(_put(where, "u_static", g.u_static, "m", ("node", "axis")), {0: node})
+    where.attrs["stress_stiffening"] = int(g.prestress in ("linear", "nonlinear"))
+    where.attrs["spin_softening"] = int(g.spin_softening)
+    where.attrs["gyroscopic"] = 0
+    where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r"
+    put(where, "u_static", g.u_static, "m", scales=[file["node"], file["axis"]])
     for name, s in sorted(g.stresses.items()):
-        _put(where.require_group("sigma_static"), name, s.static_stress, "Pa", ("place", "component"))
+        put(where.require_group("sigma_static"), name, s.static_stress, "Pa", ("place", "component"))
 
 
 def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset) -> None:
+    file = group.file
     stress, strain = (group.require_group(kind).create_group(name) for kind in ("stress", "strain"))
     for where in (stress, strain):
         where.attrs["location"] = s.location
         where.attrs["order"] = " ".join(VOIGT)
     strain.attrs["shear"] = "engineering"
-    _put(stress, "points", s.points, "m", ("place", "axis"))
-    _put(stress, "weights", s.weights, "m^3", ("place",))
-    for shared in ("points", "weights"):
+    place = put_scale(stress, "place", np.arange(1, len(s.points) + 1))
+    put(stress, "points", s.points, "m", scales=[place, file["axis"]])
+    put(stress, "weights", s.weights, "m^3", scales=[place])
+    for shared in ("place", "points", "weights"):
         strain[shared] = stress[shared]
-    _attach(_put(strain, "T", s.strain, "m^-1 kg^-1/2", ("place", "component", "mode")), {2: mode})
-    _attach(_put(stress, "T", s.stress, "Pa m^-1 kg^-1/2", ("place", "component", "mode")), {2: mode})
+    put(strain, "T", s.strain, "m^-1 kg^-1/2", scales=[place, file["component"], mode])
+    put(stress, "T", s.stress, "Pa m^-1 kg^-1/2", scales=[place, file["component"], mode])
+
+
+# reading ---------------------------------------------------------------------------------------------------------
 
 
 def open_file(path: Path | str) -> h5py.File:
-    """Open a modal file for reading after looking at its format.
+    """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
     Raises:
         UserError: missing, damaged, foreign or of another major version.
@@ -245,21 +270,37 @@ def open_file(path: Path | str) -> h5py.File:
     if not path.is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
     try:
+        if seal_state(path) == "broken":
+            raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); write it again")
         file = h5py.File(path, "r")
-        form, version = file.attrs.get("format"), file.attrs.get("format_version")
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except _DAMAGE as error:
         raise UserError(f"{path}: is damaged or no HDF5 file ({_short(error)}); write it again") from error
-    if form != FORMAT:
+    try:
+        _accept(file, path)
+    except BaseException:
         file.close()
-        raise UserError(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
-    if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-        file.close()
-        raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
+        raise
     return file
 
 
+def _accept(file: h5py.File, path: Path) -> None:
+    try:
+        form, version = file.attrs.get("format"), file.attrs.get("format_version")
+        known = form == FORMAT
+    except _DAMAGE as error:
+        raise UserError(f"{path}: is damaged ({_short(error)}); write it again") from error
+    if not known:
+        raise UserError(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+    if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
+        raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
+    try:
+        inspect(file)
+    except (*_DAMAGE, RecursionError) as error:
+        raise UserError(f"{path}: is damaged or no modal file ({_short(error)}); write it again") from error
+
+
 def _short(error: BaseException) -> str:
-    return (str(error).splitlines() or ["unreadable"])[0][:120]
+    return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
 
 
 def read_basis(path: Path | str) -> ModalBasis:
@@ -271,23 +312,58 @@ def read_basis(path: Path | str) -> ModalBasis:
     with open_file(path) as file:
         try:
             basis = _read(file)
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, UnicodeDecodeError) as error:
+        except (*_DAMAGE, RecursionError) as error:
             raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); write it again") from error
     return basis
 
 
-def _texts(dataset: h5py.Dataset) -> tuple[str, ...]:
-    return tuple(v.decode() for v in np.asarray(dataset).ravel())
+def _array(group: h5py.Group, name: str, *shape: int | None) -> Array:
+    """Numbers of the given shape (None: any length).
+
+    Raises:
+        ValueError: another shape or type.
+    """
+    dataset = group[name]
+    found = getattr(dataset, "shape", None)
+    if found is None or len(found) != len(shape) or any(b not in (None, a) for a, b in zip(found, shape, strict=True)):
+        wanted = " x ".join("any" if n is None else str(n) for n in shape) or "one number"
+        raise ValueError(f"{group.name}/{name} has shape {found}, expected {wanted}")
+    if dataset.dtype.kind != "f":
+        raise ValueError(f"{group.name}/{name} does not hold floating-point numbers")
+    return np.asarray(dataset[()], dtype=np.float64)
+
+
+def _indices(group: h5py.Group, name: str, columns: int | None, limit: int) -> Indices:
+    """Positions below `limit`: (any, columns), or (any,) without columns."""
+    dataset = group[name]
+    shape = getattr(dataset, "shape", ())
+    if dataset.dtype.kind not in "iu" or shape[1:] != (() if columns is None else (columns,)) or not shape:
+        raise ValueError(f"{group.name}/{name} holds no table of {columns or 1} whole numbers")
+    values = np.asarray(dataset[()]).astype(np.int64)
+    if values.size and (values.min() < 0 or values.max() >= limit):
+        raise ValueError(f"{group.name}/{name} refers to nodes that do not exist")
+    return values
+
+
+def _texts(group: h5py.Group, name: str, count: int | None = None) -> tuple[str, ...]:
+    values = tuple(v.decode() for v in np.asarray(group[name]).ravel())
+    if count is not None and len(values) != count:
+        raise ValueError(f"{group.name}/{name} has {len(values)} entries, expected {count}")
+    return values
+
+
+def _names(group: h5py.Group) -> list[str]:
+    """The names of a group's members in their order of precedence."""
+    names = json.loads(str(group.attrs["order"]))
+    if not isinstance(names, list) or sorted(map(str, names)) != sorted(group):
+        raise ValueError(f"{group.name}: its attribute 'order' does not list its members")
+    return names
 
 
 def _read(file: h5py.File) -> ModalBasis:
-    mesh = Mesh(
-        points=file["mesh/xyz"][:],
-        cells={k: v[:].astype(np.int64) for k, v in file["mesh/cells"].items()},
-        faces={n: {t: f[:].astype(np.int64) for t, f in g.items()} for n, g in file["mesh/groups"].items()},
-        point_sets={n: s[:].astype(np.int64) for n, s in file["mesh/point_sets"].items()},
-        node_id=file["mesh/node"][:].astype(np.int64),
-    )
+    if int(file["cyclic"].attrs["N"]) != 1:
+        raise ValueError("it holds a cyclic sector, which this version does not read")
+    mesh = _read_mesh(file["mesh"])
     groups = {}
     for name, where in file.items():
         if name.startswith("speed_"):
@@ -298,158 +374,99 @@ def _read(file: h5py.File) -> ModalBasis:
     if not groups:
         raise ValueError("no speed group")
     return ModalBasis(
-        name=str(file.attrs["name"]), mesh=mesh, groups=groups, mass=float(file["body/mass"][()]),
-        centre=file["body/centre"][:], inertia=file["body/inertia"][:], rotation_axis=file["rotation/axis"][:],
-        rotation_point=file["rotation/point"][:], damping_source=str(file.attrs["damping_source"]),
+        name=str(file.attrs["name"]), mesh=mesh, groups=groups, mass=float(_array(file, "body/mass")),
+        centre=_array(file, "body/centre", 3), inertia=_array(file, "body/inertia", 3, 3),
+        rotation_axis=_array(file, "rotation/direction", 3), rotation_point=_array(file, "rotation/point", 3),
+        damping_source=str(file.attrs["damping_source"]),
         free=bool(file.attrs["free"]), reduction=str(file.attrs["reduction"]),
         provenance={k: str(v) for k, v in file["provenance"].attrs.items()},
     )  # fmt: skip
 
 
+def _read_mesh(group: h5py.Group) -> Mesh:
+    points = _array(group, "xyz", None, 3)
+    n = len(points)
+    node_id = _indices(group, "node", None, np.iinfo(np.int64).max)
+    if len(np.unique(node_id)) != n or len(node_id) != n:
+        raise ValueError("/mesh/node does not number the points of /mesh/xyz, each once")
+    known = {t: len(kind.reference) for t, kind in CELL_TYPES.items()}
+    cells = {t: _indices(group["cells"], t, known[t], n) for t in group["cells"]}
+    faces, point_sets = {}, {}
+    position = np.argsort(node_id)
+    for link, where in group["groups"].items():
+        name = _unescaped(link)
+        nodes = _indices(where, "nodes", None, np.iinfo(np.int64).max)
+        at = np.searchsorted(node_id, nodes, sorter=position)
+        if len(nodes) and (at.max() >= n or (node_id[position[at]] != nodes).any()):
+            raise ValueError(f"{where.name}/nodes names nodes that are not in /mesh/node")
+        if where.attrs["point_set"]:
+            point_sets[name] = position[at]
+        if blocks := {t: _indices(where, t, _FACET_NODES[t], n) for t in where if t in FACET_CORNERS}:
+            faces[name] = blocks
+    return Mesh(points, cells, faces, point_sets, node_id)
+
+
 def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mesh) -> ModalGroup:
     modes = group["modes"]
-    omega = modes["omega"][:]
-    m = len(omega)
+    omega = _array(modes, "omega", None)
+    m, n = len(omega), mesh.n_points
+    if not np.allclose(_array(modes, "frequency", m) * 2 * np.pi, omega, rtol=1e-12, atol=0, equal_nan=True):
+        raise ValueError(f"{modes.name}/frequency is not omega / (2 pi)")
     state = group["rotation"]
-    static = group["compliance_static"]
+    labels = _texts(group, "compliance_row")
+    r = len(labels)
     return ModalGroup(
-        speed=float(where.attrs["omega"]), omega=omega, kind=_texts(modes["kind"]),
-        damping_ratio=modes["damping_ratio"][:], M_r=modes["M_r"][:], K_r=modes["K_r"][:], C_r=modes["C_r"][:],
-        G_r=modes["G_r"][:], phi=modes["phi"][:] if "phi" in modes else np.zeros((0, 3, m)),
+        speed=float(where.attrs["Omega"]), omega=omega, kind=_texts(modes, "kind", m),
+        damping_ratio=_array(modes, "damping_ratio", m), M_r=_array(modes, "M_r", m, m), K_r=_array(modes, "K_r", m, m),
+        C_r=_array(modes, "C_r", m, m), G_r=_array(modes, "G_r", m, m),
+        phi=_array(modes, "phi", n, 3, m) if "phi" in modes else np.zeros((0, 3, m)),
         interfaces={
-            n: _read_interface(file[f"interfaces/{n}"], group[f"interfaces/{n}"], m)
-            for n in json.loads(str(file["interfaces"].attrs["order"]))
+            name: _read_interface(file["interfaces"][name], group["interfaces"][name], m)
+            for name in _names(file["interfaces"])
         },
-        excitations=_read_rows(group["excitation"]), monitors=_read_rows(group["monitor"]),
-        gauges=_read_rows(group["gauge"]),
+        excitations=_read_rows(group["excitation"], m), monitors=_read_rows(group["monitor"], m),
+        gauges=_read_rows(group["gauge"], m),
         compliance=Compliance(
-            _texts(group["compliance_row"]), static[:], group["compliance_modal"][:], bool(static.attrs["inertia_relief"]),
+            labels, _array(group, "compliance_static", r, r), _array(group, "compliance_modal", r, r),
+            bool(group["compliance_static"].attrs["inertia_relief"]),
         ),
-        stresses={n: _read_stress(group, n) for n in group["stress"]} if "stress" in group else {},
-        u_static=state["u_static"][:], checks={k: float(v[()]) for k, v in group["checks"].items()},
-        prestress=str(state.attrs["prestress"]), harmonic=int(group.attrs["harmonic"]),
-        spin_softening=bool(state.attrs["spin_softening_in_K"]),
+        stresses={name: _read_stress(group, name, m) for name in group["stress"]} if "stress" in group else {},
+        u_static=_array(state, "u_static", n, 3),
+        checks={name: float(_array(group["checks"], name)) for name in group["checks"]},
+        prestress=str(state.attrs["prestress"]), harmonic=int(group["cyclic"].attrs["harmonic"]),
+        spin_softening=bool(state.attrs["spin_softening"]),
     )  # fmt: skip
 
 
 def _read_interface(frame: h5py.Group, group: h5py.Group, m: int) -> Interface:
+    p = len(frame["patch/areas"])
     return Interface(
-        frame["origin"][:], frame["rotation"][:], group["T"][:], group["fit_residual"][:], frame["patch/points"][:],
-        frame["patch/areas"][:], frame["patch/normals"][:],
-        group["shapes"][:] if "shapes" in group else np.zeros((0, 3, m)),
+        _array(frame, "origin", 3), _array(frame, "rotation", 3, 3), _array(group, "T", 6, m),
+        _array(group, "fit_residual", m), _array(frame, "patch/points", p, 3), _array(frame, "patch/areas", p),
+        _array(frame, "patch/normals", p, 3),
+        _array(group, "patch/shapes", p, 3, m) if "patch/shapes" in group else np.zeros((0, 3, m)),
         str(frame.attrs["role"]), str(frame.attrs["partner"]), int(frame.attrs["sector_shift"]),
     )  # fmt: skip
 
 
-def _read_rows(where: h5py.Group) -> dict[str, Rows]:
-    return {
-        name: Rows(
-            g["T"][:], _texts(g["labels"]), str(g.attrs["unit"]), g["point"][:], float(g.attrs["distance"]),
-            g["static"][:],
-        )
-        for name in json.loads(str(where.attrs["order"]))
-        for g in (where[name],)
-    }  # fmt: skip
-
-
-def _read_stress(group: h5py.Group, name: str) -> StressSet:
-    stress, strain = group[f"stress/{name}"], group[f"strain/{name}"]
-    static = group[f"rotation/sigma_static/{name}"][:]
-    return StressSet(
-        str(stress.attrs["location"]), stress["points"][:], strain["T"][:], stress["T"][:], static, stress["weights"][:]
-    )
-
-
-@dataclass(frozen=True)
-class Check:
-    """One finding of `check_basis`."""
-
-    name: str
-    value: float
-    limit: float
-    passed: bool
-    remark: str = ""
-
-
-def check_basis(basis: ModalBasis) -> list[Check]:
-    """Verify what a modal file claims from its own content, and the numbers stored by the solver.
-
-    Without the full matrices M and K this covers: shapes and sizes; finite numbers; ascending frequencies;
-    M_r = 1 and K_r = diag(omega^2) for normal modes; skew G_r; interface rows reproduce the patch's shapes; patch
-    areas; orthonormal right-handed frames; modal compliance against the rows; static not below modal compliance;
-    the solver's certificate, orthogonality and backward error.
-    """
-    out: list[Check] = []
-
-    def limit(name: str, value: float, bound: float, remark: str = "") -> None:
-        out.append(Check(name, float(value), bound, bool(value <= bound), remark))
-
-    total = sum(len(c) for c in basis.mesh.cells.values())
-    limit("mesh: cells", 0.0 if total else 1.0, 0.0, f"{total} cells")
-    highest = max((int(c.max()) for c in basis.mesh.cells.values() if c.size), default=-1)
-    limit("mesh: cells refer to points", float(highest), basis.mesh.n_points - 1)
-    for (speed, harmonic), g in sorted(basis.groups.items()):
-        where = f"speed_{speed}/nd_{harmonic}"
-        for name, value, bound, remark in _group_checks(basis, g):
-            limit(f"{where}: {name}", value, bound, remark)
+def _read_rows(where: h5py.Group, m: int) -> dict[str, Rows]:
+    out = {}
+    for name in _names(where):
+        item = where[name]
+        labels = _texts(item, "row")
+        r = len(labels)
+        out[name] = Rows(
+            _array(item, "T", r, m), labels, str(item.attrs["unit"]), _array(item, "point", 3),
+            float(item.attrs["distance"]), _array(item, "static", r),
+        )  # fmt: skip
     return out
 
 
-def _group_checks(basis: ModalBasis, g: ModalGroup) -> list[tuple[str, float, float, str]]:
-    m = g.n_modes
-    found: list[tuple[str, float, float, str]] = []
-    shapes_ok = all(
-        a.shape == (m, m) for a in (g.M_r, g.K_r, g.C_r, g.G_r)
-    ) and len(g.kind) == len(g.damping_ratio) == m and g.phi.shape[0] in (0, basis.mesh.n_points)
-    shapes_ok = shapes_ok and all(i.rows.shape == (6, m) for i in g.interfaces.values())
-    shapes_ok = shapes_ok and all(r.rows.shape[1] == m for k in (g.excitations, g.monitors, g.gauges) for r in k.values())
-    found.append(("shapes of the arrays agree", 0.0 if shapes_ok else 1.0, 0.0, ""))
-    if not shapes_ok:
-        return found
-    numbers = [g.omega, g.M_r, g.K_r, g.C_r, g.G_r, g.phi, g.u_static, g.compliance.static, g.compliance.modal]
-    numbers += [i.rows for i in g.interfaces.values()] + [s.stress for s in g.stresses.values()]
-    found.append(("every number is finite", float(sum((~np.isfinite(a)).sum() for a in numbers)), 0.0, ""))
-    found.append(("frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * float(g.omega.max(initial=1.0)), ""))
-    normal = all(k in ("rigid", "normal") for k in g.kind)
-    scale = max(float((g.omega**2).max(initial=0.0)), 1.0)
-    if normal:
-        found.append(("M_r is the identity", float(np.abs(g.M_r - np.eye(m)).max(initial=0.0)), 1e-9, ""))
-        found.append(("K_r is diag(omega^2)", float(np.abs(g.K_r - np.diag(g.omega**2)).max(initial=0.0)) / scale, 1e-9, ""))
-    found.append(("G_r is skew", float(np.abs(g.G_r + g.G_r.T).max(initial=0.0)), 1e-9 * max(float(np.abs(g.G_r).max(initial=0.0)), 1e-12), ""))
-    for name, item in g.interfaces.items():
-        R = item.rotation
-        found.append((f"interface {name}: frame is right-handed", float(np.abs(R @ R.T - np.eye(3)).max() + abs(np.linalg.det(R) - 1)), 1e-9, ""))
-        if item.shapes.shape[0]:
-            mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()
-            error = np.abs(mean - item.rows[:3]).max() / max(np.abs(item.rows[:3]).max(), 1e-300)
-            found.append((f"interface {name}: rows agree with the patch's shapes", float(error), 1e-9, ""))
-    T = _all_rows(g)
-    if T.shape[0] and T.shape[0] == len(g.compliance.labels) and normal:
-        elastic = g.omega > 0
-        modal = (T[:, elastic] / g.omega[elastic] ** 2) @ T[:, elastic].T
-        top = max(float(np.abs(modal).max()), 1e-300)
-        found.append(("modal compliance follows from the rows", float(np.abs(modal - g.compliance.modal).max()) / top, 1e-9, ""))
-    if len(g.compliance.labels) and normal:
-        d = np.sqrt(np.maximum(np.diag(g.compliance.static), 1e-300))
-        worst = float(np.linalg.eigvalsh(g.compliance.residual / np.outer(d, d)).min())
-        found.append(("static compliance is not below its modal part", max(-worst, 0.0), 1e-6, ""))
-    for key in ("orthogonality", "backward_error", "mass_error"):
-        if key in g.checks:
-            found.append((f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""))
-    if "certified" in g.checks:
-        remark = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
-        found.append(("solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, remark))
-    return found
-
-
-def _all_rows(g: ModalGroup) -> Array:
-    """Rows in the order of the compliance labels, as far as they are stored."""
-    parts = []
-    for label in g.compliance.labels:
-        kind, name, row = label.split(":", 2)
-        if kind == "interface":
-            parts.append(g.interfaces[name].rows[["u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2"].index(row)])
-        else:
-            rows = (g.excitations if kind == "excitation" else g.monitors)[name]
-            parts.append(rows.rows[rows.labels.index(row)])
-    return np.array(parts).reshape(len(parts), g.n_modes)
+def _read_stress(group: h5py.Group, name: str, m: int) -> StressSet:
+    stress, strain = group[f"stress/{name}"], group[f"strain/{name}"]
+    s = len(stress["weights"])
+    return StressSet(
+        str(stress.attrs["location"]), _array(stress, "points", s, 3), _array(strain, "T", s, 6, m),
+        _array(stress, "T", s, 6, m), _array(group, f"rotation/sigma_static/{name}", s, 6),
+        _array(stress, "weights", s),
+    )  # fmt: skip

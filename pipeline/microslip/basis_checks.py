@@ -1,0 +1,218 @@
+"""What a modal file claims, verified from its own content: `check_basis`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .data import Array, Interface, ModalBasis, ModalGroup, Rows
+from .integrate import face_mean, modal_mass
+
+TOLERANCES = {
+    "orthogonality": 1e-9,
+    "backward_error": 1e-9,
+    "mass_error": 1e-8,
+    "certified": 1.0,
+}
+"""Limits the solver's numbers are held to by `check_basis` (``certified`` must be 1)."""
+
+INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding of `check_basis`."""
+
+    name: str
+    value: float
+    limit: float
+    passed: bool
+    remark: str = ""
+
+
+def check_basis(basis: ModalBasis) -> list[Check]:
+    """Verify what a modal file claims from its own content, and the numbers stored by the solver.
+
+    Without the full K this covers: shapes and sizes; finite numbers; the mesh's volume, mass-orthogonality of the
+    shapes recomputed from the mesh (a file whose shapes stand in another node order fails here); ascending
+    frequencies; M_r = 1 and K_r = diag(omega^2) for normal modes; C_r; skew G_r; orthonormal right-handed frames;
+    interface rows against the patch's shapes and against phi; modal compliance against the rows; static not below
+    modal compliance; the solver's certificate, orthogonality and backward error.
+    """
+    out: list[Check] = []
+    for name, value, bound, remark in _mesh_checks(basis):
+        out.append(Check(name, value, bound, bool(value <= bound), remark))
+    sound = all(c.passed for c in out)
+    for (speed, harmonic), g in sorted(basis.groups.items()):
+        where = f"speed_{speed}/nd_{harmonic}"
+        for name, value, bound, remark in _group_checks(basis, g, sound):
+            out.append(Check(f"{where}: {name}", value, bound, bool(value <= bound), remark))
+    return out
+
+
+_Findings = list[tuple[str, float, float, str]]
+
+
+def _mesh_checks(basis: ModalBasis) -> _Findings:
+    mesh = basis.mesh
+    found: _Findings = [("mesh: cells", 0.0 if mesh.n_cells else 1.0, 0.0, f"{mesh.n_cells} cells")]
+    tables = [*mesh.cells.values(), *(f for blocks in mesh.faces.values() for f in blocks.values())]
+    highest = max((int(c.max()) for c in tables if c.size), default=-1)
+    lowest = min((int(c.min()) for c in tables if c.size), default=0)
+    found.append(("mesh: cells refer to points", float(highest if lowest >= 0 else np.inf), mesh.n_points - 1, ""))
+    numbers = (mesh.points, basis.mass, basis.centre, basis.inertia, basis.rotation_axis, basis.rotation_point)
+    found.append(("body: every number is finite", _not_finite(numbers), 0.0, ""))
+    found.append(("body: mass is positive", max(-basis.mass, 0.0) if basis.mass else 1.0, 0.0, f"{basis.mass:.6g} kg"))
+    found.append(("rotation axis has unit length", abs(float(np.linalg.norm(basis.rotation_axis)) - 1), 1e-9, ""))
+    return found
+
+
+def _not_finite(arrays: Iterable[Any]) -> float:
+    return float(sum(int((~np.isfinite(a)).sum()) for a in arrays))
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Findings:
+    fits = _shapes_agree(basis, g)
+    found: _Findings = [("shapes of the arrays agree", 0.0 if fits else 1.0, 0.0, "")]
+    if not fits:
+        return found
+    found.append(("every number is finite", _not_finite(_numbers(g)), 0.0, ""))
+    if found[-1][1]:
+        return found
+    normal = all(k in ("rigid", "normal") for k in g.kind)
+    found += _matrix_checks(g, normal)
+    if mesh_is_sound and normal and g.phi.shape[0]:
+        found += _shape_checks(basis, g)
+    for name, item in g.interfaces.items():
+        found += _interface_checks(basis, g, name, item, mesh_is_sound)
+    if normal:
+        found += _compliance_checks(g)
+    for key in ("orthogonality", "backward_error", "mass_error"):
+        if key in g.checks:
+            found.append((f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""))
+    if "certified" in g.checks:
+        remark = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
+        found.append(("solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, remark))
+    return found
+
+
+def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
+    m, n, r = g.n_modes, basis.mesh.n_points, len(g.compliance.labels)
+    wanted: list[tuple[Array, tuple[int, ...]]] = [(a, (m, m)) for a in (g.M_r, g.K_r, g.C_r, g.G_r)]
+    wanted += [(g.damping_ratio, (m,)), (g.u_static, (n, 3)), (g.phi, (n if g.phi.shape[0] else 0, 3, m))]
+    wanted += [(a, (r, r)) for a in (g.compliance.static, g.compliance.modal)]
+    for i in g.interfaces.values():
+        p = len(i.areas)
+        wanted += [(i.rows, (6, m)), (i.fit_residual, (m,)), (i.rotation, (3, 3)), (i.origin, (3,))]
+        wanted += [(i.areas, (p,)), (i.points, (p, 3)), (i.normals, (p, 3))]
+        wanted += [(i.shapes, (p if i.shapes.shape[0] else 0, 3, m))]
+    for rows in _every_row(g):
+        wanted += [(rows.rows, (len(rows.labels), m)), (rows.static, (len(rows.labels),)), (rows.point, (3,))]
+    for s in g.stresses.values():
+        k = len(s.weights)
+        wanted += [(s.strain, (k, 6, m)), (s.stress, (k, 6, m)), (s.static_stress, (k, 6)), (s.points, (k, 3))]
+    return len(g.kind) == m and all(a.shape == shape for a, shape in wanted)
+
+
+def _every_row(g: ModalGroup) -> list[Rows]:
+    return [rows for named in (g.excitations, g.monitors, g.gauges) for rows in named.values()]
+
+
+def _numbers(g: ModalGroup) -> list[Any]:
+    found: list[Any] = [g.speed, g.omega, g.damping_ratio, g.M_r, g.K_r, g.C_r, g.G_r, g.phi, g.u_static]
+    found += [g.compliance.static, g.compliance.modal]
+    for i in g.interfaces.values():
+        found += [i.rows, i.fit_residual, i.rotation, i.origin, i.areas, i.points, i.normals, i.shapes]
+    for rows in _every_row(g):
+        found += [rows.rows, rows.static, rows.point]
+    for s in g.stresses.values():
+        found += [s.strain, s.stress, s.static_stress, s.points, s.weights]
+    return found
+
+
+def _matrix_checks(g: ModalGroup, normal: bool) -> _Findings:
+    scale = max(_largest(g.omega**2), 1.0)
+    found: _Findings = [
+        ("frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * _largest(g.omega), ""),
+        ("G_r is skew", _largest(g.G_r + g.G_r.T), 1e-9 * max(_largest(g.G_r), 1e-12), ""),
+        ("rigid modes have omega = 0", _largest(g.omega[np.array(g.kind) == "rigid"]), 0.0, ""),
+    ]
+    if normal:
+        C = np.diag(2 * g.damping_ratio * g.omega)
+        found.append(("M_r is the identity", _largest(g.M_r - np.eye(g.n_modes)), 1e-9, ""))
+        found.append(("K_r is diag(omega^2)", _largest(g.K_r - np.diag(g.omega**2)) / scale, 1e-9, ""))
+        found.append(("C_r is diag(2 D omega)", _largest(g.C_r - C) / np.sqrt(scale), 1e-9, ""))
+    return found
+
+
+def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
+    """The shapes against the mesh they are stored with; the density is the mass over the mesh's volume."""
+    inner, volume = modal_mass(basis.mesh, g.phi)
+    error = _largest(inner * basis.mass / volume - np.eye(g.n_modes)) if volume > 0 else np.inf
+    found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, "")]
+    for name, s in g.stresses.items():
+        found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
+    return found
+
+
+def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interface, mesh_is_sound: bool) -> _Findings:
+    R = item.rotation
+    frame = float(np.abs(R @ R.T - np.eye(3)).max() + abs(np.linalg.det(R) - 1))
+    found: _Findings = [(f"interface {name}: frame is right-handed", frame, 1e-9, "")]
+    top = max(_largest(item.rows[:3]), 1e-300)
+    if item.shapes.shape[0]:
+        mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()
+        error = _largest(mean - item.rows[:3]) / top
+        found.append((f"interface {name}: rows agree with the patch's shapes", error, 1e-9, ""))
+    if mesh_is_sound and g.phi.shape[0]:
+        for face in basis.mesh.faces.values():
+            area, centre, mean = face_mean(basis.mesh.points, face, g.phi)
+            same = abs(area / item.areas.sum() - 1) < 1e-9 and _largest(centre - item.origin) < 1e-9 * np.sqrt(area)
+            if same:
+                error = _largest(R @ mean - item.rows[:3]) / top
+                found.append((f"interface {name}: rows agree with phi on its face", error, 1e-8, ""))
+                break
+    return found
+
+
+def _compliance_checks(g: ModalGroup) -> _Findings:
+    found: _Findings = []
+    T = _all_rows(g)
+    if T is None:
+        return [("compliance rows are stored", 1.0, 0.0, "a label names a row that the file does not hold")]
+    if not len(T):
+        return found
+    elastic = g.omega > 0
+    modal = (T[:, elastic] / g.omega[elastic] ** 2) @ T[:, elastic].T
+    error = _largest(modal - g.compliance.modal) / max(_largest(modal), 1e-300)
+    found.append(("modal compliance follows from the rows", error, 1e-9, ""))
+    static = g.compliance.static
+    error = _largest(static - static.T) / max(_largest(static), 1e-300)
+    found.append(("static compliance is symmetric", error, 1e-9, ""))
+    d = np.sqrt(np.maximum(np.diag(static), 1e-300))
+    worst = float(np.linalg.eigvalsh(g.compliance.residual / np.outer(d, d)).min())
+    found.append(("static compliance is not below its modal part", max(-worst, 0.0), 1e-6, ""))
+    return found
+
+
+def _all_rows(g: ModalGroup) -> Array | None:
+    """Rows in the order of the compliance labels, or None if one of them is not stored."""
+    parts = []
+    for label in g.compliance.labels:
+        try:
+            kind, name, row = label.split(":", 2)
+            if kind == "interface":
+                parts.append(g.interfaces[name].rows[INTERFACE_ROWS.index(row)])
+            else:
+                rows = {"excitation": g.excitations, "monitor": g.monitors}[kind][name]
+                parts.append(rows.rows[rows.labels.index(row)])
+        except (ValueError, KeyError):
+            return None
+    return np.array(parts).reshape(len(parts), g.n_modes)

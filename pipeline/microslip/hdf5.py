@@ -1,0 +1,129 @@
+"""HDF5 as the modal file uses it: named dimensions, a seal over the whole file, and no trust in foreign content.
+
+Rules found by trial: no time stamps, no creation order, fixed-length byte strings (variable-length ones make Octave
+lose the whole group), a dimension scale on every axis of a dataset or on none (xarray refuses a mixture).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+
+_SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
+_SEAL_LENGTH = len(_SEAL) + 64 + 1
+_DEPTH, _OBJECTS, _EXPANSION = 12, 200_000, 64
+
+
+class HostileFile(ValueError):
+    """Content that a modal file never has and that could harm the reader."""
+
+
+# writing ---------------------------------------------------------------------------------------------------------
+
+
+def put(
+    group: h5py.Group, name: str, data: Any, unit: str = "", dims: tuple[str, ...] = (),
+    scales: Sequence[h5py.Dataset] = (),
+) -> h5py.Dataset:  # fmt: skip
+    """Write a dataset with its unit and its dimensions, named by `dims` or by `scales` (one for every axis)."""
+    data = np.asarray(data)
+    if data.dtype.kind == "U":
+        data = np.char.encode(data, "utf-8") if data.size else data.astype("S1")
+    dataset = group.create_dataset(name, data=data, track_times=False)
+    if unit:
+        dataset.attrs["unit"] = unit
+    for i, label in enumerate(dims or [s.name.rsplit("/", 1)[-1] for s in scales]):
+        dataset.dims[i].label = label
+    for i, scale in enumerate(scales):
+        dataset.dims[i].attach_scale(scale)
+    return dataset
+
+
+def put_scale(group: h5py.Group, name: str, data: Any) -> h5py.Dataset:
+    """Write the values along a dimension, which datasets of this group and of those below it may use."""
+    scale = put(group, name, data)
+    scale.make_scale(name)
+    return scale
+
+
+# the seal --------------------------------------------------------------------------------------------------------
+
+
+def seal(path: Path) -> None:
+    """Append a line with the SHA-256 of the file; HDF5 looks only at what stands before it.
+
+    A program that opens the file for writing drops the line (HDF5 cuts files to the length it knows), so a seal
+    proves that nothing has touched the file since it was written; a file without one may still be sound.
+    """
+    with open(path, "r+b") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.seek(0, 2)
+        file.write(_SEAL + digest.encode() + b"\n")
+
+
+def seal_state(path: Path) -> Literal["intact", "broken", "absent"]:
+    """Whether the bytes of a file are those it was sealed with."""
+    with open(path, "rb") as file:
+        size = file.seek(0, 2)
+        if size < _SEAL_LENGTH:
+            return "absent"
+        file.seek(size - _SEAL_LENGTH)
+        line = file.read()
+        if not line.startswith(_SEAL):
+            return "absent"
+        file.seek(0)
+        digest = hashlib.sha256()
+        left = size - _SEAL_LENGTH
+        while left and (block := file.read(min(left, 1 << 20))):
+            digest.update(block)
+            left -= len(block)
+    return "intact" if line == _SEAL + digest.hexdigest().encode() + b"\n" else "broken"
+
+
+# reading ---------------------------------------------------------------------------------------------------------
+
+
+def inspect(file: h5py.File) -> None:
+    """Look at every object before any data is read.
+
+    Raises:
+        HostileFile: links that leave the file or run in circles, types other than numbers and fixed-length text,
+            data held elsewhere, more data than a file of this size can hold.
+    """
+    allowed = _EXPANSION * max(Path(file.filename).stat().st_size, 1 << 14)
+    _inspect_group(file, "", (), [allowed, _OBJECTS])
+
+
+def _inspect_group(group: h5py.Group, where: str, above: tuple[Any, ...], budget: list[int]) -> None:
+    here = h5py.h5o.get_info(group.id).addr
+    if here in above or len(above) > _DEPTH:
+        raise HostileFile(f"{where or '/'} contains itself or is nested too deeply")
+    for name in group:
+        place = f"{where}/{name}"
+        budget[1] -= 1
+        if budget[1] < 0:
+            raise HostileFile("there are too many objects")
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise HostileFile(f"{place} is a link to another place")
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            _inspect_group(item, place, (*above, here), budget)
+        elif isinstance(item, h5py.Dataset):
+            _inspect_dataset(item, place, budget)
+        else:
+            raise HostileFile(f"{place} is neither group nor dataset")
+
+
+def _inspect_dataset(item: h5py.Dataset, place: str, budget: list[int]) -> None:
+    if item.dtype.kind not in "fiuS" or item.dtype.subdtype is not None:
+        raise HostileFile(f"{place} holds neither numbers nor fixed-length text")
+    if item.shape is None or item.is_virtual or item.external:
+        raise HostileFile(f"{place} holds no data of its own")
+    budget[0] -= int(np.prod(item.shape, dtype=object)) * item.dtype.itemsize
+    if budget[0] < 0:
+        raise HostileFile(f"{place} claims more data than the file can hold")

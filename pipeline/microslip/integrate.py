@@ -1,0 +1,125 @@
+"""Integrals over a mesh with numpy alone, so that the base install can hold a modal file against its own mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from itertools import product
+
+import numpy as np
+
+from .data import Array, Indices, Mesh
+from .topology import CELL_TYPES, FACET_CORNERS
+
+# exponents of the monomials each shape function is made of
+_TRI: list[tuple[int, ...]] = [(i, j) for i, j in product(range(3), repeat=2) if i + j <= 2]
+_TET: list[tuple[int, ...]] = [e for e in product(range(3), repeat=3) if sum(e) <= 2]
+_QUAD8: list[tuple[int, ...]] = [e for e in product(range(3), repeat=2) if e != (2, 2)]
+_HEX20: list[tuple[int, ...]] = [e for e in product(range(3), repeat=3) if sum(1 for k in e if k == 2) <= 1]
+_EXPONENTS: dict[str, list[tuple[int, ...]]] = {
+    "triangle": [(0, 0), (1, 0), (0, 1)],
+    "triangle6": _TRI,
+    "quad": list(product(range(2), repeat=2)),
+    "quad8": _QUAD8,
+    "quad9": list(product(range(3), repeat=2)),
+    "tetra": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    "tetra10": _TET,
+    "hexahedron": list(product(range(2), repeat=3)),
+    "hexahedron20": _HEX20,
+    "hexahedron27": list(product(range(3), repeat=3)),
+}
+_TRIANGLE = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]
+_SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5], [0.5, 0.5]]
+
+
+def _nodes(cell_type: str) -> Array:
+    if cell_type in CELL_TYPES:
+        return CELL_TYPES[cell_type].reference
+    shape = _TRIANGLE if FACET_CORNERS[cell_type] == 3 else _SQUARE
+    return np.array(shape[: len(_EXPONENTS[cell_type])], dtype=float)
+
+
+def _monomials(exponents: list[tuple[int, ...]], x: Array) -> Array:
+    return np.stack([np.prod(x ** np.array(e), axis=1) for e in exponents], axis=1)
+
+
+def _slopes(exponents: list[tuple[int, ...]], x: Array) -> Array:
+    """(q, d, k) derivatives of the monomials."""
+    out = np.zeros((len(x), x.shape[1], len(exponents)))
+    for k, e in enumerate(exponents):
+        for d in range(x.shape[1]):
+            if e[d]:
+                lower = np.array(e) - np.eye(len(e), dtype=int)[d]
+                out[:, d, k] = e[d] * np.prod(x**lower, axis=1)
+    return out
+
+
+def _rule(cell_type: str) -> tuple[Array, Array]:
+    """Points and weights: the 4-point rule of tetrahedra, the 6-point one of triangles, Gauss' of bricks and squares.
+
+    These are the rules of `fem.discretise`, so that masses and patches agree to rounding.
+    """
+    if cell_type in ("tetra", "tetra10"):
+        a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
+        points = np.full((4, 4), a) + (b - a) * np.eye(4)
+        return points[:, 1:], np.full(4, 1 / 24)
+    if FACET_CORNERS.get(cell_type) == 3:
+        return _triangle_rule()
+    x, w = np.polynomial.legendre.leggauss(2 if cell_type in ("hexahedron", "quad") else 3)
+    d = 3 if cell_type in CELL_TYPES else 2
+    points = np.array(list(product((x + 1) / 2, repeat=d)))
+    return points, np.array([np.prod(c) for c in product(w / 2, repeat=d)])
+
+
+def _triangle_rule() -> tuple[Array, Array]:
+    """Dunavant's six points of degree four on the unit triangle."""
+    root, weight = np.sqrt(38 - 44 * np.sqrt(2 / 5)), np.sqrt(213125 - 53320 * np.sqrt(10))
+    points, weights = [], []
+    for sign in (1, -1):
+        a = (8 - np.sqrt(10) + sign * root) / 18
+        points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
+        weights += [(620 + sign * weight) / 7440] * 3
+    return np.array(points), np.array(weights)
+
+
+@cache
+def tables(cell_type: str) -> tuple[Array, Array, Array]:
+    """Shape functions (q, k), reference gradients (q, d, k) and weights (q,) at a cell's or facet's own rule."""
+    exponents = _EXPONENTS[cell_type]
+    at, weights = _rule(cell_type)
+    coefficients = np.linalg.inv(_monomials(exponents, _nodes(cell_type)))
+    return _monomials(exponents, at) @ coefficients, _slopes(exponents, at) @ coefficients, weights
+
+
+def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
+    """(m, m) integral of phi_i . phi_j over the volume (m3 times the unit of phi squared), and the volume, m3.
+
+    Args:
+        phi: (n, 3, m) shapes.
+    """
+    total, volume = np.zeros((phi.shape[2], phi.shape[2])), 0.0
+    for cell_type, cells in mesh.cells.items():
+        N, dN, weights = tables(cell_type)
+        for chunk in np.array_split(cells, max(1, len(cells) // 20000)):
+            x = mesh.points[chunk]
+            for q, w in enumerate(weights):
+                dv = w * np.linalg.det(np.einsum("dk,eki->edi", dN[q], x))
+                u = np.tensordot(N[q], phi[chunk], axes=(0, 1)).reshape(-1, phi.shape[2])
+                total += u.T @ (np.repeat(dv, 3)[:, None] * u)
+                volume += float(dv.sum())
+    return total, volume
+
+
+def face_mean(points: Array, blocks: Mapping[str, Indices], values: Array) -> tuple[float, Array, Array]:
+    """Area (m2), area centre (3,) and area mean of nodal values (n, ...) of a face."""
+    area, centre, mean = 0.0, np.zeros(3), np.zeros(values.shape[1:])
+    for facet_type, facets in blocks.items():
+        N, dN, weights = tables(facet_type)
+        x = points[facets]
+        for q, w in enumerate(weights):
+            t = np.einsum("dk,fki->fdi", dN[q], x)
+            da = w * np.linalg.norm(np.cross(t[:, 0], t[:, 1]), axis=1)
+            area += float(da.sum())
+            centre += da @ np.einsum("k,fki->fi", N[q], x)
+            mean += np.tensordot(da, np.tensordot(N[q], values[facets], axes=(0, 1)), axes=(0, 0))
+    return area, centre / area, mean / area
