@@ -28,7 +28,7 @@ from .data import (
     StressSet,
     UserError,
 )
-from .hdf5 import inspect, put, put_scale, seal, seal_state
+from .hdf5 import create, inspect, put, put_scale, seal, seal_state
 from .store import complete_or_absent
 from .topology import CELL_TYPES, FACET_CORNERS
 
@@ -72,7 +72,7 @@ def write_basis(path: Path | str, basis: ModalBasis) -> None:
         UserError: no permission, no space.
     """
     with complete_or_absent(path) as temporary:
-        with h5py.File(temporary, "w", libver=("earliest", "v110")) as file:
+        with create(temporary) as file:
             _write(file, basis)
         seal(temporary)
 

@@ -6,10 +6,11 @@ lose the whole group), a dimension scale on every axis of a dataset or on none (
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 
 import h5py
 import numpy as np
@@ -24,6 +25,55 @@ class HostileFile(ValueError):
 
 
 # writing ---------------------------------------------------------------------------------------------------------
+
+
+class _Sink:
+    """A binary file for HDF5 that remembers the first failure and swallows what comes after it.
+
+    HDF5 that meets a full disk fails again in every destructor, which Python can only print.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.error: OSError | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.file, name)  # read, seek, tell
+
+    def write(self, data: memoryview) -> int:
+        self._try(self.file.write, data)
+        return len(data)
+
+    def truncate(self, size: int) -> int:
+        self._try(self.file.truncate, size)
+        return size
+
+    def flush(self) -> None:
+        self._try(self.file.flush)
+
+    def _try(self, action: Any, *words: Any) -> None:
+        if self.error is None:
+            try:
+                action(*words)
+            except OSError as error:
+                self.error = error
+
+
+@contextlib.contextmanager
+def create(path: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file for writing.
+
+    Raises:
+        OSError: the disk is full or the file too large, once and with its errno.
+    """
+    with open(path, "w+b") as raw:
+        sink = _Sink(raw)
+        try:
+            with h5py.File(sink, "w", libver=("earliest", "v110")) as file:
+                yield file
+        finally:
+            if sink.error is not None:
+                raise sink.error
 
 
 def put(

@@ -7,11 +7,14 @@ A product ``X`` may have a sidecar ``X.json`` with the hash of exactly the input
 from __future__ import annotations
 
 import contextlib
+import errno
+import glob
 import hashlib
 import json
 import os
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,6 +27,9 @@ from .data import UserError
 def complete_or_absent(path: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it is synced and renamed onto `path`, else removed.
 
+    A process killed at any instant leaves the old file or the new one, and perhaps a hidden temporary one, which
+    the next write of the same product removes.
+
     Raises:
         UserError: if the folder is missing, not writable, or the disk is full.
     """
@@ -31,7 +37,8 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
     temporary: Path | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        _remove_leftovers(path)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix)
         os.close(handle)
         temporary = Path(name)
         yield temporary
@@ -41,15 +48,54 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
         temporary = None
         _sync(path.parent)
     except OSError as error:
-        if error.errno is None:
-            raise
-        raise UserError(
-            f"{path}: cannot be written ({os.strerror(error.errno)}); nothing was changed, "
-            "free some space or choose another folder"
-        ) from error
+        raise UserError(_refused(path, error)) from error
     finally:
         if temporary is not None:
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _refused(path: Path, error: OSError) -> str:
+    """Why a file could not be written, and what to do, in one sentence."""
+    reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())[:120] or "unknown reason"
+    remedies = {
+        errno.ENOSPC: "free some space or choose another folder",
+        errno.EFBIG: "this file system takes no larger file, choose another folder",
+        errno.EDQUOT: "free some space or choose another folder",
+        errno.EACCES: "choose a folder you may write to",
+        errno.EPERM: "choose a folder you may write to",
+        errno.EROFS: "choose a folder you may write to",
+        errno.EISDIR: "a folder has that name, choose another one",
+        errno.EEXIST: "a file stands where its folder should be, choose another one",
+        errno.ENOTDIR: "a file stands where its folder should be, choose another one",
+    }
+    remedy = remedies.get(error.errno or 0, "choose another folder")
+    return f"{path}: cannot be written ({reason}); nothing was changed, {remedy}"
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Remove temporary files of this product whose process is gone (killed, or the power failed).
+
+    A minute's silence is asked for as well, because the process may run on another machine that shares the folder.
+    """
+    for leftover in path.parent.glob(f".{glob.escape(path.stem)}.*.*{glob.escape(path.suffix)}"):
+        owner = leftover.name.removeprefix(f".{path.stem}.").split(".")[0]
+        with contextlib.suppress(OSError):
+            age = time.time() - leftover.stat().st_mtime
+            if owner.isdecimal() and age > 60 and (age > 86400 or not _is_running(int(owner))):
+                leftover.unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name == "nt":  # no harmless signal there: leftovers wait for a day
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def _umask() -> int:
