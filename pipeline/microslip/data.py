@@ -240,7 +240,7 @@ class ModalBasis:
         mass: kg. centre: (3,) m. inertia: (3, 3) kg m2 about the centre, body axes (Eqs. (2.3-32) to (2.3-34)).
         rotation_axis, rotation_point: (3,) unit vector and a point of the axis, m.
         damping_source: text that says where the ratios come from (``ratio``, ``rayleigh``, ``table``).
-        free: True if no support holds the body.
+        free: True if rigid motions remain.
         reduction: name of the method.
         provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
     """

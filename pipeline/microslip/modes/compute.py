@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -100,20 +100,29 @@ def modal_basis(
     _check_held(mesh, settings, centre, motions)
     solver = eigen.new_solver(settings.modes.solver)
     state: StaticState | None = None
+    before = 0.0
     groups = {}
     try:
         for number, rpm in enumerate(settings.rotation.speeds_rpm):
             speed = rpm * np.pi / 30
             if len(settings.rotation.speeds_rpm) > 1 or speed:
                 report(f"speed {number + 1} of {len(settings.rotation.speeds_rpm)}: {rpm:g} rpm")
-            state = equilibrium(model, speed, settings.rotation.prestress, solver, state, report)
+            state = equilibrium(model, speed, settings.rotation.prestress, solver, _guess(state, before, speed), report)
+            before = speed
             groups[number, 0] = _group(model, settings, state, speed, motions, rows, solver, report)
     finally:
         solver.close()
     return ModalBasis(
         settings.name, mesh, groups, mass, centre, inertia, model.axis, point, settings.damping.source,
-        motions.shape[1] == 6, settings.reduction, dict(provenance or {}),
+        bool(motions.shape[1]), settings.reduction, dict(provenance or {}),
     )  # fmt: skip
+
+
+def _guess(state: StaticState | None, before: float, speed: float) -> StaticState | None:
+    """Start of Newton at the next speed: displacements grow about as the square of the speed."""
+    if state is None or before == 0:
+        return state
+    return replace(state, u=state.u * (speed / before) ** 2)
 
 
 def _fixed(mesh: Mesh, settings: BodySettings) -> Indices:
@@ -134,8 +143,8 @@ def _require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False)
 
 def _check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array) -> None:
     found = motions.shape[1]
-    if settings.free and settings.supports:
-        raise UserError("free: true contradicts the supports; remove one of them")
+    if settings.free and not found:
+        raise UserError("free: true, but the supports hold the body wholly; remove one of them")
     if found and not settings.free:
         names = "; ".join(rigid.describe(mesh.points, centre, motions))
         raise UserError(
@@ -149,8 +158,6 @@ def _check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Arra
 
 
 def _with_dead_loads(model: BodyModel, mesh: Mesh, settings: BodySettings) -> BodyModel:
-    from dataclasses import replace
-
     force = np.zeros((mesh.n_points, 3))
     locator = Locator(mesh) if any(load.point for load in settings.loads) else None
     for number, load in enumerate(settings.loads):
@@ -378,12 +385,17 @@ def _static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_ma
     T = np.asarray(B @ X[:, R.shape[1] :])
     rest = F - MX @ (X.T @ F)
     u = np.zeros_like(rest)
+    previous = np.inf
     for _ in range(60):
-        step = pencil.solve(rest - pencil.K(u))
+        step = pencil.solve(rest)
         step -= X @ (MX.T @ step)
         u += step
-        if np.abs(step).max() < 1e-13 * np.abs(u).max():
+        size = np.abs(step).max() / max(np.abs(u).max(), 1e-300)
+        if size < 1e-13 or (size < 1e-8 and size > 0.3 * previous):  # no further gain above rounding
             break
+        previous = size
+        rest = -shift * pencil.M(step)  # what K leaves of the step: K s = rest + shift M s
+        rest -= MX @ (X.T @ rest)
     C = (T / elastic) @ T.T + np.asarray(B @ u)
     return 0.5 * (C + C.T)
 
