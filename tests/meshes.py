@@ -104,14 +104,19 @@ def _faces(mesh: Mesh, keys: Indices, n: tuple[int, int, int], closed: bool) -> 
         for end, at in ((0, 0), (1, 2 * n[axis])):
             if closed and axis == 1:
                 continue
-            on = (keys[:, axis] == at)
+            on = keys[:, axis] == at
             face = {t: f[on[f].all(axis=1)] for t, f in boundary.items() if on[f].all(axis=1).any()}
             faces[f"{letter}{end}"] = face
     return faces
 
 
 def pipe(
-    cell_type: str, n: tuple[int, int, int], inner: float, outer: float, length: float, angle: float = 2 * np.pi
+    cell_type: str,
+    n: tuple[int, int, int],
+    inner: float,
+    outer: float,
+    length: float,
+    angle: float = 2 * np.pi,
 ) -> Mesh:
     """A pipe along z, or a sector of it: boxes n along the radius, the circumference and the axis.
 

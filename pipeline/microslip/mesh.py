@@ -87,8 +87,8 @@ def _cell_sets(raw) -> dict[str, list]:  # noqa: ANN001
     sets = {str(k): v for k, v in (raw.cell_sets or {}).items() if not str(k).startswith("gmsh:")}
     numbers = (raw.cell_data or {}).get("gmsh:physical")
     for name, (number, dimension) in ((raw.field_data or {}).items() if numbers is not None else ()):
-        chosen = [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in zip(raw.cells, numbers, strict=True)]
-        sets.setdefault(str(name), chosen)
+        pairs = zip(raw.cells, numbers, strict=True)
+        sets.setdefault(str(name), [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in pairs])
     return sets
 
 

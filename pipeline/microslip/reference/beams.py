@@ -38,7 +38,9 @@ class Section:
         return float(np.sqrt(self.young * self.inertia / (self.density * self.area * self.length**4)))
 
 
-def rectangle(length: float, width: float, height: float, young: float, poisson: float, density: float) -> Section:
+def rectangle(
+    length: float, width: float, height: float, young: float, poisson: float, density: float
+) -> Section:
     """The beam of rectangular section that bends in the direction of `height` (m)."""
     shear = young / (2 * (1 + poisson))
     return Section(
@@ -79,7 +81,8 @@ def _series(terms: int, power: int, points: Array) -> tuple[Array, Array, Array]
     """
     basis = [Legendre.basis(j, domain=[0, 1]) for j in range(terms)]
     P, dP, ddP = (np.column_stack([b.deriv(d)(points) for b in basis]) for d in range(3))
-    front, slope, bend = (f[:, None] for f in (points**power, power * points ** max(power - 1, 0), np.full(len(points), float(power == 2) * 2)))
+    front, slope = (points**power)[:, None], (power * points ** max(power - 1, 0))[:, None]
+    bend = 2.0 if power == 2 else 0.0
     return front * P, slope * P + front * dP, bend * P + 2 * slope * dP + front * ddP
 
 
