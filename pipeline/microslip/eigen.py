@@ -168,6 +168,14 @@ def new_solver(name: str = "auto") -> DirectSolver:
     return BACKENDS[available_backends()[0] if name == "auto" else name]()
 
 
+class Unstable(NotConverged):
+    """K - shift M has negative eigenvalues where it must not: the body diverges. `count`: how many."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(f"the stiffness has {count} negative eigenvalues: the body is unstable")
+        self.count = count
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """The lowest eigenpairs of K x = lambda M x.
@@ -231,9 +239,11 @@ def search(
         tolerance: residual of (K - shift M)^-1 M over its eigenvalue. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
 
     Raises:
-        NotConverged: Lanczos failed.
+        Unstable: eigenvalues below `shift`. NotConverged: Lanczos failed.
     """
     pencil.solver.factorise(pencil.shifted(shift))
+    if negative := pencil.solver.negative():
+        raise Unstable(negative)
     known = np.zeros((pencil.n, 0)) if rigid is None else rigid
     zeros = np.zeros(known.shape[1])
     extra, before = 2, pencil.solves

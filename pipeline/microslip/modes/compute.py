@@ -296,8 +296,10 @@ def _group(
     if wanted > pencil.n - 2:
         raise UserError(f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; ask for fewer or refine")
     report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {solver.name}")
-    found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
-    found = _check_positive(found, settings, speed, R.shape[1])
+    try:
+        found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
+    except eigen.Unstable as error:
+        raise UserError(_divergence(settings, speed, error.count)) from error
     B, labels = rows.stacked(settings)
     B_free = B[:, dofs] if B.shape[0] else sp.csr_matrix((0, pencil.n))
     static = _static_compliance(pencil, found, B_free, R, shift)
@@ -324,14 +326,16 @@ def _shift(model: BodyModel) -> float:
     return -float(0.05**2 * stiffness / model.material.density / length**2)
 
 
-def _check_positive(found: eigen.Spectrum, settings: BodySettings, speed: float, zero: int) -> eigen.Spectrum:
-    if len(found.values) > zero and found.values[zero] <= 0:
-        raise UserError(
-            f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the lowest eigenvalue is negative "
-            f"({found.values[zero]:.4g} (rad/s)^2): the body diverges; lower the speed"
-            + ("" if settings.rotation.prestress != "none" else ' or use prestress = "nonlinear"')
-        )
-    return found
+def _divergence(settings: BodySettings, speed: float, count: int) -> str:
+    remedy = "lower the speed"
+    if settings.rotation.prestress == "none" and speed:
+        remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
+    elif not speed:
+        remedy = "reduce the loads or the temperature change, or check the material"
+    return (
+        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm {count} eigenvalue{'s are' if count > 1 else ' is'} "
+        f"negative: the body diverges; {remedy}"
+    )
 
 
 def _band(values: Array, settings: BodySettings, zero: int) -> int:
@@ -415,11 +419,10 @@ def _assemble_group(
     stresses: dict[str, StressSet] = {}
     if settings.output.gauss or settings.output.nodal_stress:
         report("strain and stress modes")
-        gauss = gauss_set(model, state, shapes)
         if settings.output.gauss:
-            stresses["gauss"] = gauss
+            stresses["gauss"] = gauss_set(model, state, shapes)
         if settings.output.nodal_stress:
-            stresses["nodes"] = nodal_set(model, gauss)
+            stresses["nodes"] = nodal_set(model, state, shapes)
     u = state.u.reshape(-1)
     return ModalGroup(
         speed=speed,

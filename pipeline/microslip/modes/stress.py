@@ -79,25 +79,22 @@ def _polynomials(x: Array, corners: int) -> Array:
     return np.column_stack([ones, a, b, c, a * b, b * c, a * c, a * b * c])
 
 
-def nodal_set(model: BodyModel, gauss: StressSet) -> StressSet:
-    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``)."""
-    n, m = model.d.mesh.n_points, gauss.strain.shape[2]
-    strain, stress, static = np.zeros((n, 6 * m)), np.zeros((n, 6 * m)), np.zeros((n, 6))
-    weights, start = np.zeros(n), 0
-    for block in model.d.blocks:
-        stop = start + block.dx.size
-        S, w = smoother(block, n)
-        strain += S @ gauss.strain[start:stop].reshape(-1, 6 * m)
-        stress += S @ gauss.stress[start:stop].reshape(-1, 6 * m)
-        static += S @ gauss.static_stress[start:stop]
-        weights += w
-        start = stop
-    share = gauss.weights.sum() * weights / weights.sum()
-    w = weights[:, None]
-    return StressSet(
-        "nodal-averaged", model.d.mesh.points, (strain / w).reshape(n, 6, m), (stress / w).reshape(n, 6, m),
-        static / w, share,
-    )  # fmt: skip
+def nodal_set(model: BodyModel, state: StaticState, phi: Array, batch: int = 8) -> StressSet:
+    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), `batch` modes at a time."""
+    n, m = model.d.mesh.n_points, phi.shape[2]
+    smoothers = [smoother(b, n) for b in model.d.blocks]
+    weights = sum(w for _, w in smoothers)
+    S = sp.hstack([matrix for matrix, _ in smoothers]).tocsr()
+    strain, stress = np.empty((n, 6, m)), np.empty((n, 6, m))
+    for start in range(0, m, batch):
+        part = gauss_set(model, state, phi[:, :, start : start + batch])
+        count = part.strain.shape[2]
+        for field, values in ((strain, part.strain), (stress, part.stress)):
+            smooth = (S @ values.reshape(-1, 6 * count)) / weights[:, None]
+            field[:, :, start : start + count] = smooth.reshape(n, 6, count)
+    static = np.concatenate([cauchy(state, i).reshape(-1, 6) for i in range(len(model.d.blocks))])
+    share = model.d.volume * weights / weights.sum()
+    return StressSet("nodal-averaged", model.d.mesh.points, strain, stress, (S @ static) / weights[:, None], share)
 
 
 def von_mises(stress: Array) -> Array:
