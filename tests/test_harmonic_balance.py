@@ -1,0 +1,114 @@
+"""The thin friction end: Jenkins element in closed form, one-harmonic response against limits, energy and time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from microslip.data import Compliance, Interface, ModalGroup
+from microslip.harmonic_balance import JenkinsContact, frequency_response, jenkins_harmonic, peaks, stuck_frequencies
+
+
+def oscillator(mass: float = 1.0, stiffness: float = 1e4, ratio: float = 0.0) -> ModalGroup:
+    """One degree of freedom whose displacement is u_t1 of the interface ``face``."""
+    omega = np.array([np.sqrt(stiffness / mass)])
+    rows = np.zeros((6, 1))
+    rows[1] = 1 / np.sqrt(mass)
+    face = Interface(
+        np.zeros(3), np.eye(3), rows, np.zeros(1), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 1))
+    )
+    return ModalGroup(
+        speed=0.0, omega=omega, kind=("normal",), damping_ratio=np.array([ratio]), M_r=np.eye(1),
+        K_r=np.diag(omega**2), C_r=np.diag(2 * ratio * omega), G_r=np.zeros((1, 1)), phi=np.zeros((0, 3, 1)),
+        interfaces={"face": face}, excitations={}, monitors={}, gauges={},
+        compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
+        checks={},
+    )  # fmt: skip
+
+
+def contact(stiffness: float, limit: float) -> JenkinsContact:
+    return JenkinsContact("face", np.zeros(6), 1, stiffness, limit)
+
+
+def marched_harmonic(amplitude: float, stiffness: float, limit: float, samples: int = 40000) -> complex:
+    """First harmonic of the force over displacement, by marching the return map for two cycles."""
+    t = np.arange(2 * samples) * 2 * np.pi / samples
+    u = amplitude * np.cos(t)
+    force, f, previous = np.empty_like(u), 0.0, 0.0
+    for i, x in enumerate(u):
+        f = np.clip(f + stiffness * (x - previous), -limit, limit)
+        previous, force[i] = x, f
+    last = slice(samples, 2 * samples)
+    return complex(2 / samples * np.sum(force[last] * np.exp(-1j * t[last])) / amplitude)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 1.05, 1.7, 4.0, 50.0])
+def test_closed_form_equals_the_marched_loop(ratio):
+    k, limit = 3e6, 12.0
+    amplitude = ratio * limit / k
+    value = jenkins_harmonic(np.array([amplitude]), k, limit)[0][0]
+    assert value == pytest.approx(marched_harmonic(amplitude, k, limit), rel=2e-4)
+
+
+def test_slope_is_the_derivative():
+    k, limit = 3e6, 12.0
+    a = np.array([1.01, 1.5, 3.0, 20.0]) * limit / k
+    h = 1e-6 * a
+    numeric = (jenkins_harmonic(a + h, k, limit)[0] - jenkins_harmonic(a - h, k, limit)[0]) / (2 * h)
+    assert jenkins_harmonic(a, k, limit)[1] == pytest.approx(numeric, rel=1e-6)
+
+
+def test_hysteresis_energy_is_the_area_of_the_loop():
+    k, limit, amplitude = 2e6, 5.0, 9e-6
+    value = jenkins_harmonic(np.array([amplitude]), k, limit)[0][0]
+    assert np.pi * value.imag * amplitude**2 == pytest.approx(4 * limit * (amplitude - limit / k), rel=1e-12)
+
+
+def test_sticking_and_frictionless_limits():
+    g = oscillator(ratio=0.01)
+    frequency = np.linspace(5, 40, 71)
+    force = np.array([1.0])
+    stick = frequency_response(g, [contact(2e4, 1e9)], force, np.array([1.0]), frequency)
+    slide = frequency_response(g, [contact(2e4, 1e-12)], force, np.array([1.0]), frequency)
+    Omega = 2 * np.pi * frequency
+    damping = 2j * 0.01 * 100 * Omega
+    assert stick.converged.all() and slide.converged.all()
+    np.testing.assert_allclose(stick.monitor, 1 / (3e4 - Omega**2 + damping), rtol=1e-9)
+    np.testing.assert_allclose(slide.monitor, 1 / (1e4 - Omega**2 + damping), rtol=1e-8)
+    assert stuck_frequencies(g, [contact(2e4, 1.0)])[0] == pytest.approx(np.sqrt(3e4) / 2 / np.pi, rel=1e-12)
+
+
+def test_external_work_equals_dissipation_and_newton_converges_through_the_peak():
+    g = oscillator()
+    response = frequency_response(g, [contact(2e4, 0.8)], np.array([1.0]), np.array([1.0]), np.linspace(10, 40, 601))
+    assert response.converged.all()
+    work = np.pi * np.imag(np.conj(response.monitor) * 1.0)  # pi Im(conj(u) F), F real
+    np.testing.assert_allclose(work, response.dissipated, rtol=1e-8, atol=1e-12)
+    assert len(peaks(response)) == 1
+
+
+def test_response_agrees_with_time_integration():
+    """One harmonic against the marched oscillator at three frequencies: within 2 % (the force's third harmonic)."""
+    m, k, kt, limit = 1.0, 1e4, 2e4, 0.6
+    g = replace(oscillator(m, k, 0.02))
+    frequency = np.array([17.0, 21.0, 30.0])
+    response = frequency_response(g, [contact(kt, limit)], np.array([1.0]), np.array([1.0]), frequency)
+    for f, u in zip(frequency, response.monitor, strict=True):
+        assert abs(u) == pytest.approx(marched_amplitude(m, k, 2 * 0.02 * 100, kt, limit, f), rel=0.02)
+
+
+def marched_amplitude(m: float, k: float, c: float, kt: float, limit: float, f: float) -> float:
+    """First-harmonic amplitude of a Jenkins oscillator under cos(Omega t), central differences, 60 periods."""
+    Omega, steps = 2 * np.pi * f, 4000
+    dt = 2 * np.pi / Omega / steps
+    u = previous = slider = 0.0
+    last = np.empty(steps)
+    for i in range(60 * steps):
+        friction = np.clip(kt * (u - slider), -limit, limit)
+        slider = u - friction / kt
+        drive = np.cos(Omega * i * dt) - k * u - friction
+        following = (dt**2 * drive + 2 * m * u - m * previous + 0.5 * c * dt * previous) / (m + 0.5 * c * dt)
+        previous, u = u, following
+        last[i % steps] = previous
+    return float(abs(2 / steps * np.sum(last * np.exp(-2j * np.pi * np.arange(steps) / steps))))

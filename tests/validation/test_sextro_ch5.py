@@ -1,0 +1,67 @@
+"""Sextro, Dynamical Contact Problems with Friction, 2nd ed., section 5.3: the test blade, first arrangement.
+
+Printed: uncoupled 14.1, 159.55 and 540.61 Hz (first bending, first and second torsion); coupled near 120, 320 and
+470 Hz at 780 N. Dimensions are not printed; docs/blade.md says how they were identified and what is assumed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from microslip.case import load_case, run_case
+from microslip.workflow import load_mesh, mesh_stage, open_job
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def blade(tmp_path_factory):
+    from microslip.modes import modal_basis
+
+    job = open_job(ROOT / "geometry/blade", ["output.gauss=false"], tmp_path_factory.mktemp("blade"))
+    mesh_stage(job)
+    return modal_basis(load_mesh(job)[0], job.settings)
+
+
+def test_uncoupled_frequencies(blade):
+    """0.5 %: the default mesh is converged to 0.3 %, the printed values were met to 0.2 % by a coarser solid."""
+    g = blade.groups[0, 0]
+    assert g.checks["certified"] == 1
+    twist = [f for f, kind in zip(g.frequency, turning(g), strict=True) if kind]
+    assert g.frequency[0] == pytest.approx(14.1, rel=5e-3)
+    assert twist[0] == pytest.approx(159.55, rel=5e-3)
+    assert twist[1] == pytest.approx(540.61, rel=5e-3)
+
+
+def turning(g):
+    """Torsion modes: the two contact faces move against each other along the chord."""
+    right, left = (g.interfaces[n].rotation.T @ g.interfaces[n].rows[:3] for n in ("right", "left"))
+    along = np.abs(right[1] - left[1])
+    return along > 0.2 * (np.abs(right).sum(axis=0) + np.abs(left).sum(axis=0))
+
+
+def test_mass_is_that_of_the_drawing(blade):
+    assert blade.mass == pytest.approx(7850 * (0.475 * 0.077 * 0.005 + 0.088 * 0.077 * 0.005), rel=1e-9)
+
+
+def test_sticking_frequencies(blade):
+    """3 %: between rigid neighbours through the book's c_N0, c_R0 without any tuning; roughness is left out."""
+    settings, _ = load_case(ROOT / "pipeline/cases/blade.toml", ["sweep.points=2"])
+    result = run_case(settings, blade, "case")
+    for printed in (120.0, 320.0, 470.0):
+        assert np.abs(result.stuck / printed - 1).min() < 0.035
+
+
+def test_friction_lowers_the_first_peak_and_its_frequency(blade):
+    """Fig. 5.3-7: with falling normal force the resonance frequency falls; there is an optimum of the amplitude."""
+    settings, _ = load_case(
+        ROOT / "pipeline/cases/blade.toml",
+        ["sweep.start=90.0", "sweep.stop=125.0", "sweep.points=701", "sweep.normal_forces=[10.0, 30.0, 780.0]"],
+    )
+    result = run_case(settings, blade, "case")
+    peak = {n: max(zip(np.abs(r.monitor), r.frequency, strict=True)) for n, r in result.responses.items()}
+    assert all(r.converged.all() for r in result.responses.values())
+    assert peak[10.0][1] < peak[30.0][1] < peak[780.0][1]
+    assert peak[30.0][0] < 0.2 * min(peak[780.0][0], peak[10.0][0])
