@@ -99,7 +99,8 @@ def both_signs(widths: list[float]) -> list[float]:
 def count(length: float, size: float) -> int:
     """Elements along a length."""
     if length > MOST_ALONG * size:
-        raise UserError(f"mesh.size = {size:g} puts {length / size:.1g} elements along {length:g}; is it in length_unit?")
+        many = f"{length / size:.1g} elements along {length:g}"
+        raise UserError(f"mesh.size = {size:g} puts {many}; is it in length_unit?")
     return max(1, int(np.ceil(length / size - 1e-6)))
 
 

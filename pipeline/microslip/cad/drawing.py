@@ -19,6 +19,7 @@ from microslip.cad.curved import refuse_inverted, straighten
 from microslip.data import UserError
 from microslip.store import complete_or_absent
 
+warnings: list[str] = []
 MOST_ELEMENTS = 5e6  # beyond it a size is taken for a mistake in the unit
 
 
@@ -44,19 +45,20 @@ def guarded(work: Callable[[], None], source: str) -> None:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("General.NumThreads", 1)  # one thread: the same bytes at every run
         work()
+        print("".join(f"warning: {text}\n" for text in warnings), end="", file=sys.stderr)
     except Exception as error:  # gmsh raises plain Exception
         known = isinstance(error, UserError | OSError) or type(error) is Exception
         text = str(error) if known else f"{type(error).__name__}: {error}"
-        name = "body.toml" if source.endswith(".json") else Path(source).name
-        print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
+        prefix = "" if source.endswith(".json") else f"{Path(source).name}: "  # whoever wrote the .json names the body
+        print(prefix + " ".join(text.split()), file=sys.stderr)
         sys.exit(2)
     finally:
         gmsh.finalize()
 
 
 def warn(text: str) -> None:
-    """One line on stderr; the work goes on."""
-    print(f"warning: {text}", file=sys.stderr)
+    """A line on stderr once the work is done."""
+    warnings.append(text)
 
 
 def read_settings(path: str) -> dict[str, Any]:
@@ -134,6 +136,8 @@ def finish(mesh: dict[str, Any], out: str) -> None:
         gmsh.model.mesh.setOrder(order)
     except Exception as error:
         raise UserError(f"gmsh cannot mesh the body ({error}); try another mesh.size") from None
+    if not all(len(gmsh.model.mesh.getElements(3, tag)[0]) for _, tag in gmsh.model.getEntities(3)):
+        raise UserError("gmsh left a solid without elements; try another mesh.size")
     straightened = straighten() if order == 2 else 0
     refuse_inverted()
     write(out)

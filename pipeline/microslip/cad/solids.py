@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import re
 import sys
@@ -21,7 +22,14 @@ from microslip.data import UserError
 from microslip.mesh import UNITS
 
 OCC_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "in": "INCH", "ft": "FT"}
-LONGEST_IMPORT = 600.0  # seconds; OpenCASCADE loops for ever in some damaged files
+ENDS = {  # how a complete text file of the kind ends; OpenCASCADE takes half files for whole, or hangs in them
+    ".step": rb"END-ISO-10303-21;\s*$",
+    ".stp": rb"END-ISO-10303-21;\s*$",
+    ".brep": rb"\*\s+[+-]?\d+ \d+\s*$",
+    ".iges": rb"T {0,6}\d+\s*$",
+    ".igs": rb"T {0,6}\d+\s*$",
+}
+LONGEST_IMPORT = 20.0, 20e-6  # seconds and seconds per byte; OpenCASCADE loops for ever in some damaged files
 
 
 def load(path: Path, unit: str) -> Marks:
@@ -37,7 +45,7 @@ def load(path: Path, unit: str) -> Marks:
         raise UserError(f"geometry.cad: {path.name} holds no solid ({count} surfaces of open or loose shells); "
                         "close the body in the CAD program and export it as a solid")
     for solid in solids:
-        refuse_open(path, solid)
+        refuse_damaged(path, solid)
     marks = marks_of(path)
     if len(solids) > 1:
         marks = join(path, solids, marks)
@@ -48,16 +56,18 @@ def load(path: Path, unit: str) -> Marks:
 def import_shapes(path: Path, unit: str) -> None:
     """Let OpenCASCADE read the file. STEP and IGES state their unit and are converted, BREP is taken as it is."""
     kind = path.suffix.lower()
-    if kind not in (".step", ".stp", ".brep", ".iges", ".igs"):
-        raise UserError(f"geometry.cad: {path.name} must end in .step, .stp, .brep, .iges or .igs")
-    if kind == ".brep" and not re.search(rb"\*\s+[+-]?\d+ \d+\s*$", path.read_bytes()[-200:]):
-        raise UserError(f"geometry.cad: {path.name} is no text BREP file or is cut off; export it again")
+    if kind not in ENDS:
+        raise UserError(f"geometry.cad: the name {path.name} must end in one of {', '.join(ENDS)}")
+    if not re.search(ENDS[kind], path.read_bytes()[-400:]):
+        raise UserError(f"geometry.cad: {path.name} is no {kind[1:].upper()} file or is cut off; export it again")
     if kind in (".step", ".stp"):
         gmsh.option.setString("Geometry.OCCTargetUnit", OCC_UNITS[unit])
     elif kind in (".iges", ".igs"):  # always arrives in mm
         gmsh.option.setNumber("Geometry.OCCScaling", UNITS["mm"] / UNITS[unit])
+    longest = LONGEST_IMPORT[0] + LONGEST_IMPORT[1] * path.stat().st_size
+    late = f"geometry.cad: {path.name} is damaged, it was not read within {longest:.0f} s; export it again"
     try:
-        with time_limit(f"{path.name}: no end of reading in sight, the file is damaged"), silent():
+        with time_limit(longest, late), silent():
             shapes = gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
             if kind in (".iges", ".igs") and all(dim < 3 for dim, _ in shapes):
                 sew(shapes)
@@ -74,14 +84,14 @@ def sew(shapes: Sequence[tuple[int, int]]) -> None:
 
 
 @contextlib.contextmanager
-def time_limit(text: str) -> Iterator[None]:
+def time_limit(seconds: float, text: str) -> Iterator[None]:
     """Leave the process when the body of the `with` hangs in foreign code."""
 
     def leave() -> None:
         os.write(2, f"{text}\n".encode())
         os._exit(2)
 
-    timer = threading.Timer(LONGEST_IMPORT, leave)
+    timer = threading.Timer(seconds, leave)
     timer.daemon = True
     timer.start()
     try:
@@ -104,8 +114,10 @@ def silent() -> Iterator[None]:
             os.close(kept)
 
 
-def refuse_open(path: Path, solid: tuple[int, int]) -> None:
-    """In the skin of a solid every edge joins exactly two faces (a seam joins a face to itself)."""
+def refuse_damaged(path: Path, solid: tuple[int, int]) -> None:
+    """A solid has a volume; in its skin every edge joins exactly two faces (a seam joins a face to itself)."""
+    if not 0 < gmsh.model.occ.getMass(*solid) < math.inf:
+        raise UserError(f"geometry.cad: a solid in {path.name} has no volume; repair it in the CAD program")
     uses: Counter[int] = Counter()
     for surface in gmsh.model.getBoundary([solid], oriented=False):
         uses.update(edge for _, edge in gmsh.model.getBoundary([surface], combined=False, oriented=False))
