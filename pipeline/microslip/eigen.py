@@ -235,7 +235,7 @@ def search(
     pair is cut off. The solver is left factorised at `shift`, for the static solutions that follow.
 
     Args:
-        pencil: K and M; M positive definite. shift: (rad/s)^2; 0 for a held body, negative for a free one.
+        pencil: K and M; M positive semidefinite. shift: (rad/s)^2; 0 for a held body, negative for a free one.
         tolerance: residual of (K - shift M)^-1 M over its eigenvalue. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
 
     Raises:
@@ -250,9 +250,10 @@ def search(
     while True:
         wanted = min(count + extra, pencil.n) - len(zeros)
         values, vectors = _lanczos(pencil, max(wanted, 1), shift, tolerance, known)
+        every = len(values) < max(wanted, 1) or len(zeros) + len(values) >= pencil.n  # no further one exists
         values, vectors = np.concatenate([zeros, values]), np.hstack([known, vectors])
         keep, upper = _gap(values, count)
-        if keep or len(values) >= pencil.n:
+        if keep or every:
             break
         extra *= 4
     keep = keep or len(values)
@@ -422,12 +423,20 @@ def _arpack(pencil: Pencil, count: int, shift: float, tolerance: float, known: A
 
 
 def _dense(pencil: Pencil, count: int, known: Array) -> tuple[Array, Array]:
-    """Tiny problems, where Lanczos has no room: dense generalised eigenproblem on the complement of `known`."""
+    """Tiny problems, where Lanczos has no room: dense eigenproblem on the M-orthogonal complement of `known`.
+
+    The four-point mass of a few ten-node tetrahedra is singular; what has no mass is condensed (an infinite
+    eigenvalue), so that only finite eigenvalues are returned.
+    """
     eye = np.eye(pencil.n)
     K, M = pencil.K(eye), pencil.M(eye)
+    weight, Q = np.linalg.eigh(0.5 * (M + M.T))
+    heavy = weight > 1e-12 * weight[-1]
+    X, light = Q[:, heavy] / np.sqrt(weight[heavy]), Q[:, ~heavy]
+    if light.shape[1]:
+        X = X - light @ np.linalg.solve(light.T @ K @ light, light.T @ (K @ X))
     if known.shape[1]:
-        heavy = M @ known
-        top = np.abs(K).max() * 1e3
-        K = K + top * heavy @ heavy.T / np.abs(np.diag(M)).max()
-    values, vectors = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (M + M.T), subset_by_index=(0, min(count, len(K)) - 1))
-    return values, vectors
+        away = np.linalg.qr(X.T @ (M @ known), mode="complete")[0]
+        X = X @ away[:, known.shape[1] :]
+    values, S = np.linalg.eigh(0.5 * (X.T @ K @ X + (X.T @ K @ X).T))
+    return values[:count], X @ S[:, :count]
