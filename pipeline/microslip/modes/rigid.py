@@ -27,7 +27,8 @@ def free_motions(points: Array, centre: Array, fixed: Indices) -> Array:
     scaled = fields / np.array([1, 1, 1, size, size, size])
     if not len(fixed):
         return scaled
-    _, s, vt = np.linalg.svd(scaled[fixed], full_matrices=True)
+    short = np.linalg.qr(scaled[fixed], mode="r")  # the singular values and vectors of many rows in six
+    _, s, vt = np.linalg.svd(short, full_matrices=True)
     rank = int((s > 1e-8 * max(s.max(), 1e-300)).sum())
     return scaled @ vt[rank:].T
 
@@ -47,7 +48,7 @@ def describe(points: Array, centre: Array, motions: Array) -> list[str]:
         else:
             axis = w / np.linalg.norm(w)
             through = centre + np.cross(w, t) / (w @ w)
-            at = ", ".join(f"{v:.4g}" for v in through)
+            at = ", ".join(f"{v:.4g}" for v in np.where(np.abs(through) < 1e-9 * size, 0.0, through))
             texts.append(f"rotation about {_direction(axis)} through ({at}) m")
     return texts
 
