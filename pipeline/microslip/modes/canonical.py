@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, Indices
 
 CLUSTER = 1e-6  # relative gap of eigenvalues below which they count as repeated
 
@@ -17,6 +17,13 @@ def clusters(values: Array, zero: int = 0) -> list[slice]:
             runs.append(slice(start, i))
             start = i
     return runs
+
+
+def by_place(points: Array) -> Indices:
+    """(3n,) degrees of freedom ordered by the position of their points, so that numbering decides no tie."""
+    place = np.round((points - points.min(axis=0)) / max(np.ptp(points, axis=0).max(), 1e-300), 6)
+    nodes = np.lexsort((place[:, 2], place[:, 1], place[:, 0]))
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
 def turn_clusters(phi: Array, values: Array, rows: Array, zero: int = 0) -> Array:

@@ -309,9 +309,10 @@ def _group(
     zero = R.shape[1]
     phi = np.zeros((3 * model.d.mesh.n_points, len(found.values)))
     phi[dofs] = found.vectors
-    lead = _leading_rows(rows, settings, phi)
+    place = canonical.by_place(model.d.mesh.points)
+    lead = _leading_rows(rows, settings, phi, place)
     phi = canonical.turn_clusters(phi, found.values, lead(phi), zero)
-    phi *= canonical.signs(lead(phi)[:6] if settings.interfaces else phi)
+    phi *= canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
     keep = _band(found.values, settings, zero)
     phi, values = phi[:, :keep], found.values[:keep]
     omega = np.sqrt(np.maximum(values, 0.0))
@@ -355,20 +356,22 @@ def _band(values: Array, settings: BodySettings, zero: int) -> int:
     return keep
 
 
-def _leading_rows(rows: BodyRows, settings: BodySettings, phi: Array) -> Callable[[Array], Array]:
+def _leading_rows(
+    rows: BodyRows, settings: BodySettings, phi: Array, place: Indices
+) -> Callable[[Array], Array]:
     """Rows that decide signs and the basis of pairs: the first interface's, else the strongest nodes' motion."""
     first = next((i.name for i in settings.interfaces), None)
+    chosen = _strong(phi, place)
     if first is not None:
         B = rows.patches[first].B
-        return lambda x: np.vstack([B @ x, x[_strong(phi)]])
-    chosen = _strong(phi)
+        return lambda x: np.vstack([B @ x, x[chosen]])
     return lambda x: x[chosen]
 
 
-def _strong(phi: Array) -> Indices:
-    """Degrees of freedom with the largest motion over all modes, a few of them, in definite order."""
-    power = (phi**2).sum(axis=1)
-    return np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]
+def _strong(phi: Array, place: Indices) -> Indices:
+    """Degrees of freedom with the largest motion over all modes, a few of them; of ties the first in `place`."""
+    power = (phi[place] ** 2).sum(axis=1)
+    return place[np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]]
 
 
 def _static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix, R: Array, shift: float) -> Array:
