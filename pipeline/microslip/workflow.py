@@ -123,12 +123,14 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         os.utime(product)
         return product
     report(f"meshing {source.name}")
-    _run_mesher(job, source, product)
+    for line in _run_mesher(job, source, product):
+        report(line)
     store.note_product(product, inputs)
     return product
 
 
-def _run_mesher(job: Job, source: Path, product: Path) -> None:
+def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
+    """Run gmsh in its own process; returns its warnings."""
     settings = {**job.raw, "folder": str(job.folder.resolve())}
     if job.settings.geometry.build:
         command = [sys.executable, str(source.resolve())]
@@ -144,6 +146,7 @@ def _run_mesher(job: Job, source: Path, product: Path) -> None:
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
+    return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
 
 
 def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
@@ -155,6 +158,11 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
         return (
             f"gmsh needs the system library {library}; type: "
             "sudo apt-get install -y libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1 libegl1"
+        )
+    if done.returncode < 0 and job.settings.geometry.cad:
+        return (
+            f"{job.path}: geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} (signal {-done.returncode}); "
+            "the file is probably damaged, export it again"
         )
     if done.returncode < 0:
         return f"{job.path}: gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
