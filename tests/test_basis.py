@@ -1,0 +1,452 @@
+"""The modal file: round trip, the documented readers, findings on tampered content, damage, hostile content."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import small
+
+from microslip.basis import check_basis, open_file, read_basis, write_basis
+from microslip.data import Mesh, ModalBasis, UserError
+from microslip.hdf5 import HostileFile, inspect, seal_state
+from microslip.integrate import modal_mass
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "modal_file.md"
+
+
+def same(a: object, b: object) -> bool:
+    """Equal to the last bit, arrays of the same type."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        x, y = np.asarray(a), np.asarray(b)
+        return x.shape == y.shape and x.dtype == y.dtype and x.tobytes() == y.tobytes()
+    if dataclasses.is_dataclass(a) and not isinstance(a, type):
+        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
+    if isinstance(a, Mapping):
+        return isinstance(b, Mapping) and set(a) == set(b) and all(same(a[k], b[k]) for k in a)
+    return a == b
+
+
+def failed(basis: ModalBasis) -> list[str]:
+    return [c.name for c in check_basis(basis) if not c.passed]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("basis") / "basis.h5"
+    write_basis(path, small.basis((0.0, 3000.0)))
+    return path
+
+
+@pytest.fixture
+def copy(file: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(file, tmp_path / "copy.h5"))
+
+
+# ---------------------------------------------------------------- round trip
+
+
+@pytest.mark.parametrize("which", ["held", "spinning", "free"])
+def test_round_trip_is_exact_and_writes_the_same_bytes(tmp_path: Path, which: str) -> None:
+    basis = {"held": small.basis(), "spinning": small.basis((0.0, 3000.0)), "free": small.basis(free=True)}[which]
+    write_basis(tmp_path / "a.h5", basis)
+    again = read_basis(tmp_path / "a.h5")
+    for field in dataclasses.fields(basis):
+        if field.name != "mesh":
+            assert same(getattr(basis, field.name), getattr(again, field.name)), field.name
+    for key, group in basis.groups.items():  # order is precedence
+        assert list(group.interfaces) == list(again.groups[key].interfaces)
+        assert list(group.excitations) == list(again.groups[key].excitations)
+    assert same(basis.mesh.points, again.mesh.points)
+    assert {n: {t: f.tolist() for t, f in b.items()} for n, b in basis.mesh.faces.items()} == {
+        n: {t: f.tolist() for t, f in b.items()} for n, b in again.mesh.faces.items()
+    }
+    assert {n: s.tolist() for n, s in basis.mesh.point_sets.items()} == {
+        n: s.tolist() for n, s in again.mesh.point_sets.items()
+    }
+    write_basis(tmp_path / "b.h5", again)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    assert failed(again) == []
+
+
+def test_without_shapes_and_stresses(tmp_path: Path) -> None:
+    basis = small.basis()
+    m = basis.groups[0, 0].n_modes
+    faces = {
+        n: dataclasses.replace(i, shapes=np.zeros((0, 3, m))) for n, i in basis.groups[0, 0].interfaces.items()
+    }
+    group = dataclasses.replace(basis.groups[0, 0], phi=np.zeros((0, 3, m)), stresses={}, interfaces=faces)
+    write_basis(tmp_path / "a.h5", dataclasses.replace(basis, groups={(0, 0): group}))
+    again = read_basis(tmp_path / "a.h5")
+    assert same(again.groups[0, 0], group)
+    assert failed(again) == []
+
+
+@pytest.mark.parametrize("name", ["a/b", "a%2Fb", ".", "..", "", "Fläche 1", "%", "x" * 300])
+def test_any_name_of_a_set_survives(tmp_path: Path, name: str) -> None:
+    basis = small.basis()
+    faces, sets = {name: basis.mesh.faces["tip"]}, {name + "s": np.array([3, 5])}
+    mesh = dataclasses.replace(basis.mesh, faces=faces, point_sets=sets)
+    write_basis(tmp_path / "a.h5", dataclasses.replace(basis, mesh=mesh))
+    again = read_basis(tmp_path / "a.h5").mesh
+    assert list(again.faces) == [name]
+    assert {n: s.tolist() for n, s in again.point_sets.items()} == {name + "s": [3, 5]}
+
+
+def test_node_numbers_with_gaps(tmp_path: Path) -> None:
+    basis = small.basis()
+    ids = np.random.default_rng(1).permutation(10 * basis.mesh.n_points)[: basis.mesh.n_points] + 1
+    mesh = dataclasses.replace(basis.mesh, node_id=ids)
+    write_basis(tmp_path / "a.h5", dataclasses.replace(basis, mesh=mesh))
+    again = read_basis(tmp_path / "a.h5").mesh
+    assert same(again.node_id, ids)
+    assert again.point_sets["tip_points"].tolist() == mesh.point_sets["tip_points"].tolist()
+    with h5py.File(tmp_path / "a.h5") as f:
+        assert f["mesh/groups/clamp/nodes"][:].tolist() == ids[mesh.face_points("clamp")].tolist()
+
+
+def test_same_inputs_on_one_thread_give_the_same_bytes(tmp_path: Path) -> None:
+    script = (
+        "import sys, small; from microslip.basis import write_basis;"
+        "write_basis(sys.argv[1], small.basis((0.0, 3000.0)))"
+    )
+    threads = {k: "1" for k in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    paths = os.pathsep.join([str(ROOT / "tests"), str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    hashes = set()
+    for run in ("a", "b"):
+        out = tmp_path / f"{run}.h5"
+        environment = {**os.environ, **threads, "PYTHONPATH": paths, "PYTHONHASHSEED": run.encode().hex()}
+        subprocess.run([sys.executable, "-c", script, str(out)], check=True, env=environment, timeout=120)
+        hashes.add(hashlib.sha256(out.read_bytes()).hexdigest())
+    assert len(hashes) == 1
+
+
+# ---------------------------------------------------------------- layout and documentation
+
+
+def test_every_axis_has_a_scale_or_none(file: Path) -> None:
+    def look(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and not item.is_scale:
+            assert len({len(d) for d in item.dims}) <= 1, name
+
+    with h5py.File(file) as f:
+        f.visititems(look)
+        phi = f["speed_0/nd_0/modes/phi"]
+        assert [d.label for d in phi.dims] == ["node", "axis", "mode"]
+
+
+def test_text_is_of_fixed_length(file: Path) -> None:
+    def look(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            assert item.dtype.kind in "fiuS", name
+
+    with h5py.File(file) as f:
+        f.visititems(look)
+
+
+def test_every_dataset_is_documented(file: Path) -> None:
+    documented = set(re.findall(r"[A-Za-z_]\w*", PAGE.read_text(encoding="utf-8")))
+    names: set[str] = set()
+    with h5py.File(file) as f:
+        f.visititems(lambda name, item: names.add(name.rsplit("/", 1)[-1]) if isinstance(item, h5py.Dataset) else None)
+        names -= {*f["speed_0/nd_0/checks"], "tetra10", "triangle6"}
+    assert names <= documented, names - documented
+
+
+def test_the_documented_python_lines(file: Path) -> None:
+    code = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert code is not None
+    lines = code[1].replace('"basis.h5"', repr(str(file)))
+    assert len([line for line in lines.splitlines() if line.strip()]) <= 15
+    found: dict = {}
+    exec(lines, found)
+    group = read_basis(file).groups[0, 0]
+    assert same(found["omega"], group.omega)
+    assert same(found["phi"], group.phi)
+    assert same(found["T"]["left"], group.interfaces["left"].rows)
+    assert same(found["missing"], group.compliance.residual)
+    assert same(found["stress"], group.stresses["nodes"].stress)
+    assert found["failed"] == []
+
+
+@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")
+def test_the_documented_matlab_function(file: Path) -> None:
+    ask = (
+        f"addpath('{PAGE.parent}'); b = read_modal_file('{file}', 1, 'right');"
+        "printf('%.17g ', b.omega(2), b.G_r(1, 2), b.phi(324, 1, 2), b.T(2, 3), b.xyz(324, 3), b.rotation(1, 1));"
+    )
+    done = subprocess.run(["octave-cli", "-q", "--eval", ask], capture_output=True, text=True, timeout=120)
+    g = read_basis(file).groups[1, 0]
+    right = g.interfaces["right"]
+    expected = [g.omega[1], g.G_r[0, 1], g.phi[323, 0, 1], right.rows[1, 2], small.basis().mesh.points[323, 2]]
+    assert [float(v) for v in done.stdout.split()] == [*expected, right.rotation[0, 0]], done.stderr
+
+
+def test_xarray_names_the_dimensions(file: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    tree = xarray.open_datatree(file, engine="h5netcdf", phony_dims="sort")
+    assert tree["speed_0/nd_0/modes/phi"].dims == ("node", "axis", "mode")
+    assert tree["speed_0/nd_0/stress/nodes/T"].dims == ("place", "component", "mode")
+
+
+# ---------------------------------------------------------------- checks
+
+
+def change(path: Path, place: str, how: Callable[[np.ndarray], np.ndarray]) -> None:
+    with h5py.File(path, "r+") as f:
+        f[place][...] = how(f[place][...])
+
+
+def scaled(factor: float, index: object) -> Callable[[np.ndarray], np.ndarray]:
+    def apply(a: np.ndarray) -> np.ndarray:
+        a[index] *= factor
+        return a
+
+    return apply
+
+
+def swapped(a: np.ndarray) -> np.ndarray:
+    a[[0, 1]] = a[[1, 0]]
+    return a
+
+
+def with_nan(a: np.ndarray) -> np.ndarray:
+    a.flat[a.size // 2] = np.nan
+    return a
+
+
+AT = "speed_0/nd_0/"
+TAMPERED = {
+    "frequency": (AT + "modes/frequency", scaled(1.001, 2)),
+    "omega": (AT + "modes/omega", scaled(1.001, 2)),
+    "M_r": (AT + "modes/M_r", scaled(1.001, (1, 1))),
+    "K_r": (AT + "modes/K_r", scaled(1.001, (1, 1))),
+    "C_r": (AT + "modes/C_r", scaled(1.001, (1, 1))),
+    "G_r": ("speed_1/nd_0/modes/G_r", scaled(1.001, (0, 1))),
+    "one shape": (AT + "modes/phi", scaled(1.001, (..., 2))),
+    "one node": (AT + "modes/phi", scaled(-1.0, (324,))),
+    "nodes in another order": (AT + "modes/phi", lambda a: a[::-1]),
+    "axes in another order": (AT + "modes/phi", lambda a: a[:, [1, 0, 2]]),
+    "sign of one shape": (AT + "modes/phi", scaled(-1.0, (..., 2))),
+    "interface rows swapped": (AT + "interfaces/right/T", swapped),
+    "interface rotation row": (AT + "interfaces/left/T", scaled(1.001, 4)),
+    "excitation rows": (AT + "excitation/shaker/T", scaled(-1.0, (0, 1))),
+    "monitor rows swapped": (AT + "monitor/tip-probe/T", swapped),
+    "frame": ("interfaces/right/rotation", swapped),
+    "patch areas": ("interfaces/right/patch/areas", scaled(1.5, 3)),
+    "modal compliance": (AT + "compliance_modal", scaled(1.001, (0, 0))),
+    "static compliance": (AT + "compliance_static", scaled(0.5, (13, 13))),
+    "mass": ("body/mass", lambda a: a * 1.001),
+    "one point of the mesh": ("mesh/xyz", scaled(1.5, 150)),
+    "cells": ("mesh/cells/tetra10", lambda a: a[:, ::-1]),
+    "certificate": (AT + "checks/certified", lambda a: a * 0),
+    "backward error": (AT + "checks/backward_error", lambda a: a + 1e-3),
+    "axis of rotation": ("rotation/direction", lambda a: a * 2),
+}
+
+
+@pytest.mark.parametrize("what", TAMPERED)
+def test_tampered_content_is_found(copy: Path, what: str) -> None:
+    change(copy, *TAMPERED[what])
+    assert seal_state(copy) == "absent"
+    try:
+        assert failed(read_basis(copy)) != []
+    except UserError as error:
+        assert "damaged" in str(error)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        AT + "modes/omega", AT + "modes/phi", AT + "modes/K_r", AT + "modes/damping_ratio", AT + "interfaces/right/T",
+        AT + "interfaces/right/patch/shapes", AT + "interfaces/right/fit_residual", AT + "compliance_static",
+        AT + "compliance_modal", AT + "stress/gauss/T", AT + "strain/nodes/T", AT + "rotation/u_static",
+        AT + "gauge/root/T", AT + "rotation/sigma_static/nodes", "mesh/xyz", "body/inertia", "rotation/point",
+        "interfaces/left/patch/normals", "interfaces/left/rotation", "interfaces/left/origin",
+    ],
+)  # fmt: skip
+def test_not_a_number_is_found(copy: Path, place: str) -> None:
+    change(copy, place, with_nan)
+    try:
+        assert failed(read_basis(copy)) != []
+    except UserError as error:
+        assert "damaged" in str(error)
+
+
+def test_mass_from_the_mesh_needs_no_finite_element_package() -> None:
+    basis = small.basis()
+    inner, volume = modal_mass(basis.mesh, basis.groups[0, 0].phi)
+    assert volume == pytest.approx(np.prod(small.SIZE), rel=1e-13)
+    assert np.allclose(inner * basis.mass / volume, np.eye(6), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("cell_type", ["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"])
+def test_quadrature_of_the_checks_is_that_of_the_assembly(cell_type: str) -> None:
+    pytest.importorskip("skfem")
+    from microslip.fem.discretise import shape_functions
+    from microslip.integrate import _rule, tables
+
+    points, _ = _rule(cell_type)
+    N, dN, weights = tables(cell_type)
+    expected_N, expected_dN = shape_functions(cell_type, points)
+    assert np.allclose(N, expected_N, rtol=0, atol=1e-13)
+    assert np.allclose(dN, expected_dN, rtol=0, atol=1e-12)
+    assert weights.sum() == pytest.approx(1 / 6 if "tetra" in cell_type else 1.0, rel=1e-14)
+
+
+def test_checks_do_not_raise_on_arrays_that_do_not_fit() -> None:
+    basis = small.basis()
+    group = basis.groups[0, 0]
+    for field, value in {
+        "M_r": np.zeros((0, 0)), "phi": np.zeros((7, 3, 6)), "kind": ("normal",), "u_static": np.zeros(3),
+        "damping_ratio": np.zeros(2),
+    }.items():  # fmt: skip
+        broken = dataclasses.replace(basis, groups={(0, 0): dataclasses.replace(group, **{field: value})})
+        assert any("shapes" in name for name in failed(broken)), field
+    labels = ("interface:nowhere:u_n", *group.compliance.labels[1:])
+    renamed = dataclasses.replace(group, compliance=dataclasses.replace(group.compliance, labels=labels))
+    assert any("compliance rows" in name for name in failed(dataclasses.replace(basis, groups={(0, 0): renamed})))
+    no_cells = dataclasses.replace(basis, mesh=Mesh(basis.mesh.points, {}))
+    assert any("mesh" in name for name in failed(no_cells))
+
+
+# ---------------------------------------------------------------- damage
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(UserError) as error:
+        read_basis(path)
+    text = str(error.value)
+    assert str(path) in text
+    assert "\n" not in text
+    return text
+
+
+def test_missing_foreign_and_text_files(tmp_path: Path) -> None:
+    assert "no such modal file" in refusal(tmp_path / "none.h5")
+    assert "no such modal file" in refusal(tmp_path)
+    (tmp_path / "text.h5").write_text("hello")
+    assert "no HDF5" in refusal(tmp_path / "text.h5")
+    (tmp_path / "empty.h5").write_bytes(b"")
+    assert "no HDF5" in refusal(tmp_path / "empty.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as f:
+        f["x"] = 1.0
+    assert "is no modal file" in refusal(tmp_path / "other.h5")
+
+
+@pytest.mark.parametrize("share", [0.0001, 0.01, 0.3, 0.7, 0.99])
+def test_truncated_files(copy: Path, share: float) -> None:
+    data = copy.read_bytes()
+    copy.write_bytes(data[: int(share * len(data))])
+    assert "damaged" in refusal(copy)
+
+
+def test_a_cut_seal_leaves_a_readable_file(copy: Path) -> None:
+    copy.write_bytes(copy.read_bytes()[:-10])
+    assert seal_state(copy) == "absent"
+    assert failed(read_basis(copy)) == []
+
+
+def test_any_flipped_byte_breaks_the_seal(copy: Path) -> None:
+    data = copy.read_bytes()
+    assert seal_state(copy) == "intact"
+    for place in np.random.default_rng(0).integers(0, len(data) - 200, 20):
+        flipped = bytearray(data)
+        flipped[place] ^= 0x10
+        copy.write_bytes(flipped)
+        assert "sealed" in refusal(copy)
+
+
+def test_another_major_version(copy: Path) -> None:
+    with h5py.File(copy, "r+") as f:
+        f.attrs["format_version"] = "7.1"
+    assert "7.1" in refusal(copy)
+
+
+def test_a_cyclic_sector_is_not_misread(copy: Path) -> None:
+    with h5py.File(copy, "r+") as f:
+        f["cyclic"].attrs["N"] = 24
+    assert "cyclic" in refusal(copy)
+
+
+def test_every_missing_part_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "basis.h5"
+    write_basis(path, small.basis())
+    parts = ["mesh/" + p for p in ("node", "xyz", "cells", "groups", "groups/tip/nodes")]
+    parts += ["body/" + p for p in ("mass", "centre", "inertia")]
+    parts += ["cyclic", "provenance", "rotation/direction", "rotation/point", "speed_0", "interfaces"]
+    parts += ["interfaces/left/" + p for p in ("origin", "rotation", "patch/points", "patch/areas", "patch/normals")]
+    parts += [f"{AT}modes/{p}" for p in ("omega", "frequency", "damping_ratio", "kind", "M_r", "K_r", "C_r", "G_r")]
+    parts += [AT + p for p in ("modes", "rotation", "rotation/u_static", "checks", "excitation", "monitor", "gauge")]
+    parts += [AT + p for p in ("interfaces/right", "interfaces/right/T", "interfaces/right/fit_residual")]
+    parts += [AT + "monitor/tip-probe/" + p for p in ("T", "row", "static", "point")]
+    parts += [AT + p for p in ("compliance_static", "compliance_modal", "compliance_row", "cyclic")]
+    parts += [AT + p for p in ("stress/gauss/T", "stress/gauss/points", "stress/gauss/weights", "strain/gauss/T")]
+    parts += [AT + p for p in ("rotation/sigma_static/gauss", "strain")]
+    for part in parts:
+        with h5py.File(path, "r+") as f:
+            f.move(part, "elsewhere")
+        assert "damaged or incomplete" in refusal(path), part
+        with h5py.File(path, "r+") as f:
+            f.move("elsewhere", part)
+    assert failed(read_basis(path)) == []
+
+
+def test_hostile_content_is_refused_before_it_is_read(copy: Path, tmp_path: Path) -> None:
+    def soft(f: h5py.File) -> None:
+        f["body/extra"] = h5py.SoftLink("/mesh/xyz")
+
+    def external(f: h5py.File) -> None:
+        f["body/extra"] = h5py.ExternalLink("/etc/passwd", "/")
+
+    def circle(f: h5py.File) -> None:
+        f["body/extra"] = f["/"]
+
+    def huge(f: h5py.File) -> None:
+        f["body"].create_dataset("extra", shape=(10**15,), dtype="f8", chunks=(1024,))
+
+    def objects(f: h5py.File) -> None:
+        f["body"].create_dataset("extra", data=["a", "b"], dtype=h5py.string_dtype())
+
+    def references(f: h5py.File) -> None:
+        f["body"].create_dataset("extra", data=f["body"].ref, dtype=h5py.ref_dtype)
+
+    def elsewhere(f: h5py.File) -> None:
+        f["body"].create_dataset("extra", shape=(3,), dtype="f8", external=[("/etc/passwd", 0, 24)])
+
+    def virtual(f: h5py.File) -> None:
+        layout = h5py.VirtualLayout(shape=(3,), dtype="f8")
+        layout[:] = h5py.VirtualSource("/etc/passwd", "x", shape=(3,))
+        f["body"].create_virtual_dataset("extra", layout)
+
+    def named_type(f: h5py.File) -> None:
+        f["body/extra"] = np.dtype("f8")
+
+    for trick in (soft, external, circle, huge, objects, references, elsewhere, virtual, named_type):
+        path = Path(shutil.copy(copy, tmp_path / f"{trick.__name__}.h5"))
+        with h5py.File(path, "r+") as f:
+            trick(f)
+        assert "body/extra" in refusal(path) or trick is circle, trick.__name__
+        with h5py.File(path) as f, pytest.raises(HostileFile):
+            inspect(f)
+
+
+def test_open_file_leaves_nothing_open(copy: Path) -> None:
+    with h5py.File(copy, "r+") as f:
+        f.attrs["format_version"] = "7.1"
+    with pytest.raises(UserError):
+        open_file(copy)
+    with h5py.File(copy, "r+"):  # a file still open for reading could not be opened for writing
+        pass
