@@ -145,6 +145,7 @@ def test_the_table_of_writers(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")
 def test_octave_reads_it(file: Path) -> None:
-    ask = f"load('{file}'); b = speed_1; r = b.K - diag(b.omega.^2); printf('%g %s', max(abs(r(:))), b.interfaces.right.role)"
+    ask = f"load('{file}'); b = speed_1; r = b.K - diag(b.omega.^2);"
+    ask += "printf('%g %s', max(abs(r(:))), b.interfaces.right.role)"
     done = subprocess.run(["octave-cli", "-q", "--eval", ask], capture_output=True, text=True, timeout=120)
     assert done.stdout == "0 right", done.stderr
