@@ -50,6 +50,8 @@ def read_mesh(path: Path | str, unit: str) -> Mesh:
         )
     if not cells:
         raise UserError(f"{path}: holds no volume cells (only surfaces or lines?); mesh the volume first")
+    if path.suffix.lower() == ".med":
+        cells = {t: c[:, _mirrored(t)] for t, c in cells.items()}  # MED's own order
     points = np.asarray(raw.points, dtype=float) * UNITS[unit]
     if points.shape[1] != 3 or not np.isfinite(points).all():
         raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
@@ -63,12 +65,37 @@ def _read_raw(path: Path):
 
     if not path.is_file():
         raise UserError(f"{path}: no such mesh file; make it first or correct the path")
+    _know_more_abaqus_types()
+    said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises whatever its parsers meet, and exits on some
-        detail = str(error).splitlines()[0] if str(error) and not isinstance(error, SystemExit) else "unknown format"
+        text = str(error) if not isinstance(error, SystemExit) else said.getvalue()
+        detail = " ".join(text.split())[-160:] or "unknown format"
         raise UserError(f"{path}: is damaged or of a format that cannot be read ({detail}); write it again") from error
+
+
+def _mirrored(cell_type: str) -> Indices:
+    """Permutation between VTK's order and the mirrored one of MED, which meshio leaves as it is."""
+    kind = CELL_TYPES[cell_type]
+    corners = [0, 2, 1, 3] if kind.corners == 4 else [0, 3, 2, 1, 4, 7, 6, 5]
+    image = kind.reference[: kind.corners][corners]
+    # the affine map that takes each corner to its mirrored partner takes every other node to its own
+    ones = np.ones((kind.corners, 1))
+    map_ = np.linalg.lstsq(np.hstack([kind.reference[: kind.corners], ones]), image, rcond=None)[0]
+    moved = np.hstack([kind.reference, np.ones((len(kind.reference), 1))]) @ map_
+    return np.abs(moved[:, None] - kind.reference[None]).sum(axis=2).argmin(axis=1)
+
+
+def _know_more_abaqus_types() -> None:
+    """Second-order facets that mesh generators write beside the solid, which meshio's Abaqus reader lacks."""
+    from meshio.abaqus import _abaqus
+
+    known = getattr(_abaqus, "abaqus_to_meshio_type", {})
+    for name, kind in {"CPS6": "triangle6", "CPE6": "triangle6", "S6": "triangle6", "CPS8": "quad8", "S8": "quad8"}.items():
+        known.setdefault(name, kind)
+    known["C3D4H"] = "tetra"
 
 
 def _volume_cells(raw) -> tuple[dict[str, Indices], set[str]]:  # noqa: ANN001
@@ -89,6 +116,12 @@ def _cell_sets(raw) -> dict[str, list]:  # noqa: ANN001
     for name, (number, dimension) in ((raw.field_data or {}).items() if numbers is not None else ()):
         pairs = zip(raw.cells, numbers, strict=True)
         sets.setdefault(str(name), [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in pairs])
+    families = (raw.cell_data or {}).get("cell_tags", [])
+    for number, names in getattr(raw, "cell_tags", {}).items():  # MED: a family of cells may bear several names
+        for name in names:
+            chosen = [np.flatnonzero(np.asarray(f) == number) for f in families]
+            pairs = zip(sets.get(name, chosen), chosen, strict=True)
+            sets[name] = [np.union1d(a, b) for a, b in pairs]
     return sets
 
 

@@ -134,15 +134,18 @@ def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
     settings = {**job.raw, "folder": str(job.folder.resolve())}
     if job.settings.geometry.build:
         command = [sys.executable, str(source.resolve())]
-    else:
+    elif job.settings.geometry.cad:
         command = [sys.executable, "-m", "microslip.cad"]
+    else:
+        command = [sys.executable, "-m", "microslip.cad", "--convert"]
     with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
         table = Path(scratch) / "settings.json"
         table.write_text(json.dumps(settings))
+        given = source if job.settings.geometry.mesh else table
         made = Path(scratch) / "mesh.msh"
         paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
-        done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+        done = subprocess.run([*command, str(given), str(made)], capture_output=True, text=True, env=environment)
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
@@ -414,6 +417,24 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
     response, converged = None, True
     if job.case_file is not None:
         response, converged = response_stage(job.case_file, job.basis_file, job.build_folder, None, force, report)
+    return report_stage(job, response, force, report), converged
+
+
+def run_case_file(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal file a case needs, and the case. Products of a case named otherwise than its body have their own folder.
+
+    Returns:
+        The report's path (the table's, for a case that has its own folder), and whether every point converged.
+    """
+    case, _ = load_case(path, assignments)
+    job = open_job(find_body(path, case.body, Path(".")))
+    modes_stage(job, report=report)
+    folder = job.root / "build" / case.name
+    response, converged = response_stage(path, job.basis_file, folder, assignments, force, report)
+    if folder != job.build_folder:
+        return folder / "response.csv", converged
     return report_stage(job, response, force, report), converged
 
 
