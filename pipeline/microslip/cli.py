@@ -11,18 +11,24 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
-from .data import NotConverged, UserError
+from .errors import NotConverged, UserError
 from .progress import progress
 
 app = App(
     name="microslip",
     help="Modal bases of elastic bodies for vibration with friction contacts: from CAD to a file solvers can trust.",
     version=__version__,
+    help_format="plaintext",  # importing rich's Markdown costs a tenth of a second
+    default_parameter=Parameter(negative=()),
+    suppress_keyboard_interrupt=False,
 )
 
-Set = Annotated[list[str], Parameter(name="--set", negative="", help="override a setting: key.subkey=value")]
-Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), negative="", help="say nothing but errors")]
-Force = Annotated[bool, Parameter(negative="", help="do the work even if the products are up to date")]
+Set = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", show_default=False, help="override a setting: key.subkey=value (may be repeated)"),
+]
+Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, help="say nothing but errors")]
+Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
 
 PACKAGE = Path(__file__).parent
@@ -40,7 +46,7 @@ def _cases() -> Path:
 
 
 @app.command
-def init(name: str, folder: Path | None = None) -> None:
+def init(name: str, folder: Path | None = None, /) -> None:
     """Copy a runnable body (and its case) to start from.
 
     Args:
@@ -66,7 +72,7 @@ def init(name: str, folder: Path | None = None) -> None:
 
 
 @app.command
-def mesh(body: Path, *, output: Output = None, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+def mesh(body: Path, /, *, output: Output = None, set_: Set = (), force: Force = False, quiet: Quiet = False) -> None:
     """Draw and mesh a body (gmsh runs in a process of its own).
 
     Args:
@@ -74,16 +80,17 @@ def mesh(body: Path, *, output: Output = None, set_: Set = [], force: Force = Fa
     """
     from .workflow import load_mesh, mesh_stage, open_job
 
-    job = open_job(body, set_)
+    job = open_job(body, list(set_))
     with progress(f"mesh {job.settings.name}", quiet) as report:
         path = mesh_stage(job, output, force, report)
         grid, warnings = load_mesh(job, path)
-    _warn(warnings)
-    print(f"{path}: {grid.n_points} points, {grid.n_cells} cells, faces {', '.join(sorted(grid.faces)) or 'none'}")
+        for warning in warnings:
+            report(f"warning: {warning}")
+    _say(f"{path}: {grid.n_points} points, {grid.n_cells} cells, faces {', '.join(sorted(grid.faces)) or 'none'}", quiet)
 
 
 @app.command
-def modes(body: Path, *, output: Output = None, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force = False, quiet: Quiet = False) -> None:
     """Mesh if needed, then compute the modal file of a body.
 
     Args:
@@ -92,45 +99,37 @@ def modes(body: Path, *, output: Output = None, set_: Set = [], force: Force = F
     from .basis import read_basis
     from .workflow import basis_summary, modes_stage, open_job
 
-    job = open_job(body, set_)
+    job = open_job(body, list(set_))
     with progress(f"modes of {job.settings.name}", quiet) as report:
-        path, warnings = modes_stage(job, output, force, report)
-    _warn(warnings)
+        path, _ = modes_stage(job, output, force, report)
     if not quiet:
         print("\n".join(basis_summary(read_basis(path))))
-    print(path)
+    _say(path, quiet)
 
 
 @app.command
-def run(path: Path, *, set_: Set = [], force: Force = False, quiet: Quiet = False) -> None:  # noqa: B006
+def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False) -> None:
     """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
 
     Args:
         path: a body.toml, the folder that holds it, or a case.toml.
     """
-    from .workflow import find_body, is_case, open_job, report_stage, response_stage, run_body
-    from .case import load_case
-    from .workflow import modes_stage
+    from .workflow import is_case, open_job, run_body, run_case_file
 
     if is_case(path):
-        case, _ = load_case(path, set_)
-        job = open_job(find_body(path, case.body, Path(".")))
-        with progress(f"run {case.name}", quiet) as report:
-            modes_stage(job, force=False, report=report)
-            folder = job.build_folder if case.name == job.settings.name else job.root / "build" / case.name
-            summary, converged = response_stage(path, job.basis_file, folder, set_, force, report)
-            page = report_stage(job, summary, force, report) if folder == job.build_folder else folder / "response.csv"
+        with progress(f"run {path}", quiet) as report:
+            page, converged = run_case_file(path, list(set_), force, report)
     else:
-        job = open_job(path, set_)
+        job = open_job(path, list(set_))
         with progress(f"run {job.settings.name}", quiet) as report:
             page, converged = run_body(job, force, report)
-    print(page)
+    _say(page, quiet)
     if not converged:
         raise NotConverged("some points of the response did not converge; they are marked in response.csv")
 
 
 @app.command
-def check(file: Path, *, quiet: Quiet = False) -> None:
+def check(file: Path, /, *, quiet: Quiet = False) -> None:
     """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate.
 
     Args:
@@ -145,11 +144,11 @@ def check(file: Path, *, quiet: Quiet = False) -> None:
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
-    print(f"{file}: all {len(findings)} checks passed")
+    _say(f"{file}: all {len(findings)} checks passed", quiet)
 
 
 @app.command
-def export(file: Path, *, to: str, output: Output = None) -> None:
+def export(file: Path, /, *, to: str, output: Output = None) -> None:
     """Write a modal file in another program's format.
 
     Args:
@@ -167,7 +166,7 @@ def export(file: Path, *, to: str, output: Output = None) -> None:
 
 
 @app.command
-def report(file: Path, *, output: Output = None, quiet: Quiet = False) -> None:
+def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> None:
     """Pictures and one self-contained page of a modal file.
 
     Args:
@@ -184,11 +183,11 @@ def report(file: Path, *, output: Output = None, quiet: Quiet = False) -> None:
         reason = pictures.can_draw()
         drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell)
         write_report(basis, drawn, page, [f"The pictures are missing: {reason}"] if reason else [])
-    print(page)
+    _say(page, quiet)
 
 
 @app.command
-def info(file: Path, *, unit: str = "mm") -> None:
+def info(file: Path, /, *, unit: str = "mm") -> None:
     """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), or a body.toml.
 
     Args:
@@ -243,18 +242,24 @@ def _cad_info(file: Path, unit: str) -> None:
     print(done.stdout, end="")
 
 
+def _say(text: object, quiet: bool) -> None:
+    if not quiet:
+        print(text)
+
+
 def _warn(warnings: list[str]) -> None:
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the command line and return the exit code."""
+    """Run the command line and return the exit code: 0, 1, 2 or 130, see the top of this file."""
     try:
         app(words, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
         return 0
     except CycloptsError as error:
-        return _fail(f"{error}; see microslip --help", 2)
+        return _fail(f"{str(error).rstrip('.')}; see microslip --help", 2)
     except UserError as error:
         return _fail(str(error), 2)
     except NotConverged as error:
@@ -263,6 +268,11 @@ def main(words: list[str] | None = None) -> int:
         return _fail("there is not enough memory; use a coarser mesh, fewer modes, or [output] gauss = false", 1)
     except ModuleNotFoundError as error:
         return _fail(_missing(error), 2)
+    except BrokenPipeError:  # the reader of the output, `head` say, has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}; correct the path or its permissions", 2)
     except KeyboardInterrupt:
         return _fail("interrupted; finished products are kept", 130)
 

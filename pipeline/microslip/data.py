@@ -11,19 +11,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import NotConverged as NotConverged
+from .errors import UserError as UserError
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the six strain and stress components (Sextro Eqs. (2.2-17), (2.2-19); the same as VTK's)."""
-
-
-class UserError(Exception):
-    """A mistake in the input. Its text is one sentence naming file, key, what is wrong and what to do."""
-
-
-class NotConverged(Exception):
-    """A solve or a check that did not succeed although the input is well formed (exit code 1)."""
 
 
 @dataclass(frozen=True)

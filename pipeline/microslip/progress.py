@@ -14,38 +14,49 @@ Report = Callable[[str], None]
 def progress(title: str, quiet: bool = False) -> Iterator[Report]:
     """Yield a function that is told, in words, what begins now.
 
-    On a terminal a spinner with the elapsed time shows the present step and finished steps stay above it; when
-    the output is a file or a pipe each step is one plain line.
+    On a terminal a bar shows the present step and its time, and finished steps stay above it; when the output is a
+    file or a pipe each step is one plain line. ``300 of 600 frequencies`` moves the bar of the present step, and a
+    text that begins with ``warning:`` stays on the screen.
     """
-    began = time.perf_counter()
     if quiet:
         yield lambda _: None
-        return
-    if not sys.stderr.isatty():
-        print(f"{title}", file=sys.stderr)
+    elif sys.stderr.isatty():
+        with _bar(title) as report:
+            yield report
+    else:
+        began = time.perf_counter()
+        print(title, file=sys.stderr, flush=True)
         yield lambda text: print(f"  {time.perf_counter() - began:6.1f} s  {text}", file=sys.stderr, flush=True)
-        return
+
+
+@contextlib.contextmanager
+def _bar(title: str) -> Iterator[Report]:
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    bar = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn(),
-        console=Console(stderr=True), transient=True,
-    )  # fmt: skip
-    with bar:
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TimeElapsedColumn())
+    step = ""
+
+    def finish() -> None:
+        if step:
+            bar.console.print(f"  [green]ok[/green] {escape(step)}", highlight=False)
+
+    def report(text: str) -> None:
+        nonlocal step
+        total, done = _fraction(text)
+        if text.startswith("warning:"):
+            bar.console.print(text, style="yellow", highlight=False, markup=False)
+            return
+        if total is None:
+            finish()
+            step = text
+        bar.update(task, description=f"{title}: {text}", total=total, completed=done)
+
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
-        previous = [""]
-
-        def report(text: str) -> None:
-            if previous[0]:
-                bar.console.print(f"  [green]ok[/green] {previous[0]}", highlight=False)
-            previous[0] = text
-            total, done = _fraction(text)
-            bar.update(task, description=f"{title}: {text}", total=total, completed=done)
-
         yield report
-        if previous[0]:
-            bar.console.print(f"  [green]ok[/green] {previous[0]}", highlight=False)
+        finish()
 
 
 def _fraction(text: str) -> tuple[float | None, float]:
