@@ -1,0 +1,151 @@
+"""Modes followed over the rotation speed, and where engine orders meet them. Pure numpy and scipy.
+
+Between two speeds the squared frequency is taken as linear in the squared speed (Southwell: omega^2 =
+omega_0^2 + B Omega^2), which is exact at the stations and makes every crossing a root in closed form.
+Gyroscopic coupling is not in the frequencies of a modal file (its matrix G_r stands beside them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from .data import Array, Indices, ModalBasis, ModalGroup
+
+LINK = 0.3
+"""Two shapes with a smaller MAC than this are never taken for the same mode."""
+
+SURE = 0.8
+"""A step with a smaller MAC is drawn as uncertain: add speeds in between."""
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Curves of frequency over speed.
+
+    Attributes:
+        speeds: (s,) rad/s, ascending.
+        modes: (c, s) mode number (0-based) of each curve at each speed, -1 where the curve does not exist.
+        omega: (c, s) rad/s, nan where it does not exist.
+        mac: (c, s - 1) modal assurance criterion of each step, nan where there is none.
+    """
+
+    speeds: Array
+    modes: Indices
+    omega: Array
+    mac: Array
+
+    def frequency(self, curve: int, speeds: Array) -> Array:
+        """Hz of one curve at any speeds (rad/s), nan outside its range."""
+        known = self.modes[curve] >= 0
+        x, y = self.speeds[known] ** 2, self.omega[curve, known] ** 2
+        return np.sqrt(np.interp(np.asarray(speeds) ** 2, x, y, left=np.nan, right=np.nan)) / (2 * np.pi)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Engine order `order` meets curve `curve` (0-based) at `speed` (rad/s) and `frequency` (Hz)."""
+
+    order: int
+    curve: int
+    speed: float
+    frequency: float
+
+
+def mac(A: Array, B: Array, weights: Array | None = None) -> Array:
+    """Modal assurance criterion of two sets of shapes.
+
+    Args:
+        A: (n, 3, a). B: (n, 3, b). weights: (n,) mass or volume that belongs to each point; None: all equal.
+
+    Returns:
+        (a, b) numbers between 0 and 1: (A^T W B)^2 / ((A^T W A) (B^T W B)).
+    """
+    w = np.ones(len(A)) if weights is None else weights
+    left = A.reshape(-1, A.shape[2])
+    WB = (w[:, None, None] * B).reshape(-1, B.shape[2])
+    a = np.einsum("n,nia,nia->a", w, A, A)
+    b = np.einsum("nib,nib->b", w[:, None, None] * B, B)
+    scale = np.outer(a, b)
+    return np.divide((left.T @ WB) ** 2, scale, out=np.zeros_like(scale), where=scale > 0)
+
+
+def track(groups: Sequence[ModalGroup], weights: Array | None = None) -> Tracks:
+    """Follow modes over the speed by the MAC of their shapes.
+
+    Args:
+        groups: one a speed, speeds ascending, same mesh. weights: see `mac`.
+
+    Returns:
+        The curves in the order of their first mode. Without shapes in the groups mode j is joined to mode j.
+        At every step the assignment with the largest sum of MAC is taken; where even that stays below `LINK`
+        the curve ends and a new one begins.
+    """
+    links = [_link(a, b, weights) for a, b in zip(groups[:-1], groups[1:], strict=True)]
+    s = len(groups)
+    rows: list[list[int]] = [[j] + [-1] * (s - 1) for j in range(groups[0].n_modes)]
+    macs: list[list[float]] = [[np.nan] * (s - 1) for _ in rows]
+    for step, (partner, values) in enumerate(links):
+        at = {row[step]: number for number, row in enumerate(rows) if row[step] >= 0}
+        for mode in range(groups[step + 1].n_modes):
+            before = int(partner[mode])
+            if before < 0:
+                rows.append([-1] * (step + 1) + [mode] + [-1] * (s - step - 2))
+                macs.append([np.nan] * (s - 1))
+            else:
+                rows[at[before]][step + 1] = mode
+                macs[at[before]][step] = float(values[mode])
+    modes = np.array(rows, dtype=np.int64).reshape(len(rows), s)
+    omega = np.full(modes.shape, np.nan)
+    for i, group in enumerate(groups):
+        here = modes[:, i] >= 0
+        omega[here, i] = group.omega[modes[here, i]]
+    speeds = np.array([g.speed for g in groups])
+    return Tracks(speeds, modes, omega, np.array(macs, dtype=float).reshape(len(rows), s - 1))
+
+
+def _link(a: ModalGroup, b: ModalGroup, weights: Array | None) -> tuple[Indices, Array]:
+    """For each mode of b: the mode of a it continues (-1: none), and their MAC."""
+    partner = np.full(b.n_modes, -1, dtype=np.int64)
+    value = np.full(b.n_modes, np.nan)
+    if not (len(a.phi) and len(b.phi)):
+        common = min(a.n_modes, b.n_modes)
+        partner[:common] = np.arange(common)
+        return partner, value
+    table = mac(a.phi, b.phi, weights)
+    rows, columns = linear_sum_assignment(-table)
+    good = table[rows, columns] >= LINK
+    partner[columns[good]] = rows[good]
+    value[columns[good]] = table[rows, columns][good]
+    return partner, value
+
+
+def track_basis(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
+    """Curves of one nodal diameter of a modal file, or None if it holds fewer than two speeds.
+
+    The shapes are weighted by the volume that belongs to each node where the file has nodal stresses (for one
+    density that is the mass), else equally.
+    """
+    groups = [g for (_, h), g in sorted(basis.groups.items()) if h == harmonic]
+    if len(groups) < 2:
+        return None
+    nodal = groups[0].stresses.get("nodes")
+    weights = nodal.weights if nodal is not None and len(nodal.weights) == basis.mesh.n_points else None
+    return track(groups, weights)
+
+
+def crossings(tracks: Tracks, orders: Sequence[int]) -> list[Crossing]:
+    """Where engine orders (omega = order Omega) meet the curves, ascending in speed."""
+    found = []
+    x = tracks.speeds**2
+    for order in sorted({k for k in orders if k > 0}):
+        for curve in range(len(tracks.modes)):
+            g = tracks.omega[curve] ** 2 - order**2 * x
+            for i in range(len(x) - 1):
+                if np.isfinite(g[i : i + 2]).all() and g[i] * g[i + 1] <= 0 and g[i] != 0:
+                    speed = float(np.sqrt(x[i] + (x[i + 1] - x[i]) * g[i] / (g[i] - g[i + 1])))
+                    found.append(Crossing(order, curve, speed, order * speed / (2 * np.pi)))
+    return sorted(found, key=lambda c: (c.speed, c.order))

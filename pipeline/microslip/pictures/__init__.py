@@ -1,0 +1,156 @@
+"""Pictures of a modal file, drawn without a display: `can_draw`, `draw_all`.
+
+`scene` and `views` draw the body by PyVista, `lettering` writes round it, `plots` draws curves by matplotlib.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..campbell import track_basis
+from ..data import ModalBasis, ModalGroup
+from ..store import complete_or_absent
+from . import plots
+from .scene import quiet_vtk
+
+if TYPE_CHECKING:
+    from .lettering import Picture
+    from .views import Studio
+
+Report = Callable[[str], None]
+
+PACKAGES = ("libglu1-mesa", "libgl1", "libxcursor1", "libxft2", "libxinerama1", "libgomp1", "libegl1")
+"""What a bare Debian or Ubuntu lacks for gmsh and VTK."""
+
+MOST_MODES = 40
+"""Modes drawn per speed."""
+
+ANIMATED, STRESSED = 3, 6
+"""Modes that move, and modes whose stress is shown."""
+
+_PROBE = """
+from microslip.pictures.scene import quiet_vtk
+quiet_vtk()
+import matplotlib, pyvista
+p = pyvista.Plotter(off_screen=True, window_size=[40, 40])
+p.add_mesh(pyvista.Sphere())
+raise SystemExit(0 if p.screenshot(return_img=True).min() < 250 else 3)
+"""
+
+
+def can_draw() -> str | None:
+    """Whether PyVista can draw here: None, or a sentence that says why not and what to install.
+
+    Tried in a process of its own, because VTK ends the process when a library of OpenGL is missing.
+    """
+    root = str(Path(__file__).parents[2])
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {root!r})\n{_PROBE}"]
+    try:
+        tried = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    except (OSError, subprocess.SubprocessError) as error:
+        return f"PyVista could not be tried ({type(error).__name__})"
+    if tried.returncode == 0:
+        return None
+    last = (tried.stderr.strip().splitlines() or ["no message"])[-1][:160]
+    if "ModuleNotFoundError" in last:
+        return f"{last.removeprefix('ModuleNotFoundError: ')}; install microslip[viz]"
+    cause = "crashed" if tried.returncode < 0 else f"failed ({last})"
+    return f"PyVista {cause}; on Debian or Ubuntu: apt-get install {' '.join(PACKAGES)}"
+
+
+def draw_all(
+    basis: ModalBasis, folder: Path | str, report: Report = lambda _: None, engine_orders: Sequence[int] = (),
+    scenes: bool = True,
+) -> dict[str, Path]:  # fmt: skip
+    """Draw everything a modal file can show.
+
+    Args:
+        basis: what to show. folder: where the files go. report: told what is done. engine_orders: lines of the
+            Campbell diagram. scenes: False leaves out what needs PyVista (see `can_draw`).
+
+    Returns:
+        Picture name -> file, in the order of the report: ``mesh``, ``interfaces``, ``modes_<rpm>rpm`` (sheets),
+        ``mode_<number>_<rpm>rpm``, ``animation_<number>``, ``stress_modes``, ``static``, ``compliance``,
+        ``campbell``; what does not apply to the body is not there.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn: dict[str, Path] = {}
+    if scenes:
+        drawn |= _scenes(basis, folder, report)
+    report("curves")
+    first = basis.groups[min(basis.groups)]
+    if (path := plots.compliance_plot(basis, first, folder / "compliance.png")) is not None:
+        drawn["compliance"] = path
+    if (tracks := track_basis(basis)) is not None:
+        drawn["campbell"] = plots.campbell_plot(basis, tracks, engine_orders, folder / "campbell.png")
+    return drawn
+
+
+def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
+    quiet_vtk()
+    from . import views
+
+    drawn: dict[str, Path] = {}
+
+    def keep(name: str, image: Picture | None) -> None:
+        if image is not None:
+            drawn[name] = folder / f"{name}.png"
+            _save(image, drawn[name])
+
+    studio = views.open_studio(basis)
+    try:
+        report("pictures of mesh and interfaces")
+        keep("mesh", views.mesh_picture(studio))
+        keep("interfaces", views.interface_picture(studio))
+        shown = [g for g in _ends(basis) if len(g.phi)]
+        if shown:
+            camera = views.mode_camera(studio, shown, MOST_MODES)
+            for group in shown:
+                report(f"pictures of {min(group.n_modes, MOST_MODES)} modes{views.at_speed(group)}")
+                images = list(views.mode_pictures(studio, group, MOST_MODES, camera))
+                keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images))
+                for j, image in enumerate(images):
+                    keep(f"mode_{j + 1:02d}_{_rpm(group)}", views.mode_caption(image, group, j))
+            report("animations")
+            drawn |= _animations(studio, shown[0], folder)
+            report("pictures of stresses")
+            keep("stress_modes", views.stress_sheet(studio, shown[0], STRESSED, camera))
+        keep("static", views.static_picture(studio, _ends(basis)[-1]))
+    finally:
+        studio.stage.close()
+    return drawn
+
+
+def _ends(basis: ModalBasis) -> list[ModalGroup]:
+    """The groups of the lowest and the highest speed (one if they are the same)."""
+    keys = sorted(k for k in basis.groups if k[1] == min(basis.groups)[1])
+    return [basis.groups[k] for k in dict.fromkeys((keys[0], keys[-1]))]
+
+
+def _rpm(group: ModalGroup) -> str:
+    return f"{group.speed * 30 / np.pi:.6g}rpm"
+
+
+def _animations(studio: Studio, group: ModalGroup, folder: Path) -> dict[str, Path]:
+    from . import lettering, views
+
+    drawn = {}
+    camera = views.mode_camera(studio, [group], ANIMATED + group.kind.count("rigid"), 0.45 * views.AREA)
+    for j in [j for j in range(group.n_modes) if group.kind[j] != "rigid"][:ANIMATED]:
+        path = folder / f"animation_{j + 1:02d}.gif"
+        with complete_or_absent(path) as temporary:
+            lettering.save_gif(str(temporary), views.animation(studio, group, j, camera), 60)
+        drawn[path.stem] = path
+    return drawn
+
+
+def _save(image: Picture, path: Path) -> None:
+    with complete_or_absent(path) as temporary:
+        image.save(temporary, format="PNG", compress_level=6)

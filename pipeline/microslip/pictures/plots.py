@@ -1,0 +1,200 @@
+"""Curves by matplotlib: compliance over the number of modes, Campbell diagram."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..campbell import SURE, Crossing, Tracks, crossings
+from ..data import Array, ModalBasis, ModalGroup
+from ..store import complete_or_absent
+from ..truncation import Coordinate, coordinates, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f", "#5b6270", "#94a112")
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=110, layout="constrained")
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    """As PNG, complete or absent, without a date in it."""
+    with complete_or_absent(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None}, facecolor="white")
+    return path
+
+
+def _plain(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#dde0e6", linewidth=0.7)
+    axes.set_axisbelow(True)
+
+
+# --- compliance ----------------------------------------------------------------------------------------------------
+
+_STYLE = {
+    "u_n": ("#c8382c", "-"), "u_t1": ("#26863c", "-"), "u_t2": ("#0b4f9c", "-"),
+    "phi_n": ("#c8382c", ":"), "phi_t1": ("#26863c", ":"), "phi_t2": ("#0b4f9c", ":"), "squeezed": ("#111111", "-"),
+}  # fmt: skip
+
+
+def compliance_plot(basis: ModalBasis, group: ModalGroup, path: Path, most: int = 12) -> Path | None:
+    """Share of the static compliance over the number of modes, one panel an interface (None without rows)."""
+    panels: dict[str, list[Coordinate]] = {}
+    for c in coordinates(group):
+        where = {"squeeze": "pressed from both sides", "excitation": "excitations", "monitor": "monitors"}.get(
+            c.kind, c.label.rsplit(" ", 1)[0]
+        )
+        panels.setdefault(where, []).append(c)
+    if not panels:
+        return None
+    names = list(panels)[:most]
+    columns = min(len(names), 4 if len(names) > 6 else 3)
+    rows = math.ceil(len(names) / columns)
+    figure = _figure(max(3.6 * columns, 5.5), 0.9 + 2.9 * rows)
+    table = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, name in zip(table, names, strict=False):
+        _compliance_panel(axes, name, panels[name], group.n_modes)
+    for axes in table[len(names) :]:
+        axes.set_visible(False)
+    figure.supxlabel("number of modes kept")
+    figure.supylabel("share of the static compliance in %")
+    more = f" (first {most} of {len(panels)} panels)" if len(panels) > most else ""
+    figure.suptitle(f"{basis.name}: how much of the static compliance the modes hold{more}", fontweight="bold")
+    return _save(figure, path)
+
+
+def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count: int) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    _plain(axes)
+    axes.axhline(100, color="#5b6270", linewidth=0.8)
+    kept = np.arange(count + 2)
+    for i, c in enumerate(found):
+        short = c.label.rsplit(" ", 1)[-1] if c.kind != "excitation" else c.label.rsplit(" ", 1)[0]
+        short = c.label if c.kind == "monitor" else short
+        colour, line = _STYLE.get(short, (COLOURS[i % len(COLOURS)], "-"))
+        label = f"{c.label.removesuffix(' squeezed') if c.kind == 'squeeze' else short}  {percent(c.share)}"
+        share = 100 * np.concatenate([[0.0], c.shares, [c.share]])
+        axes.step(kept, share, line, where="post", color=colour, label=label, linewidth=1.6)
+    axes.set_title(name, fontsize=10)
+    axes.set_xlim(0, count + 0.6)
+    axes.set_ylim(-3, 106)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.legend(fontsize=7, loc="best", framealpha=0.8, handlelength=1.4, borderaxespad=0.8)
+
+
+# --- Campbell ------------------------------------------------------------------------------------------------------
+
+
+def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path: Path) -> Path:
+    """Frequencies over the speed with engine-order lines and their crossings."""
+    figure = _figure(8.6, 6.4)
+    axes = figure.subplots()
+    _plain(axes)
+    orders = sorted({k for k in orders if k > 0})
+    top = _ceiling(tracks, orders)
+    rpm = np.linspace(tracks.speeds[0], tracks.speeds[-1], 201) * 30 / np.pi
+    _curves(axes, tracks, rpm, top)
+    for order in orders:
+        axes.plot(rpm, order * rpm / 60, color="#5b6270", linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
+        _order_label(axes, order, rpm[-1], top)
+    _mark(axes, [c for c in crossings(tracks, orders) if c.frequency <= top])
+    _campbell_frame(axes, basis, rpm, top, tracks)
+    return _save(figure, path)
+
+
+def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
+    """Hz shown: all modes, or with engine orders the part they reach and a bit more."""
+    highest = float(np.nanmax(tracks.omega)) / (2 * np.pi)
+    if not orders:
+        return 1.05 * highest
+    reached = max(orders) * tracks.speeds[-1] / (2 * np.pi)
+    lowest = np.nanmin(tracks.omega, axis=1) / (2 * np.pi)
+    above = lowest[(lowest > 1.1 * reached) & (lowest < 1.5 * reached)]
+    return float(min(1.05 * highest, max([1.2 * reached, *(1.1 * above)])))
+
+
+def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
+    speeds = rpm * np.pi / 30
+    labels = []
+    for c in range(len(tracks.modes)):
+        f = tracks.frequency(c, speeds)
+        if np.nanmin(f) > top:
+            continue
+        colour = COLOURS[c % len(COLOURS)]
+        known = tracks.modes[c] >= 0
+        axes.plot(rpm, f, color=colour, linewidth=1.8)
+        stations = tracks.omega[c, known] / (2 * np.pi)
+        shown = stations <= top
+        x = tracks.speeds[known][shown] * 30 / np.pi
+        axes.plot(x, stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
+        for step in np.flatnonzero(tracks.mac[c] < SURE):
+            part = (speeds >= tracks.speeds[step]) & (speeds <= tracks.speeds[step + 1])
+            axes.plot(rpm[part], f[part], color="white", linewidth=2.4, linestyle=(0, (2, 3)))
+        end = int(np.flatnonzero(np.isfinite(f) & (f <= top))[-1])
+        first = int(tracks.modes[c][known][0]) + 1
+        labels.append((float(f[end]), float(rpm[end]), f"mode {first}", colour))
+    _end_labels(axes, labels, float(rpm[-1]), top)
+
+
+def _end_labels(axes: Axes, labels: list[tuple[float, float, str, str]], last: float, top: float) -> None:
+    """Name each curve at its right end, moved apart where two would overlap."""
+    gap, y = 0.032 * top, -math.inf
+    for f, x, text, colour in sorted(labels):
+        y = max(f, y + gap)
+        cut = x < last  # leaves the picture through its upper edge
+        where: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8.5}
+        at, shift = ((x, f), (5, -8)) if cut else ((x, y), (6, 0))
+        axes.annotate(text, at, xytext=shift, color=colour, annotation_clip=False, **where)
+
+
+def _order_label(axes: Axes, order: int, last: float, top: float) -> None:
+    x = min(last, 60 * top / order) * 0.985
+    y = order * x / 60
+    axes.annotate(
+        f"EO {order}", (x, y), xytext=(-3, 3), textcoords="offset points", ha="right", va="bottom", fontsize=8,
+        color="#3c424e",
+    )  # fmt: skip
+
+
+def _mark(axes: Axes, found: Sequence[Crossing]) -> None:
+    x = [c.speed * 30 / np.pi for c in found]
+    axes.plot(
+        x, [c.frequency for c in found], "o", mfc="white", mec="#111111", markersize=6, zorder=4, linestyle="none"
+    )
+
+
+def _per_second(rpm: Any) -> Any:
+    return rpm / 60
+
+
+def _per_minute(turns: Any) -> Any:
+    return turns * 60
+
+
+def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, tracks: Tracks) -> None:
+    axes.set_xlim(rpm[0], rpm[-1])
+    axes.set_ylim(0, top)
+    axes.set_xlabel("rotation speed in rpm")
+    axes.set_ylabel("frequency in Hz")
+    second = axes.secondary_xaxis("top", functions=(_per_second, _per_minute))
+    second.set_xlabel("rotation speed in rev/s")
+    note = "dots: computed; curves joined by MAC; circles: engine order meets mode"
+    shown = np.nanmin(tracks.omega, axis=1) / (2 * np.pi) <= top
+    if (tracks.mac[shown] < SURE).any():
+        note += f"; dotted: MAC below {SURE:g}, add speeds"
+    if not shown.all():
+        note += f"; {int((~shown).sum())} modes lie above"
+    axes.set_title(f"{basis.name}: Campbell diagram\n", fontweight="bold")
+    axes.text(0.5, -0.13, note, transform=axes.transAxes, ha="center", va="top", fontsize=8, color="#5b6270")
