@@ -98,10 +98,15 @@ def test_any_name_of_a_set_survives(tmp_path: Path, name: str) -> None:
     basis = small.basis()
     faces, sets = {name: basis.mesh.faces["tip"]}, {name + "s": np.array([3, 5])}
     mesh = dataclasses.replace(basis.mesh, faces=faces, point_sets=sets)
-    write_basis(tmp_path / "a.h5", dataclasses.replace(basis, mesh=mesh))
-    again = read_basis(tmp_path / "a.h5").mesh
-    assert list(again.faces) == [name]
-    assert {n: s.tolist() for n, s in again.point_sets.items()} == {name + "s": [3, 5]}
+    group = basis.groups[0, 0]
+    first = {name: group.interfaces["right"]}  # the load patch of an excitation bears the name of its face
+    group = dataclasses.replace(group, interfaces={**first, "left": group.interfaces["left"]})
+    write_basis(tmp_path / "a.h5", dataclasses.replace(basis, mesh=mesh, groups={(0, 0): group}))
+    again = read_basis(tmp_path / "a.h5")
+    assert list(again.mesh.faces) == [name]
+    assert {n: s.tolist() for n, s in again.mesh.point_sets.items()} == {name + "s": [3, 5]}
+    assert list(again.groups[0, 0].interfaces) == [name, "left"]
+    assert same(again.groups[0, 0].interfaces, group.interfaces)
 
 
 def test_node_numbers_with_gaps(tmp_path: Path) -> None:

@@ -154,7 +154,7 @@ def _write_frames(file: h5py.File, group: ModalGroup) -> None:
     where = file.create_group("interfaces")
     where.attrs["order"] = json.dumps(list(group.interfaces))
     for name, item in group.interfaces.items():
-        face = where.create_group(name)
+        face = where.create_group(_escaped(name))
         for key in ("role", "partner", "sector_shift"):
             face.attrs[key] = getattr(item, key)
         put(face, "origin", item.origin, "m", scales=[file["axis"]])
@@ -206,18 +206,18 @@ def _write_rows(group: h5py.Group, g: ModalGroup, mode: h5py.Dataset) -> None:
     file = group.file
     interfaces = group.create_group("interfaces")
     for name, item in g.interfaces.items():
-        face = interfaces.create_group(name)
+        face = interfaces.create_group(_escaped(name))
         put(face, "T", item.rows, "kg^-1/2; last three m^-1 kg^-1/2", scales=[file["interface_row"], mode])
         put(face, "fit_residual", item.fit_residual, "1", scales=[mode])
         if item.shapes.shape[0]:
             patch = face.create_group("patch")
-            patch["point"] = file[f"interfaces/{name}/patch/point"]
+            patch["point"] = file[f"interfaces/{_escaped(name)}/patch/point"]
             put(patch, "shapes", item.shapes, "kg^-1/2", scales=[patch["point"], file["axis"], mode])
     for kind, field in _ROW_FIELDS.items():
         where = group.create_group(kind)
         where.attrs["order"] = json.dumps(list(getattr(g, field)))
         for name, rows in getattr(g, field).items():
-            item = where.create_group(name)
+            item = where.create_group(_escaped(name))
             item.attrs["unit"] = rows.unit
             item.attrs["distance"] = rows.distance
             row = put_scale(item, "row", np.array(rows.labels, dtype="U"))
@@ -355,7 +355,7 @@ def _texts(group: h5py.Group, name: str, count: int | None = None) -> tuple[str,
 def _names(group: h5py.Group) -> list[str]:
     """The names of a group's members in their order of precedence."""
     names = json.loads(str(group.attrs["order"]))
-    if not isinstance(names, list) or sorted(map(str, names)) != sorted(group):
+    if not isinstance(names, list) or sorted(_escaped(str(n)) for n in names) != sorted(group):
         raise ValueError(f"{group.name}: its attribute 'order' does not list its members")
     return names
 
@@ -421,7 +421,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         C_r=_array(modes, "C_r", m, m), G_r=_array(modes, "G_r", m, m),
         phi=_array(modes, "phi", n, 3, m) if "phi" in modes else np.zeros((0, 3, m)),
         interfaces={
-            name: _read_interface(file["interfaces"][name], group["interfaces"][name], m)
+            name: _read_interface(file["interfaces"][_escaped(name)], group["interfaces"][_escaped(name)], m)
             for name in _names(file["interfaces"])
         },
         excitations=_read_rows(group["excitation"], m), monitors=_read_rows(group["monitor"], m),
@@ -452,7 +452,7 @@ def _read_interface(frame: h5py.Group, group: h5py.Group, m: int) -> Interface:
 def _read_rows(where: h5py.Group, m: int) -> dict[str, Rows]:
     out = {}
     for name in _names(where):
-        item = where[name]
+        item = where[_escaped(name)]
         labels = _texts(item, "row")
         r = len(labels)
         out[name] = Rows(

@@ -6,16 +6,17 @@ build and CAD meshers are handed the file's own numbers (`BodySettings.raw`), in
 
 from __future__ import annotations
 
-import difflib
+import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from .data import Array, Material, UserError
 from .mesh import UNITS
+from .mistakes import validate
 
 _LENGTH = "length"  # metadata that marks a number as a length in the file's unit
 
@@ -25,13 +26,23 @@ def _tuple(value: Any) -> Any:
 
 
 def _finite_vector(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(float(v) if isinstance(v, int | float) and not isinstance(v, bool) else v for v in value)
-    return value
+    return tuple(map(_float, value)) if isinstance(value, list) else value
 
 
 def _float(value: Any) -> Any:
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    """Whole numbers stand for numbers; true and false do not."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _has_length(value: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(value):
+        raise ValueError("a direction must not be [0, 0, 0]")
+    return value
 
 
 Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
@@ -40,11 +51,18 @@ NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_na
 Length = Annotated[Number, _LENGTH]
 PositiveLength = Annotated[Positive, _LENGTH]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)]
+Direction = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), AfterValidator(_has_length)]
 Point = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
 Box = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
+Positives = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector)]
 Directions = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$", max_length=64)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
+FaceName = Annotated[str, Field(min_length=1, max_length=200)]  # as other programs name their sets
+
+
+Byte = Annotated[int, Field(ge=0, le=255)]
+EngineOrder = Annotated[int, Field(ge=1, le=10000)]
 
 
 class Model(BaseModel):
@@ -58,7 +76,7 @@ class FaceRule(Model):
 
     name: Name
     label: str | None = None
-    colour: Annotated[tuple[int, int, int], BeforeValidator(_tuple)] | None = None
+    colour: Annotated[tuple[Byte, Byte, Byte], BeforeValidator(_tuple)] | None = None
     box: Box | None = None
     surfaces: Annotated[tuple[int, ...], BeforeValidator(_tuple)] | None = None
 
@@ -66,7 +84,10 @@ class FaceRule(Model):
     def _one_way(self) -> FaceRule:
         ways = [k for k in ("label", "colour", "box", "surfaces") if getattr(self, k) is not None]
         if len(ways) != 1:
-            raise ValueError(f"face '{self.name}' needs exactly one of label, colour, box, surfaces; it has {ways or 'none'}")
+            raise ValueError(
+                f"a face needs exactly one of label, colour, box, surfaces, and has {' and '.join(ways) or 'none'}; "
+                "keep one"
+            )
         return self
 
 
@@ -83,7 +104,8 @@ class Geometry(Model):
     def _one_source(self) -> Geometry:
         sources = [k for k in ("build", "cad", "mesh") if getattr(self, k)]
         if len(sources) != 1:
-            raise ValueError(f"needs exactly one of build, cad, mesh; it has {sources or 'none'}")
+            given = " and ".join(sources) or "none"
+            raise ValueError(f"needs exactly one of build, cad, mesh, and has {given}; keep one")
         return self
 
 
@@ -95,18 +117,26 @@ class Meshing(Model):
     local: dict[str, Positive] = Field(default_factory=dict)
 
 
+def _at_right_angles(axes: Array) -> bool:
+    lengths = np.linalg.norm(axes, axis=1)
+    if lengths.min() == 0:
+        return False
+    cosines = (axes / lengths[:, None]) @ (axes / lengths[:, None]).T
+    return bool(np.abs(cosines - np.eye(3)).max() < 1e-6)
+
+
 class MaterialSettings(Model):
     """Isotropic (young, poisson) or orthotropic (young, poisson, shear as three numbers each, with axes)."""
 
     name: str = "material"
     density: Positive
-    young: Positive | Numbers
+    young: Positive | Positives
     poisson: Annotated[float, BeforeValidator(_float), Field(gt=-1, lt=0.5)] | Numbers
-    shear: Numbers | None = None
+    shear: Positives | None = None
     axes: Annotated[tuple[Vector, Vector, Vector], BeforeValidator(_finite_vector)] | None = None
     expansion: Number | Numbers = 0.0
-    temperature: Numbers | None = None
-    modulus_factor: Numbers | None = None
+    temperature: Positives | None = None
+    modulus_factor: Positives | None = None
     unusual: bool = False
 
     @model_validator(mode="after")
@@ -121,14 +151,15 @@ class MaterialSettings(Model):
         if (self.temperature is None) != (self.modulus_factor is None):
             raise ValueError("temperature and modulus_factor come together")
         if self.temperature is not None:
-            if len(self.temperature) != len(self.modulus_factor or ()):
+            if not self.temperature or len(self.temperature) != len(self.modulus_factor or ()):
                 raise ValueError("temperature and modulus_factor must have the same length")
             if any(b <= a for a, b in zip(self.temperature[:-1], self.temperature[1:], strict=True)):
                 raise ValueError("temperature must rise from entry to entry")
-            if min(self.modulus_factor or (1,)) <= 0:
-                raise ValueError("modulus_factor must be positive")
         if isinstance(self.expansion, tuple) and len(self.expansion) != 3:
             raise ValueError("expansion is one number or three along the material axes")
+        if self.axes is not None and not _at_right_angles(np.array(self.axes)):
+            raise ValueError("axes must be three directions at right angles")
+        self.material()
         return self
 
     def material(self) -> Material:
@@ -140,14 +171,15 @@ class MaterialSettings(Model):
             try:
                 C = orthotropic(np.array(self.young), np.array(self.poisson), np.array(self.shear), axes)
             except ValueError as error:
-                raise UserError(f"[material]: {error}; check the ratios nu_ij and moduli") from error
+                raise ValueError(f"the {error}; lower poisson's ratios or check the order of the moduli") from error
         else:
             assert isinstance(self.poisson, float)
             C = isotropic(self.young, self.poisson)
         alpha = np.broadcast_to(np.asarray(self.expansion, dtype=float), 3)
         R = np.eye(3) if axes is None else axes
         strain = R.T @ np.diag(alpha) @ R
-        voigt = np.array([strain[0, 0], strain[1, 1], strain[2, 2], 2 * strain[0, 1], 2 * strain[1, 2], 2 * strain[0, 2]])
+        shear = 2 * strain[[0, 1, 0], [1, 2, 2]]
+        voigt = np.concatenate([np.diag(strain), shear])
         table = None
         if self.temperature is not None:
             table = np.column_stack([self.temperature, self.modulus_factor or ()])
@@ -161,11 +193,17 @@ class Temperature(Model):
     uniform: Positive | None = None
     file: str | None = None
 
+    @model_validator(mode="after")
+    def _one_source(self) -> Temperature:
+        if self.uniform is not None and self.file is not None:
+            raise ValueError("give uniform or file, not both")
+        return self
+
 
 class Support(Model):
     """A face, or a point set, whose displacement is held in the named body directions."""
 
-    face: Name
+    face: FaceName
     directions: Directions = "xyz"
 
 
@@ -176,17 +214,15 @@ class Rotation(Model):
     ``none`` (K as the book prints it in Eq. (2.3-29), with the softening term only: frequencies fall with speed).
     """
 
-    axis: Vector = (0.0, 1.0, 0.0)
+    axis: Direction = (0.0, 1.0, 0.0)
     point: Point = (0.0, 0.0, 0.0)
     speeds_rpm: Numbers = (0.0,)
     prestress: Literal["nonlinear", "linear", "none"] = "nonlinear"
     spin_softening: bool = True
-    engine_orders: Annotated[tuple[int, ...], BeforeValidator(_tuple)] = ()
+    engine_orders: Annotated[tuple[EngineOrder, ...], BeforeValidator(_tuple)] = ()
 
     @model_validator(mode="after")
     def _sensible(self) -> Rotation:
-        if not any(self.axis):
-            raise ValueError("axis has no length")
         if not self.speeds_rpm or min(self.speeds_rpm) < 0 or list(self.speeds_rpm) != sorted(set(self.speeds_rpm)):
             raise ValueError("speeds_rpm must be one or more rising numbers, none negative")
         return self
@@ -196,7 +232,7 @@ class Load(Model):
     """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a face or point (N)."""
 
     kind: Literal["gravity", "pressure", "force"]
-    face: Name | None = None
+    face: FaceName | None = None
     point: Point | None = None
     value: Number | None = None
     vector: Vector | None = None
@@ -216,11 +252,11 @@ class InterfaceSettings(Model):
     """A contact patch. t2: direction whose projection on the patch becomes the second tangent; n points outwards."""
 
     name: Name
-    face: Name
+    face: FaceName
     role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
     partner: str = ""
     sector_shift: Literal[-1, 0, 1] = 0
-    t2: Vector = (0.0, 0.0, 1.0)
+    t2: Direction = (0.0, 0.0, 1.0)
 
 
 class Excitation(Model):
@@ -228,7 +264,7 @@ class Excitation(Model):
 
     name: Name
     point: Point | None = None
-    face: Name | None = None
+    face: FaceName | None = None
     direction: Vector | None = None
     pressure: bool = False
 
@@ -256,7 +292,7 @@ class Gauge(Model):
 
     name: Name
     point: Point
-    direction: Vector
+    direction: Direction
 
 
 class Modes(Model):
@@ -342,55 +378,73 @@ class BodySettings(Model):
             names = [item.name for item in getattr(self, kind)]
             twice = {n for n in names if names.count(n) > 1}
             if twice:
-                raise ValueError(f"{kind}: the name '{twice.pop()}' is used twice")
+                raise ValueError(f"{kind}: the name '{min(twice)}' is used twice; rename one")
         return self
 
 
-def load_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+def load_toml(path: Path | str) -> dict[str, Any]:
+    """Read a TOML file (UTF-8, with or without a byte-order mark).
 
     Raises:
         UserError: missing, unreadable or not TOML.
     """
+    path = Path(path)
     try:
-        with open(path, "rb") as file:
-            return tomllib.load(file)
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: is not valid TOML ({error}); correct that place") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is not valid TOML ({_one_line(error)}); correct that place") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets without end
+        raise UserError(f"{path}: cannot be read ({_one_line(error)}); is it a settings file?") from error
+
+
+def _one_line(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return text[:1].lower() + text[1:120]
 
 
 def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[str, Any]:
     """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
     for text in assignments:
         key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise UserError(f"--set {text}: write --set key.subkey=value")
-        try:
-            parsed = tomllib.loads(f"v = {value}")["v"]
-        except tomllib.TOMLDecodeError:
-            parsed = value
+        steps = [step.strip() for step in key.split(".")]
+        if not equals or not all(steps):
+            raise UserError(f"--set {text}: is no setting; write --set key.subkey=value")
         place: Any = table
-        *parents, last = key.strip().split(".")
-        for parent in parents:
+        for number, step in enumerate(steps[:-1]):
             if isinstance(place, list):
-                place = _entry(place, parent, key, path)
-                continue
-            place = place.setdefault(parent, {})
+                place = _entry(place, step, key, path)
+            else:
+                place = place.setdefault(step, {})
             if not isinstance(place, dict | list):
-                raise UserError(f"--set {key}: '{parent}' in {path} is not a table")
+                above = ".".join(steps[: number + 1])
+                raise UserError(f"--set {key}: '{above}' in {path} is a value, not a table; correct the key")
         if isinstance(place, list):
-            raise UserError(f"--set {key}: name the entry and its key, as in interfaces.NAME.face=...")
-        place[last] = parsed
+            above = ".".join(steps[:-1])
+            raise UserError(f"--set {key}: name the entry and its key; write --set {above}.NAME.KEY=value")
+        place[steps[-1]] = _parsed(value)
     return table
+
+
+def _parsed(value: str) -> Any:
+    """A value in TOML's notation, or the bare text."""
+    try:
+        table = tomllib.loads(f"v = {value}")
+    except (ValueError, RecursionError):
+        return value.strip()
+    return table["v"] if set(table) == {"v"} else value.strip()
 
 
 def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
     for number, item in enumerate(items):
         if isinstance(item, dict) and name in (item.get("name"), item.get("face"), str(number)):
             return item
-    raise UserError(f"--set {key}: {path} has no entry '{name}' there")
+    tables = [(number, item) for number, item in enumerate(items) if isinstance(item, dict)]
+    known = [str(item.get("name") or item.get("face") or number) for number, item in tables]
+    raise UserError(f"--set {key}: {path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}")
 
 
 def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[BodySettings, dict[str, Any]]:
@@ -409,49 +463,6 @@ def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[B
     raw = override(load_toml(path), assignments or [], path)
     settings = validate(BodySettings, raw, path)
     return _to_metres(settings, UNITS[settings.length_unit]), raw
-
-
-def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
-    """Check a table against a settings model; one sentence a mistake."""
-    try:
-        return model.model_validate(raw)
-    except ValidationError as error:
-        lines = [_sentence(e, model) for e in error.errors(include_url=False)]
-        raise UserError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from error
-
-
-def _sentence(error: Any, model: type[BaseModel]) -> str:
-    where = [str(p) for p in error["loc"] if not str(p).startswith(("function-", "tuple[", "constrained", "float"))]
-    key = ".".join(where) or "the file"
-    kind, given = error["type"], error.get("input")
-    if kind == "extra_forbidden":
-        known = _known_keys(model, error["loc"][:-1])
-        close = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
-        hint = f"did you mean '{close[0]}'?" if close else f"known keys: {', '.join(known)}"
-        return f"{key}: unknown key; {hint}"
-    if kind == "missing":
-        return f"{key}: is missing; add it"
-    message = error["msg"].removeprefix("Value error, ")
-    message = message[:1].lower() + message[1:]
-    shown = "" if isinstance(given, dict | BaseModel) or kind == "value_error" else f" (it is {given!r})"
-    return f"{key}: {message}{shown}; correct it"
-
-
-def _known_keys(model: Any, location: tuple[Any, ...]) -> list[str]:
-    for part in location:
-        if isinstance(part, int) or part not in getattr(model, "model_fields", {}):
-            continue
-        model = _model_in(model.model_fields[part].annotation) or model
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        if (found := _model_in(argument)) is not None:
-            return found
-    return None
 
 
 def _to_metres(model: Any, scale: float) -> Any:
