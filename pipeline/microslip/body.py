@@ -39,6 +39,12 @@ def _float(value: Any) -> Any:
         return math.inf
 
 
+def _whole(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("must be a whole number, not true or false")
+    return value
+
+
 def _has_length(value: tuple[float, ...]) -> tuple[float, ...]:
     if not any(value):
         raise ValueError("a direction must not be [0, 0, 0]")
@@ -113,7 +119,7 @@ class Meshing(Model):
     """Target element size (length_unit) and local sizes by face name."""
 
     size: Annotated[Positive | None, _LENGTH] = None
-    order: Literal[1, 2] = 2
+    order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
     local: dict[str, Positive] = Field(default_factory=dict)
 
 
@@ -255,7 +261,7 @@ class InterfaceSettings(Model):
     face: FaceName
     role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
     partner: str = ""
-    sector_shift: Literal[-1, 0, 1] = 0
+    sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
     t2: Direction = (0.0, 0.0, 1.0)
 
 
