@@ -9,11 +9,15 @@ SOURCES  := $(shell find pipeline/microslip -name '*.py')
 
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)
-unexport DISPLAY
+unexport DISPLAY PYTHONPATH PYTHONHOME
+
+# The environment knows the folder it was made for: a checkout that was moved or copied is set up again.
+MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-all lint docs bench clean distclean
+.SECONDEXPANSION:
+.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-all lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -21,7 +25,7 @@ help: ## list the verbs
 
 setup: $(READY) ## virtual environment, locked packages, system libraries
 
-$(READY): requirements.lock pyproject.toml pipeline/setup.sh
+$(READY): requirements.lock pyproject.toml pipeline/setup.sh $(MOVED)
 	@sh pipeline/setup.sh
 
 all: $(BODIES) ## every body to its report
@@ -30,13 +34,13 @@ $(BODIES): %: build/%/report.html
 $(BODIES:%=%-mesh): %-mesh: meshes/%.msh
 $(BODIES:%=%-modes): %-modes: build/%/basis.h5
 
-meshes/%.msh: geometry/%/body.toml geometry/%/build.py $(SOURCES) | $(READY)
+meshes/%.msh: $$(wildcard geometry/$$*/*) $(SOURCES) | $(READY)
 	@$(RUN) mesh geometry/$*
 
 build/%/basis.h5: meshes/%.msh geometry/%/body.toml $(SOURCES) | $(READY)
 	@$(RUN) modes geometry/$*
 
-build/%/report.html: build/%/basis.h5 $(wildcard pipeline/cases/*.toml) $(SOURCES) | $(READY)
+build/%/report.html: build/%/basis.h5 $$(wildcard pipeline/cases/$$*.toml) $(SOURCES) | $(READY)
 	@$(RUN) run geometry/$*
 
 test: $(READY) ## the quick tests, under ten minutes on two cores
