@@ -198,13 +198,17 @@ def _newton(
 def _newton_at(
     model: BodyModel, speed: float, level: float, solver: DirectSolver, u: Array
 ) -> StaticState:
-    """Newton at a share `level` of all loads. Ends when a step is below 1e-9 of u, or small and no longer falling."""
+    """Newton at a share `level` of all loads. Ends when a step is below 1e-9 of u, or small and no longer falling.
+
+    A millionth of the body stands for u where less moves: heated between walls a body does not move at all.
+    """
     n, free = model.d.mesh.n_points, model.free.free
     omega = speed * np.sqrt(level)
     soft = softening(model, omega)
     if model.thermal_strain is not None and level < 1:
         model = replace(model, thermal_strain=[level * e for e in model.thermal_strain])
     steps: list[float] = []
+    size = float(np.ptp(model.d.mesh.points, axis=0).max())
     for _ in range(25):
         H = [displacement_gradient(b, u) for b in model.d.blocks]
         stress = stress_of(model, [green_strain(h) for h in H])
@@ -222,8 +226,8 @@ def _newton_at(
         change = np.zeros(3 * n)
         change[free] = solver.solve(residual)
         u = u + change.reshape(n, 3)
-        steps.append(float(np.abs(change).max() / max(np.abs(u).max(), 1e-300)))
-        if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * np.ptp(model.d.mesh.points, axis=0).max():
+        steps.append(float(np.abs(change).max() / max(np.abs(u).max(), 1e-6 * size)))
+        if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * size:
             break
     raise NotConverged(_no_equilibrium(speed))
 
@@ -241,8 +245,8 @@ def linear_stiffness(model: BodyModel, state: StaticState) -> Array:
 
 
 def cauchy(state: StaticState, block: int) -> Array:
-    """(e, q, 6) Cauchy stress F S F^T / det F, Pa (the stress itself where the reference geometry is used)."""
-    if state.H is None:
+    """(e, q, 6) Cauchy stress F S F^T / det F, Pa; of a linear solution its stress C : epsilon as it is."""
+    if state.H is None or state.prestress == "linear":
         return state.stress[block]
     from ..fem.operators import to_symmetric
 
