@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
+
 from microslip import eigen
 from microslip.data import NotConverged, UserError
 from microslip.fem import discretise
