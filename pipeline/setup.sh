@@ -89,7 +89,10 @@ usable() { # a whole environment of a Python that still exists, not a link to th
     [ -f "$DONE" ] && "$INSIDE" -c 'import sys; sys.exit(sys.prefix == sys.base_prefix)' 2>/dev/null && recent "$INSIDE"
 }
 
+announce() { say "packages into $VENV: some 600 MB to download, 2.2 GB on disk, a few minutes"; }
+
 by_uv() {
+    announce
     usable || { rm -rf "$VENV"; uv venv -q --python "$(find_python | grep . || echo '>=3.11')" "$VENV"; }
     rm -f "$DONE"
     uv pip install -q --python "$INSIDE" --only-binary :all: -r "$LOCK" &&
@@ -99,6 +102,7 @@ by_uv() {
 by_pip() {
     if ! usable || ! "$INSIDE" -m pip -V >/dev/null 2>&1; then
         find_or_install_python
+        announce
         rm -rf "$VENV"
         "$PYTHON" -m venv "$VENV"
     fi
@@ -108,7 +112,6 @@ by_pip() {
 
 wanted="$(cat "$LOCK" pyproject.toml | cksum) $(pwd -P)"
 if ! usable || [ "$(cat "$DONE")" != "$wanted" ]; then
-    say "packages into $VENV: half a gigabyte to download, 2 GB on disk, some minutes"
     if command -v uv >/dev/null 2>&1; then installer=by_uv; else installer=by_pip; fi
     $installer || stop "The packages could not be installed: see above, make sure that the network is there and the" \
         "disk not full, and type make again."

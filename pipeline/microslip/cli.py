@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import sys
@@ -254,6 +255,7 @@ def _warn(warnings: list[str]) -> None:
 
 def main(words: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0, 1, 2 or 130, see the top of this file."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
     try:
         app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
