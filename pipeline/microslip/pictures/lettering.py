@@ -184,13 +184,22 @@ def save_gif(path: str, frames: Sequence[Picture], milliseconds: int, colours: i
 
     strip = stacked([scaled(f, 0.5) for f in (frames[0], frames[len(frames) // 4], frames[len(frames) // 2])])
     palette = strip.quantize(colours, Image.Quantize.MEDIANCUT)
-    entries = np.array(palette.getpalette()[: 3 * colours]).reshape(-1, 3)  # type: ignore[index]
-    entries[entries.sum(axis=1).argmax()] = 255
-    palette.putpalette(entries.ravel().tolist())
-    flat = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames]
+    entries = [*(palette.getpalette() or [])[: 3 * colours], 255, 255, 255]
+    flat = [_white_stays(f, f.quantize(palette=palette, dither=Image.Dither.NONE), entries) for f in frames]
     flat[0].save(
         path, format="GIF", save_all=True, append_images=flat[1:], duration=milliseconds, loop=0, optimize=False
     )
+
+
+def _white_stays(frame: Picture, reduced: Picture, entries: list[int]) -> Picture:
+    """The reduced frame with the last palette entry, white, wherever the frame is white."""
+    from PIL import Image
+
+    index = np.array(reduced)
+    index[(np.asarray(frame) == 255).all(axis=2)] = len(entries) // 3 - 1
+    out = Image.fromarray(index, "P")
+    out.putpalette(entries)
+    return out
 
 
 def nice(value: float) -> float:

@@ -1,0 +1,492 @@
+"""One self-contained page about a modal file: `write_report`. Standard library and numpy only.
+
+Every text that comes from a file is escaped; pictures are embedded; nothing is loaded from anywhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .basis_checks import check_basis
+from .campbell import crossings, track_basis
+from .data import Interface, ModalBasis, ModalGroup
+from .store import write_text
+from .truncation import percent, verdict
+
+STYLE = """
+:root { color-scheme: light; --ink: #1f242d; --faint: #667; --line: #d9dde5; --tint: #f4f6f9; --accent: #0b4f9c; }
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 68rem; padding: 1rem; color: var(--ink); background: #fff;
+  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
+h1 { font-size: 1.8rem; line-height: 1.2; margin: .5rem 0; }
+h2 { font-size: 1.25rem; margin: 2.2rem 0 .5rem; border-bottom: 2px solid var(--line); padding-bottom: .2rem; }
+h3 { font-size: 1rem; margin: 1.2rem 0 .3rem; }
+nav { display: flex; flex-wrap: wrap; gap: .2rem .9rem; margin: .8rem 0; font-size: .9rem; }
+a { color: var(--accent); }
+.lead { font-size: 1.05rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; margin: .5rem 0; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .7rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }
+th { background: var(--tint); vertical-align: bottom; }
+th:first-child, td:first-child, .words td, .words th { text-align: left; }
+.words td { white-space: normal; overflow-wrap: anywhere; }
+figure { margin: 1rem 0; }
+figure img { max-width: 100%; height: auto; display: block; }
+figure.wide img { min-width: 46rem; }
+figcaption, .faint { color: var(--faint); font-size: .88rem; }
+sup { line-height: 0; }
+.row { display: flex; flex-wrap: wrap; gap: 1rem; align-items: flex-start; }
+.row figure { flex: 1 1 9rem; max-width: 18rem; margin: 0; }
+.box { border-left: 4px solid var(--accent); background: var(--tint); padding: .6rem .9rem; margin: .8rem 0; }
+.warn { border-color: #d98410; background: #fdf6ea; }
+.bad { border-color: #c8382c; background: #fdf0ee; }
+.box p { margin: .25rem 0; }
+summary { cursor: pointer; color: var(--accent); margin: .4rem 0; }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--tint); padding: .6rem; font-size: .8rem; }
+@media print { details > *, details[open] > * { display: block; } nav { display: none; } }
+"""
+
+RIGID_ENOUGH = 0.05
+"""A patch whose fit residual is below this moves as a rigid patch for most purposes."""
+
+
+def write_report(
+    basis: ModalBasis, pictures: Mapping[str, Path], path: Path | str, remarks: Sequence[str] = (),
+    response: Mapping[str, Any] | None = None,
+) -> None:  # fmt: skip
+    """Write the page, complete or absent.
+
+    Args:
+        basis: what it is about. pictures: name -> file, the names of `pictures.draw_all`; others are shown with
+            the response. path: of the page. remarks: sentences that a reader must know. response: a summary of
+            a case, name -> text, number, list of numbers or list of rows (each a mapping of the same names).
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    write_text(path, report_html(basis, pictures, remarks, response))
+
+
+def report_html(
+    basis: ModalBasis, pictures: Mapping[str, Path], remarks: Sequence[str] = (),
+    response: Mapping[str, Any] | None = None,
+) -> str:  # fmt: skip
+    """The page as text; see `write_report`."""
+    album = _Album(pictures)
+    parts = [
+        ("Body", _body(basis, album)),
+        ("Frequencies", _frequencies(basis, album)),
+        ("Modes", _modes(basis, album)),
+        ("Stresses", _stresses(basis, album)),
+        ("Interfaces", _interfaces(basis, album)),
+        ("How many modes are enough", _truncation(basis, album)),
+        ("Loads and read-outs", _rows(basis)),
+        ("Friction response", _response(response, album)),
+        ("Checks", _checks(basis)),
+        ("Provenance", _provenance(basis)),
+    ]
+    parts = [(title, text) for title, text in parts if text]
+    links = "".join(f'<a href="#{_anchor(t)}">{t}</a>' for t, _ in parts)
+    sections = "\n".join(f'<section id="{_anchor(t)}"><h2>{t}</h2>\n{text}</section>' for t, text in parts)
+    name = html.escape(basis.name)
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{name}: modal basis</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{name}: modal basis</h1>\n"
+        f"{_lead(basis)}{_remarks(remarks)}<nav>{links}</nav>\n{sections}\n</body></html>\n"
+    )
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+# --- words and tables ----------------------------------------------------------------------------------------------
+
+
+def text(value: object) -> str:
+    """Escaped; powers of ten of numbers in it are set as such."""
+    safe = html.escape(str(value)).replace(" %", "&nbsp;%")
+    return re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-])0*(\d+)(?![\w.])", _power, safe)
+
+
+def _power(found: re.Match[str]) -> str:
+    sign = "−" if found[2] == "-" else ""
+    return f"{found[1]}·10<sup>{sign}{found[3]}</sup>"
+
+
+def _number(value: float, digits: int = 4) -> str:
+    return text(f"{value:.{digits}g}")
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
+    """Cells are HTML already."""
+    if not rows:
+        return ""
+    top = "".join(f"<th>{c}</th>" for c in head)
+    body = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>\n" for row in rows)
+    first = f"<thead><tr>{top}</tr></thead>" if head else ""
+    return f'<div class="scroll"><table class="{kind}">{first}<tbody>{body}</tbody></table></div>\n'
+
+
+def _say(*sentences: str, kind: str = "") -> str:
+    shown = "".join(f"<p>{text(s)}</p>" for s in sentences if s)
+    return f'<div class="box {kind}">{shown}</div>\n' if kind is not None and kind != "plain" else shown
+
+
+def _hidden(title: str, inside: str) -> str:
+    return f"<details><summary>{text(title)}</summary>\n{inside}</details>\n" if inside else ""
+
+
+def number_list(numbers: Sequence[int]) -> str:
+    """``1 to 4, 7 and 9``."""
+    runs: list[list[int]] = []
+    for n in sorted(numbers):
+        if runs and n == runs[-1][-1] + 1:
+            runs[-1].append(n)
+        else:
+            runs.append([n])
+    words = [w for r in runs for w in ([f"{r[0]} to {r[-1]}"] if len(r) > 2 else map(str, r))]
+    return ", ".join(words[:-1]) + f" and {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+class _Album:
+    """Pictures by name; each is embedded once, what is left at the end was not asked for."""
+
+    def __init__(self, pictures: Mapping[str, Path]) -> None:
+        self.left = dict(pictures)
+
+    def take(self, name: str, caption: str = "", wide: bool = False) -> str:
+        """A figure, or nothing if there is no such picture."""
+        path = self.left.pop(name, None)
+        if path is None or not Path(path).is_file():
+            return ""
+        data = base64.b64encode(Path(path).read_bytes()).decode()
+        kind = "gif" if Path(path).suffix.lower() == ".gif" else "png"
+        words = f"<figcaption>{text(caption)}</figcaption>" if caption else ""
+        image = f'<img alt="{html.escape(caption or name)}" loading="lazy" src="data:image/{kind};base64,{data}">'
+        outer = "wide scroll" if wide else ""
+        return f'<figure class="{outer}">{image}{words}</figure>\n'
+
+    def row(self, prefix: str) -> str:
+        """All pictures whose names begin so, beside each other."""
+        found = [n for n in self.left if n.startswith(prefix)]
+        shown = "".join(self.take(n) for n in found)
+        return f'<div class="row">{shown}</div>\n' if shown else ""
+
+
+# --- sections ------------------------------------------------------------------------------------------------------
+
+
+def _groups(basis: ModalBasis) -> list[ModalGroup]:
+    return [basis.groups[k] for k in sorted(basis.groups)]
+
+
+def _at(group: ModalGroup) -> str:
+    return f"{group.speed * 30 / np.pi:.6g} rpm"
+
+
+def _lead(basis: ModalBasis) -> str:
+    group = _groups(basis)[0]
+    elastic = group.frequency[group.omega > 0]
+    band = f" from {elastic[0]:.5g} Hz to {elastic[-1]:.5g} Hz" if len(elastic) else ""
+    rigid = int((group.omega == 0).sum())
+    free = f", {rigid} of them rigid" if rigid else ""
+    speeds = f" at each of {len(basis.groups)} speeds" if len(basis.groups) > 1 else ""
+    return (
+        f'<p class="lead">{group.n_modes} modes{free}{band}{speeds}; mass {_number(basis.mass)} kg. '
+        f"{text(certificate(group))}</p>\n"
+    )
+
+
+def certificate(group: ModalGroup) -> str:
+    """What the inertia count proves, in one sentence."""
+    if not group.checks.get("certified"):
+        return "Nothing proves that no mode is missing: the spectrum was not certified (modes.certify)."
+    count, limit = (
+        int(group.checks.get("count_below_upper_shift", group.n_modes)),
+        group.checks.get("upper_shift_hz", 0),
+    )
+    kept = f"; the first {group.n_modes} are kept" if count > group.n_modes else ""
+    return f"The inertia count proves that these are all {count} modes below {limit:.6g} Hz{kept}."
+
+
+def _remarks(remarks: Sequence[str]) -> str:
+    return _say(*remarks, kind="warn") if remarks else ""
+
+
+def _body(basis: ModalBasis, album: _Album) -> str:
+    size = np.ptp(basis.mesh.points, axis=0) * 1e3
+    cells = ", ".join(f"{len(c)} {kind}" for kind, c in basis.mesh.cells.items())
+    centre = ", ".join(f"{v * 1e3:.4g}" for v in _clean(basis.centre, float(np.ptp(basis.mesh.points))))
+    inertia = _clean(basis.inertia, float(np.abs(basis.inertia).max()))
+    rows = [
+        ("mass", f"{_number(basis.mass, 6)} kg"),
+        ("size along x, y, z", text(" × ".join(f"{v:.4g}" for v in size)) + " mm"),
+        ("centre of mass x, y, z", text(centre) + " mm"),
+        ("inertia about the centre xx, yy, zz", _join(inertia[[0, 1, 2], [0, 1, 2]]) + " kg m²"),
+        ("xy, yz, xz", _join(inertia[[0, 1, 0], [1, 2, 2]]) + " kg m²"),
+        ("mesh", f"{basis.mesh.n_points} points, {text(cells)}, {3 * basis.mesh.n_points} degrees of freedom"),
+        ("held", "free in space" if basis.free else "by its supports"),
+        ("damping given as", text(basis.damping_source)),
+        ("reduction", text(basis.reduction)),
+        *_material(basis.provenance),
+        *_rotation(basis),
+    ]
+    return (
+        _table([], [(text(a), b) for a, b in rows], "words")
+        + album.take("mesh", "The mesh and its named faces, seen from two opposite sides.")
+    )  # fmt: skip
+
+
+def _clean(values: Any, scale: float) -> Any:
+    """Rounding rests set to zero."""
+    return np.where(np.abs(values) < 1e-9 * scale, 0.0, values)
+
+
+def _join(values: Any) -> str:
+    return ", ".join(_number(float(v)) for v in values)
+
+
+def _material(provenance: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The material's row, if the settings travel with the file."""
+    try:
+        found = json.loads(provenance.get("settings", "{}")).get("material", {})
+        words = [str(found.get("name", "material"))]
+        words += [f"density {found['density']} kg/m³"] if "density" in found else []
+        words += [f"E = {_pascal(found['young'])}"] if "young" in found else []
+        words += [f"nu = {found['poisson']}"] if "poisson" in found else []
+    except (ValueError, AttributeError, TypeError):
+        words = []
+    if len(words) < 2:
+        return [("material", text(provenance["material"]))] if provenance.get("material") else []
+    return [("material", text(", ".join(words)))]
+
+
+def _pascal(value: Any) -> str:
+    return ", ".join(f"{float(v) / 1e9:g}" for v in (value if isinstance(value, list) else [value])) + " GPa"
+
+
+def _rotation(basis: ModalBasis) -> list[tuple[str, str]]:
+    groups = _groups(basis)
+    if not any(g.speed for g in groups):
+        return []
+    axis = ", ".join(f"{v:.4g}" for v in basis.rotation_axis)
+    point = ", ".join(f"{v * 1e3:.4g}" for v in basis.rotation_point)
+    stress = {"nonlinear": "nonlinear equilibrium", "linear": "linear prestress", "none": "no prestress"}
+    how = stress.get(groups[-1].prestress, groups[-1].prestress)
+    softening = "with" if groups[-1].spin_softening else "without"
+    return [("rotation", text(f"about ({axis}) through ({point}) mm; {how}, {softening} spin softening"))]
+
+
+def _frequencies(basis: ModalBasis, album: _Album) -> str:
+    groups = _groups(basis)
+    several = len(groups) > 1
+    head = ["mode"] + [f"Hz at {_at(g)}" if several else "Hz" for g in groups] + ["damping in %", "kind"]
+    rows = []
+    for j in range(max(g.n_modes for g in groups)):
+        cells = [
+            f"{g.frequency[j]:#.6g}" if j < g.n_modes and g.omega[j] else "0" if j < g.n_modes else "" for g in groups
+        ]
+        first = next(g for g in groups if j < g.n_modes)
+        rows.append([str(j + 1), *cells, f"{100 * first.damping_ratio[j]:.4g}", text(first.kind[j])])
+    proofs = [(f"{_at(g)}: " if several else "") + certificate(g) for g in groups]
+    out = _say(*proofs, kind="" if all(g.checks.get("certified") for g in groups) else "warn")
+    return out + _table(head, rows) + _campbell(basis, album)
+
+
+def _campbell(basis: ModalBasis, album: _Album) -> str:
+    tracks = track_basis(basis)
+    if tracks is None:
+        return ""
+    out = _say(
+        "Modes are ordered by frequency at each speed; the Campbell diagram joins those that have the same shape. "
+        "The frequencies hold stress stiffening and spin softening as stated above, but no gyroscopic coupling.",
+        kind="plain",
+    )
+    out += album.take("campbell", "Campbell diagram.")
+    rows = [
+        [str(c.order), str(int(tracks.modes[c.curve][tracks.modes[c.curve] >= 0][0]) + 1)]
+        + [f"{c.speed * 30 / np.pi:.0f}", f"{c.frequency:.5g}"]
+        for c in crossings(tracks, _engine_orders(basis))
+    ]
+    return out + _hidden("Where engine orders meet modes", _table(["engine order", "mode", "rpm", "Hz"], rows))
+
+
+def _engine_orders(basis: ModalBasis) -> list[int]:
+    try:
+        orders = json.loads(basis.provenance.get("settings", "{}"))["rotation"]["engine_orders"]
+        return [k for k in orders if isinstance(k, int)]
+    except (ValueError, KeyError, TypeError):
+        return []
+
+
+def _modes(basis: ModalBasis, album: _Album) -> str:
+    moving = album.row("animation_")
+    sheets = "".join(album.take(n, wide=True) for n in [n for n in album.left if n.startswith("modes_")])
+    single = ""
+    for group in _groups(basis):
+        rpm = f"{group.speed * 30 / np.pi:.6g}rpm"
+        names = [n for n in album.left if n.startswith("mode_") and n.endswith(f"_{rpm}")]
+        if names:
+            shown = "".join(album.take(n) for n in names)
+            single += _hidden(f"Each mode at {_at(group)}", f'<div class="row">{shown}</div>')
+    return moving + sheets + single
+
+
+def _stresses(basis: ModalBasis, album: _Album) -> str:
+    return album.take("stress_modes", wide=True) + album.take("static")
+
+
+def _interfaces(basis: ModalBasis, album: _Album) -> str:
+    group = _groups(basis)[0]
+    if not group.interfaces:
+        return ""
+    rows = []
+    for name, i in group.interfaces.items():
+        origin = ", ".join(f"{v * 1e3:.4g}" for v in _clean(i.origin, float(np.abs(basis.mesh.points).max())))
+        normal = ", ".join(f"{v:.3g}" for v in _clean(i.rotation[0], 1.0))
+        role = i.role + (f", faces {i.partner}" if i.partner else "")
+        area = f"{1e6 * i.areas.sum():.4g}"
+        rows.append([text(name), text(role), area, str(len(i.areas)), text(origin), text(normal)])
+    head = ["interface", "role", "area in mm²", "points", "origin in mm", "outward normal"]
+    words = [fit_sentence(name, i, group) for name, i in group.interfaces.items()]
+    rigid = _say(*words, kind="plain")
+    if len(words) > 4:
+        rigid = _say(_fit_summary(group), kind="plain") + _hidden("Each patch", rigid)
+    return (
+        _table(head, rows)
+        + album.take("interfaces", "Where the patches lie, their points, and their frames n, t1, t2.")
+        + "<h3>Do the patches move as rigid ones?</h3>\n" + _say(*words, kind="plain")
+    )  # fmt: skip
+
+
+def _fit_summary(group: ModalGroup) -> str:
+    """One sentence over all patches."""
+    worst = {name: float(i.fit_residual.max()) for name, i in group.interfaces.items()}
+    loose = [name for name, value in worst.items() if value > RIGID_ENOUGH]
+    if not loose:
+        return f"All {len(worst)} patches move as rigid ones (to {100 * RIGID_ENOUGH:g} %) in all modes."
+    name = max(loose, key=lambda n: worst[n])
+    mode = int(group.interfaces[name].fit_residual.argmax()) + 1
+    return (
+        f"{len(loose)} of {len(worst)} patches deform in some modes, most {name} in mode {mode}: "
+        f"{percent(worst[name])} of its motion is not rigid."
+    )
+
+
+def fit_sentence(name: str, interface: Interface, group: ModalGroup) -> str:
+    """How well six components describe the motion of a patch, in words."""
+    residual = interface.fit_residual
+    loose = [j for j in range(group.n_modes) if residual[j] > RIGID_ENOUGH]
+    firm = [j + 1 for j in range(group.n_modes) if j not in loose]
+    limit = f"{100 * RIGID_ENOUGH:g} %"
+    if not loose:
+        most = percent(float(residual.max()))
+        return f"{name} moves as a rigid patch in all modes (at most {most} of its motion is deformation)."
+    worst = max(loose, key=lambda j: residual[j])
+    begins = f"{name} moves as a rigid patch (to {limit}) in modes {number_list(firm)}; it" if firm else name
+    return (
+        f"{begins} deforms in modes {number_list([j + 1 for j in loose])} (most in mode {worst + 1}: "
+        f"{percent(float(residual[worst]))} of its motion is not rigid), which six components do not see."
+    )
+
+
+def _truncation(basis: ModalBasis, album: _Album) -> str:
+    group = _groups(basis)[0]
+    found = verdict(group)
+    if not found.coordinates:
+        return _say(found.sentence)
+    rows = [
+        [text(c.label), f"{_number(c.static)} {c.unit}", percent(c.share), f"{_number(c.residual)} {c.unit}"]
+        + [str(c.modes_for(s) or "more") for s in (0.9, 0.99)]
+        for c in found.coordinates
+    ]
+    head = ["coordinate", "static compliance", "held by the modes", "left out", "modes for 90 %", "modes for 99 %"]
+    relief = "The body is free: compliance is that of the elastic part, without the rigid motion (inertia relief). "
+    return (
+        _say(found.sentence)
+        + _say(*found.remarks, relief if group.compliance.inertia_relief else "", kind="plain")
+        + _hidden("Every coordinate", _table(head, rows))
+        + album.take("compliance", "Share of the static compliance over the number of modes kept.")
+    )
+
+
+def _rows(basis: ModalBasis) -> str:
+    group = _groups(basis)[0]
+    out = []
+    for kind, named in (("excitation", group.excitations), ("monitor", group.monitors), ("gauge", group.gauges)):
+        for name, rows in named.items():
+            at = ", ".join(f"{v * 1e3:.4g}" for v in _clean(rows.point, float(np.abs(basis.mesh.points).max())))
+            off = f"{rows.distance * 1e3:.3g}" if rows.distance > 1e-9 else "0"
+            out.append([kind, text(name), text(" ".join(rows.labels)), text(rows.unit), text(at), off])
+    return _table(["kind", "name", "rows", "unit", "at, in mm", "mm off the body"], out)
+
+
+def _response(response: Mapping[str, Any] | None, album: _Album) -> str:
+    """Everything the case tells, and every picture that no other section took."""
+    shown = ""
+    for name in list(album.left):
+        if not name.startswith(("mode_", "modes_", "animation_")):
+            shown += album.take(name, name)
+    if response is None:
+        return shown
+    facts: list[tuple[str, str]] = []
+    tables = ""
+    for key, value in response.items():
+        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+            head = [text(_label(k)) for k in value[0]]
+            tables += f"<h3>{text(_label(key))}</h3>\n" + _table(
+                head, [[_cell(v) for v in row.values()] for row in value]
+            )
+        elif isinstance(value, list):
+            facts.append((text(_label(key)), ", ".join(_cell(v) for v in value)))
+        elif value not in ("", None):
+            facts.append((text(_label(key)), _cell(value)))
+    return shown + _table([], facts, "words") + tables
+
+
+def _label(key: str) -> str:
+    """``normal_force_N`` -> ``normal force in N``."""
+    words = key.split("_")
+    if len(words) > 1 and words[-1] in ("N", "Hz", "m", "mm", "s", "Pa", "rpm", "W", "J", "K"):
+        return " ".join(words[:-1]) + f" in {words[-1]}"
+    return " ".join(words)
+
+
+def _cell(value: Any) -> str:
+    return _number(value, 5) if isinstance(value, float) else text(value)
+
+
+def _checks(basis: ModalBasis) -> str:
+    found = check_basis(basis)
+    failed = [c for c in found if not c.passed]
+    rows = [
+        [
+            text(c.name),
+            _number(c.value, 3),
+            _number(c.limit, 3),
+            "passed" if c.passed else "<b>failed</b>",
+            text(c.remark),
+        ]
+        for c in found
+    ]
+    table = _table(["check", "value", "limit", "", "remark"], rows)
+    if failed:
+        names = "; ".join(c.name for c in failed)
+        return _say(f"{len(failed)} of {len(found)} checks failed: {names}.", kind="bad") + table
+    return _say(f"All {len(found)} checks of the file passed.") + _hidden("Every check", table)
+
+
+def _provenance(basis: ModalBasis) -> str:
+    short = [(text(k), text(v)) for k, v in sorted(basis.provenance.items()) if len(v) <= 80 and v]
+    long = [(k, v) for k, v in sorted(basis.provenance.items()) if len(v) > 80]
+    return _table([], short, "words") + "".join(_hidden(k, f"<pre>{html.escape(v)}</pre>") for k, v in long)

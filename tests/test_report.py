@@ -1,0 +1,263 @@
+"""The page: self-contained, well formed, escaped, and saying what the file says."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+from hypothesis import given
+from hypothesis import strategies as st
+
+from microslip.data import ModalBasis, UserError
+from microslip.report import certificate, fit_sentence, number_list, report_html, text, write_report
+
+PNG = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c4944415408d763f8ffff3f0005fe02fe"
+    "dccc59e70000000049454e44ae426082"
+)
+VOID = {"meta", "img", "br", "link", "input"}
+
+
+class Tags(HTMLParser):
+    """Checks that tags close in order, and collects what the page loads and shows."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.loads: list[str] = []
+        self.words: list[str] = []
+        self.ids: list[str] = []
+        self.names: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list) -> None:
+        self.names.add(tag)
+        self.loads += [v for k, v in attrs if k in ("src", "href", "srcset", "action", "data")]
+        self.ids += [v for k, v in attrs if k == "id"]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag, f"</{tag}> closes something else"
+
+    def handle_data(self, data: str) -> None:
+        if not {"style", "script"} & set(self.open):
+            self.words.append(data)
+
+
+def parsed(page: str) -> Tags:
+    tags = Tags()
+    tags.feed(page)
+    tags.close()
+    assert not tags.open
+    return tags
+
+
+def said(page: str) -> str:
+    return re.sub(r"\s+", " ", "".join(parsed(page).words).replace("\xa0", " "))
+
+
+def album(tmp_path: Path, *names: str) -> dict[str, Path]:
+    found = {}
+    for name in names:
+        found[name] = tmp_path / f"{name}.{'gif' if name.startswith('animation') else 'png'}"
+        found[name].write_bytes(PNG)
+    return found
+
+
+def test_the_page_is_whole_and_loads_nothing(tmp_path: Path) -> None:
+    names = ["mesh", "interfaces", "modes_0rpm", "mode_01_0rpm", "animation_01", "compliance", "friction response"]
+    write_report(small.basis(), album(tmp_path, *names), tmp_path / "report.html", ["Only a beam."])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    tags = parsed(page)
+    pictures = [v for v in tags.loads if v.startswith("data:image/")]
+    links = [v for v in tags.loads if not v.startswith("data:image/")]
+    assert len(pictures) == len(names)
+    assert links and all(v.startswith("#") and v[1:] in tags.ids for v in links)
+    assert not {"script", "link", "iframe", "object"} & tags.names
+    assert "url(" not in page and "@import" not in page and 'name="viewport"' in page
+    assert "Only a beam." in said(page)
+
+
+def test_the_page_says_what_the_file_holds() -> None:
+    basis = small.basis()
+    group, words = basis.groups[0, 0], said(report_html(basis, {}))
+    for f in group.frequency:
+        assert f"{f:#.6g}" in words
+    assert f"{basis.mass:.6g} kg" in words and "20 × 30 × 120 mm" in words
+    limit = group.checks["upper_shift_hz"]
+    assert f"The inertia count proves that these are all 6 modes below {limit:.6g} Hz." in words
+    assert re.search(r"All \d+ checks of the file passed", words)
+    assert "shaker" in words and "tip-probe" in words and "root" in words
+    assert "6 modes are not enough" in words or "of 6 modes are" in words
+    assert "right + left squeezed" in words
+
+
+def test_speeds_stand_beside_each_other_with_crossings() -> None:
+    basis = small.basis((0.0, 3000.0))
+    settings = (
+        '{"rotation": {"engine_orders": [30]}, "material": {"name": "steel", "density": 7850.0, "young": 2.1e11}}'
+    )
+    basis = dataclasses.replace(basis, provenance={"settings": settings})
+    words = said(report_html(basis, {}))
+    assert "Hz at 0 rpm" in words and "Hz at 3000 rpm" in words
+    assert "steel, density 7850.0 kg/m³, E = 210 GPa" in words
+    assert "nonlinear equilibrium, with spin softening" in words
+    assert "Where engine orders meet modes" in words
+
+
+@pytest.mark.parametrize("settings", ["", "not json", "[1, 2]", '{"material": 3}', '{"rotation": null}', "3"])
+def test_foreign_settings_do_no_harm(settings: str) -> None:
+    basis = dataclasses.replace(small.basis((0.0, 3000.0)), provenance={"settings": settings, "material": "tin"})
+    assert "tin" in said(report_html(basis, {}))
+
+
+NASTY = '<script>alert("x")</script>&amp;\'"'
+
+
+def test_every_text_is_escaped(tmp_path: Path) -> None:
+    basis = small.basis()
+    group = basis.groups[0, 0]
+    left = dataclasses.replace(group.interfaces["left"], role=NASTY, partner=NASTY)
+    labels = tuple(label.replace("left", NASTY) for label in group.compliance.labels)
+    renamed = dataclasses.replace(
+        group,
+        interfaces={"right": group.interfaces["right"], NASTY: left},
+        monitors={NASTY: group.monitors["tip-probe"]},
+        compliance=dataclasses.replace(group.compliance, labels=tuple(x.replace("tip-probe", NASTY) for x in labels)),
+    )
+    nasty = dataclasses.replace(
+        basis, name=NASTY, groups={(0, 0): renamed}, provenance={NASTY: NASTY, "long": NASTY * 20},
+        damping_source=NASTY, reduction=NASTY,
+    )  # fmt: skip
+    picture = tmp_path / "p.png"
+    picture.write_bytes(PNG)
+    response = {NASTY: NASTY, "list": [NASTY], "rows": [{NASTY: NASTY}]}
+    page = report_html(nasty, {NASTY: picture}, [NASTY], response)
+    tags = parsed(page)
+    assert "script" not in tags.names
+    assert "".join(tags.words).count('<script>alert("x")</script>&amp;\'"') > 12
+
+
+@given(st.text(max_size=60))
+def test_any_text_survives(words: str) -> None:
+    back = "".join(parsed(f"<p>{text(words)}</p>").words).replace("\xa0", " ")
+    shown = re.sub(r"·10(−?)(\d+)", "", back)
+    assert len(shown) <= len(words) and "<" not in text(words).replace("<sup>", "").replace("</sup>", "")
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted"),
+    [
+        ("1.09e-09 m/N", "1.09·10<sup>−9</sup> m/N"),
+        ("2e+06", "2·10<sup>6</sup>"),
+        ("bolt1e5", "bolt1e5"),
+        ("0.5 %", "0.5&nbsp;%"),
+    ],
+)
+def test_powers_of_ten_are_set_as_such(value: str, wanted: str) -> None:
+    assert text(value) == wanted
+
+
+def test_the_certificate_in_words() -> None:
+    group = small.basis().groups[0, 0]
+    cut = dataclasses.replace(group, checks={**group.checks, "count_below_upper_shift": 9.0})
+    assert certificate(cut).endswith("the first 6 are kept.") and "all 9 modes" in certificate(cut)
+    open_end = dataclasses.replace(group, checks={**group.checks, "certified": 0.0})
+    assert "not certified" in certificate(open_end)
+    basis = dataclasses.replace(small.basis(), groups={(0, 0): open_end})
+    assert "1 of" in said(report_html(basis, {})) and "checks failed" in said(report_html(basis, {}))
+
+
+def test_a_failed_check_is_named_first() -> None:
+    group = small.basis().groups[0, 0]
+    broken = dataclasses.replace(group, K_r=group.K_r * 1.01)
+    words = said(report_html(dataclasses.replace(small.basis(), groups={(0, 0): broken}), {}))
+    assert re.search(r"\d+ of \d+ checks failed: .*K_r", words)
+
+
+def test_fit_residuals_in_words() -> None:
+    group = small.basis().groups[0, 0]
+    patch = group.interfaces["right"]
+
+    def sentence(*residual: float) -> str:
+        return fit_sentence("tip", dataclasses.replace(patch, fit_residual=np.array(residual)), group)
+
+    assert sentence(0.01, 0.02, 0.0, 0.0, 0.0, 0.0) == (
+        "tip moves as a rigid patch in all modes (at most 2.0 % of its motion is deformation)."
+    )
+    mixed = sentence(0.01, 0.2, 0.0, 0.5, 0.3, 0.0)
+    assert "in modes 1, 3 and 6; it deforms in modes 2, 4 and 5 (most in mode 4: 50.0 %" in mixed
+    assert sentence(*[0.6] * 6).startswith("tip deforms in modes 1 to 6")
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [([], ""), ([3], "3"), ([1, 2], "1 and 2"), ([1, 2, 3, 7, 9], "1 to 3, 7 and 9"), ([4, 5, 6], "4 to 6")],
+)
+def test_lists_of_numbers(numbers: list[int], words: str) -> None:
+    assert number_list(numbers) == words
+
+
+def test_a_response_is_told_whatever_it_holds(tmp_path: Path) -> None:
+    response = {
+        "case": "blade",
+        "description": "",
+        "stuck_frequencies_Hz": [86.5, 121.25],
+        "resonances": [{"normal_force_N": 10.0, "frequency_Hz": 14.2, "amplitude_m": 1.5e-5}],
+        "failed_points": 0,
+    }
+    words = said(report_html(small.basis(), album(tmp_path, "friction response"), (), response))
+    for part in (
+        "stuck frequencies in Hz86.5, 121.25",
+        "normal force in N",
+        "frequency in Hz",
+        "1.5·10−5",
+        "failed points0",
+    ):
+        assert part in words
+    assert "description" not in words
+
+
+def test_pictures_that_are_missing_leave_no_hole(tmp_path: Path) -> None:
+    page = report_html(small.basis(), {"mesh": tmp_path / "gone.png"})
+    assert "<img" not in page
+    parsed(page)
+
+
+def test_same_inputs_give_the_same_page(tmp_path: Path) -> None:
+    found = album(tmp_path, "mesh", "compliance")
+    assert report_html(small.basis(), found) == report_html(small.basis(), found)
+
+
+def bare() -> ModalBasis:
+    """A basis that holds hardly more than frequencies."""
+    basis = small.basis()
+    group = basis.groups[0, 0]
+    nothing = dataclasses.replace(group.compliance, labels=(), static=np.zeros((0, 0)), modal=np.zeros((0, 0)))
+    thin = dataclasses.replace(
+        group, phi=np.zeros((0, 3, group.n_modes)), interfaces={}, excitations={}, monitors={}, gauges={}, stresses={},
+        compliance=nothing, checks={},
+    )  # fmt: skip
+    return dataclasses.replace(basis, groups={(0, 0): thin}, provenance={})
+
+
+def test_a_bare_file_has_a_page_too(tmp_path: Path) -> None:
+    words = said(report_html(bare(), {}))
+    assert "no compliance to check" in words and "not certified" in words
+
+
+def test_a_free_body_says_so() -> None:
+    words = said(report_html(small.basis(free=True), {}))
+    assert "6 of them rigid" in words and "inertia relief" in words and "free in space" in words
+
+
+def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        write_report(small.basis(), {}, tmp_path / "file" / "report.html")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
