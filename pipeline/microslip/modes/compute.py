@@ -27,7 +27,7 @@ from ..fem.loads import body_force, pressure, traction
 from ..fem.operators import skew
 from . import canonical, rigid
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
-from .rows import Locator, Patch, gauge_row, patch, point_rows
+from .rows import Locator, Patch, patch, point_rows, slope_rows
 from .stress import gauss_set, nodal_set
 
 Report = Callable[[str], None]
@@ -68,6 +68,7 @@ class _Named:
     unit: str
     point: Array
     distance: float
+    direction: Array | None = None  # of a gauge, whose B holds the three rows of the slope along it
 
 
 def modal_basis(
@@ -201,7 +202,8 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
     for g in settings.gauges:
         place = locator.find(np.array(g.point), f"gauges.{g.name}.point")
         direction = np.array(g.direction) / np.linalg.norm(g.direction)
-        gauges[g.name] = _Named(gauge_row(n, place, direction), ("strain",), "1", place.point, place.distance)
+        slopes = slope_rows(n, place, direction)
+        gauges[g.name] = _Named(slopes, ("strain",), "1", place.point, place.distance, direction)
     return BodyRows(patches, excitations, monitors, gauges)
 
 
@@ -378,7 +380,8 @@ def _static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_ma
     """(r, r) displacement of row i under unit force on row j; inertia relief when rigid motions are free.
 
     With rigid motions, the part outside the modes found is solved by fixed-point iteration on the shifted
-    factorisation, which contracts by |shift| / (lambda_next + |shift|) a step.
+    factorisation, which contracts by |shift| / (lambda_next + |shift|) a step; a body so slender that this would
+    hardly contract is factorised again, with a smaller shift.
     """
     F = np.asarray(B.T.todense())
     if not F.shape[1]:
@@ -386,6 +389,9 @@ def _static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_ma
     if not R.shape[1]:
         C = np.asarray(B @ pencil.solve(F))
         return 0.5 * (C + C.T)
+    if -shift > 0.3 * found.upper_shift:
+        shift = -0.1 * found.upper_shift
+        pencil.solver.factorise(pencil.shifted(shift))
     X = found.vectors
     MX = pencil.M(X)
     elastic = found.values[R.shape[1] :]
@@ -440,7 +446,7 @@ def _assemble_group(
         interfaces=_interfaces(rows, settings, phi, shapes),
         excitations={k: _reduced(v, phi, None) for k, v in rows.excitations.items()},
         monitors={k: _reduced(v, phi, u) for k, v in rows.monitors.items()},
-        gauges={k: _reduced(v, phi, u) for k, v in rows.gauges.items()},
+        gauges={k: _gauge(v, phi, state) for k, v in rows.gauges.items()},
         compliance=Compliance(labels, static, modal, bool(zero)),
         stresses=stresses,
         u_static=state.u,
@@ -468,6 +474,16 @@ def _interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shapes: Arra
 def _reduced(named: _Named, phi: Array, u: Array | None) -> Rows:
     static = np.zeros(len(named.labels)) if u is None else np.asarray(named.B @ u)
     return Rows(np.asarray(named.B @ phi), named.labels, named.unit, named.point, named.distance, static)
+
+
+def _gauge(named: _Named, phi: Array, state: StaticState) -> Rows:
+    """Strain along the gauge: of the static state, and its change per unit coordinate (`slope_rows`)."""
+    assert named.direction is not None
+    slope = np.asarray(named.B @ state.u.reshape(-1))
+    along = named.direction if state.H is None else named.direction + slope
+    strain = named.direction @ slope + (0.5 * slope @ slope if state.prestress == "nonlinear" else 0.0)
+    row = along @ np.asarray(named.B @ phi)
+    return Rows(row[None], named.labels, named.unit, named.point, named.distance, np.array([strain]))
 
 
 def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:

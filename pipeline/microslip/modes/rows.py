@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.optimize import lsq_linear, nnls
 from scipy.spatial import cKDTree
 
 from ..data import Array, Indices, Mesh, UserError
@@ -171,9 +172,10 @@ class Locator:
         xi = kind.reference[: kind.corners].mean(axis=0)
         for _ in range(25):
             N, dN = shape_functions(cell_type, xi[None])
-            step = np.linalg.lstsq((dN[0] @ x).T, point - N[0] @ x, rcond=None)[0]
-            xi = _clamp(xi + step, kind.corners)
-            if np.abs(step).max() < 1e-13:
+            J = (dN[0] @ x).T
+            before = xi
+            xi = _into_cell(J, xi + np.linalg.lstsq(J, point - N[0] @ x, rcond=None)[0], kind.corners)
+            if np.abs(xi - before).max() < 1e-13:
                 break
         N, dN = shape_functions(cell_type, xi[None])
         place = N[0] @ x
@@ -183,21 +185,18 @@ class Locator:
         return Location(nodes, N[0], np.linalg.solve(dN[0] @ x, dN[0]), place, distance)
 
 
-def _clamp(xi: Array, corners: int) -> Array:
-    """Nearest reference coordinates inside the cell (tetrahedron: onto the simplex)."""
+def _into_cell(J: Array, xi: Array, corners: int) -> Array:
+    """Reference coordinates inside the cell whose image under J is nearest to that of xi (distance in space)."""
     if corners == 8:
-        return np.clip(xi, 0.0, 1.0)
-    inside = np.maximum(xi, 0.0)
-    total = inside.sum()
-    return inside if total <= 1 else _onto_simplex(xi)
-
-
-def _onto_simplex(xi: Array) -> Array:
-    """Euclidean projection on {x >= 0, sum x = 1}."""
-    ordered = np.sort(xi)[::-1]
-    excess = np.cumsum(ordered) - 1
-    last = np.flatnonzero(ordered - excess / np.arange(1, len(xi) + 1) > 0)[-1]
-    return np.maximum(xi - excess[last] / (last + 1), 0.0)
+        inside = (xi >= 0).all() and (xi <= 1).all()
+        return xi if inside else lsq_linear(J, J @ xi, bounds=(0.0, 1.0), method="bvls").x
+    if (xi >= 0).all() and xi.sum() <= 1:
+        return xi
+    # barycentric coordinates w >= 0 of the simplex; the heavy last row makes their sum 1
+    A = J @ (np.column_stack([np.zeros(3), np.eye(3)]) - xi[:, None])
+    heavy = 1e6 * np.abs(A).max()
+    w = nnls(np.vstack([A, np.full(4, heavy)]), np.array([0.0, 0.0, 0.0, heavy]))[0]
+    return w[1:] / w.sum()
 
 
 def point_rows(n: int, place: Location, directions: Array) -> sp.csr_matrix:
@@ -208,11 +207,17 @@ def point_rows(n: int, place: Location, directions: Array) -> sp.csr_matrix:
     return sp.csr_matrix(rows)
 
 
-def gauge_row(n: int, place: Location, direction: Array) -> sp.csr_matrix:
-    """(1, 3n) normal strain at a place along a unit direction: d . grad(u) . d."""
-    row = np.zeros((n, 3))
-    row[place.nodes] = (place.grad.T @ direction)[:, None] * direction
-    return sp.csr_matrix(row.reshape(1, -1))
+def slope_rows(n: int, place: Location, direction: Array) -> sp.csr_matrix:
+    """(3, 3n) derivative of the displacement along a unit direction d at a place: grad(u) d.
+
+    A strain gauge reads d . grad(u) d, and about a deformed state the change of the Green strain,
+    (d + grad(u_static) d) . grad(u) d.
+    """
+    rows = np.zeros((3, n, 3))
+    slope = place.grad.T @ direction
+    for i in range(3):
+        rows[i, place.nodes, i] = slope
+    return sp.csr_matrix(rows.reshape(3, -1))
 
 
 def strain_of(grad_u: Array) -> Array:
