@@ -49,7 +49,7 @@ def rectangle(
 
 
 def rectangle_kappa(poisson: float) -> float:
-    """Shear coefficient of a vibrating rectangle (Kaneko, J. Phys. D 8 (1975) 1927; Cowper's static one is 2 % lower)."""
+    """Shear coefficient of a vibrating rectangle (Kaneko, J. Phys. D 8 (1975) 1927); Cowper's is 2 % lower."""
     return 5 * (1 + poisson) / (6 + 5 * poisson)
 
 
