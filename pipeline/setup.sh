@@ -93,7 +93,13 @@ announce() { say "packages into $VENV: some 600 MB to download, 2.2 GB on disk, 
 
 by_uv() {
     announce
-    usable || { rm -rf "$VENV"; uv venv -q --python "$(find_python | grep . || echo '>=3.11')" "$VENV"; }
+    if ! usable; then
+        rm -rf "$VENV"
+        PYTHON=$(find_python)
+        # Without a Python on the system uv downloads one; where it cannot, the system's is installed.
+        [ -n "$PYTHON" ] || uv venv -q --python 3.12 "$VENV" 2>/dev/null || find_or_install_python
+        [ -z "$PYTHON" ] || uv venv -q --python "$PYTHON" "$VENV" || return
+    fi
     rm -f "$DONE"
     uv pip install -q --python "$INSIDE" --only-binary :all: -r "$LOCK" &&
         uv pip install -q --python "$INSIDE" --no-deps -e .
