@@ -1,22 +1,29 @@
 """Any mesh file -> `Mesh`: named faces, unit of length, quality gates.
 
-The only place that calls meshio. Node orders are VTK's from here on; gmsh's different order of the last two
-mid-side nodes of a ten-node tetrahedron is turned by meshio and checked by a test.
+gmsh's MSH 4.1 and Abaqus files have readers of their own (`mesh_msh`, `mesh_inp`), which keep node numbers and notice
+damage; every other format goes through meshio, which is called here only. Node orders are VTK's from here on.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import re
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .data import Array, Indices, Mesh, UserError
+from .mesh_inp import read_inp
+from .mesh_msh import is_msh41, read_msh41
+from .rawmesh import Damaged, RawMesh
 from .topology import CELL_TYPES, FACET_CORNERS
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -30,7 +37,8 @@ def read_mesh(path: Path | str, unit: str) -> Mesh:
     """Read a volume mesh with its named sets.
 
     Args:
-        path: any file meshio reads (``.msh``, ``.inp``, ``.med``, ``.vtu``, ``.bdf``, ...).
+        path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, or any file meshio reads (``.med``, ``.vtu``,
+            ``.bdf``, ...).
         unit: of the file's coordinates, a key of `UNITS`.
 
     Returns:
@@ -41,39 +49,109 @@ def read_mesh(path: Path | str, unit: str) -> Mesh:
         UserError: unreadable or truncated file, no volume cells, unsupported cells.
     """
     path = Path(path)
-    raw = _read_raw(path)
-    cells, foreign = _volume_cells(raw)
-    if foreign:
-        raise UserError(
-            f"{path}: cells of type {', '.join(sorted(foreign))} cannot be assembled; "
-            f"convert the mesh to one of {', '.join(CELL_TYPES)}"
-        )
-    if not cells:
-        raise UserError(f"{path}: holds no volume cells (only surfaces or lines?); mesh the volume first")
-    if path.suffix.lower() == ".med":
-        cells = {t: c[:, _mirrored(t)] for t, c in cells.items()}  # MED's own order
-    points = np.asarray(raw.points, dtype=float) * UNITS[unit]
-    if points.shape[1] != 3 or not np.isfinite(points).all():
-        raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
-    if max(c.max() for c in cells.values()) >= len(points):
-        raise UserError(f"{path}: cells refer to points that are not in the file; it is truncated, write it again")
-    return _assemble_mesh(points, cells, _named_facets(raw), _named_points(raw), path)
-
-
-def _read_raw(path: Path):
-    import meshio
-
+    if unit not in UNITS:
+        raise UserError(f"{path}: the unit of length '{unit}' is unknown; choose one of {', '.join(UNITS)}")
     if not path.is_file():
         raise UserError(f"{path}: no such mesh file; make it first or correct the path")
-    _know_more_abaqus_types()
+    try:
+        raw = _read_raw(path)
+        return _mesh_of(raw, UNITS[unit], path)
+    except Damaged as error:
+        raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+
+
+def _read_raw(path: Path) -> RawMesh:
+    if path.suffix.lower() == ".msh" and is_msh41(path):
+        return read_msh41(path)
+    if path.suffix.lower() == ".inp":
+        return read_inp(path)
+    return _read_by_meshio(path)
+
+
+def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
+    foreign = sorted({kind for kind, cells in raw.blocks if kind not in CELL_TYPES and len(cells)})
+    if foreign:
+        raise UserError(
+            f"{path}: cells of type {', '.join(foreign)} cannot be assembled; "
+            f"convert the mesh to one of {', '.join(CELL_TYPES)}"
+        )
+    cells: dict[str, list[Indices]] = {}
+    for kind, connectivity in raw.blocks:
+        if len(connectivity):
+            cells.setdefault(kind, []).append(connectivity)
+    if not cells:
+        raise UserError(f"{path}: holds no volume cells (only surfaces or lines?); mesh the volume first")
+    points = raw.points * metres
+    if points.shape[1:] != (3,) or not np.isfinite(points).all():
+        raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
+    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, path)
+
+
+# other formats, by meshio ----------------------------------------------------------------------------------------
+
+
+def _read_by_meshio(path: Path) -> RawMesh:
+    import meshio
+
+    _check_sections(path)
     said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return meshio.read(path)
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _from_meshio(meshio.read(path), path.suffix.lower())
+    except Damaged:
+        raise
     except (Exception, SystemExit) as error:  # meshio raises whatever its parsers meet, and exits on some
         text = str(error) if not isinstance(error, SystemExit) else said.getvalue()
         detail = " ".join(text.split())[-160:] or "unknown format"
-        raise UserError(f"{path}: is damaged or of a format that cannot be read ({detail}); write it again") from error
+        raise Damaged(f"not readable as {path.suffix or 'a file without suffix'}: {detail}") from error
+
+
+def _check_sections(path: Path) -> None:
+    """Truncated files of gmsh and numbers beyond the file's size, which meshio does not notice or survive."""
+    if path.suffix.lower() != ".msh":
+        return
+    data = path.read_bytes()
+    for name in re.findall(rb"^\$(?!End)(\w+)[ \t\r]*$", data, re.MULTILINE):
+        if name in (b"Nodes", b"Elements", b"PhysicalNames", b"Entities") and b"$End" + name not in data:
+            raise Damaged(f"the section ${name.decode()} has no end, the file is truncated")
+    limit = max(10**7, 10 * len(data))
+    if re.search(rb"^\$MeshFormat\s+[\d.]+\s+0\s", data) and any(
+        int(number[:30]) > limit for number in re.findall(rb"(?<![\d.])\d{8,}(?![\d.])", data)
+    ):
+        raise Damaged("it holds a number that a file of this size cannot need")
+
+
+def _from_meshio(mesh: Any, suffix: str) -> RawMesh:
+    points = np.asarray(mesh.points, dtype=float)
+    raw = RawMesh(points, np.arange(1, len(points) + 1))
+    for block in mesh.cells:
+        nodes = _valid(block.data, len(points))
+        if block.type in CELL_TYPES:
+            raw.blocks.append((block.type, nodes[:, _mirrored(block.type)] if suffix == ".med" else nodes))
+        elif block.type not in FACET_CORNERS and block.type not in _IGNORED:
+            raw.blocks.append((block.type, nodes))
+    for name, chosen in (mesh.point_sets or {}).items():
+        raw.add_points(str(name), np.unique(_valid(chosen, len(points))))
+    for name, per_block in _cell_sets(mesh).items():
+        for block, chosen in zip(mesh.cells, per_block, strict=False):
+            if chosen is None or not len(chosen):
+                continue
+            nodes = _valid(block.data, len(points))[_valid(chosen, len(block.data))]
+            if block.type in FACET_CORNERS:
+                raw.facets.setdefault(name, []).append(nodes[:, : FACET_CORNERS[block.type]])
+            elif block.type in _IGNORED:
+                raw.add_points(name, np.unique(nodes))
+    return raw
+
+
+def _valid(indices: Any, count: int) -> Indices:
+    indices = np.asarray(indices, dtype=np.int64)
+    if indices.size and not (0 <= indices.min() and indices.max() < count):
+        raise Damaged("cells or sets refer to what is not in the file, it is truncated")
+    return indices
 
 
 def _mirrored(cell_type: str) -> Indices:
@@ -88,33 +166,12 @@ def _mirrored(cell_type: str) -> Indices:
     return np.abs(moved[:, None] - kind.reference[None]).sum(axis=2).argmin(axis=1)
 
 
-def _know_more_abaqus_types() -> None:
-    """Second-order facets that mesh generators write beside the solid, which meshio's Abaqus reader lacks."""
-    from meshio.abaqus import _abaqus
-
-    known = getattr(_abaqus, "abaqus_to_meshio_type", {})
-    for name, kind in {"CPS6": "triangle6", "CPE6": "triangle6", "S6": "triangle6", "CPS8": "quad8", "S8": "quad8"}.items():
-        known.setdefault(name, kind)
-    known["C3D4H"] = "tetra"
-
-
-def _volume_cells(raw) -> tuple[dict[str, Indices], set[str]]:  # noqa: ANN001
-    cells: dict[str, list[Indices]] = {}
-    foreign: set[str] = set()
-    for block in raw.cells:
-        if block.type in CELL_TYPES:
-            cells.setdefault(block.type, []).append(np.asarray(block.data, dtype=np.int64))
-        elif block.type not in FACET_CORNERS and block.type not in _IGNORED and len(block.data):
-            foreign.add(block.type)
-    return {t: np.concatenate(b) for t, b in cells.items() if sum(map(len, b))}, foreign
-
-
-def _cell_sets(raw) -> dict[str, list]:  # noqa: ANN001
+def _cell_sets(raw: Any) -> dict[str, list]:
     """Set name -> chosen cells of each block. meshio leaves the groups of gmsh's format 2.2 as numbers of cells."""
     sets = {str(k): v for k, v in (raw.cell_sets or {}).items() if not str(k).startswith("gmsh:")}
     numbers = (raw.cell_data or {}).get("gmsh:physical")
-    for name, (number, dimension) in ((raw.field_data or {}).items() if numbers is not None else ()):
-        pairs = zip(raw.cells, numbers, strict=True)
+    for name, (number, dimension) in (raw.field_data or {}).items() if numbers is not None else ():
+        pairs = zip(raw.cells, numbers or (), strict=True)
         sets.setdefault(str(name), [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in pairs])
     families = (raw.cell_data or {}).get("cell_tags", [])
     for number, names in getattr(raw, "cell_tags", {}).items():  # MED: a family of cells may bear several names
@@ -125,48 +182,25 @@ def _cell_sets(raw) -> dict[str, list]:  # noqa: ANN001
     return sets
 
 
-def _named_facets(raw) -> dict[str, list[Indices]]:  # noqa: ANN001
-    """Set name -> corner points of its facets, (f, 3) or (f, 4) per cell block."""
-    named: dict[str, list[Indices]] = {}
-    for name, per_block in _cell_sets(raw).items():
-        for block, chosen in zip(raw.cells, per_block, strict=False):
-            if block.type in FACET_CORNERS and chosen is not None and len(chosen):
-                facets = np.asarray(block.data, dtype=np.int64)[np.asarray(chosen, dtype=np.int64)]
-                named.setdefault(name, []).append(facets[:, : FACET_CORNERS[block.type]])
-    return named
+# surface and faces ------------------------------------------------------------------------------------------------
 
 
-def _named_points(raw) -> dict[str, Indices]:  # noqa: ANN001
-    named = {str(k): np.unique(np.asarray(v, dtype=np.int64)) for k, v in (raw.point_sets or {}).items()}
-    for name, per_block in _cell_sets(raw).items():
-        for block, chosen in zip(raw.cells, per_block, strict=False):
-            if block.type in _IGNORED and chosen is not None and len(chosen):
-                found = np.unique(np.asarray(block.data)[np.asarray(chosen, dtype=np.int64)])
-                named[name] = np.union1d(named.get(name, np.zeros(0, dtype=np.int64)), found)
-    return named
-
-
-def _assemble_mesh(
-    points: Array,
-    cells: dict[str, Indices],
-    facets: Mapping[str, list[Indices]],
-    point_sets: Mapping[str, Indices],
-    path: Path,
-) -> Mesh:
+def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path: Path) -> Mesh:
     used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
     renumber = np.full(len(points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
     mesh = Mesh(
         points=points[used],
         cells={t: renumber[c] for t, c in cells.items()},
-        point_sets={n: kept for n, s in point_sets.items() if len(kept := _kept(renumber[s]))},
-        node_id=used + 1,
+        point_sets={n: kept for n, s in raw.point_sets.items() if len(kept := _kept(renumber[s]))},
+        node_id=raw.node_id[used],
     )
     boundary = boundary_facets(mesh)
     faces: dict[str, dict[str, Indices]] = {}
-    for name, blocks in facets.items():
+    for name, blocks in raw.facets.items():
         face = _match_facets(boundary, [renumber[b] for b in blocks])
-        wanted, found = sum(map(len, blocks)), sum(map(len, face.values()))
+        wanted = len({tuple(row) for b in blocks for row in np.sort(b, axis=1).tolist()})
+        found = sum(map(len, face.values()))
         if found:
             faces[name] = face
         if found < wanted:
@@ -246,11 +280,14 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     for cell_type, cells in mesh.cells.items():
         repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
         if repeated.any():
-            errors.append(f"{repeated.sum()} {cell_type} cells name a point twice (first: {_first(repeated)}); they are degenerate, remesh")
+            errors.append(
+                f"{repeated.sum()} {cell_type} cells name a point twice (first: {_first(repeated)}); they are "
+                "degenerate, remesh"
+            )
             continue
         volume = corner_volumes(mesh, cell_type)
         scale = np.abs(volume).mean()
-        if (flat := np.abs(volume) < 1e-9 * scale).any():
+        if (flat := np.abs(volume) <= 1e-9 * scale).any():
             errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {_first(flat)}); remesh")
         elif (inverted := volume < 0).any():
             errors.append(
@@ -264,6 +301,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             )
     pairs = _coincident(mesh.points)
     parts = part_numbers(mesh)
+    if overlapping := _overlapping(mesh):
+        errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
     if len(pairs):
         a, b = mesh.node_id[pairs[0]]
         errors.append(
@@ -279,18 +318,34 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     return errors, warnings
 
 
-def _first(mask: Array) -> int:
+def _overlapping(mesh: Mesh) -> int:
+    """Number of facets that more than two cells share."""
+    found = 0
+    for corners in (3, 4):
+        sides = [
+            np.sort(cells[:, list(f[:corners])], axis=1)
+            for cell_type, cells in mesh.cells.items()
+            for f in CELL_TYPES[cell_type].facets
+            if FACET_CORNERS[CELL_TYPES[cell_type].facet_type] == corners
+        ]
+        if sides:
+            found += int((np.unique(np.concatenate(sides), axis=0, return_counts=True)[1] > 2).sum())
+    return found
+
+
+def _first(mask: NDArray[np.bool_]) -> int:
     return int(np.flatnonzero(mask)[0]) + 1
 
 
 def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
-    """(e,) signed volume of the tetrahedron at the cell's first corner times 6 (tetrahedra) or the mean over corners."""
+    """(e,) six times the signed volume between a tetrahedron's corners, or the least such at a brick's corners."""
     p = mesh.points[mesh.cells[cell_type]]
     if CELL_TYPES[cell_type].corners == 4:
         return np.linalg.det(p[:, 1:4] - p[:, :1])
-    neighbours = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7), (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
-    dets = np.array([np.linalg.det(np.stack([p[:, j] - p[:, i] for j in (a, b, c)], axis=1)) for i, a, b, c in neighbours])
-    return dets.min(axis=0)
+    bottom = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
+    top = ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
+    edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in (*bottom, *top))
+    return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
 
 
 def _coincident(points: Array) -> Indices:

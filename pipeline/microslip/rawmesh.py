@@ -1,0 +1,72 @@
+"""What a mesh file holds, before units, unused points and the surface have been dealt with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .data import Array, Indices
+
+NODES = {
+    "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
+    "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27, "wedge": 6, "wedge15": 15, "wedge18": 18,
+    "pyramid": 5, "pyramid13": 13, "pyramid14": 14,
+}  # fmt: skip
+"""Cell or facet type -> number of its nodes."""
+
+
+class Damaged(ValueError):
+    """A mesh file that contradicts itself or ends too early. The text says how, without the file's name."""
+
+
+@dataclass
+class RawMesh:
+    """A file's content.
+
+    Attributes:
+        points: (n, 3) in the file's unit. node_id: (n,) the file's own numbers.
+        blocks: (type, (e, k) positions in `points` in VTK's node order), volumes only.
+        facets: set name -> corner positions of its facets, (f, 3) or (f, 4) arrays.
+        point_sets: set name -> positions.
+    """
+
+    points: Array
+    node_id: Indices
+    blocks: list[tuple[str, Indices]] = field(default_factory=list)
+    facets: dict[str, list[Indices]] = field(default_factory=dict)
+    point_sets: dict[str, Indices] = field(default_factory=dict)
+
+    def add_points(self, name: str, positions: Indices) -> None:
+        """Add to a point set."""
+        before = self.point_sets.get(name, np.zeros(0, dtype=np.int64))
+        self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
+
+
+class Numbering:
+    """Positions of a file's node numbers.
+
+    Raises:
+        Damaged: a number is used twice.
+    """
+
+    def __init__(self, node_id: Indices) -> None:
+        self.order = np.argsort(node_id, kind="stable")
+        self.sorted = node_id[self.order]
+        twice = np.flatnonzero(np.diff(self.sorted) == 0)
+        if len(twice):
+            raise Damaged(f"node {self.sorted[twice[0]]} is defined twice")
+
+    def positions(self, ids: Indices, what: str) -> Indices:
+        """Positions of node numbers, any shape.
+
+        Raises:
+            Damaged: a number that no node has.
+        """
+        if not len(self.sorted):
+            raise Damaged(f"{what} but there are no nodes before it")
+        at = np.minimum(np.searchsorted(self.sorted, ids), len(self.sorted) - 1)
+        missing = self.sorted[at] != ids
+        if missing.any():
+            raise Damaged(f"{what} node {np.asarray(ids)[missing].flat[0]}, which the file does not define")
+        return self.order[at]
