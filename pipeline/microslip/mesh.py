@@ -301,7 +301,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             )
     pairs = _coincident(mesh.points)
     parts = part_numbers(mesh)
-    if overlapping := _overlapping(mesh):
+    if not errors and (overlapping := _overlapping(mesh)):
         errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
     if len(pairs):
         a, b = mesh.node_id[pairs[0]]
