@@ -256,6 +256,30 @@ def test_a_free_body_says_so() -> None:
     assert "6 of them rigid" in words and "inertia relief" in words and "free in space" in words
 
 
+def test_many_patches_are_summed_up() -> None:
+    group = small.basis().groups[0, 0]
+    patch = dataclasses.replace(group.interfaces["right"], role="bolt", fit_residual=np.full(group.n_modes, 0.01))
+    loose = dataclasses.replace(patch, fit_residual=np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]))
+    bolts = {f"bolt_{i}": loose if i == 3 else patch for i in range(1, 7)}
+    labels = tuple(x for x in group.compliance.labels if not x.startswith("interface"))
+    keep = [i for i, x in enumerate(group.compliance.labels) if x in labels]
+    pick = np.ix_(keep, keep)
+    compliance = dataclasses.replace(
+        group.compliance, labels=labels, static=group.compliance.static[pick], modal=group.compliance.modal[pick]
+    )
+    bolted = dataclasses.replace(group, interfaces=bolts, compliance=compliance)
+    words = said(report_html(dataclasses.replace(small.basis(), groups={(0, 0): bolted}), {}))
+    assert "Of 6 patches 1 deform in some modes, most of all bolt_3 in mode 3: 30.0 %" in words
+
+
+def test_load_faces_are_no_contacts() -> None:
+    group = small.basis().groups[0, 0]
+    assert "contact_left" in group.interfaces and group.interfaces["contact_left"].role == "load"
+    words = said(report_html(small.basis(), {}))
+    assert "contact_left load" in words or "contact_leftload" in words
+    assert "contact_left moves" not in words and "contact_left deforms" not in words
+
+
 def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):

@@ -23,7 +23,8 @@ def chain(keep: int, n: int = 12) -> ModalGroup:
     omega = np.sqrt(values[:keep])
     template = small.basis().groups[0, 0]
     interfaces = {
-        name: _interface(T[i], partner) for i, (name, partner) in enumerate((("right", "left"), ("left", "right")))
+        name: _interface(T[i], name, partner)
+        for i, (name, partner) in enumerate((("right", "left"), ("left", "right")))
     }
     labels = ("interface:right:u_n", "interface:left:u_n")
     return dataclasses.replace(
@@ -32,13 +33,22 @@ def chain(keep: int, n: int = 12) -> ModalGroup:
     )  # fmt: skip
 
 
-def _interface(normal: np.ndarray, partner: str) -> Interface:
+def _interface(normal: np.ndarray, role: str, partner: str) -> Interface:
     m = len(normal)
     rows = np.zeros((6, m))
     rows[0] = normal
     empty = np.zeros((0, 3))
     return Interface(
-        np.zeros(3), np.eye(3), rows, np.zeros(m), empty, np.zeros(0), empty, np.zeros((0, 3, m)), partner=partner
+        np.zeros(3),
+        np.eye(3),
+        rows,
+        np.zeros(m),
+        empty,
+        np.zeros(0),
+        empty,
+        np.zeros((0, 3, m)),
+        role=role,
+        partner=partner,
     )
 
 
@@ -80,6 +90,12 @@ def test_the_sentence_says_how_many_modes_are_enough() -> None:
         group, interfaces={k: dataclasses.replace(i, partner="") for k, i in group.interfaces.items()}
     )
     assert [c.kind for c in coordinates(lonely)] == ["translation", "translation"]
+
+
+def test_bolts_that_face_another_body_are_not_squeezed() -> None:
+    group = chain(3)
+    bolts = {k: dataclasses.replace(i, role="bolt") for k, i in group.interfaces.items()}
+    assert len(coordinates(dataclasses.replace(group, interfaces=bolts))) == 2
 
 
 def test_modes_for() -> None:

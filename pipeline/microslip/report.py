@@ -358,27 +358,28 @@ def _interfaces(basis: ModalBasis, album: _Album) -> str:
         area = f"{1e6 * i.areas.sum():.4g}"
         rows.append([text(name), text(role), area, str(len(i.areas)), text(origin), text(normal)])
     head = ["interface", "role", "area in mm²", "points", "origin in mm", "outward normal"]
-    words = [fit_sentence(name, i, group) for name, i in group.interfaces.items()]
+    contacts = {name: i for name, i in group.interfaces.items() if i.role != "load"}
+    words = [fit_sentence(name, i, group) for name, i in contacts.items()]
     rigid = _say(*words, kind="plain")
     if len(words) > 4:
-        rigid = _say(_fit_summary(group), kind="plain") + _hidden("Each patch", rigid)
+        rigid = _say(_fit_summary(contacts), kind="plain") + _hidden("Each patch", rigid)
     return (
         _table(head, rows)
         + album.take("interfaces", "Where the patches lie, their points, and their frames n, t1, t2.")
-        + "<h3>Do the patches move as rigid ones?</h3>\n" + _say(*words, kind="plain")
+        + ("<h3>Do the patches move as rigid ones?</h3>\n" + rigid if words else "")
     )  # fmt: skip
 
 
-def _fit_summary(group: ModalGroup) -> str:
+def _fit_summary(contacts: Mapping[str, Interface]) -> str:
     """One sentence over all patches."""
-    worst = {name: float(i.fit_residual.max()) for name, i in group.interfaces.items()}
+    worst = {name: float(i.fit_residual.max()) for name, i in contacts.items()}
     loose = [name for name, value in worst.items() if value > RIGID_ENOUGH]
     if not loose:
         return f"All {len(worst)} patches move as rigid ones (to {100 * RIGID_ENOUGH:g} %) in all modes."
     name = max(loose, key=lambda n: worst[n])
-    mode = int(group.interfaces[name].fit_residual.argmax()) + 1
+    mode = int(contacts[name].fit_residual.argmax()) + 1
     return (
-        f"{len(loose)} of {len(worst)} patches deform in some modes, most {name} in mode {mode}: "
+        f"Of {len(worst)} patches {len(loose)} deform in some modes, most of all {name} in mode {mode}: "
         f"{percent(worst[name])} of its motion is not rigid."
     )
 
@@ -411,7 +412,7 @@ def _truncation(basis: ModalBasis, album: _Album) -> str:
         for c in found.coordinates
     ]
     head = ["coordinate", "static compliance", "held by the modes", "left out", "modes for 90 %", "modes for 99 %"]
-    relief = "The body is free: compliance is that of the elastic part, without the rigid motion (inertia relief). "
+    relief = "The body can move as a rigid one: compliance is that of its elastic part (inertia relief)."
     return (
         _say(found.sentence)
         + _say(*found.remarks, relief if group.compliance.inertia_relief else "", kind="plain")

@@ -114,13 +114,16 @@ def _describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
 
 
 def _ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:
-    """Interfaces of this body that name each other as partner, each pair once."""
-    pairs = {
-        tuple(sorted((name, item.partner), reverse=True))
-        for name, item in group.interfaces.items()
-        if item.partner != name and item.partner in group.interfaces and group.interfaces[item.partner].partner == name
-    }
-    return sorted((a, b) for a, b in pairs)
+    """Left and right contacts of this body that name each other as partner, each pair once.
+
+    Bolted patches that face each other belong to two bodies; pressing them squeezes nothing.
+    """
+    found = []
+    for name, item in group.interfaces.items():
+        facing = group.interfaces.get(item.partner)
+        if item.role == "right" and facing is not None and facing.role == "left" and facing.partner == name:
+            found.append((name, item.partner))
+    return found
 
 
 def percent(share: float) -> str:

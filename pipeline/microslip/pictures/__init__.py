@@ -152,10 +152,10 @@ def _animations(studio: Studio, group: ModalGroup, folder: Path) -> dict[str, Pa
 
 
 def _save(image: Picture, path: Path) -> None:
-    """As PNG; pictures of modes, which are many and need no exact colours, in 256 colours: a third of the size."""
+    """As PNG; those of single modes, which are many and need no exact colours, in 256 colours: a third of the size."""
     from PIL import Image
 
     with complete_or_absent(path) as temporary:
-        if path.stem.startswith("mode"):
+        if path.stem.startswith("mode_"):
             image = image.quantize(256, dither=Image.Dither.NONE)
         image.save(temporary, format="PNG", compress_level=6)

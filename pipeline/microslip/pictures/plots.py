@@ -160,12 +160,14 @@ def _end_labels(axes: Axes, labels: list[tuple[float, float, str, str]], last: f
 
 
 def _order_label(axes: Axes, order: int, last: float, top: float) -> None:
-    x = min(last, 60 * top / order) * 0.985
-    y = order * x / 60
-    axes.annotate(
-        f"EO {order}", (x, y), xytext=(-3, 3), textcoords="offset points", ha="right", va="bottom", fontsize=8,
-        color="#3c424e",
-    )  # fmt: skip
+    """On the line, near where it leaves the picture."""
+    from matplotlib.patheffects import withStroke
+
+    x = min(last, 60 * top / order) * 0.96
+    behind = [withStroke(linewidth=6, foreground="white")]
+    axes.text(
+        x, order * x / 60, f"EO {order}", ha="center", va="center", fontsize=8, color="#3c424e", path_effects=behind
+    )
 
 
 def _mark(axes: Axes, found: Sequence[Crossing]) -> None:

@@ -197,8 +197,9 @@ def _measured(image: Picture, camera: Camera) -> Picture:
 
 
 def interface_picture(studio: Studio, most: int = 12) -> Picture | None:
-    """Where the contact patches lie, and each with its points and its frame n, t1, t2 (None without interfaces)."""
-    interfaces = studio.basis.groups[min(studio.basis.groups)].interfaces
+    """Where the contact patches lie, and each with its points and its frame n, t1, t2 (None without contacts)."""
+    every = studio.basis.groups[min(studio.basis.groups)].interfaces
+    interfaces = {name: item for name, item in every.items() if item.role != "load"}
     if not interfaces:
         return None
     names = list(interfaces)
