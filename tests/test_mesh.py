@@ -339,7 +339,7 @@ DAMAGED_INP = {
     "not a number": ("12, 1., 0., 0.", "12, 1., nan, 0.", "three finite numbers"),
     "cylindrical": ("*NODE, NSET=NALL", "*NODE, SYSTEM=C", "cylindrical"),
     "generated nodes": ("*ELEMENT, TYPE=C3D8R", "*NGEN\n11, 12, 1\n*ELEMENT, TYPE=C3D8", "*NGEN"),
-    "wedges": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D6\n301, 11, 12, 13, 21, 22, 23\n*ELEMENT, TYPE=S4", "type wedge"),
+    "wedges": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D6\n9, 11, 12, 13, 21, 22, 23\n*ELEMENT, TYPE=S4", "type wedge"),
     "an odd solid": ("TYPE=C3D8R", "TYPE=C3D9", "C3D9 cannot be assembled"),
     "no nodes": ("*NODE", "*NOTHING", "there is no *NODE"),
     "no solids": ("*ELEMENT, TYPE=C3D8R,", "*ELEMENT, TYPE=T3D2,", "holds no volume cells"),
