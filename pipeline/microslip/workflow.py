@@ -6,6 +6,7 @@ Each stage knows the inputs its product depends on and does nothing when they ha
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -29,9 +30,14 @@ Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
 
 _READS_BY_GMSH = {".unv"}
+# Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
-_MODES_CODE = ("data.py", "topology.py", "mesh.py", "body.py", "eigen.py", "basis.py", "fem", "modes")
-_CASE_CODE = ("harmonic_balance.py", "case.py")
+_MODES_CODE = (
+    "data.py", "body.py", "mesh.py", "mesh_inp.py", "mesh_msh.py", "rawmesh.py", "topology.py", "integrate.py",
+    "eigen.py", "basis.py", "hdf5.py", "fem", "modes",
+)  # fmt: skip
+_CASE_CODE = ("harmonic_balance.py", "case.py", "plots.py")
+_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "basis_checks.py")
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,12 @@ def _code_hash(parts: tuple[str, ...]) -> str:
     return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
 
 
+def _touch(product: Path) -> None:
+    """Tell make that a product is as new as what it was made from (others' products stay as they are)."""
+    with contextlib.suppress(OSError):
+        os.utime(product)
+
+
 # mesh ------------------------------------------------------------------------------------------------------------
 
 
@@ -120,7 +132,7 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     }
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
-        os.utime(product)
+        _touch(product)
         return product
     report(f"meshing {source.name}")
     for line in _run_mesher(job, source, product):
@@ -232,7 +244,7 @@ def modes_stage(
     inputs = modes_inputs(job, mesh_file)
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
-        os.utime(product)
+        _touch(product)
         return product, []
     from .modes import modal_basis
 
@@ -328,7 +340,7 @@ def response_stage(
     pictures = {"response": folder / "pictures" / "response.png"}
     if not force and store.is_up_to_date(summary_file, inputs) and all(p.is_file() for p in pictures.values()):
         report(f"{summary_file} is up to date")
-        os.utime(summary_file)
+        _touch(summary_file)
         summary = json.loads(summary_file.read_text())
         return summary, summary["failed_points"] == 0
     from .harmonic_balance import response_table
@@ -370,32 +382,40 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
     from . import pictures
     from .report import write_report
 
-    product = job.build_folder / "report.html"
+    product, folder = job.build_folder / "report.html", job.build_folder / "pictures"
+    remarks = _remarks(job)
     inputs = {
         "basis": store.hash_file(job.basis_file),
         "response": response,
         "engine_orders": list(job.settings.rotation.engine_orders),
-        "code": _code_hash(("pictures.py", "pictures", "campbell.py", "report.py", "truncation.py", "plots.py")),
+        "remarks": remarks,
+        "code": _code_hash(_REPORT_CODE),
     }
-    if not force and store.is_up_to_date(product, inputs):
+    if not force and store.is_up_to_date(product, inputs) and _all_there(product):
         report(f"{product} is up to date")
-        os.utime(product)
+        _touch(product)
         return product
     basis = read_basis(job.basis_file)
-    remarks = _remarks(job)
-    drawn: dict[str, Path] = {}
+    report("starting PyVista")
     reason = pictures.can_draw()
-    if reason is None:
-        drawn = pictures.draw_all(basis, job.build_folder / "pictures", report, list(job.settings.rotation.engine_orders))
-    else:
+    if reason is not None:
         report(f"warning: no pictures of the body: {reason}")
         remarks.append(f"The pictures of the body are missing: {reason}")
+    engine_orders = list(job.settings.rotation.engine_orders)
+    drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
     if response is not None:
-        drawn["friction response"] = job.build_folder / "pictures" / "response.png"
+        drawn["friction response"] = folder / "response.png"
     report("writing the report")
     write_report(basis, drawn, product, remarks, response)
-    store.note_product(product, inputs)
+    if reason is None:  # else the next run tries again
+        store.note_product(product, inputs, pictures=sorted(p.name for p in drawn.values()))
     return product
+
+
+def _all_there(page: Path) -> bool:
+    """True if the pictures that were drawn for a page still exist."""
+    names = json.loads(store.sidecar_path(page).read_text()).get("pictures", [])
+    return all((page.parent / "pictures" / name).is_file() for name in names)
 
 
 def _remarks(job: Job) -> list[str]:
