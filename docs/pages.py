@@ -28,7 +28,8 @@ def fill(page: str, name: str, text: str) -> None:
     """Put `text` between the marks ``<!-- table NAME -->`` and ``<!-- end -->`` of a page."""
     path = HERE / page
     old = path.read_text(encoding="utf-8")
-    new, count = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + text.strip() + "\n" + m[2], old, flags=re.S)
+    place = re.compile(rf"(<!-- table {name} -->\n).*?(<!-- end -->)", re.S)
+    new, count = place.subn(lambda m: f"{m[1]}{text.strip()}\n{m[2]}", old)
     if count != 1:
         raise SystemExit(f"{page}: has {count} places for the table '{name}'")
     if new != old:
@@ -43,8 +44,8 @@ def filled(page: str, name: str) -> str:
 
 
 def table(head: list[str], rows: list[list[Any]]) -> str:
-    """A Markdown table; numbers right-aligned."""
-    right = ["---:" if rows and not isinstance(v, str) else "---" for v in (rows[0] if rows else head)]
+    """A Markdown table; columns that begin with a bare number, or one with its unit, are aligned right."""
+    right = ["---:" if re.fullmatch(r"[-+]?[\d.e-]+( \S{1,3})?", str(v)) else "---" for v in rows[0]]
     lines = [head, right, *[[str(v) for v in row] for row in rows]]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
@@ -242,6 +243,10 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 
+WORDS = {"number": "number", "integer": "integer", "string": "text", "boolean": "true or false"}
+SIGNS = {"exclusiveMinimum": ">", "gt": ">", "minimum": ">=", "exclusiveMaximum": "<", "lt": "<", "maximum": "<="}
+
+
 def _type(schema: dict[str, Any]) -> str:
     """What may be written, in words, from a field's JSON schema."""
     if "anyOf" in schema:
@@ -256,7 +261,5 @@ def _type(schema: dict[str, Any]) -> str:
         return f"{count} x ({inner})" if item.get("type") == "array" else f"{count or 'list of'} {inner}"
     if kind == "object":
         return "table"
-    words = {"number": "number", "integer": "integer", "string": "text", "boolean": "true or false"}.get(str(kind), "any")
-    signs = {"exclusiveMinimum": ">", "gt": ">", "minimum": ">=", "ge": ">=", "exclusiveMaximum": "<", "lt": "<", "maximum": "<=", "le": "<="}
-    bounds = [f"{sign} {schema[k]:g}" for k, sign in signs.items() if k in schema]
-    return " ".join([words, ", ".join(bounds)]).strip()
+    bounds = [f"{sign} {schema[k]:g}" for k, sign in SIGNS.items() if k in schema]
+    return " ".join([WORDS.get(str(kind), "any"), ", ".join(bounds)]).strip()

@@ -1,0 +1,445 @@
+"""Every picture and every measured table of docs/, made by microslip's own functions: `make docs` (some minutes).
+
+    python docs/make_pictures.py [STUDY ...]       all studies, or the named ones (those of STUDIES below)
+
+Products go to build/docs; a study whose inputs have not changed takes its modal files from there.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pages import HERE, body_reference, fill, play, table
+
+from microslip import truncation
+from microslip.basis import read_basis
+from microslip.campbell import track_basis
+from microslip.case import CaseSettings, _contact, load_case, run_case
+from microslip.data import ModalBasis, ModalGroup
+from microslip.harmonic_balance import peaks, stuck_frequencies
+from microslip.pictures import lettering, plots, views
+from microslip.pictures.scene import quiet_vtk
+from microslip.plots import response_picture
+from microslip.workflow import modes_stage, open_job
+
+ROOT = HERE.parent
+BUILD = ROOT / "build" / "docs"
+PICTURES = HERE / "pictures"
+LIGHT = ("output.gauss=false", "output.nodal_stress=false")
+COARSE_SHROUD = ("mesh.size=12", "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}")
+PRINTED_FREE, PRINTED_STUCK = (14.1, 159.55, 540.61), (120.0, 320.0, 470.0)
+SPRINGS = ("normal_stiffness", "tangential_stiffness")
+TORSION = (0, 2, 6)  # the modes of the free blade that section 5.3 prints: first bending, first and second torsion
+
+
+def made(name: str, body: str, *changes: str) -> ModalBasis:
+    """The modal file of a body with some settings changed, under a name of its own."""
+    job = open_job(ROOT / "geometry" / body, [f'name="{name}"', *changes], BUILD)
+    return read_basis(modes_stage(job)[0])
+
+
+def save(image: Any, name: str, smooth: bool = False) -> None:
+    """A PNG of 256 colours whose palette covers rare ones too, or with all its colours where they blend (smooth)."""
+    from PIL import Image
+
+    flat = image.convert("RGB")
+    if not smooth:
+        flat = flat.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.NONE)
+    flat.save(PICTURES / f"{name}.png", optimize=True)
+
+
+def figure(width: float, height: float) -> Any:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=110, layout="constrained")
+
+
+def drawn(fig: Any) -> Any:
+    """A matplotlib figure as a Pillow image."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(fig)
+    canvas.draw()
+    return lettering.picture(np.asarray(canvas.buffer_rgba()))
+
+
+def plain(axes: Any) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(True, color="#dde0e6", linewidth=0.7)
+    axes.set_axisbelow(True)
+
+
+def from_file(path: Path) -> Any:
+    from PIL import Image
+
+    return Image.open(path)
+
+
+def percent(value: float, printed: float) -> str:
+    return f"{100 * (value / printed - 1):+.2f} %"
+
+
+# the four bodies ---------------------------------------------------------------------------------------------------
+
+
+def geometry() -> None:
+    """A picture of each body with its named faces, and a table of what each is."""
+    rows = []
+    for body in ("blade", "shroud", "pendulum", "half-pipe"):
+        still = ("rotation.speeds_rpm=[0.0]",) if body == "shroud" else ()
+        basis = made(body, body, *LIGHT, *still)
+        with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body))
+        group = basis.groups[0, 0]
+        lowest = group.frequency[group.kind.index("normal")]
+        size = " x ".join(f"{v:.4g}" for v in np.ptp(basis.mesh.points, axis=0) * 1e3)
+        rows.append([f"`{body}`", size, f"{basis.mass:.4g}", basis.mesh.n_points, basis.mesh.n_cells, f"{lowest:.2f}"])
+    head = ["body", "size in mm (x, y, z)", "mass in kg", "points", "cells", "first elastic frequency in Hz"]
+    fill("geometry.md", "bodies", table(head, rows))
+    designs()
+
+
+def with_studio(basis: ModalBasis, draw: Any) -> Any:
+    quiet_vtk()
+    studio = views.open_studio(basis)
+    try:
+        return draw(studio)
+    finally:
+        studio.stage.close()
+
+
+def designs() -> None:
+    """Top views of the two shroud designs between their neighbours."""
+    tiles = []
+    for design, title in ((1, "design = 1, shroud_angle = 30"), (2, "design = 2, shroud_angle = 60")):
+        own = () if design == 1 else ("geometry.parameters.shroud_angle=60", "geometry.parameters.contact_width=20")
+        change = (f"geometry.parameters.design={design}", *own, "rotation.speeds_rpm=[0.0]", "modes.count=2")
+        basis = made(f"shroud-design-{design}", "shroud", *COARSE_SHROUD, *change, *LIGHT)
+        tiles.append(lettering.captioned(with_studio(basis, top_view), title, size=16))
+    note = "Seen from outside, with both neighbours; x to the right, y upwards. Orange: contact_left, green: contact_right."
+    save(lettering.captioned(lettering.side_by_side(tiles, 30), "shroud: the two designs", note, 20), "shroud_designs")
+
+
+def top_view(studio: views.Studio) -> Any:
+    """The shroud plates of three blades from outside; contacts as thick lines."""
+    from microslip.pictures.scene import fit
+
+    outside, mesh, stage = studio.outside, studio.basis.mesh, studio.stage
+    high = studio.points[outside.triangles][:, :, 2].min(axis=1) > 0.395
+    plate = outside.triangles[high]
+    edges = outside.outline[(mesh.points[outside.outline][:, :, 2] > 0.395).all(axis=1)]
+    camera = fit(mesh.points[np.unique(edges)] * [2.2, 1.15, 1], np.eye(3), 150_000, (0.4, 4.0))
+    stage.clear()
+    for side, colour in ((-1, (228, 231, 236)), (1, (228, 231, 236)), (0, (190, 196, 206))):
+        turn = turned_about_y(side * 2 * np.pi / 24)
+        stage.skin(studio.points @ turn.T, plate, color=colour)
+        stage.lines(mesh.points @ turn.T + [0, 0, 0.004], edges, (60, 64, 74), 1.5)
+    for name, colour in (("left", (240, 120, 10)), ("right", (30, 140, 40))):
+        item = studio.basis.groups[0, 0].interfaces[name]
+        along = np.sort((item.points - item.origin) @ item.rotation[1])[[0, -1]]
+        ends = item.origin + along[:, None] * item.rotation[1] + [0, 0, 0.02]
+        stage.lines(ends, np.array([[0, 1]]), colour, 7.0)
+    return stage.shoot(camera)
+
+
+def turned_about_y(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+# the blade of section 5.3 ------------------------------------------------------------------------------------------
+
+
+def convergence() -> None:
+    """Frequencies of the free blade over the element size."""
+    sizes = (24, 16, 12, 8, 6, 4.5)
+    runs = [made(f"blade-{s:g}", "blade", *LIGHT, f"mesh.size={s}", "modes.count=10") for s in sizes]
+    f = np.array([b.groups[0, 0].frequency[list(TORSION)] for b in runs])
+    n = [3 * b.mesh.n_points for b in runs]
+    rows = [[f"{s:g}", k, *(f"{v:.3f}" for v in row)] for s, k, row in zip(sizes, n, f, strict=True)]
+    rows.append(["printed", "", *(f"{v:g}" for v in PRINTED_FREE)])
+    rows.append(["finest against printed", "", *(percent(v, p) for v, p in zip(f[-1], PRINTED_FREE, strict=True))])
+    head = ["element size in mm", "degrees of freedom", "bending 1, Hz", "torsion 1, Hz", "torsion 2, Hz"]
+    fill("blade.md", "convergence", table(head, rows))
+    fig = figure(7.2, 4.2)
+    axes = fig.subplots()
+    plain(axes)
+    for i, (name, colour) in enumerate(zip(("bending 1", "torsion 1", "torsion 2"), plots.COLOURS, strict=False)):
+        axes.loglog(n[:-1], 100 * (f[:-1, i] / f[-1, i] - 1), "o-", color=colour, label=f"{name}, {f[-1, i]:.2f} Hz")
+    for k, s, y in zip(n[:-1], sizes[:-1], 100 * (f[:-1] / f[-1] - 1).max(axis=1), strict=True):
+        axes.annotate(f"{s:g} mm", (k, y), xytext=(4, 6), textcoords="offset points", fontsize=9, color="#5b6270")
+    axes.set_xlabel("degrees of freedom")
+    axes.set_ylabel(f"above the mesh of {sizes[-1]:g} mm, in %")
+    axes.legend(fontsize=9)
+    save(drawn(fig), "blade_convergence")
+
+
+def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
+    settings, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
+    return settings.model_copy(update=changes)
+
+
+def stuck(group: ModalGroup, settings: CaseSettings, normal: float = 780.0) -> np.ndarray:
+    return stuck_frequencies(group, [_contact(c, normal) for c in settings.contacts])[:4]
+
+
+def contact() -> None:
+    """The blade between its neighbours: sticking frequencies against the printed ones, the friction response."""
+    basis = made("blade", "blade", *LIGHT)
+    result = run_case(blade_case(basis), basis, "pipeline/cases/blade.toml")
+    rows = [
+        [name, f"{p:g}", f"{v:.1f}", percent(v, p)]
+        for name, p, v in zip(("bending", "bending", "torsion"), PRINTED_STUCK, result.stuck, strict=False)
+    ]
+    fill("blade.md", "stuck", table(["resonance", "printed, Hz", "sticking contacts, Hz", "deviation"], rows))
+    rows = []
+    for normal, response in sorted(result.responses.items(), reverse=True):
+        f, a = max((p for p in peaks(response) if p[0] < 200), key=lambda p: p[1])
+        i = int(np.argmin(np.abs(response.frequency - f)))
+        rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{1e6 * response.dissipated[i]:.3g}"])
+    fill("blade.md", "peaks", table(["F_N, N", "resonance, Hz", "amplitude, um", "friction loss a cycle, uJ"], rows))
+    PICTURES.mkdir(exist_ok=True)
+    response_picture(result, BUILD / "response.png")
+    save(from_file(BUILD / "response.png"), "blade_response")
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes", smooth=True))
+
+
+def mode_sheet(studio: views.Studio, chosen: Sequence[int], factor: float) -> Any:
+    """Some modes in one row."""
+    group = studio.basis.groups[0, 0]
+    camera = views.mode_camera(studio, [group], max(chosen) + 1)
+    images = list(views.mode_pictures(studio, group, max(chosen) + 1, camera))
+    small = {j: lettering.scaled(images[j], factor) for j in chosen}
+    row = lettering.side_by_side([lettering.captioned(i, views.mode_title(group, j), size=16) for j, i in small.items()], 4)
+    return lettering.captioned(row, "", "Amplified to the same largest displacement; grey lines: at rest.", 18)
+
+
+def sensitivity() -> None:
+    """What the assumptions of the blade case are worth."""
+    basis = made("blade", "blade", *LIGHT)
+    group, settings = basis.groups[0, 0], blade_case(basis)
+    base = stuck(group, settings)
+    rows = [["as in the case file", *(f"{v:.1f} Hz" for v in base[:3])]]
+
+    def row(text: str, values: np.ndarray) -> None:
+        rows.append([text, *(percent(v, b) for v, b in zip(values[:3], base[:3], strict=True))])
+
+    for key, text in zip(SPRINGS, ("normal stiffness", "tangential stiffness"), strict=True):
+        for factor in (0.8, 1.2):
+            changed = with_contacts(settings, lambda c, k=key, f=factor: {k: f * getattr(c, k)})
+            row(f"{text} {100 * (factor - 1):+.0f} %", stuck(group, changed))
+    row("both a tenth", stuck(group, with_contacts(settings, lambda c: {k: 0.1 * getattr(c, k) for k in SPRINGS})))
+    row("no rotational spring about t1", stuck(group, with_contacts(settings, lambda c: {"height": 1e-6})))
+    for text, change in (
+        ("60 modes instead of 20", "modes.count=60"), ("element size 6 mm instead of 8", "mesh.size=6"),
+        ("blade 1 % shorter", "geometry.parameters.blade_length=470.25"),
+        ("blade 1 % thicker", "geometry.parameters.thickness=5.05"),
+        ("Young's modulus -1 %", "material.young=2.079e11"),
+    ):  # fmt: skip
+        name = "blade-" + "".join(c if c.isalnum() else "-" for c in change.split(".")[-1])
+        row(text, stuck(made(name, "blade", *LIGHT, change).groups[0, 0], settings))
+    fill("blade.md", "sensitivity", table(["change", "bending 1", "bending 2", "torsion"], rows))
+    amplitudes(basis, settings)
+
+
+def with_contacts(settings: CaseSettings, change: Any) -> CaseSettings:
+    """The case with every contact changed by what `change` (contact -> keys) says."""
+    return settings.model_copy(update={"contacts": tuple(c.model_copy(update=change(c)) for c in settings.contacts)})
+
+
+def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
+    """First resonance at 780 N and 100 N for other excitation heights and dampings."""
+    band = {"start": 105.0, "stop": 125.0, "points": 2001, "normal_forces": (100.0, 780.0)}
+    near = settings.sweep.model_copy(update=band)
+    rows = []
+
+    def row(text: str, b: ModalBasis) -> None:
+        result = run_case(settings.model_copy(update={"sweep": near}), b, "blade.toml")
+        best = [max(peaks(r), key=lambda p: p[1]) for r in result.responses.values()]
+        rows.append([text, *(f"{1e6 * a:.0f} um at {f:.2f} Hz" for f, a in best)])
+
+    row("as in the files: 285 mm, D = 0.1 %", basis)
+    for height in (237.5, 332.5):
+        at = [f"excitations.magnet.point=[2.5,30,{height}]", f"monitors.accelerometer.point=[2.5,30,{height}]"]
+        row(f"excitation and accelerometer at {height:g} mm", made(f"blade-at-{height:g}", "blade", *LIGHT, *at))
+    group = basis.groups[0, 0]
+    for ratio in (0.0005, 0.002):
+        damped = replace(group, damping_ratio=np.full(group.n_modes, ratio), C_r=np.diag(2 * ratio * group.omega))
+        row(f"D = {100 * ratio:g} %", replace(basis, groups={(0, 0): damped}))
+    fill("blade.md", "amplitudes", table(["change", "F_N = 100 N", "F_N = 780 N"], rows))
+
+
+def arrangement2() -> None:
+    """The second arrangement: contacts turned, bending tangential."""
+    change = ("geometry.parameters.arrangement=2", "interfaces.right.t2=[0,0,1]", "interfaces.left.t2=[0,0,1]")
+    basis = made("blade-arrangement-2", "blade", *LIGHT, *change)
+    settings = blade_case(basis)
+    stiff = dict(zip(SPRINGS, (7.6e9, 2.9e9), strict=True)) | {"width": 0.020, "friction": 0.4, "slides_along": "t1"}
+    values = stuck(basis.groups[0, 0], with_contacts(settings, lambda _: stiff))
+    text = ", ".join(f"{v:.1f}" for v in values[:3])
+    fill("blade.md", "arrangement2", f"With sticking contacts: {text} and {values[3]:.1f} Hz.")
+
+
+def first() -> None:
+    """README's first screen: three modes of the free blade, and the friction response between its neighbours."""
+    basis = made("blade", "blade", *LIGHT)
+    forces = (10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0, 780.0)
+    settings = blade_case(basis)
+    sweep = settings.sweep.model_copy(update={"start": 90.0, "stop": 130.0, "points": 1601, "normal_forces": forces})
+    result = run_case(settings.model_copy(update={"sweep": sweep}), basis, "blade.toml")
+    left = with_studio(basis, three_modes)
+    fig = figure(7.2, left.height / 110)
+    axes = fig.subplots()
+    plain(axes)
+    free = result.free
+    axes.semilogy(free.frequency, 1e6 * np.abs(free.monitor), color="0.55", lw=1.2, ls="--", label="free blade")
+    colours = plots_colours(len(forces))
+    for colour, (normal, r) in zip(colours, result.responses.items(), strict=True):
+        axes.semilogy(r.frequency, 1e6 * np.abs(r.monitor), color=colour, lw=2.0, label=f"{normal:g} N")
+    axes.set_xlim(90, 130)
+    axes.set_ylim(2, 2500)
+    axes.set_xlabel("excitation frequency in Hz", fontsize=12)
+    axes.set_ylabel("amplitude at the accelerometer in µm", fontsize=12)
+    axes.legend(title="normal force", fontsize=10.5, title_fontsize=10.5, ncols=1, framealpha=0.95, loc="upper right")
+    parts = [
+        lettering.captioned(left, "Modes of the free blade", size=22),
+        lettering.captioned(drawn(fig), "Friction response to 1 N between two neighbours", size=22),
+    ]
+    save(lettering.side_by_side(parts, 30), "first", smooth=True)
+
+
+def plots_colours(count: int) -> list[Any]:
+    from matplotlib import colormaps
+
+    return [colormaps["plasma"](x) for x in np.linspace(0.0, 0.86, count)]
+
+
+def three_modes(studio: views.Studio) -> Any:
+    group = studio.basis.groups[0, 0]
+    camera = views.mode_camera(studio, [group], 1)
+    chosen = dict(zip(TORSION, ("bending", "torsion", "torsion"), strict=True))
+    tiles = []
+    for j, image in enumerate(views.mode_pictures(studio, group, max(chosen) + 1, camera)):
+        if j in chosen:
+            small = lettering.scaled(image, 640 / image.height)
+            tiles.append(lettering.captioned(small, f"{group.frequency[j]:.1f} Hz {chosen[j]}", size=17))
+    return lettering.side_by_side(tiles, 6)
+
+
+# the stage page ----------------------------------------------------------------------------------------------------
+
+
+def speed() -> None:
+    """The shrouded blade at speed with the three kinds of prestress; its Campbell diagram."""
+    high = (0, 3000, 4500, 6000, 9000, 12000)
+    speeds = {"nonlinear": high, "linear": high, "none": (0, 3000, 4500, 6000, 7500)}
+    runs = {}
+    for kind, rpm in speeds.items():
+        change = (f'rotation.prestress="{kind}"', f"rotation.speeds_rpm={[float(s) for s in rpm]}")
+        quick = ("modes.certify=false", "output.shapes=false")
+        runs[kind] = made(f"shroud-{kind}", "shroud", *COARSE_SHROUD, *LIGHT, *quick, *change)
+    speed_table(runs, speeds)
+    speed_picture(runs, speeds)
+    basis = made("shroud-campbell", "shroud", *COARSE_SHROUD, *LIGHT)
+    tracks = track_basis(basis)
+    assert tracks is not None
+    plots.campbell_plot(replace(basis, name="shroud"), tracks, [2, 4, 6, 8], BUILD / "campbell.png")
+    save(from_file(BUILD / "campbell.png"), "campbell")
+
+
+def speed_table(runs: dict[str, ModalBasis], speeds: dict[str, Sequence[int]]) -> None:
+    def f(kind: str, rpm: int) -> np.ndarray:
+        return runs[kind].groups[speeds[kind].index(rpm), 0].frequency
+
+    rows = []
+    for j in range(6):
+        row: list[Any] = [str(j + 1), f"{f('none', 0)[j]:.2f}", f"{f('none', 4500)[j]:.2f}"]
+        for rpm in (4500, 9000, 12000):
+            full, cheap = f("nonlinear", rpm)[j], f("linear", rpm)[j]
+            row += [f"{full:.2f}", percent(cheap, full)]
+        rows.append(row)
+    head = ["mode", "at rest", "4500 rpm, none"]
+    for rpm in (4500, 9000, 12000):
+        head += [f"{rpm} rpm, nonlinear", "linear differs"]
+    fill("modes.md", "speed", table(head, rows))
+
+
+def speed_picture(runs: dict[str, ModalBasis], speeds: dict[str, Sequence[int]]) -> None:
+    fig = figure(9.4, 4.4)
+    for axes, j in zip(fig.subplots(1, 2), (0, 2), strict=True):
+        plain(axes)
+        for kind, style, colour in zip(runs, ("o-", "s--", "^:"), ("#0b4f9c", "#d98410", "#c8382c"), strict=True):
+            f = [runs[kind].groups[i, 0].frequency[j] for i in range(len(speeds[kind]))]
+            axes.plot(speeds[kind], f, style, color=colour, label=kind, markersize=5)
+        axes.set_title(f"mode {j + 1}", fontsize=11)
+        axes.set_xlabel("rotation speed in rpm")
+        axes.set_ylim(bottom=0)
+        axes.legend(title="prestress", fontsize=9, title_fontsize=9)
+    fig.axes[0].set_ylabel("frequency in Hz")
+    save(drawn(fig), "speed")
+
+
+def compliance() -> None:
+    """How much static compliance the modes hold, for every body."""
+    rows = []
+    for body in ("blade", "shroud", "pendulum", "half-pipe"):
+        still = ("rotation.speeds_rpm=[0.0]",) if body == "shroud" else ()
+        group = made(body, body, *LIGHT, *still).groups[0, 0]
+        rows.append([f"`{body}`", str(group.n_modes), truncation.verdict(group).sentence])
+    fill("modes.md", "verdicts", table(["body", "modes", "verdict"], rows))
+    basis = made("blade-60", "blade", *LIGHT, "modes.count=60")
+    rows = []
+    for c in truncation.coordinates(basis.groups[0, 0]):
+        if c.label.startswith(("right u", "right +", "magnet")):
+            shares = [truncation.percent(float(c.shares[k - 1])) for k in (5, 10, 20, 40, 60)]
+            rows.append([c.label, f"{c.static:.3g} {c.unit}", *shares])
+    fill("modes.md", "compliance", table(["force", "static compliance", "5 modes", "10", "20", "40", "60"], rows))
+    plots.compliance_plot(replace(basis, name="blade"), basis.groups[0, 0], BUILD / "compliance.png")
+    save(from_file(BUILD / "compliance.png"), "compliance")
+
+
+# your own model ----------------------------------------------------------------------------------------------------
+
+
+def own() -> None:
+    """Everything the page tells the reader to do, and what it looks like."""
+    folder = BUILD / "own"
+    folder.mkdir(parents=True, exist_ok=True)
+    shown = play("your_own_model.md", folder)
+    for name, command in (("info", "$ microslip info"), ("modes", "$ microslip modes bracket")):
+        part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
+        fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
+    basis = read_basis(folder / "build" / "bracket" / "basis.h5")
+    with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
+
+
+def reference() -> None:
+    """The reference of body.toml."""
+    fill("body_toml.md", "body_toml", body_reference())
+
+
+STUDIES = {
+    f.__name__: f
+    for f in (reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, compliance, own)
+}
+
+
+def main(names: Sequence[str]) -> None:
+    if unknown := set(names) - set(STUDIES):
+        raise SystemExit(f"unknown: {', '.join(sorted(unknown))}; the studies are {', '.join(STUDIES)}")
+    PICTURES.mkdir(exist_ok=True)
+    BUILD.mkdir(parents=True, exist_ok=True)
+    for name in names or STUDIES:
+        began = time.perf_counter()
+        STUDIES[name]()
+        print(f"{time.perf_counter() - began:6.1f} s  {name}", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
