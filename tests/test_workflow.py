@@ -1,0 +1,253 @@
+"""The chain body.toml -> mesh -> modal file -> response -> report: only what changed is made again; products complete."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from box import edit, write_box
+
+from microslip import store, workflow
+from microslip.basis import read_basis
+from microslip.body import load_toml
+from microslip.data import UserError
+
+PACKAGE = Path(workflow.__file__).parent
+MESH, BASIS, RESPONSE = "meshes/box.msh", "build/box/basis.h5", "build/box/response.json"
+
+
+def run_chain(folder: Path, assignments: list[str] | None = None) -> set[str]:
+    """Run mesh, modes and response of the box in `folder`; returns which products were made."""
+    made: set[str] = set()
+    told: list[str] = []
+    job = workflow.open_job(folder, assignments, root=folder)
+    workflow.modes_stage(job, report=told.append)
+    assert job.case_file is not None
+    workflow.response_stage(job.case_file, job.basis_file, job.build_folder, report=told.append)
+    begins = {"meshing": MESH, "assembling": BASIS, "friction response": RESPONSE}
+    for product in (p for text in told for words, p in begins.items() if text.startswith(words)):
+        made.add(product)
+    return made
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_box(tmp_path_factory.mktemp("finished") / "box")
+    assert run_chain(folder) == {MESH, BASIS, RESPONSE}
+    return folder
+
+
+@pytest.fixture
+def box(finished: Path, tmp_path: Path) -> Path:
+    """A copy of the finished chain, to change."""
+    return shutil.copytree(finished, tmp_path / "box")
+
+
+def test_a_second_run_makes_nothing_and_a_touch_changes_nothing(box: Path) -> None:
+    before = {p: (box / p).read_bytes() for p in (MESH, BASIS, RESPONSE)}
+    for name in ("body.toml", "build.py", "case.toml"):
+        os.utime(box / name)
+    assert run_chain(box) == set()
+    assert before == {p: (box / p).read_bytes() for p in before}
+
+
+def test_finished_products_are_as_new_as_what_they_were_made_from(box: Path) -> None:
+    """make compares times: a stage with nothing to do must still leave its product newer than its inputs."""
+    os.utime(box / "body.toml", (4e9, 4e9))
+    os.utime(box / MESH, (1e9, 1e9))
+    run_chain(box)
+    assert (box / MESH).stat().st_mtime > 1.1e9
+    assert (box / BASIS).stat().st_mtime >= (box / MESH).stat().st_mtime - 1
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "made"),
+    [
+        ("case.toml", "normal_forces = [1.0, 100.0]", "normal_forces = [1.0, 90.0]", {RESPONSE}),
+        ("case.toml", "friction = 0.3", "friction = 0.31", {RESPONSE}),
+        ("body.toml", "density = 7850.0", "density = 7800.0", {BASIS, RESPONSE}),
+        ("body.toml", "count = 6", "count = 5", {BASIS, RESPONSE}),
+        ("body.toml", "size = 20.0", "size = 10.0", {MESH, BASIS, RESPONSE}),
+        ("body.toml", "size = [20.0, 30.0, 120.0]", "size = [20.0, 32.0, 120.0]", {MESH, BASIS, RESPONSE}),
+        ("build.py", 'name_face("tip"', '# the same mesh\n    name_face("tip"', {MESH}),
+        ("body.toml", "a clamped box", "a box that is clamped", set()),
+        ("body.toml", "[material]", "# steel\n\n[material]", set()),
+    ],
+)
+def test_only_what_depends_on_a_change_is_made_again(box: Path, name: str, old: str, new: str, made: set[str]) -> None:
+    edit(box / name, old, new)
+    assert run_chain(box) == made
+    assert run_chain(box) == set()
+
+
+def test_an_override_counts_as_a_change_and_leaves_the_file_alone(box: Path) -> None:
+    text = (box / "body.toml").read_text()
+    assert run_chain(box, ["material.young=2.0e11"]) == {BASIS, RESPONSE}
+    assert (box / "body.toml").read_text() == text
+    assert run_chain(box) == {BASIS, RESPONSE}
+
+
+@pytest.mark.parametrize(
+    ("product", "spoil"),
+    [
+        (BASIS, lambda p: p.write_bytes(p.read_bytes()[:-1000])),
+        (BASIS, lambda p: p.unlink()),
+        (BASIS, lambda p: store.sidecar_path(p).unlink()),
+        (BASIS, lambda p: store.sidecar_path(p).write_text("{")),
+        (MESH, lambda p: p.write_text("")),
+    ],
+    ids=["truncated", "deleted", "without sidecar", "spoilt sidecar", "emptied mesh"],
+)
+def test_a_damaged_product_is_made_again_with_the_same_bytes(box: Path, product: str, spoil: object) -> None:
+    good = (box / product).read_bytes()
+    spoil(box / product)
+    assert run_chain(box) == {product}
+    assert (box / product).read_bytes() == good
+
+
+def test_what_changes_between_runs_stands_in_the_sidecar_only(box: Path) -> None:
+    note = json.loads(store.sidecar_path(box / BASIS).read_text())
+    assert {"inputs", "product", "written"} <= set(note)
+    assert note["product"] == store.hash_file(box / BASIS)
+    provenance = read_basis(box / BASIS).provenance
+    assert provenance["mesh_sha256"] == store.hash_file(box / MESH)
+    assert not any(str(box) in text for text in provenance.values())
+
+
+def test_products_of_the_whole_chain_are_complete(box: Path) -> None:
+    job = workflow.open_job(box, root=box)
+    page, converged = workflow.run_body(job)
+    assert converged and page == box / "build/box/report.html"
+    build = box / "build" / "box"
+    text = page.read_text()
+    assert text.rstrip().endswith("</html>") and "Hz" in text and 'src="http' not in text
+    for name in ("basis.h5", "response.csv", "response.json", "pictures/response.png"):
+        assert (build / name).stat().st_size > 100, name
+    drawn = json.loads(store.sidecar_path(page).read_text()).get("pictures", [])
+    assert not drawn or {"mesh.png", "interfaces.png", "compliance.png"} <= set(drawn)
+    assert all((build / "pictures" / name).stat().st_size > 1000 for name in drawn)
+    assert not [p for p in box.rglob(".*") if p.is_file()], "temporary files are left"
+    if not drawn:
+        pytest.skip("pictures of bodies cannot be drawn on this machine")
+    told: list[str] = []
+    workflow.run_body(job, report=told.append)
+    assert len(told) == 4 and all("is up to date" in t for t in told)
+    assert workflow._all_there(page)
+    (build / "pictures" / "mesh.png").unlink()
+    assert not workflow._all_there(page)
+
+
+def test_a_case_of_another_name_has_its_own_folder(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(box)
+    other = box / "stiff.toml"
+    other.write_text((box / "case.toml").read_text().replace('name = "box"', 'name = "stiff"', 1))
+    assert workflow.is_case(other) and not workflow.is_case(box / "body.toml")
+    product, converged = workflow.run_case_file(other)
+    assert converged and product == Path("build/stiff/response.csv") and product.is_file()
+    assert (box / BASIS).is_file() and not (box / "build/stiff/basis.h5").exists()
+
+
+def test_a_case_finds_its_body(box: Path, tmp_path: Path) -> None:
+    far = tmp_path / "far"
+    far.mkdir()
+    case = Path(shutil.copy(box / "case.toml", far))
+    with pytest.raises(UserError, match="no body.toml of a body 'box'"):
+        workflow.find_body(case, "box", tmp_path / "nowhere")
+    shutil.copytree(box, tmp_path / "geometry" / "box")
+    assert workflow.find_body(case, "box", tmp_path) == tmp_path / "geometry" / "box" / "body.toml"
+
+
+@pytest.mark.parametrize(
+    ("script", "sentence"),
+    [
+        ("import sys; sys.exit('the wall is thicker than the pipe')", "meshing failed.*thicker"),
+        ("import sys; print('wall = 9 is too thick', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too thick"),
+        ("raise ValueError('odd')", "meshing failed .ValueError: odd."),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
+        ("", "meshing failed .no message."),
+        ("raise ModuleNotFoundError(\"No module named 'gmsh'\")", "microslip.fem"),
+        ("raise OSError('libGLU.so.1: cannot open shared object file')", "libGLU.so.1; type: sudo apt-get install"),
+    ],
+)
+def test_a_mesher_that_fails_gives_one_sentence_and_leaves_the_old_mesh(box: Path, script: str, sentence: str) -> None:
+    old = (box / MESH).read_bytes()
+    (box / "build.py").write_text(script)
+    with pytest.raises(UserError, match=sentence) as caught:
+        run_chain(box)
+    assert "\n" not in str(caught.value)
+    assert (box / MESH).read_bytes() == old
+    assert not list((box / "meshes").glob(".*"))
+
+
+@pytest.mark.parametrize("key", ["build", "cad", "mesh"])
+def test_a_missing_source_is_named_with_its_key(box: Path, key: str) -> None:
+    edit(box / "body.toml", 'build = "build.py"', f'{key} = "gone.step"')
+    edit(box / "body.toml", "[geometry.parameters]\nsize = [20.0, 30.0, 120.0]\n", "")
+    with pytest.raises(UserError, match=f"geometry.{key}: there is no file .*gone.step"):
+        run_chain(box)
+
+
+def test_temperatures_of_a_table_reach_the_nodes(box: Path) -> None:
+    """T = 300 + 2 z (z in mm) is linear: interpolation of a coarse table must return it at every node."""
+    rows = [f"{x}, {y}, {z}, {300 + 2 * z}" for x in (-10, 10) for y in (-15, 15) for z in (0, 70, 120)]
+    (box / "heat.csv").write_text("# x, y, z in mm, T in K\n" + "\n".join(rows) + "\n")
+    edit(box / "body.toml", "[[supports]]", '[temperature]\nfile = "heat.csv"\n\n[[supports]]')
+    job = workflow.open_job(box, root=box)
+    mesh, _ = workflow.load_mesh(job)
+    found = workflow.nodal_temperature(job, mesh)
+    assert found == pytest.approx(300 + 2000 * mesh.points[:, 2], rel=1e-9)
+    (box / "heat.csv").write_text("1, 2, 3\n")
+    with pytest.raises(UserError, match="heat.csv: must be lines of x, y, z, T"):
+        workflow.nodal_temperature(job, mesh)
+    (box / "heat.csv").unlink()
+    with pytest.raises(UserError, match="temperature.file: there is no file"):
+        run_chain(box)
+
+
+# ---------------------------------------------------------------- what products depend on
+
+
+def source(module: str) -> Path:
+    path = PACKAGE / module.replace(".", "/")
+    return path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"
+
+
+def imported(module: str) -> set[str]:
+    """Modules of the package that a module imports, at any depth of its text."""
+    inside = module if source(module).name == "__init__.py" else module.rpartition(".")[0]
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source(module).read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        parts = inside.split(".") if inside else []
+        base = ".".join([*parts[: len(parts) + 1 - node.level], *([node.module] if node.module else [])])
+        found |= {base, *(f"{base}.{a.name}".strip(".") for a in node.names)}
+    return {m for m in found if m and source(m).is_file()}
+
+
+def test_every_module_behind_a_modal_file_counts_as_its_input() -> None:
+    """A modal file is made anew when code that makes it changes: the list in workflow.py must miss no module."""
+    needed, todo = set(), ["modes", "basis", "mesh"]
+    while todo:
+        module = todo.pop()
+        if module not in needed:
+            needed.add(module)
+            todo += imported(module)
+    without_numbers = {"errors", "mistakes", "store", "basis_checks"}
+    listed = {p.removesuffix(".py") for p in workflow._MODES_CODE}
+    assert {m.split(".")[0] for m in needed} - without_numbers <= listed
+    assert all((PACKAGE / p).exists() for p in (*workflow._MODES_CODE, *workflow._CASE_CODE, *workflow._REPORT_CODE))
+
+
+def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:
+    root = PACKAGE.parents[1]
+    bodies = [p.parent.name for p in (root / "geometry").glob("*/body.toml")]
+    assert {"blade", "shroud", "pendulum", "half-pipe"} <= set(bodies)
+    for name in bodies:
+        assert load_toml(root / "geometry" / name / "body.toml")["name"] == name
+    makefile = (root / "Makefile").read_text()
+    assert set(makefile.split("BODIES   := ")[1].splitlines()[0].split()) <= set(bodies)
