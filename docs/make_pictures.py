@@ -121,8 +121,9 @@ def designs() -> None:
         change = (f"geometry.parameters.design={design}", *own, "rotation.speeds_rpm=[0.0]", "modes.count=2")
         basis = made(f"shroud-design-{design}", "shroud", *COARSE_SHROUD, *change, *LIGHT)
         tiles.append(lettering.captioned(with_studio(basis, top_view), title, size=16))
-    note = "Seen from outside, with both neighbours; x to the right, y upwards. Orange: contact_left, green: contact_right."
-    save(lettering.captioned(lettering.side_by_side(tiles, 30), "shroud: the two designs", note, 20), "shroud_designs")
+    note = "Seen from outside, with both neighbours; x to the right, y upwards. Contacts: orange left, green right."
+    row = lettering.side_by_side(tiles, 30)
+    save(lettering.captioned(row, "shroud: the two designs", note, 20), "shroud_designs")
 
 
 def top_view(studio: views.Studio) -> Any:
@@ -215,7 +216,8 @@ def mode_sheet(studio: views.Studio, chosen: Sequence[int], factor: float) -> An
     camera = views.mode_camera(studio, [group], max(chosen) + 1)
     images = list(views.mode_pictures(studio, group, max(chosen) + 1, camera))
     small = {j: lettering.scaled(images[j], factor) for j in chosen}
-    row = lettering.side_by_side([lettering.captioned(i, views.mode_title(group, j), size=16) for j, i in small.items()], 4)
+    tiles = [lettering.captioned(image, views.mode_title(group, j), size=16) for j, image in small.items()]
+    row = lettering.side_by_side(tiles, 4)
     return lettering.captioned(row, "", "Amplified to the same largest displacement; grey lines: at rest.", 18)
 
 
@@ -417,6 +419,7 @@ def own() -> None:
     basis = read_basis(folder / "build" / "bracket" / "basis.h5")
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
+    save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
 
 
 def reference() -> None:

@@ -1,0 +1,236 @@
+"""The pages of docs/: examples run, links lead somewhere, made tables are current, a number of each page is right."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small import basis as small_basis
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+
+import pages  # noqa: E402
+
+from microslip.basis import read_basis  # noqa: E402
+from microslip.workflow import modes_stage, open_job  # noqa: E402
+
+PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"])
+PACKAGE = ROOT / "pipeline" / "microslip"
+
+
+def rows(page: str, name: str) -> list[list[str]]:
+    """Cells of a made table, without its head."""
+    return [[c.strip() for c in line.strip("|").split("|")] for line in pages.filled(page, name).splitlines()[2:]]
+
+
+def number(text: str) -> float:
+    """The first number of a cell."""
+    found = re.search(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", text)
+    assert found, text
+    return float(found[0])
+
+
+def made(tmp_path: Path, body: str, *changes: str):
+    """A modal file made now, in a folder of its own."""
+    light = ["output.gauss=false", "output.nodal_stress=false", "output.shapes=false", "modes.solver=superlu"]
+    return read_basis(modes_stage(open_job(ROOT / "geometry" / body, [*light, *changes], tmp_path))[0])
+
+
+# links, tables, words ----------------------------------------------------------------------------------------------
+
+
+def anchors(text: str) -> set[str]:
+    """GitHub's anchors of a page's headings."""
+    heads = re.findall(r"^#+ (.*)$", re.sub(r"```.*?```", "", text, flags=re.S), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text, flags=re.S)):
+        if target.startswith("http"):
+            continue
+        name, _, anchor = target.partition("#")
+        file = (page.parent / name).resolve() if name else page
+        assert file.exists(), f"{page.name}: {target}"
+        if anchor and file.suffix == ".md":
+            assert anchor in anchors(file.read_text(encoding="utf-8")), f"{page.name}: {target}"
+
+
+def test_every_picture_is_shown_and_small() -> None:
+    """No picture without a page; less than 300 kB each and 1.5 MB together."""
+    shown = {m for page in PAGES for m in re.findall(r"pictures/([\w-]+\.png)", page.read_text(encoding="utf-8"))}
+    files = list((DOCS / "pictures").glob("*"))
+    assert {f.name for f in files} == shown
+    assert max(f.stat().st_size for f in files) < 300_000 and sum(f.stat().st_size for f in files) < 1_500_000
+
+
+def test_reference_of_body_toml_is_current() -> None:
+    """`python docs/make_pictures.py reference` would change nothing."""
+    assert pages.filled("body_toml.md", "body_toml") == pages.body_reference().strip()
+
+
+def test_python_blocks_are_python() -> None:
+    for page in PAGES:
+        for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.S):
+            ast.parse(block)
+
+
+# architecture ------------------------------------------------------------------------------------------------------
+
+
+def room_order() -> list[str]:
+    """Rooms of docs/architecture.md, first to last."""
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    table = text.split("## Rooms", 1)[1].split("\n## ", 1)[0]
+    return [m.removesuffix("/").removesuffix(".py") for m in re.findall(r"^\| `([^`]+)` \|", table, flags=re.M)]
+
+
+def room_imports(room: str) -> set[str]:
+    """Other rooms that a room imports, at the top of a file or inside a function."""
+    folder = PACKAGE / room
+    found = set()
+    for file in sorted(folder.rglob("*.py")) if folder.is_dir() else [PACKAGE / f"{room}.py"]:
+        package = ["microslip", *file.relative_to(PACKAGE).parts[:-1]]
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom):
+                continue
+            base = package[: len(package) - node.level + 1] if node.level else []
+            names = [[*base, *(node.module or "").split(".")]] if node.module else [[*base, a.name] for a in node.names]
+            found |= {n[1] for n in names if n[0] == "microslip" and len(n) > 1}
+    return (found & set(room_order())) - {room}
+
+
+def test_rooms_import_only_from_rooms_above() -> None:
+    order = room_order()
+    exist = {p.stem for p in PACKAGE.iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()}
+    assert set(order) == exist - {"__init__", "__main__"}
+    for i, room in enumerate(order):
+        assert room_imports(room) <= set(order[:i]), room
+
+
+def test_gmsh_is_imported_only_where_the_page_says() -> None:
+    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "geometry").rglob("*.py")]:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
+        assert "gmsh" not in names or "cad" in file.parts or file.name == "build.py", file
+
+
+# conventions, errata -----------------------------------------------------------------------------------------------
+
+
+def test_interface_frame_is_the_one_of_the_page() -> None:
+    """n outward, t1 = t2 x n; with t2 = z the right side has (x, y, z), the left one (-x, -y, z)."""
+    faces = small_basis().groups[0, 0].interfaces
+    np.testing.assert_allclose(faces["right"].rotation, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(faces["left"].rotation, np.diag([-1.0, -1.0, 1.0]), atol=1e-12)
+
+
+def test_gyroscopic_matrix_has_the_sign_of_the_page() -> None:
+    """G_r = phi^T 2 Omega (n x) M phi, n = y: a velocity along z meets +2 Omega m on x."""
+    group = small_basis((0.0, 3000.0)).groups[1, 0]
+    np.testing.assert_allclose(group.G_r, -group.G_r.T, atol=1e-9 * np.abs(group.G_r).max())
+    cross = np.array([[0, 0, 1], [0, 0, 0], [-1, 0, 0.0]])  # y x
+    lumped = 2 * group.speed * np.einsum("nia,ij,njb->ab", group.phi, cross, group.phi)  # equal masses: the sign only
+    assert (lumped * group.G_r).sum() > 0.5 * np.linalg.norm(lumped) * np.linalg.norm(group.G_r)
+
+
+def test_loss_of_the_jenkins_element_in_the_errata() -> None:
+    """The closed form quoted there against the integral of force over displacement."""
+    from microslip.harmonic_balance import jenkins_harmonic
+
+    c, limit, amplitude = 3.0, 2.0, 1.9
+    x = c * amplitude / limit
+    value = complex(jenkins_harmonic(np.array([amplitude]), c, limit)[0][0])
+    assert value.imag == pytest.approx(c * 4 * (x - 1) / (np.pi * x**2), rel=1e-12)
+    loop = 4 * limit * (amplitude - limit / c)  # area of the parallelogram
+    assert np.pi * value.imag * amplitude**2 == pytest.approx(loop, rel=1e-12)
+
+
+# numbers of the other pages ----------------------------------------------------------------------------------------
+
+
+def test_blade_page(tmp_path: Path) -> None:
+    """The coarsest mesh of the convergence table, computed again."""
+    group = made(tmp_path, "blade", "mesh.size=24", "modes.count=10").groups[0, 0]
+    told = next(r for r in rows("blade.md", "convergence") if r[0] == "24")
+    np.testing.assert_allclose(group.frequency[[0, 2, 6]], [float(v) for v in told[2:]], rtol=1e-4)
+
+
+def test_blade_page_agrees_with_itself() -> None:
+    """Deviations follow from the frequencies beside them; all six printed ones are met within 3.3 %."""
+    for _, printed, value, deviation in rows("blade.md", "stuck"):
+        assert number(deviation) == pytest.approx(100 * (float(value) / float(printed) - 1), abs=0.05)
+        assert abs(number(deviation)) < 3.3
+    assert all(abs(number(v)) < 0.6 for v in rows("blade.md", "convergence")[-1][2:])
+
+
+def test_modes_page(tmp_path: Path) -> None:
+    """Prestress "none" at 4500 rpm on the coarse shroud: frequencies fall, as the table says."""
+    coarse = "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"
+    change = ["mesh.size=12", coarse, 'rotation.prestress="none"', "rotation.speeds_rpm=[0.0, 4500.0]", "modes.count=6"]
+    basis = made(tmp_path, "shroud", *change, "modes.certify=false")
+    told = rows("modes.md", "speed")
+    for i, column in ((0, 1), (1, 2)):
+        np.testing.assert_allclose(basis.groups[i, 0].frequency[:6], [float(r[column]) for r in told], rtol=1e-4)
+
+
+def test_geometry_page(tmp_path: Path) -> None:
+    """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
+    basis = made(tmp_path, "pendulum", "modes.count=3")
+    told = next(r for r in rows("geometry.md", "bodies") if "pendulum" in r[0])
+    assert basis.mass == pytest.approx(float(told[2]), rel=1e-3)
+    x, _, z = basis.centre
+    about_axis = basis.inertia[1, 1] + basis.mass * (x**2 + z**2)
+    assert about_axis / 0.4**2 == pytest.approx(0.092, rel=5e-3)
+    assert about_axis / 0.05115**2 == pytest.approx(5.632, rel=5e-3)
+
+
+def test_build_file_of_the_geometry_page(tmp_path: Path) -> None:
+    """The build.py printed there draws, and its faces can be used."""
+    text = (DOCS / "geometry.md").read_text(encoding="utf-8")
+    (tmp_path / "build.py").write_text(re.findall(r"```python\n(.*?)```", text, flags=re.S)[0])
+    (tmp_path / "body.toml").write_text(
+        'name = "box"\nlength_unit = "mm"\n[geometry]\nbuild = "build.py"\n[mesh]\nsize = 20.0\n'
+        "[material]\ndensity = 7850.0\nyoung = 2.1e11\npoisson = 0.3\n"
+        '[[supports]]\nface = "clamp"\n[[interfaces]]\nname = "tip"\nface = "tip"\nt2 = [1, 0, 0]\n[modes]\ncount = 3\n'
+    )
+    assert read_basis(modes_stage(open_job(tmp_path, [], tmp_path))[0]).groups[0, 0].n_modes == 3
+
+
+def test_platforms_page() -> None:
+    """Its system libraries are those the set-up installs and the pictures ask for; its solvers are all there are."""
+    from microslip import eigen, pictures
+
+    text = (DOCS / "platforms.md").read_text(encoding="utf-8")
+    line = re.search(r"apt-get install -y (lib.*)", text)
+    assert line and line[1].split() == list(pictures.PACKAGES)
+    assert line[1] in (ROOT / "pipeline" / "setup.sh").read_text(encoding="utf-8")
+    assert set(eigen.BACKENDS) == {"pardiso", "superlu"}
+
+
+def test_own_model_page(tmp_path: Path) -> None:
+    """Everything the page says to type (pictures left to the slow test); the frequency it shows."""
+    shown = pages.play("your_own_model.md", tmp_path, slow=False)
+    assert "all " in shown and "checks passed" in shown
+    told = [line for line in pages.filled("your_own_model.md", "modes").splitlines() if " Hz " in line]
+    for file in ("bracket", "part"):
+        f = read_basis(tmp_path / "build" / file / "basis.h5").groups[0, 0].frequency
+        np.testing.assert_allclose(f, [number(line.split()[1]) for line in told], rtol=1e-4)
+    coarse = read_basis(tmp_path / "build" / "bracket-coarse" / "basis.h5").groups[0, 0].frequency[0]
+    assert coarse == pytest.approx(1020.8, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_own_model_page_to_the_report(tmp_path: Path) -> None:
+    """The same with pictures and friction response."""
+    pages.play("your_own_model.md", tmp_path)
+    assert (tmp_path / "build" / "bracket" / "report.html").stat().st_size > 100_000
+    assert (tmp_path / "build" / "bracket" / "response.csv").is_file()
