@@ -112,14 +112,14 @@ def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
 
 def face_mean(points: Array, blocks: Mapping[str, Indices], values: Array) -> tuple[float, Array, Array]:
     """Area (m2), area centre (3,) and area mean of nodal values (n, ...) of a face."""
-    area, centre, mean = 0.0, np.zeros(3), np.zeros(values.shape[1:])
+    area, centre, mean = np.float64(0), np.zeros(3), np.zeros(values.shape[1:])
     for facet_type, facets in blocks.items():
         N, dN, weights = tables(facet_type)
         x = points[facets]
         for q, w in enumerate(weights):
             t = np.einsum("dk,fki->fdi", dN[q], x)
             da = w * np.linalg.norm(np.cross(t[:, 0], t[:, 1]), axis=1)
-            area += float(da.sum())
+            area += da.sum()
             centre += da @ np.einsum("k,fki->fi", N[q], x)
             mean += np.tensordot(da, np.tensordot(N[q], values[facets], axes=(0, 1)), axes=(0, 0))
-    return area, centre / area, mean / area
+    return float(area), centre / area, mean / area
