@@ -1,0 +1,394 @@
+"""The command line: verbs, exit codes 0, 1, 2, 130, one sentence for every mistake, silence on demand."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from box import edit, write_box
+
+from microslip.basis import read_basis, write_basis
+from microslip.case import CaseResult, run_case
+from microslip.cli import app, main
+
+ROOT = Path(__file__).resolve().parents[1]
+POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX systems")
+HEAVY = ("gmsh", "meshio", "skfem", "pyvista", "vtkmodules", "vtk", "matplotlib", "imageio", "PIL", "jax", "qdldl", "pypardiso")
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT / "pipeline"), "OMP_NUM_THREADS": "1"}
+
+
+def start(folder: Path, *words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "microslip", *words]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=folder, env=environment(), stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the box has been meshed and solved from the command line."""
+    folder = tmp_path_factory.mktemp("cli")
+    write_box(folder / "box")
+    process = start(folder, "modes", "box")
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    assert "6 modes, certified complete" in out and out.splitlines()[-1] == "build/box/basis.h5"
+    assert "meshing build.py" in err and "\x1b" not in out + err and "\r" not in out + err, "plain when not a terminal"
+    return folder
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    copy = shutil.copytree(finished, tmp_path / "work")
+    monkeypatch.chdir(copy)
+    return copy
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
+    out, err = capsys.readouterr()
+    assert "Traceback" not in out + err
+    return out, err
+
+
+# ---------------------------------------------------------------- verbs that do their work
+
+
+def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
+    """`--help` answers in 0.3 s: numpy alone would take most of that."""
+    program = (
+        "import sys; from microslip.cli import main; code = main(['--help'])\n"
+        "print(*sorted({m.split('.')[0] for m in sys.modules}), file=sys.stderr); sys.exit(code)"
+    )
+    began = os.times()
+    done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True)
+    ended = os.times()
+    for verb in ("init", "mesh", "modes", "run", "check", "export", "report", "info"):
+        assert f" {verb} " in done.stdout
+    assert not {"numpy", "scipy", "h5py", "pydantic", *HEAVY} & set(done.stderr.split())
+    used = ended.children_user + ended.children_system - began.children_user - began.children_system
+    assert used < 1.5, f"{used:.2f} s: 0.1 to 0.3 s are usual"
+
+
+@pytest.mark.parametrize("verb", ["init", "mesh", "modes", "run", "check", "export", "report", "info"])
+def test_help_of_every_verb(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([verb, "--help"]) == 0
+    out, err = said(capsys)
+    assert f"Usage: microslip {verb}" in out and err == ""
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    from microslip import __version__
+
+    assert main(["--version"]) == 0
+    assert said(capsys)[0].strip() == __version__
+
+
+def test_check_info_and_export_of_a_modal_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = "build/box/basis.h5"
+    assert main(["check", file]) == 0
+    out, err = said(capsys)
+    assert err == "" and "FAIL" not in out and out.count("ok   ") > 15 and "checks passed" in out.splitlines()[-1]
+    assert main(["info", file]) == 0
+    assert "6 modes, certified complete" in said(capsys)[0]
+    for format_ in ("mat", "vtu"):
+        assert main(["export", file, "--to", format_, "-o", f"out.{format_}"]) == 0
+        assert said(capsys)[0].strip() == f"out.{format_}" and (folder / f"out.{format_}").stat().st_size > 1000
+
+
+def test_info_of_bodies_and_meshes(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", "box"]) == 0
+    assert "box: a clamped box" in said(capsys)[0]
+    assert main(["info", "meshes/box.msh", "--unit", "mm"]) == 0
+    out, _ = said(capsys)
+    assert "0.02 x 0.03 x 0.12 m" in out and "faces: clamp, tip" in out
+
+
+def test_set_overrides_and_output_goes_where_it_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mesh", "box", "--set", "mesh.size=40", "--set", "geometry.parameters.size=[20, 30, 60]"]) == 0
+    out, err = said(capsys)
+    assert out.startswith("meshes/box.msh: ") and "meshing" in err
+    assert main(["modes", "box", "--set", "modes.count=2", "-o", "two.h5", "--quiet"]) == 0
+    assert said(capsys) == ("", ""), "--quiet says nothing"
+    assert read_basis(folder / "two.h5").groups[0, 0].n_modes == 2
+
+
+def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("blade", "shroud", "pendulum", "half-pipe"):
+        assert main(["init", name]) == 0
+        assert (folder / name / "body.toml").is_file() and (folder / name / "build.py").is_file()
+        assert main(["info", name]) == 0
+    assert (folder / "blade" / "case.toml").is_file()
+    assert main(["init", "blade", "mine"]) == 0 and (folder / "mine" / "body.toml").is_file()
+    said(capsys)
+    before = (folder / "blade" / "body.toml").read_bytes()
+    assert main(["init", "blade"]) == 2
+    assert "is there already" in said(capsys)[1] and (folder / "blade" / "body.toml").read_bytes() == before
+
+
+def test_run_of_a_case_and_a_response_that_does_not_converge(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.move(folder / "box", folder / "geometry" / "box")
+    case = Path(shutil.copy(folder / "geometry/box/case.toml", folder / "other.toml"))
+    edit(case, 'name = "box"', 'name = "other"')
+    assert main(["run", "other.toml", "--set", "sweep.points=10", "-q"]) == 0
+    assert said(capsys) == ("", "")
+    assert len((folder / "build/other/response.csv").read_text().splitlines()) > 10
+
+    def spoilt(*words: Any) -> CaseResult:
+        result = run_case(*words)
+        failed = {f: replace(r, converged=np.zeros_like(r.converged)) for f, r in result.responses.items()}
+        return replace(result, responses=failed)
+
+    monkeypatch.setattr("microslip.workflow.run_case", spoilt)
+    assert main(["run", "other.toml", "--set", "sweep.points=11"]) == 1
+    out, err = said(capsys)
+    assert out == "build/other/response.csv\n" and "did not converge" in err.splitlines()[-1]
+
+
+# ---------------------------------------------------------------- 1: a check that fails
+
+
+def test_a_check_that_fails_is_named_and_exits_1(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    basis = read_basis(folder / "build/box/basis.h5")
+    group = basis.groups[0, 0]
+    spoilt = replace(group, K_r=group.K_r * 1.01)
+    write_basis(folder / "spoilt.h5", replace(basis, groups={(0, 0): spoilt}))
+    assert main(["check", "spoilt.h5"]) == 1
+    out, err = said(capsys)
+    assert "FAIL speed_0/nd_0: K_r is diag(omega^2)" in out and "checks failed" in err
+    assert main(["check", "spoilt.h5", "-q"]) == 1
+    assert said(capsys)[0].splitlines() == [line for line in out.splitlines() if line.startswith("FAIL")]
+
+
+# ---------------------------------------------------------------- 2: bad input, one sentence each
+
+
+MISTAKES = [
+    (["bla"], "Unknown command"),
+    (["modes"], "BODY requires an argument"),
+    (["modes", "box", "extra"], "extra"),
+    (["modes", "box", "--colour"], "--colour"),
+    (["export", "build/box/basis.h5"], "--to requires an argument"),
+    (["export", "build/box/basis.h5", "--to", "docx"], "unknown format; choose one of mat, vtu"),
+    (["export", "build/box/basis.h5", "--to", "mat", "-o", "body.toml/x.mat"], "body.toml/x.mat: cannot be written"),
+    (["modes", "gone"], "gone: cannot be read"),
+    (["modes", "gone.toml"], "gone.toml: cannot be read"),
+    (["run", "gone.toml"], "gone.toml: cannot be read"),
+    (["modes", "empty"], "empty/body.toml: cannot be read"),
+    (["modes", "bad.toml"], "bad.toml: is not valid TOML"),
+    (["run", "bad.toml"], "bad.toml: is not valid TOML"),
+    (["modes", "build/box/basis.h5"], "build/box/basis.h5: is not UTF-8 text"),
+    (["run", "build/box/basis.h5"], "build/box/basis.h5: is not UTF-8 text"),
+    (["modes", "box", "--set", "nonsense"], "write --set key.subkey=value"),
+    (["modes", "box", "--set", "modes.cuont=3"], "modes.cuont: unknown key; did you mean 'count'?"),
+    (["modes", "box", "--set", "modes.count=0"], "modes.count"),
+    (["modes", "box", "--set", "modes.count=many"], "modes.count"),
+    (["modes", "box", "--set", "supports.clamp.face=clmp", "-q"], "clmp"),
+    (["modes", "box", "--set", "modes.count=100000"], "modes.count"),
+    (["run", "box/case.toml", "--set", "sweep.stop=1"], "stop must be above start"),
+    (["run", "box/case.toml", "--set", "monitor=top", "-q"], "no monitor 'top'; it has tip"),
+    (["run", "stray.toml"], "no body.toml of a body 'nobody'"),
+    (["check", "gone.h5"], "gone.h5"),
+    (["check", "empty"], "empty"),
+    (["check", "bad.toml"], "bad.toml"),
+    (["check", "zero.h5"], "zero.h5"),
+    (["check", "other.h5"], "other.h5"),
+    (["check", "cut.h5"], "cut.h5"),
+    (["report", "cut.h5"], "cut.h5"),
+    (["info", "gone.step"], "there is no such file"),
+    (["info", "cut.msh"], "cut.msh"),
+    (["info", "zero.h5"], "zero.h5"),
+    (["info", "bad.stl"], "bad.stl"),
+    (["info", "meshes/box.msh", "--unit", "parsec"], "unknown unit of length; choose one of m, "),
+    (["init", "rotor"], "there is no such body; choose one of blade, half-pipe, pendulum, shroud"),
+    (["init", "blade", "body.toml/x"], "body.toml/x"),
+]
+
+
+@pytest.fixture
+def mistakes(folder: Path) -> Path:
+    basis = (folder / "build/box/basis.h5").read_bytes()
+    (folder / "empty").mkdir()
+    (folder / "zero.h5").write_bytes(b"")
+    (folder / "cut.h5").write_bytes(basis[: len(basis) // 2])
+    with h5py.File(folder / "other.h5", "w") as file:
+        file["x"] = 1.0
+    (folder / "cut.msh").write_bytes((folder / "meshes/box.msh").read_bytes()[:3000])
+    (folder / "bad.toml").write_text('name = "box\n')
+    (folder / "body.toml").write_text("")
+    (folder / "bad.stl").write_bytes(bytes(range(256)))
+    (folder / "stray.toml").write_text((folder / "box/case.toml").read_text().replace('body = "box"', 'body = "nobody"'))
+    return folder
+
+
+@pytest.mark.parametrize(("words", "sentence"), MISTAKES, ids=lambda w: " ".join(w) if isinstance(w, list) else "")
+def test_a_mistake_gives_one_sentence_and_exit_code_2(
+    mistakes: Path, words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(str(p) for p in mistakes.rglob("*"))
+    assert main(words) == 2
+    out, err = said(capsys)
+    errors = [line for line in err.splitlines() if line.startswith("error: ")]
+    assert out == "" and len(errors) == 1 and sentence in errors[0]
+    assert len(errors[0]) < 400
+    assert sorted(str(p) for p in mistakes.rglob("*")) == before, "nothing was made or lost"
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="rights bind no administrator")
+def test_files_without_the_right_to_read_or_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for file, words in (("box/body.toml", ["modes", "box"]), ("build/box/basis.h5", ["check", "build/box/basis.h5"])):
+        (folder / file).chmod(0)
+        assert main(words) == 2
+        assert file in said(capsys)[1]
+        (folder / file).chmod(0o644)
+    (folder / "meshes").chmod(0o500)
+    assert main(["mesh", "box", "--force"]) == 2
+    assert "meshes/box.msh: cannot be written" in said(capsys)[1]
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "sentence"),
+    [
+        (MemoryError(), 1, "not enough memory"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (PermissionError(13, "Permission denied", "secret"), 2, "secret: Permission denied"),
+        (ModuleNotFoundError("No module named 'skfem.element'", name="skfem.element"), 2, "microslip[fem]"),
+        (ModuleNotFoundError("No module named 'pyvista'", name="pyvista"), 2, "microslip[viz]"),
+        (ModuleNotFoundError("No module named 'jax'", name="jax"), 2, "microslip[solve]"),
+    ],
+)
+def test_what_may_happen_anywhere_is_said_in_one_sentence(
+    raised: BaseException, code: int, sentence: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: Path) -> None:
+        raise raised
+
+    monkeypatch.setattr("microslip.basis.read_basis", fail)
+    assert main(["check", "any.h5"]) == code
+    assert sentence in said(capsys)[1]
+
+
+def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: Path) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("microslip.basis.read_basis", fail)
+    with pytest.raises(ZeroDivisionError):
+        main(["check", "any.h5"])
+
+
+# ---------------------------------------------------------------- 130: interrupted
+
+
+@POSIX
+@pytest.mark.parametrize(
+    ("words", "sign", "absent"),
+    [
+        (["mesh", "box", "--set", "mesh.size=1"], "meshing", "meshes/box.msh"),
+        (["modes", "box", "--set", "mesh.size=3.5", "--set", "modes.count=400"], "eigenmodes", "build/box/basis.h5"),
+    ],
+    ids=["while gmsh works", "while the modes are solved"],
+)
+def test_an_interrupt_exits_130_and_leaves_no_half_product(tmp_path: Path, words: list[str], sign: str, absent: str) -> None:
+    write_box(tmp_path / "box")
+    process = start(tmp_path, *words)
+    assert process.stderr is not None
+    lines = []
+    for line in process.stderr:
+        lines.append(line)
+        if sign in line:
+            break
+    time.sleep(0.3)
+    assert process.poll() is None, "".join(lines)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert time.monotonic() - began < 30
+    assert err.splitlines()[-1] == "error: interrupted; finished products are kept" and "Traceback" not in err
+    assert not (tmp_path / absent).exists() and not (tmp_path / (absent + ".json")).exists()
+    assert not [p for p in tmp_path.rglob(".*") if p.is_file()], "temporary files are left"
+    if "modes" in words:
+        assert (tmp_path / "meshes/box.msh").is_file(), "the finished mesh is kept"
+
+
+@POSIX
+def test_a_reader_that_leaves_is_no_error(finished: Path) -> None:
+    command = f"{sys.executable} -m microslip check build/box/basis.h5 | head -n 1"
+    done = subprocess.run(command, shell=True, cwd=finished, env=environment(), capture_output=True, text=True)
+    assert done.stderr == "" and done.stdout.startswith("ok   ")
+
+
+# ---------------------------------------------------------------- the base install
+
+
+BASE = f"""
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {HEAVY!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Absent())
+from microslip.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        (["check", "build/box/basis.h5"], 0, "checks passed"),
+        (["info", "build/box/basis.h5"], 0, "6 modes"),
+        (["info", "box"], 0, "a clamped box"),
+        (["export", "build/box/basis.h5", "--to", "mat"], 0, "basis.mat"),
+        (["init", "blade"], 0, "ready"),
+        (["modes", "box", "--force"], 2, "pip install 'microslip[fem]'"),
+    ],
+    ids=lambda w: w[0] if isinstance(w, list) else "",
+)
+def test_the_base_install_reads_checks_and_converts(folder: Path, words: list[str], code: int, text: str) -> None:
+    """Without gmsh, meshio, scikit-fem, VTK, matplotlib, jax; what needs them names the extra."""
+    done = subprocess.run(
+        [sys.executable, "-c", BASE, *words], cwd=folder, env=environment(), capture_output=True, text=True
+    )
+    assert done.returncode == code, done.stderr
+    assert text in done.stdout + done.stderr and "Traceback" not in done.stderr
+
+
+def test_progress_on_a_terminal_keeps_steps_and_warnings(monkeypatch: pytest.MonkeyPatch) -> None:
+    import io
+
+    from microslip.progress import progress
+
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    screen = Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress("run box") as report:
+        for text in ("meshing [a]", "warning: small [b]", "sweep", "300 of 600 frequencies", "done [c]"):
+            report(text)
+    shown = screen.getvalue()
+    assert all(text in shown for text in ("meshing [a]", "warning: small [b]", "sweep", "done [c]", "run box"))
+    assert "ok" in shown and "\x1b" in shown
+
+
+def test_every_verb_is_documented() -> None:
+    for verb in app:
+        if not verb.startswith("-"):
+            assert app[verb].help
