@@ -18,9 +18,10 @@ from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
 from microslip.mesh import read_mesh
 from microslip.modes import modal_basis
+from microslip.modes.boundary import fixed_dofs
 from microslip.modes.canonical import clusters, signs, turn_clusters
-from microslip.modes.compute import _fixed, _pencil
 from microslip.modes.equilibrium import make_model
+from microslip.modes.spectrum import make_pencil
 from microslip.reference.bars import box_frequencies
 
 BACKENDS = eigen.available_backends()
@@ -32,14 +33,14 @@ CLAMPED = {"supports": [{"face": "x0"}]}
 def pencil_of(mesh, what, solver="superlu"):
     """K and M of a body at rest on its free degrees of freedom, and its model."""
     d = discretise(mesh)
-    fixed = _fixed(mesh, what)
+    fixed = fixed_dofs(mesh, what)
     zero = np.zeros((mesh.n_points, 3))
     axis = np.array([0.0, 1.0, 0.0])
     material = what.material.material()
     model = make_model(
         d, material, free_upper(d.pattern, fixed), fixed, axis, zero[0], None, 293.0, zero, True
     )
-    return _pencil(model, model.K0, eigen.new_solver(solver)), model
+    return make_pencil(model, model.K0, eigen.new_solver(solver)), model
 
 
 def dense(pencil):

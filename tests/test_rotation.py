@@ -14,7 +14,7 @@ from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, internal_force
 from microslip.fem.discretise import free_upper
 from microslip.modes import modal_basis
-from microslip.modes.compute import _fixed
+from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import equilibrium, linear_stiffness, make_model, softening, stress_of
 from microslip.reference.bars import box_frequencies
 
@@ -32,7 +32,7 @@ def the_group(mesh, temperature=None, **what):
 
 def model_of(mesh, what, load=None, spin_softening=True, axis=Y, temperature=None):
     d = discretise(mesh)
-    fixed = _fixed(mesh, what)
+    fixed = fixed_dofs(mesh, what)
     load = np.zeros((mesh.n_points, 3)) if load is None else load
     return make_model(
         d, what.material.material(), free_upper(d.pattern, fixed), fixed, axis, np.zeros(3), temperature, 293.15, load,

@@ -14,7 +14,7 @@ from microslip.fem import discretise, mass, stiffness
 from microslip.fem.discretise import face_blocks, shape_functions
 from microslip.fem.operators import isotropic
 from microslip.modes import modal_basis
-from microslip.modes.compute import body_rows
+from microslip.modes.body_rows import body_rows
 from microslip.modes.rigid import rigid_fields
 from microslip.modes.rows import Locator, patch, point_rows, slope_rows
 

@@ -69,9 +69,12 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
     origin = areas @ points / total
     rotation = _frame(vectors.sum(axis=0), t2, areas, points, name)
     r = points - origin
-    J = np.einsum("p,pij->ij", areas, np.einsum("pk,pk->p", r, r)[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None])
+    second = np.einsum("p,pi,pj->ij", areas, r, r)
+    J = np.trace(second) * np.eye(3) - second
     if np.linalg.cond(J) > 1e9:
-        raise UserError(f"interface '{name}': the points of face '{face}' lie on a line, so it has no rotation; pick a face with area")
+        raise UserError(
+            f"interface '{name}': the points of face '{face}' lie on a line, so it has no rotation; pick a face with area"
+        )
     # weights (6, p, 3): translation and J^-1 (r x u), turned into the interface frame
     W = np.empty((6, len(points), 3))
     W[:3] = rotation[:, None, :] * (areas / total)[None, :, None]
@@ -88,7 +91,9 @@ def _frame(normal: Array, t2: Array, areas: Array, points: Array, name: str) -> 
     t2 = np.asarray(t2, dtype=float)
     flat = t2 - n * (n @ t2)
     if np.linalg.norm(flat) < 1e-3 * np.linalg.norm(t2):
-        raise UserError(f"interfaces.{name}.t2: {t2.tolist()} is along the normal of the face; choose a direction in its plane")
+        raise UserError(
+            f"interfaces.{name}.t2: {t2.tolist()} is along the normal of the face; choose a direction in its plane"
+        )
     t2 = flat / np.linalg.norm(flat)
     return np.array([n, np.cross(t2, n), t2])
 

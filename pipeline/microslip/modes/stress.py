@@ -83,7 +83,7 @@ def nodal_set(model: BodyModel, state: StaticState, phi: Array, batch: int = 8) 
     """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), `batch` modes at a time."""
     n, m = model.d.mesh.n_points, phi.shape[2]
     smoothers = [smoother(b, n) for b in model.d.blocks]
-    weights = sum(w for _, w in smoothers)
+    weights = np.sum([w for _, w in smoothers], axis=0)
     S = sp.hstack([matrix for matrix, _ in smoothers]).tocsr()
     strain, stress = np.empty((n, 6, m)), np.empty((n, 6, m))
     for start in range(0, m, batch):

@@ -1,0 +1,137 @@
+"""Interfaces, excitations, monitors and gauges of a body file as rows on its mesh, and reduced by its shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..body import BodySettings, Excitation
+from ..data import Array, Interface, Mesh, Rows
+from ..fem.discretise import face_blocks
+from ..fem.loads import pressure, traction
+from .boundary import AXES, require_face
+from .equilibrium import StaticState
+from .rows import Locator, Patch, patch, point_rows, slope_rows
+
+INTERFACE_LABELS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+
+
+@dataclass(frozen=True)
+class BodyRows:
+    """All rows on nodal displacements, named. Each value is (B (r, 3n), labels, unit, point, distance)."""
+
+    patches: Mapping[str, Patch]
+    excitations: Mapping[str, NamedRows]
+    monitors: Mapping[str, NamedRows]
+    gauges: Mapping[str, NamedRows]
+
+    def stacked(self, settings: BodySettings) -> tuple[sp.csr_matrix, tuple[str, ...]]:
+        """Every interface (but load faces), excitation and monitor row, for the static compliance."""
+        parts: list[sp.csr_matrix] = []
+        labels: list[str] = []
+        for item in settings.interfaces:
+            if item.role != "load":
+                parts.append(self.patches[item.name].B)
+                labels += [f"interface:{item.name}:{c}" for c in INTERFACE_LABELS]
+        for kind, named in (("excitation", self.excitations), ("monitor", self.monitors)):
+            for name, rows in named.items():
+                parts.append(rows.B)
+                labels += [f"{kind}:{name}:{label}" for label in rows.labels]
+        if not parts:
+            return sp.csr_matrix((0, 0)), ()
+        return sp.vstack(parts).tocsr(), tuple(labels)
+
+
+@dataclass(frozen=True)
+class NamedRows:
+    B: sp.csr_matrix
+    labels: tuple[str, ...]
+    unit: str
+    point: Array
+    distance: float
+    direction: Array | None = None  # of a gauge, whose B holds the three rows of the slope along it
+
+
+def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
+    """Rows of all interfaces, excitations, monitors and gauges of the settings on a mesh."""
+    patches = {}
+    for item in settings.interfaces:
+        require_face(mesh, item.face, f"interfaces.{item.name}.face")
+        patches[item.name] = patch(mesh, item.face, np.array(item.t2), item.name)
+    for excitation in settings.excitations:
+        if excitation.face is not None:
+            require_face(mesh, excitation.face, f"excitations.{excitation.name}.face")
+            if excitation.face not in patches:
+                patches[excitation.face] = _load_patch(mesh, excitation.face)
+    locator = Locator(mesh)
+    n = mesh.n_points
+    excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations}
+    monitors, gauges = {}, {}
+    for m in settings.monitors:
+        place = locator.find(np.array(m.point), f"monitors.{m.name}.point")
+        directions = np.eye(3)[[AXES[c] for c in m.directions]]
+        labels = tuple(f"u_{c}" for c in m.directions)
+        monitors[m.name] = NamedRows(point_rows(n, place, directions), labels, "m", place.point, place.distance)
+    for g in settings.gauges:
+        place = locator.find(np.array(g.point), f"gauges.{g.name}.point")
+        direction = np.array(g.direction) / np.linalg.norm(g.direction)
+        slopes = slope_rows(n, place, direction)
+        gauges[g.name] = NamedRows(slopes, ("strain",), "1", place.point, place.distance, direction)
+    return BodyRows(patches, excitations, monitors, gauges)
+
+
+def _load_patch(mesh: Mesh, face: str) -> Patch:
+    blocks = face_blocks(mesh, face)
+    mean = sum(b.area.sum(axis=(0, 1)) for b in blocks)
+    hint = np.eye(3)[int(np.abs(mean).argmin())]
+    return patch(mesh, face, hint, face)
+
+
+def _excitation(mesh: Mesh, locator: Locator, e: Excitation) -> NamedRows:
+    n = mesh.n_points
+    if e.face is None:
+        place = locator.find(np.array(e.point), f"excitations.{e.name}.point")
+        direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
+        return NamedRows(point_rows(n, place, direction[None]), ("force",), "N", place.point, place.distance)
+    blocks = face_blocks(mesh, e.face)
+    sizes = [np.linalg.norm(b.area, axis=2) for b in blocks]
+    total = sum(s.sum() for s in sizes)
+    centre = sum(np.einsum("fq,fqi->i", s, b.points) for s, b in zip(sizes, blocks, strict=True)) / total
+    if e.pressure:
+        return NamedRows(sp.csr_matrix(pressure(blocks, n).reshape(1, -1)), ("pressure",), "Pa", centre, 0.0)
+    direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
+    force = traction(blocks, n, direction / total)
+    return NamedRows(sp.csr_matrix(force.reshape(1, -1)), ("force",), "N", centre, 0.0)
+
+
+def reduced_interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shapes: Array) -> dict[str, Interface]:
+    described = {i.name: i for i in settings.interfaces}
+    out = {}
+    for name, p in rows.patches.items():
+        item = described.get(name)
+        keep = settings.output.patch_shapes
+        moved = (p.N @ shapes.reshape(len(shapes), -1)).reshape(len(p.points), 3, -1)
+        out[name] = Interface(
+            p.origin, p.rotation, np.asarray(p.B @ phi), p.fit_residual(shapes), p.points, p.areas, p.normals,
+            moved if keep else np.zeros((0, 3, phi.shape[1])),
+            item.role if item else "load", item.partner if item else "", item.sector_shift if item else 0,
+        )  # fmt: skip
+    return out
+
+
+def reduced_rows(named: NamedRows, phi: Array, u: Array | None) -> Rows:
+    static = np.zeros(len(named.labels)) if u is None else np.asarray(named.B @ u)
+    return Rows(np.asarray(named.B @ phi), named.labels, named.unit, named.point, named.distance, static)
+
+
+def reduced_gauge(named: NamedRows, phi: Array, state: StaticState) -> Rows:
+    """Strain along the gauge: of the static state, and its change per unit coordinate (`slope_rows`)."""
+    assert named.direction is not None
+    slope = np.asarray(named.B @ state.u.reshape(-1))
+    along = named.direction if state.H is None else named.direction + slope
+    strain = named.direction @ slope + (0.5 * slope @ slope if state.prestress == "nonlinear" else 0.0)
+    row = along @ np.asarray(named.B @ phi)
+    return Rows(row[None], named.labels, named.unit, named.point, named.distance, np.array([strain]))

@@ -1,0 +1,70 @@
+"""Supports and dead loads of a body file on its mesh, and the refusal of bodies that nothing holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..body import BodySettings
+from ..data import Array, Indices, Mesh, UserError
+from ..fem.discretise import face_blocks
+from ..fem.loads import body_force, pressure, traction
+from . import rigid
+from .equilibrium import BodyModel
+from .rows import Locator
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+def require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False) -> None:
+    if face in mesh.faces or (points_suffice and face in mesh.point_sets):
+        return
+    known = sorted(mesh.faces) + (sorted(set(mesh.point_sets) - set(mesh.faces)) if points_suffice else [])
+    raise UserError(f"{key}: the mesh has no face '{face}'; its faces are {', '.join(known) or 'none'}")
+
+
+def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
+    fixed = [np.zeros(0, dtype=np.int64)]
+    for support in settings.supports:
+        require_face(mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
+        nodes = mesh.face_points(support.face)
+        fixed += [3 * nodes + AXES[c] for c in support.directions]
+    return np.unique(np.concatenate(fixed))
+
+
+def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array) -> None:
+    found = motions.shape[1]
+    if settings.free and not found:
+        raise UserError("free: true, but the supports hold the body wholly; remove one of them")
+    if found and not settings.free:
+        names = "; ".join(rigid.describe(mesh.points, centre, motions))
+        raise UserError(
+            f"supports: nothing holds the body against {names}; add supports, or write free = true if it is meant "
+            "to float"
+        )
+    if settings.free and any(settings.rotation.speeds_rpm):
+        raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")
+    if settings.free and settings.loads:
+        raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
+
+
+def with_dead_loads(model: BodyModel, mesh: Mesh, settings: BodySettings) -> BodyModel:
+    force = np.zeros((mesh.n_points, 3))
+    locator = Locator(mesh) if any(load.point for load in settings.loads) else None
+    for number, load in enumerate(settings.loads):
+        if load.kind == "gravity":
+            force += body_force(model.M_full, np.array(load.vector))
+        elif load.kind == "pressure":
+            require_face(mesh, load.face or "", f"loads.{number}.face")
+            force += pressure(face_blocks(mesh, load.face or ""), mesh.n_points, load.value or 0.0)
+        elif load.face is not None:
+            require_face(mesh, load.face, f"loads.{number}.face")
+            blocks = face_blocks(mesh, load.face)
+            area = sum(np.linalg.norm(b.area, axis=2).sum() for b in blocks)
+            force += traction(blocks, mesh.n_points, np.array(load.vector) / area)
+        else:
+            assert locator is not None
+            place = locator.find(np.array(load.point), f"loads.{number}.point")
+            force[place.nodes] += place.N[:, None] * np.array(load.vector)
+    return replace(model, dead_load=force)

@@ -1,0 +1,117 @@
+"""The eigenproblem of a body model, its static compliance, and the rows that make its shapes definite."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from .. import eigen
+from ..body import BodySettings
+from ..data import Array, Indices
+from .body_rows import BodyRows
+from .equilibrium import BodyModel
+
+
+def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen.Pencil:
+    free = model.free
+    K_upper = free.matrix(K)
+    M_upper = free.matrix(model.M[:, None, None] * np.eye(3))
+    diagonal = K_upper.diagonal()
+
+    def K_times(x: Array) -> Array:
+        return K_upper @ x + K_upper.T @ x - (diagonal * x.T).T
+
+    M_times = _mass_product(model)
+
+    def shifted(s: float) -> sp.csr_matrix:
+        return sp.csr_matrix((K_upper.data - s * M_upper.data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
+
+    return eigen.Pencil(shifted, K_times, M_times, len(diagonal), _norm(K_upper), _norm(M_upper), solver)
+
+
+def _mass_product(model: BodyModel) -> Callable[[Array], Array]:
+    """Products of the mass matrix on the free degrees of freedom with (n_free,) or (n_free, r) arrays."""
+    free, n = model.free.free, model.d.mesh.n_points
+    M: sp.csr_matrix = model.M_full  # type: ignore[assignment]
+    nodes = np.unique(free // 3)
+    if len(free) == 3 * len(nodes):  # whole points are held or free: no scattering needed
+        M_nodes = M if len(nodes) == n else M[nodes][:, nodes]
+        return lambda x: (M_nodes @ x.reshape(len(nodes), -1)).reshape(x.shape)
+
+    def product(x: Array) -> Array:
+        whole = np.zeros((3 * n, *x.shape[1:]))
+        whole[free] = x
+        return (M @ whole.reshape(n, -1)).reshape(whole.shape)[free]
+
+    return product
+
+
+def _norm(upper: sp.csr_matrix) -> float:
+    """Infinity norm of the symmetric matrix with this upper triangle (its diagonal counted twice)."""
+    size = np.abs(upper.data)
+    columns = np.bincount(upper.indices, size, minlength=upper.shape[0])
+    return float((np.add.reduceat(size, upper.indptr[:-1]) + columns).max())
+
+
+def rigid_shift(model: BodyModel) -> float:
+    """Negative shift for bodies with rigid modes: minus the square of a twentieth of wave speed over length."""
+    stiffness = np.linalg.eigvalsh(model.material.elasticity).max()
+    length = np.ptp(model.d.mesh.points, axis=0).max()
+    return -float(0.05**2 * stiffness / model.material.density / length**2)
+
+
+def static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix, R: Array, shift: float) -> Array:
+    """(r, r) displacement of row i under unit force on row j; inertia relief when rigid motions are free.
+
+    With rigid motions, the part outside the modes found is solved by fixed-point iteration on the shifted
+    factorisation, which contracts by |shift| / (lambda_next + |shift|) a step; a body so slender that this would
+    hardly contract is factorised again, with a smaller shift.
+    """
+    F = np.asarray(B.T.todense())
+    if not F.shape[1]:
+        return np.zeros((0, 0))
+    if not R.shape[1]:
+        C = np.asarray(B @ pencil.solve(F))
+        return 0.5 * (C + C.T)
+    if -shift > 0.3 * found.upper_shift:
+        shift = -0.1 * found.upper_shift
+        pencil.solver.factorise(pencil.shifted(shift))
+    X = found.vectors
+    MX = pencil.M(X)
+    elastic = found.values[R.shape[1] :]
+    T = np.asarray(B @ X[:, R.shape[1] :])
+    rest = F - MX @ (X.T @ F)
+    u = np.zeros_like(rest)
+    previous = np.inf
+    for _ in range(60):
+        step = pencil.solve(rest)
+        step -= X @ (MX.T @ step)
+        u += step
+        size = np.abs(step).max() / max(np.abs(u).max(), 1e-300)
+        if size < 1e-13 or (size < 1e-8 and size > 0.3 * previous):  # no further gain above rounding
+            break
+        previous = size
+        rest = -shift * pencil.M(step)  # what K leaves of the step: K s = rest + shift M s
+        rest -= MX @ (X.T @ rest)
+    C = (T / elastic) @ T.T + np.asarray(B @ u)
+    return 0.5 * (C + C.T)
+
+
+def leading_rows(
+    rows: BodyRows, settings: BodySettings, phi: Array, place: Indices
+) -> Callable[[Array], Array]:
+    """Rows that decide signs and the basis of pairs: the first interface's, else the strongest nodes' motion."""
+    first = next((i.name for i in settings.interfaces), None)
+    chosen = _strong(phi, place)
+    if first is not None:
+        B = rows.patches[first].B
+        return lambda x: np.vstack([B @ x, x[chosen]])
+    return lambda x: x[chosen]
+
+
+def _strong(phi: Array, place: Indices) -> Indices:
+    """Degrees of freedom with the largest motion over all modes, a few of them; of ties the first in `place`."""
+    power = (phi[place] ** 2).sum(axis=1)
+    return place[np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]]
