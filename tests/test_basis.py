@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -9,7 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import h5py
@@ -19,7 +20,7 @@ import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
 from microslip.data import Mesh, ModalBasis, UserError
-from microslip.hdf5 import HostileFile, inspect, seal_state
+from microslip.hdf5 import HostileFile, inspect, seal, seal_state, trial
 from microslip.integrate import modal_mass
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -209,8 +210,16 @@ def test_xarray_names_the_dimensions(file: Path) -> None:
 # ---------------------------------------------------------------- checks
 
 
-def change(path: Path, place: str, how: Callable[[np.ndarray], np.ndarray]) -> None:
+@contextlib.contextmanager
+def edited(path: Path) -> Iterator[h5py.File]:
+    """The file open for changes. It is sealed again, or every reading would begin with a trial."""
     with h5py.File(path, "r+") as f:
+        yield f
+    seal(path)
+
+
+def change(path: Path, place: str, how: Callable[[np.ndarray], np.ndarray]) -> None:
+    with edited(path) as f:
         f[place][...] = how(f[place][...])
 
 
@@ -265,7 +274,6 @@ TAMPERED = {
 @pytest.mark.parametrize("what", TAMPERED)
 def test_tampered_content_is_found(copy: Path, what: str) -> None:
     change(copy, *TAMPERED[what])
-    assert seal_state(copy) == "absent"
     try:
         assert failed(read_basis(copy)) != []
     except UserError as error:
@@ -364,6 +372,25 @@ def test_a_cut_seal_leaves_a_readable_file(copy: Path) -> None:
     assert failed(read_basis(copy)) == []
 
 
+def test_another_program_may_change_the_file(copy: Path) -> None:
+    with h5py.File(copy, "r+") as f:
+        f["mine"] = [1.0, 2.0]
+    assert seal_state(copy) == "absent"
+    assert failed(read_basis(copy)) == []
+
+
+def test_files_without_a_seal_are_tried_in_a_process_of_their_own(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert trial("path.read_bytes()", copy) == ""
+    assert trial("raise ValueError", copy) == ""
+    assert trial("import os; os.abort()", copy) == "crashes"
+    assert trial("while True: pass", copy, seconds=1.0) == "does not come to an end"
+    assert trial("raise MemoryError", copy) == "wants too much memory"
+    monkeypatch.setattr("microslip.basis._TRIAL", "import os; os.abort()")
+    assert failed(read_basis(copy)) == []  # sealed: no trial
+    copy.write_bytes(copy.read_bytes()[:-10])
+    assert "HDF5 crashes on it" in refusal(copy)
+
+
 def test_any_flipped_byte_breaks_the_seal(copy: Path) -> None:
     data = copy.read_bytes()
     assert seal_state(copy) == "intact"
@@ -375,13 +402,13 @@ def test_any_flipped_byte_breaks_the_seal(copy: Path) -> None:
 
 
 def test_another_major_version(copy: Path) -> None:
-    with h5py.File(copy, "r+") as f:
+    with edited(copy) as f:
         f.attrs["format_version"] = "7.1"
     assert "7.1" in refusal(copy)
 
 
 def test_a_cyclic_sector_is_not_misread(copy: Path) -> None:
-    with h5py.File(copy, "r+") as f:
+    with edited(copy) as f:
         f["cyclic"].attrs["N"] = 24
     assert "cyclic" in refusal(copy)
 
@@ -401,10 +428,10 @@ def test_every_missing_part_is_named(tmp_path: Path) -> None:
     parts += [AT + p for p in ("stress/gauss/T", "stress/gauss/points", "stress/gauss/weights", "strain/gauss/T")]
     parts += [AT + p for p in ("rotation/sigma_static/gauss", "strain")]
     for part in parts:
-        with h5py.File(path, "r+") as f:
+        with edited(path) as f:
             f.move(part, "elsewhere")
         assert "damaged or incomplete" in refusal(path), part
-        with h5py.File(path, "r+") as f:
+        with edited(path) as f:
             f.move("elsewhere", part)
     assert failed(read_basis(path)) == []
 
@@ -441,7 +468,7 @@ def test_hostile_content_is_refused_before_it_is_read(copy: Path, tmp_path: Path
 
     for trick in (soft, external, circle, huge, objects, references, elsewhere, virtual, named_type):
         path = Path(shutil.copy(copy, tmp_path / f"{trick.__name__}.h5"))
-        with h5py.File(path, "r+") as f:
+        with edited(path) as f:
             trick(f)
         assert "body/extra" in refusal(path) or trick is circle, trick.__name__
         with h5py.File(path) as f, pytest.raises(HostileFile):

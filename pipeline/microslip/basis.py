@@ -28,7 +28,7 @@ from .data import (
     StressSet,
     UserError,
 )
-from .hdf5 import create, inspect, put, put_scale, seal, seal_state
+from .hdf5 import create, inspect, put, put_scale, seal, seal_state, trial
 from .store import complete_or_absent
 from .topology import CELL_TYPES, FACET_CORNERS
 
@@ -263,6 +263,9 @@ def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset
 def open_file(path: Path | str) -> h5py.File:
     """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
+    A file without a seal, one that another program has written or changed, is first read by a process of its own:
+    damaged HDF5 can hang the library or crash it.
+
     Raises:
         UserError: missing, damaged, foreign or of another major version.
     """
@@ -270,8 +273,23 @@ def open_file(path: Path | str) -> h5py.File:
     if not path.is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
     try:
-        if seal_state(path) == "broken":
-            raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); write it again")
+        state = seal_state(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
+    if state == "broken":
+        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); write it again")
+    if not h5py.is_hdf5(path):
+        raise UserError(f"{path}: is damaged or no HDF5 file; write it again")
+    if state == "absent" and (trouble := trial(_TRIAL, path)):
+        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); write it again")
+    return _open(path)
+
+
+_TRIAL = "from microslip.basis import _open, _read; _read(_open(path))"
+
+
+def _open(path: Path) -> h5py.File:
+    try:
         file = h5py.File(path, "r")
     except _DAMAGE as error:
         raise UserError(f"{path}: is damaged or no HDF5 file ({_short(error)}); write it again") from error

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -177,3 +180,40 @@ def _inspect_dataset(item: h5py.Dataset, place: str, budget: list[int]) -> None:
     budget[0] -= int(np.prod(item.shape, dtype=object)) * item.dtype.itemsize
     if budget[0] < 0:
         raise HostileFile(f"{place} claims more data than the file can hold")
+
+
+_GUARD = """
+import sys
+from pathlib import Path
+path, memory, source, code = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3], sys.argv[4]
+sys.path.insert(0, source)
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+except (ImportError, ValueError, OSError):
+    pass  # not on Windows
+try:
+    exec(code)
+except MemoryError:
+    sys.exit(7)
+except Exception:
+    pass
+"""
+
+
+def trial(code: str, path: Path, seconds: float = 20.0) -> str:
+    """Run `code` on a file (it sees ``path``) in a process of its own, whatever becomes of it.
+
+    Returns:
+        Nothing if the process came to an end, with a result or a Python exception; else what happened.
+    """
+    size = path.stat().st_size
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    words = [str(path.resolve()), str((4 << 30) + 100 * size), str(Path(__file__).parents[1]), code]
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _GUARD, *words], capture_output=True, env=environment, timeout=seconds + size / 1e7
+        )
+    except subprocess.TimeoutExpired:
+        return "does not come to an end"
+    return {0: "", 7: "wants too much memory"}.get(done.returncode, "crashes")
