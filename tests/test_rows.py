@@ -209,6 +209,20 @@ def test_every_node_and_quadrature_point_is_found(cell_type):
         np.testing.assert_allclose(place.N @ mesh.points[place.nodes], x, atol=1e-9 * 0.1)
 
 
+def test_points_in_a_large_cell_beside_many_small_ones_are_found():
+    """The centres of a hundred thin cells are nearer than that of the thick cell the point lies in."""
+
+    def thin(points):
+        out = points.copy()
+        out[:, 0] = np.where(points[:, 0] <= 100, 1e-3 * points[:, 0], 0.1 + (points[:, 0] - 100))
+        return out
+
+    mesh = brick("hexahedron20", (101, 1, 1), (101.0, 0.2, 0.2), to=thin, straight=True)
+    place = Locator(mesh).find(np.array([0.15, 0.11, 0.07]), "monitor")
+    assert place.distance == 0
+    np.testing.assert_allclose(place.point, [0.15, 0.11, 0.07], atol=1e-12)
+
+
 def test_a_point_outside_is_drawn_to_the_surface():
     """Slightly outside: the nearest place of the body and how far; far outside: refused."""
     mesh = brick("tetra10", (3, 3, 3), (0.3, 0.2, 0.1))

@@ -5,12 +5,12 @@ A row set is a sparse matrix B (r, 3n) on u = (u_x1, u_y1, u_z1, u_x2, ...): ``B
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.optimize import lsq_linear, nnls
-from scipy.spatial import cKDTree
 
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
@@ -73,7 +73,8 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
     J = np.trace(second) * np.eye(3) - second
     if np.linalg.cond(J) > 1e9:
         raise UserError(
-            f"interface '{name}': the points of face '{face}' lie on a line, so it has no rotation; pick a face with area"
+            f"interface '{name}': the points of face '{face}' lie on a line, so it has no rotation; "
+            "pick a face with area"
         )
     # weights (6, p, 3): translation and J^-1 (r x u), turned into the interface frame
     W = np.empty((6, len(points), 3))
@@ -136,15 +137,23 @@ class Location:
 
 @dataclass
 class Locator:
-    """Finds the cell and reference coordinates of points (Newton on the curved map of the nearest cells)."""
+    """Finds the cell and reference coordinates of points (Newton on the curved map, nearest boxes first)."""
 
     mesh: Mesh
-    _cells: list[tuple[str, Array, cKDTree]] = field(default_factory=list)
+    _first: list[int] = field(default_factory=list)  # number of the first cell of each type
+    _low: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    _high: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
+        low, high = [], []
         for cell_type, cells in self.mesh.cells.items():
-            centre = self.mesh.points[cells[:, : CELL_TYPES[cell_type].corners]].mean(axis=1)
-            self._cells.append((cell_type, centre, cKDTree(centre)))
+            self._first.append(sum(map(len, low)))
+            first, last = self.mesh.points[cells].min(axis=1), self.mesh.points[cells].max(axis=1)
+            # the sides of a quadratic cell may bulge beyond its nodes, by an eighth of their second difference
+            bulge = 0.1 * (last - first).max(axis=1, keepdims=True) * (CELL_TYPES[cell_type].order > 1)
+            low.append(first - bulge)
+            high.append(last + bulge)
+        self._low, self._high = np.concatenate(low), np.concatenate(high)
 
     def find(self, point: Array, what: str) -> Location:
         """Locate a point; if it is outside, the nearest place of the body.
@@ -153,15 +162,17 @@ class Locator:
             UserError: further from the body than 2 % of the body's size.
         """
         point = np.asarray(point, dtype=float)
+        away = np.linalg.norm(np.maximum(np.maximum(self._low - point, point - self._high), 0.0), axis=1)
+        middle = np.linalg.norm(self._low + self._high - 2 * point, axis=1)
         best: Location | None = None
-        for cell_type, centre, tree in self._cells:
-            _, near = tree.query(point, k=min(48, len(centre)))
-            for cell in np.atleast_1d(near):
-                found = self._in_cell(cell_type, self.mesh.cells[cell_type][cell], point)
-                if best is None or found.distance < best.distance - 1e-15:
-                    best = found
-                if best.distance == 0.0:
-                    return best
+        for cell in np.lexsort((middle, away)):
+            if best is not None and away[cell] >= best.distance:
+                break  # no later box is nearer
+            found = self._in_cell(*self._cell(int(cell)), point)
+            if best is None or found.distance < best.distance - 1e-15:
+                best = found
+            if best.distance == 0.0:
+                return best
         assert best is not None
         size = np.ptp(self.mesh.points, axis=0).max()
         if best.distance > 0.02 * size:
@@ -170,6 +181,11 @@ class Locator:
                 f"{best.point.round(6).tolist()} m); correct it, or check length_unit"
             )
         return best
+
+    def _cell(self, number: int) -> tuple[str, Indices]:
+        block = bisect_right(self._first, number) - 1
+        cell_type = list(self.mesh.cells)[block]
+        return cell_type, self.mesh.cells[cell_type][number - self._first[block]]
 
     def _in_cell(self, cell_type: str, nodes: Indices, point: Array) -> Location:
         kind = CELL_TYPES[cell_type]
