@@ -202,7 +202,7 @@ def contact() -> None:
     for normal, response in sorted(result.responses.items(), reverse=True):
         f, a = max((p for p in peaks(response) if p[0] < 200), key=lambda p: p[1])
         i = int(np.argmin(np.abs(response.frequency - f)))
-        rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{1e6 * response.dissipated[i]:.3g}"])
+        rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{1e6 * response.dissipated[i]:.0f}"])
     fill("blade.md", "peaks", table(["F_N, N", "resonance, Hz", "amplitude, um", "friction loss a cycle, uJ"], rows))
     PICTURES.mkdir(exist_ok=True)
     response_picture(result, BUILD / "response.png")
