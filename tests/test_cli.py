@@ -23,7 +23,7 @@ from microslip.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[1]
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX systems")
-HEAVY = ("gmsh", "meshio", "skfem", "pyvista", "vtkmodules", "vtk", "matplotlib", "imageio", "PIL", "jax", "qdldl", "pypardiso")
+HEAVY = "gmsh meshio skfem pyvista vtkmodules vtk matplotlib imageio PIL jax qdldl pypardiso".split()
 
 
 def environment() -> dict[str, str]:
@@ -72,7 +72,8 @@ def test_help_names_every_verb_and_loads_nothing_heavy() -> None:
         "print(*sorted({m.split('.')[0] for m in sys.modules}), file=sys.stderr); sys.exit(code)"
     )
     began = os.times()
-    done = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True)
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
     ended = os.times()
     for verb in ("init", "mesh", "modes", "run", "check", "export", "report", "info"):
         assert f" {verb} " in done.stdout
@@ -230,7 +231,8 @@ def mistakes(folder: Path) -> Path:
     (folder / "bad.toml").write_text('name = "box\n')
     (folder / "body.toml").write_text("")
     (folder / "bad.stl").write_bytes(bytes(range(256)))
-    (folder / "stray.toml").write_text((folder / "box/case.toml").read_text().replace('body = "box"', 'body = "nobody"'))
+    case = (folder / "box/case.toml").read_text()
+    (folder / "stray.toml").write_text(case.replace('body = "box"', 'body = "nobody"'))
     return folder
 
 
@@ -302,7 +304,9 @@ def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch)
     ],
     ids=["while gmsh works", "while the modes are solved"],
 )
-def test_an_interrupt_exits_130_and_leaves_no_half_product(tmp_path: Path, words: list[str], sign: str, absent: str) -> None:
+def test_an_interrupt_exits_130_and_leaves_no_half_product(
+    tmp_path: Path, words: list[str], sign: str, absent: str
+) -> None:
     write_box(tmp_path / "box")
     process = start(tmp_path, *words)
     assert process.stderr is not None

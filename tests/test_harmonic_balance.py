@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from microslip.data import Compliance, Interface, ModalGroup
 from microslip.harmonic_balance import JenkinsContact, frequency_response, jenkins_harmonic, peaks, stuck_frequencies
 

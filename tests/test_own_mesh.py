@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+
 from microslip.modes import modal_basis
 from microslip.workflow import load_mesh, mesh_stage, open_job
 
@@ -51,7 +52,8 @@ def frequencies(tmp_path_factory):
     found = {}
     for name, version in (("a.msh", 4.1), ("b.msh", 2.2), ("c.unv", 4.1), ("d.inp", 4.1), ("e.med", 4.1)):
         folder = tmp_path_factory.mktemp("own")
-        done = subprocess.run([sys.executable, "-c", DRAW, str(folder / name), str(version)], capture_output=True, text=True)
+        command = [sys.executable, "-c", DRAW, str(folder / name), str(version)]
+        done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             assert "med" in name, done.stderr  # gmsh may be built without MED
             continue

@@ -1,4 +1,4 @@
-"""The chain body.toml -> mesh -> modal file -> response -> report: only what changed is made again; products complete."""
+"""The chain from body.toml to the report: only what changed is made again, and products are complete."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def test_a_case_finds_its_body(box: Path, tmp_path: Path) -> None:
     ("script", "sentence"),
     [
         ("import sys; sys.exit('the wall is thicker than the pipe')", "meshing failed.*thicker"),
-        ("import sys; print('wall = 9 is too thick', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too thick"),
+        ("import sys; print('wall = 9 is too much', file=sys.stderr); sys.exit(2)", "body.toml: wall = 9 is too much"),
         ("raise ValueError('odd')", "meshing failed .ValueError: odd."),
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"),
         ("", "meshing failed .no message."),

@@ -99,7 +99,8 @@ def run_case(
     monitored = _row(group.monitors, settings.monitor, path, "monitor")
     label = f"u_{settings.direction}"
     if label not in monitored.labels:
-        raise UserError(f"{path}: direction: monitor '{settings.monitor}' reads {', '.join(monitored.labels)}, not {label}")
+        known = ", ".join(monitored.labels)
+        raise UserError(f"{path}: direction: monitor '{settings.monitor}' reads {known}, not {label}; choose one")
     watch = monitored.rows[monitored.labels.index(label)]
     for c in settings.contacts:
         if c.interface not in group.interfaces:

@@ -6,6 +6,7 @@ import logging
 import os
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -87,7 +88,7 @@ def mesh(body: Path, /, *, output: Output = None, set_: Set = (), force: Force =
         grid, warnings = load_mesh(job, path)
         for warning in warnings:
             report(f"warning: {warning}")
-    _say(f"{path}: {grid.n_points} points, {grid.n_cells} cells, faces {', '.join(sorted(grid.faces)) or 'none'}", quiet)
+    _say(f"{path}: {grid.n_points} points, {grid.n_cells} cells, faces {_words(grid.faces)}", quiet)
 
 
 @app.command
@@ -223,7 +224,7 @@ def info(file: Path, /, *, unit: str = "mm") -> None:
         size = (grid.points.max(axis=0) - grid.points.min(axis=0)).tolist()
         kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
         print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")
-        print(f"faces: {', '.join(sorted(grid.faces)) or 'none'}\npoint sets: {', '.join(sorted(grid.point_sets)) or 'none'}")
+        print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
         errors, warnings = mesh_problems(grid)
         _warn(warnings)
         if errors:
@@ -246,6 +247,10 @@ def _cad_info(file: Path, unit: str) -> None:
 def _say(text: object, quiet: bool) -> None:
     if not quiet:
         print(text)
+
+
+def _words(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names)) or "none"
 
 
 def _warn(warnings: list[str]) -> None:
@@ -280,8 +285,13 @@ def main(words: list[str] | None = None) -> int:
 
 
 def _missing(error: ModuleNotFoundError) -> str:
-    extras = {"skfem": "fem", "meshio": "fem", "gmsh": "fem", "matplotlib": "viz", "pyvista": "viz", "vtk": "viz", "jax": "solve"}
-    extra = extras.get((error.name or "").split(".")[0])
+    extras = {
+        "fem": ("skfem", "meshio", "gmsh", "qdldl"),
+        "viz": ("matplotlib", "pyvista", "vtk", "vtkmodules", "imageio", "PIL"),
+        "solve": ("jax",),
+    }
+    package = (error.name or "").split(".")[0]
+    extra = next((e for e, packages in extras.items() if package in packages), None)
     if extra is None:
         raise error
     return f"this needs the package {error.name}, which is not installed; pip install 'microslip[{extra}]'"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 from .errors import NotConverged as NotConverged
 from .errors import UserError as UserError
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
+"""Real numbers in double precision unless the docstring says otherwise."""
+
 Indices = NDArray[np.int64]
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")

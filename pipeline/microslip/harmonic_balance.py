@@ -121,7 +121,7 @@ def _slider_stiffness(contacts: list[JenkinsContact], amplitude: Array) -> tuple
 
 
 def _solve_sliders(contacts: list[JenkinsContact], free: Array, D: Array, start: Array) -> tuple[Array, bool]:
-    """u + D k(|u|) u = free by Newton in real and imaginary parts with halved steps; from `start`, then from sticking."""
+    """u + D k(|u|) u = free by Newton in real and imaginary parts with halved steps, from `start` or from sticking."""
     stuck = np.linalg.solve(np.eye(len(free)) + D * [c.tangential for c in contacts], free)
     scale = np.abs(free).max(initial=1e-300)
     for u in (start, stuck, free):

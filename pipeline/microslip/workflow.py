@@ -92,7 +92,7 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
 
 
 def _code_hash(parts: tuple[str, ...]) -> str:
-    files = sorted(f for p in parts for f in ([PACKAGE / p] if (PACKAGE / p).is_file() else (PACKAGE / p).rglob("*.py")))
+    files = sorted(f for p in parts for f in ([PACKAGE / p] if p.endswith(".py") else (PACKAGE / p).rglob("*.py")))
     return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
 
 
@@ -176,8 +176,8 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
         )
     if done.returncode < 0 and job.settings.geometry.cad:
         return (
-            f"{job.path}: geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} (signal {-done.returncode}); "
-            "the file is probably damaged, export it again"
+            f"{job.path}: geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} "
+            f"(signal {-done.returncode}); the file is probably damaged, export it again"
         )
     if done.returncode < 0:
         return f"{job.path}: gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
@@ -223,7 +223,7 @@ def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
         found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
         if not found:
-            raise UserError(f"{job.path}: geometry.faces.{rule.name}: no facet of the surface lies in the box; widen it")
+            raise UserError(f"{job.path}: geometry.faces.{rule.name}: no facet of the surface is in the box; widen it")
         faces[rule.name] = found
     return replace(mesh, faces=faces)
 
@@ -364,7 +364,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
     for normal, response in result.responses.items():
         for frequency, amplitude in peaks(response):
             rows.append({"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude})
-    failed = sum(int((~r.converged).sum()) for r in result.responses.values())
+    failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
     return {
         "case": result.settings.name,
         "description": result.settings.description,
@@ -443,7 +443,7 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
 def run_case_file(
     path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
 ) -> tuple[Path, bool]:
-    """The modal file a case needs, and the case. Products of a case named otherwise than its body have their own folder.
+    """The modal file a case needs, and the case; the products of one not named like its body have their own folder.
 
     Returns:
         The report's path (the table's, for a case that has its own folder), and whether every point converged.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,7 +44,7 @@ def reference_nodes(cell_type: str) -> Array:
 
 
 @cache
-def _element(cell_type: str):  # noqa: ANN202 - a scikit-fem element and the permutation to VTK's order
+def _element(cell_type: str) -> Any:  # a scikit-fem element and the permutation to VTK's order
     import skfem
 
     element = getattr(skfem, _ELEMENTS[cell_type][0])()
@@ -215,7 +216,8 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None) -> Block:
     if (bad := (det <= 0).any(axis=1)).any():
         raise UserError(
             f"{bad.sum()} of {len(cells)} {cell_type} cells are inside out or degenerate where they are "
-            f"integrated (first: cell {int(np.flatnonzero(bad)[0]) + 1} of its type); straighten their mid-side nodes or remesh"
+            f"integrated (first: cell {int(np.flatnonzero(bad)[0]) + 1} of its type); straighten their mid-side nodes "
+            "or remesh"
         )
     grad = np.matmul(_inverse3(jacobian, det).transpose(0, 1, 3, 2), dN[None])
     return Block(cell_type, cells, at, N, grad, det * weights)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..data import Array, Indices
@@ -61,8 +63,8 @@ def _direction(v: Array) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in v) + ")"
 
 
-def mass_orthonormal(motions: Array, mass_product) -> Array:  # noqa: ANN001 - callable (n, r) -> (n, r)
-    """M-orthonormal basis of the span of the columns."""
+def mass_orthonormal(motions: Array, mass_product: Callable[[Array], Array]) -> Array:
+    """M-orthonormal basis of the span of the columns; `mass_product` maps (n, r) to M times it."""
     gram = motions.T @ mass_product(motions)
     w, Q = np.linalg.eigh(gram)
     return motions @ (Q / np.sqrt(w))
