@@ -16,8 +16,8 @@ stop() { say "$@"; exit 2; }
 # Foreign settings that would leak into the environment, and a cache only where one can be kept.
 unset PYTHONPATH PYTHONHOME
 export PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 UV_LINK_MODE="${UV_LINK_MODE:-copy}"
-CACHE=${XDG_CACHE_HOME:-${HOME:-/nowhere}/.cache}
-if ! mkdir -p "$CACHE" 2>/dev/null || ! [ -w "$CACHE" ] || ! [ -O "$CACHE" ]; then
+CACHE=${XDG_CACHE_HOME:-${HOME:+$HOME/.cache}}
+if [ -z "$CACHE" ] || ! mkdir -p "$CACHE" 2>/dev/null || ! [ -w "$CACHE" ] || ! [ -O "$CACHE" ]; then
     export PIP_NO_CACHE_DIR=1 UV_NO_CACHE=1
 fi
 
