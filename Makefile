@@ -4,6 +4,7 @@
 BODIES   := blade shroud pendulum half-pipe
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
+PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile
 READY    := .venv/.ready
 SOURCES  := $(shell find pipeline/microslip -name '*.py')
 
@@ -17,7 +18,7 @@ MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved
 .DELETE_ON_ERROR:
 .SECONDARY:
 .SECONDEXPANSION:
-.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-all lint docs bench clean distclean
+.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -44,10 +45,13 @@ build/%/report.html: build/%/basis.h5 $$(wildcard pipeline/cases/$$*.toml) $(SOU
 	@$(RUN) run geometry/$*
 
 test: $(READY) ## the quick tests, under ten minutes on two cores
-	@$(PYTHON) -m pytest -n 2 --dist loadfile
+	@$(PYTEST)
 
-test-all: $(READY) ## also the slow ones and the peers (CalculiX, if it is installed)
-	@$(PYTHON) -m pytest -n 2 --dist loadfile -m "slow or not slow"
+test-slow: $(READY) ## only the slow ones and the peers (CalculiX, if it is installed)
+	@$(PYTEST) -m slow
+
+test-all: $(READY) ## both
+	@$(PYTEST) -m "slow or not slow"
 
 lint: $(READY) ## ruff and mypy
 	@.venv/bin/ruff check .
