@@ -130,6 +130,14 @@ def test_a_sweep_gives_what_single_speeds_give():
     assert sweep.groups[0, 0].prestress == "none" and sweep.groups[2, 0].speed == pytest.approx(400 * np.pi)
 
 
+def test_newton_is_not_misled_by_an_indefinite_step_on_its_way():
+    """A foil of a blade at once at 48000 rpm: iterates have negative directions, the equilibrium has none."""
+    foil = twisted_blade(n=(1, 3, 8), thickness=0.0008, twist=-1.0, stagger=1.2)
+    at_once = the_group(foil, **ROOT, rotation=at_rpm(48000))
+    by_steps = modal_basis(foil, body(**ROOT, modes={"count": 4}, rotation={"speeds_rpm": [12000.0, 24000.0, 48000.0]}))
+    np.testing.assert_allclose(at_once.omega, by_steps.groups[2, 0].omega, rtol=1e-7)
+
+
 def test_rotor_axis_and_point_are_used():
     """A blade and its copy moved along the rotor axis see the same; away from it, more pull."""
     from meshes import moved

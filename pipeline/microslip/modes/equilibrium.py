@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Array, Indices, Material, NotConverged, UserError
-from ..eigen import DirectSolver
+from ..eigen import DirectSolver, Unstable
 from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import (
     displacement_gradient,
@@ -154,9 +154,9 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
         relaxed = stress_of(model, [np.zeros_like(e) for e in model.thermal_strain])
         force = force - internal_force(model.d, relaxed, None)
     solver.factorise(model.free.matrix(model.K0))
-    u = np.zeros(3 * n)
-    u[model.free.free] = solver.solve(force.reshape(-1)[model.free.free])
-    u = u.reshape(n, 3)
+    flat = np.zeros(3 * n)
+    flat[model.free.free] = solver.solve(force.reshape(-1)[model.free.free])
+    u = flat.reshape(n, 3)
     H = [displacement_gradient(b, u) for b in model.d.blocks]
     stress = stress_of(model, [green_strain(h, nonlinear=False) for h in H])
     K = _tangent(model, H, stress) + soft
@@ -164,7 +164,7 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
 
 
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
-    factor = model.factor or [None] * len(H)
+    factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
     A = [tangent_tensor(model.material.elasticity, f, h, s) for f, h, s in zip(factor, H, stress, strict=True)]
     return tangent(model.d, A)
 
@@ -184,10 +184,10 @@ def _newton(
         target = min(level + step, 1.0)
         try:
             state = _newton_at(model, speed, target, solver, good)
-        except NotConverged:
+        except NotConverged as error:
             step *= 0.5
             if step < 1 / 64:
-                raise
+                raise UserError(_unstable(speed, error.count)) if isinstance(error, Unstable) else error from None
             continue
         total += state.iterations
         report(f"static state: {100 * target:.0f} % of the load after {total} Newton steps")
@@ -219,10 +219,7 @@ def _newton_at(
         residual = (outer - internal_force(model.d, stress, H)).reshape(-1)[free]
         solver.factorise(model.free.matrix(K + soft))
         if (negative := solver.negative()) and len(steps) > 3:
-            raise UserError(
-                f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has "
-                f"{negative} negative directions: buckling or centrifugal divergence); lower the speed or the loads"
-            )
+            raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
         change = np.zeros(3 * n)
         change[free] = solver.solve(residual)
         u = u + change.reshape(n, 3)
@@ -230,6 +227,13 @@ def _newton_at(
         if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * size:
             break
     raise NotConverged(_no_equilibrium(speed))
+
+
+def _unstable(speed: float, count: int) -> str:
+    return (
+        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} negative "
+        "directions: buckling or centrifugal divergence); lower the speed or the loads"
+    )
 
 
 def _no_equilibrium(speed: float) -> str:
