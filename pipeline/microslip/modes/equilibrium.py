@@ -231,8 +231,8 @@ def _newton_at(
 
 def _unstable(speed: float, count: int) -> str:
     return (
-        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} negative "
-        "directions: buckling or centrifugal divergence); lower the speed or the loads"
+        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} "
+        "negative directions: buckling or centrifugal divergence); lower the speed or the loads"
     )
 
 
