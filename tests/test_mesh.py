@@ -236,6 +236,7 @@ DAMAGED = {
     "not a number": (r"0 1 1\n1 0 1", "0 nan 1\n1 0 1", "three finite numbers"),
     "infinity": (r"0 1 1\n1 0 1", "0 inf 1\n1 0 1", "three finite numbers"),
     "overflow": (r"0 1 1\n1 0 1", "0 1e999 1\n1 0 1", "three finite numbers"),
+    "far away": (r"0 1 1\n1 0 1", "0 1e300 1\n1 0 1", "m from the origin"),
     "a broken name": (r'2 5 "foot"', '2 5 "foot', "$PhysicalNames holds the line"),
     "more names announced": (r"\n3\n0 7", "\n4\n0 7", "another number of names"),
     "a partition": (r"\$Nodes", "$PartitionedEntities\n0\n$EndPartitionedEntities\n$Nodes", "partitioned"),

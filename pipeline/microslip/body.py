@@ -124,11 +124,9 @@ class Meshing(Model):
 
 
 def _at_right_angles(axes: Array) -> bool:
-    lengths = np.linalg.norm(axes, axis=1)
-    if lengths.min() == 0:
-        return False
-    cosines = (axes / lengths[:, None]) @ (axes / lengths[:, None]).T
-    return bool(np.abs(cosines - np.eye(3)).max() < 1e-6)
+    with np.errstate(all="ignore"):  # a zero or immense axis gives NaN, which compares false
+        unit = axes / np.linalg.norm(axes, axis=1)[:, None]
+        return bool(np.abs(unit @ unit.T - np.eye(3)).max() < 1e-6)
 
 
 class MaterialSettings(Model):
@@ -165,7 +163,10 @@ class MaterialSettings(Model):
             raise ValueError("expansion is one number or three along the material axes")
         if self.axes is not None and not _at_right_angles(np.array(self.axes)):
             raise ValueError("axes must be three directions at right angles")
-        self.material()
+        with np.errstate(all="ignore"):
+            built = self.material()
+        if not (np.isfinite(built.elasticity).all() and np.isfinite(built.expansion).all()):
+            raise ValueError("young, poisson, shear and expansion give no finite stiffness")
         return self
 
     def material(self) -> Material:

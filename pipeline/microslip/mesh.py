@@ -29,6 +29,7 @@ from .topology import CELL_TYPES, FACET_CORNERS
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
 
+_FARTHEST = 1e9  # m; beyond it a file is damaged, and geometry loses its digits
 _FIRST_ORDER = {"tetra", "hexahedron"}
 _IGNORED = {"vertex", "line", "line3"}
 
@@ -86,6 +87,8 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
     points = raw.points * metres
     if points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
+    if np.abs(points).max() > _FARTHEST:
+        raise UserError(f"{path}: a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
     return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, path)
 
 
@@ -359,3 +362,13 @@ def part_numbers(mesh: Mesh) -> Indices:
     cols = np.concatenate([c[:, 1:].ravel() for c in mesh.cells.values()])
     graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(mesh.n_points, mesh.n_points))
     return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def longest_over_shortest(mesh: Mesh) -> float:
+    """Largest ratio, over all cells, of a cell's longest edge to its shortest."""
+    worst = 1.0
+    for cell_type, cells in mesh.cells.items():
+        ends = mesh.points[cells[:, np.array(CELL_TYPES[cell_type].edges)]]
+        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+        worst = max(worst, float((length.max(axis=1) / np.maximum(length.min(axis=1), 1e-300)).max(initial=1.0)))
+    return worst
