@@ -84,10 +84,11 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
 
 
 def _load_patch(mesh: Mesh, face: str) -> Patch:
+    """The points, areas and shapes of a load face; a face that closes on itself keeps the body's axes as frame."""
     blocks = face_blocks(mesh, face)
-    mean = sum(b.area.sum(axis=(0, 1)) for b in blocks)
+    mean = np.sum([b.area.sum(axis=(0, 1)) for b in blocks], axis=0)
     hint = np.eye(3)[int(np.abs(mean).argmin())]
-    return patch(mesh, face, hint, face)
+    return patch(mesh, face, hint, face, needs_frame=False)
 
 
 def _excitation(mesh: Mesh, locator: Locator, e: Excitation) -> NamedRows:

@@ -21,6 +21,7 @@ from ..data import (
 )
 from ..fem.discretise import Discretisation, discretise, free_upper
 from ..fem.operators import skew
+from ..mesh import longest_over_shortest
 from . import canonical, rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
 from .boundary import check_held, fixed_dofs, with_dead_loads
@@ -116,7 +117,7 @@ def _group(
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
-        raise UserError(_divergence(settings, speed, error.count)) from error
+        raise UserError(_divergence(settings, speed, error.count, model)) from error
     B, labels = rows.stacked(settings)
     B_free = B[:, dofs] if B.shape[0] else sp.csr_matrix((0, pencil.n))
     static = static_compliance(pencil, found, B_free, R, shift)
@@ -137,7 +138,13 @@ def _group(
     return _assemble_group(model, settings, state, speed, rows, found, phi, omega, zero, static, B, labels, report)
 
 
-def _divergence(settings: BodySettings, speed: float, count: int) -> str:
+def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
+    if not speed and not model.loaded:
+        return (
+            f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
+            f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as the "
+            "shortest of the cell); refine the mesh or check length_unit"
+        )
     remedy = "lower the speed"
     if settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'

@@ -48,7 +48,7 @@ class Patch:
         return np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
 
 
-def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
+def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True) -> Patch:
     """Area-weighted, work-conjugate rigid fit of a face (Sextro Eqs. (5.1-6), (5.1-8)).
 
     The six rows minimise the area integral of |u - t - w x r|^2, so a rigid motion is reproduced exactly and
@@ -56,9 +56,10 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
 
     Args:
         t2: direction whose projection on the face becomes the second tangent. name: for messages.
+        needs_frame: whether a face without a mean normal (a bore) is refused; else it gets the body's axes.
 
     Raises:
-        UserError: t2 along the normal; a patch whose points lie on a line.
+        UserError: t2 along the normal; no mean normal; a patch whose points lie on a line.
     """
     blocks = face_blocks(mesh, face)
     points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
@@ -67,7 +68,9 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
     N = _interpolation(mesh.n_points, [(b.facets, b.N) for b in blocks])
     total = areas.sum()
     origin = areas @ points / total
-    rotation = _frame(vectors.sum(axis=0), t2, areas, points, name)
+    normal = vectors.sum(axis=0)
+    closed = np.linalg.norm(normal) < 1e-6 * total
+    rotation = np.eye(3) if closed and not needs_frame else _frame(normal, t2, areas, name)
     r = points - origin
     second = np.einsum("p,pi,pj->ij", areas, r, r)
     J = np.trace(second) * np.eye(3) - second
@@ -85,7 +88,7 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str) -> Patch:
     return Patch(origin, rotation, B, points, areas, vectors / areas[:, None], N)
 
 
-def _frame(normal: Array, t2: Array, areas: Array, points: Array, name: str) -> Array:
+def _frame(normal: Array, t2: Array, areas: Array, name: str) -> Array:
     if np.linalg.norm(normal) < 1e-6 * areas.sum():
         raise UserError(f"interface '{name}': the face closes on itself and has no mean normal; split it")
     n = normal / np.linalg.norm(normal)
