@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import shutil
 import sys
 from collections.abc import Iterable
@@ -56,21 +57,38 @@ def init(name: str, folder: Path | None = None, /) -> None:
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
-    if name not in known:
-        raise UserError(f"init {name}: there is no such body; choose one of {', '.join(known)}")
+    if name not in [*known, "own"]:
+        raise UserError(f"init {name}: there is no such body; choose one of {', '.join(known)}, own")
     target = folder or Path(name)
     if target.exists() and any(target.iterdir() if target.is_dir() else [target]):
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
     try:
         target.mkdir(parents=True, exist_ok=True)
-        for source in sorted((_bodies() / name).iterdir()):
-            if source.is_file():
-                shutil.copyfile(source, target / source.name)
-        if (_cases() / f"{name}.toml").is_file():
-            shutil.copyfile(_cases() / f"{name}.toml", target / "case.toml")
+        for source, copy in _to_copy(name):
+            shutil.copyfile(source, target / copy)
+            if copy.endswith(".toml"):
+                _rename(target / copy, target.resolve().name)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
     print(f"{target}: ready. Look at {target / 'body.toml'}, then: microslip run {target}")
+
+
+def _to_copy(name: str) -> list[tuple[Path, str]]:
+    """Files of a body that travels with the package, and their names in the new folder."""
+    if name == "own":
+        return [(PACKAGE / "templates" / "own.toml", "body.toml")]
+    files = [(f, f.name) for f in sorted((_bodies() / name).iterdir()) if f.is_file()]
+    case = _cases() / f"{name}.toml"
+    return files + ([(case, "case.toml")] if case.is_file() else [])
+
+
+def _rename(path: Path, name: str) -> None:
+    """Give the body (and its case) the name of its folder, so that its products stand in build/<folder>/."""
+    if re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", name):
+        text = path.read_text(encoding="utf-8")
+        for key in ("name", "body"):
+            text = re.sub(rf'^{key} = "[^"]*"', f'{key} = "{name}"', text, count=1, flags=re.M)
+        path.write_text(text, encoding="utf-8")
 
 
 @app.command
