@@ -148,9 +148,10 @@ class Locator:
     _high: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        low, high = [], []
+        low: list[Array] = []
+        high: list[Array] = []
         for cell_type, cells in self.mesh.cells.items():
-            self._first.append(sum(map(len, low)))
+            self._first.append(sum(len(boxes) for boxes in low))
             first, last = self.mesh.points[cells].min(axis=1), self.mesh.points[cells].max(axis=1)
             # the sides of a quadratic cell may bulge beyond its nodes, by an eighth of their second difference
             bulge = 0.1 * (last - first).max(axis=1, keepdims=True) * (CELL_TYPES[cell_type].order > 1)

@@ -6,6 +6,7 @@ of Wright, Smith, Thresher and Wang, Vibration modes of centrifugally stiffened 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +54,7 @@ def rectangle_kappa(poisson: float) -> float:
     return 5 * (1 + poisson) / (6 + 5 * poisson)
 
 
-_EULER = {  # ends -> (function whose roots are beta L, scaled so that it stays bounded; (k - shift) pi near a root)
+_EULER: dict[str, tuple[Callable[[float], float], float]] = {  # ends -> (function whose roots are beta L, scaled so that it stays bounded; (k - shift) pi near a root)
     "clamped-free": (lambda b: np.cos(b) + 1 / np.cosh(b), 0.5),
     "free-free": (lambda b: np.cos(b) - 1 / np.cosh(b), -0.5),
     "clamped-clamped": (lambda b: np.cos(b) - 1 / np.cosh(b), -0.5),
