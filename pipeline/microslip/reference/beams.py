@@ -54,7 +54,8 @@ def rectangle_kappa(poisson: float) -> float:
     return 5 * (1 + poisson) / (6 + 5 * poisson)
 
 
-_EULER: dict[str, tuple[Callable[[float], float], float]] = {  # ends -> (function whose roots are beta L, scaled so that it stays bounded; (k - shift) pi near a root)
+# ends -> (function whose roots are beta L, scaled so that it stays bounded; the k-th is near (k - shift) pi)
+_EULER: dict[str, tuple[Callable[[float], float], float]] = {
     "clamped-free": (lambda b: np.cos(b) + 1 / np.cosh(b), 0.5),
     "free-free": (lambda b: np.cos(b) - 1 / np.cosh(b), -0.5),
     "clamped-clamped": (lambda b: np.cos(b) - 1 / np.cosh(b), -0.5),
