@@ -160,9 +160,9 @@ def test_any_value_at_any_place_of_the_settings(
         place: Any = table
         for step in above:
             place = place[step]
-        place[last] = new
+        place[last] = copy.deepcopy(new)
         if more and isinstance(place, dict):
-            place[key] = value
+            place[key] = copy.deepcopy(value)
     with user_errors_only():
         validate(BodySettings, table, Path("body.toml"))
 

@@ -417,9 +417,10 @@ def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[
     """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
     for text in assignments:
         key, equals, value = text.partition("=")
+        key = " ".join(key.split())
         steps = [step.strip() for step in key.split(".")]
         if not equals or not all(steps):
-            raise UserError(f"--set {text}: is no setting; write --set key.subkey=value")
+            raise UserError(f"--set {key + equals}: is no setting; write --set key.subkey=value")
         place: Any = table
         for number, step in enumerate(steps[:-1]):
             if isinstance(place, list):

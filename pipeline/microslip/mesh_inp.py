@@ -226,7 +226,7 @@ def _generated(words: list[str], known: Indices, what: str) -> Indices:
 def _read_surface(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
     name, kind = parameters.get("NAME", ""), parameters.get("TYPE", "ELEMENT").upper()
     if name and "COMBINE" not in parameters:
-        deck.surfaces.append((name, kind, [_fields(line) for line in lines]))
+        deck.surfaces.append((name, kind, [words for line in lines if (words := _fields(line))]))
 
 
 _READERS = {
