@@ -177,7 +177,7 @@ def test_all_modes_together_hold_any_static_stress():
 
 
 def test_stress_modes_at_speed_are_derivatives_of_the_stress():
-    """About the deformed state: d S(u_static + h phi) / dh by central differences (strain is quadratic: exact)."""
+    """About the deformed state: F (d S(u_static + h phi) / dh) F^T / det F by central differences (exact)."""
     mesh = brick("tetra10", (1, 2, 5), (0.01, 0.04, 0.2), (0.0, 0.0, 0.1), to=shaken(0.002))
     group = the_group(mesh, 4, supports=[{"face": "z0"}], rotation={"speeds_rpm": [20000.0]})
     (b,) = discretise(mesh).blocks
@@ -185,14 +185,15 @@ def test_stress_modes_at_speed_are_derivatives_of_the_stress():
     def second(u):
         return green_strain(displacement_gradient(b, u)) @ STEEL_C.T
 
+    F = np.eye(3) + displacement_gradient(b, group.u_static)
     for j in range(4):
         phi = group.phi[:, :, j]
         h = 1e-4 / np.abs(phi).max()
-        slope = (second(group.u_static + h * phi) - second(group.u_static - h * phi)) / (2 * h)
-        found = group.stresses["gauss"].stress[:, :, j]
-        np.testing.assert_allclose(found, slope.reshape(-1, 6), atol=1e-9 * np.abs(slope).max())
+        slope = to_symmetric((second(group.u_static + h * phi) - second(group.u_static - h * phi)) / (2 * h))
+        pushed = F @ slope @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None]
+        found = to_symmetric(group.stresses["gauss"].stress[:, :, j])
+        np.testing.assert_allclose(found, pushed.reshape(-1, 3, 3), atol=1e-9 * np.abs(slope).max())
     # the static stress is Cauchy's, F S F^T / det F
-    F = np.eye(3) + displacement_gradient(b, group.u_static)
     S = to_symmetric(second(group.u_static))
     sigma = F @ S @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None]
     found = to_symmetric(group.stresses["gauss"].static_stress)
@@ -282,3 +283,31 @@ def test_mesh_of_many_types_has_stresses_in_the_meshs_order():
     for j in range(group.n_modes):  # the parts are not joined: a mode lives in one of them
         left, right = (np.abs(part).max() for part in (s.stress[:24, :, j], s.stress[24:, :, j]))
         assert min(left, right) < 1e-6 * max(left, right)
+
+
+def test_stress_modes_at_speed_are_the_change_of_the_cauchy_stress_seen_by_the_material():
+    """sigma(u + h phi) pulled back by the change of deformation f = F F0^-1 and its volume: Truesdell's rate."""
+    from microslip.modes.stress import spatial_elasticity
+
+    rng = np.random.default_rng(5)
+    C = isotropic(2.1e11, 0.3)
+    F0 = np.eye(3) + 0.2 * rng.standard_normal((1, 1, 3, 3))
+    dF = rng.standard_normal((3, 3))
+    h = 1e-6
+
+    def cauchy_of(F):
+        E = 0.5 * (F.T @ F - np.eye(3))
+        e = np.array([E[0, 0], E[1, 1], E[2, 2], 2 * E[0, 1], 2 * E[1, 2], 2 * E[0, 2]])
+        S = to_symmetric(C @ e)
+        return F @ S @ F.T / np.linalg.det(F)
+
+    def pulled(F):
+        f = np.linalg.inv(F @ np.linalg.inv(F0[0, 0]))
+        return f @ cauchy_of(F) @ f.T / np.linalg.det(f)
+
+    rate = (pulled(F0[0, 0] + h * dF) - pulled(F0[0, 0] - h * dF)) / (2 * h)
+    slope = dF @ np.linalg.inv(F0[0, 0])
+    e = 0.5 * (slope + slope.T)
+    strain = np.array([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
+    stress = to_symmetric(spatial_elasticity(C, F0)[0, 0] @ strain)
+    np.testing.assert_allclose(stress, rate, rtol=1e-6, atol=1e-6 * np.abs(rate).max())

@@ -12,25 +12,47 @@ from ..topology import CELL_TYPES
 from .equilibrium import BodyModel, StaticState, cauchy
 
 
-def modal_strain(block: Block, phi: Array, H: Array | None) -> Array:
-    """(e, q, 6, m) strain of shapes (n, 3, m): sym(F^T grad phi), the small strain where H is None.
+def modal_strain(block: Block, phi: Array, F: Array | None) -> Array:
+    """(e, q, 6, m) strain of shapes (n, 3, m) about a state: the symmetric part of the gradient in the deformed body.
 
-    About a deformed state this is the change of the Green strain per unit modal coordinate.
+    Args:
+        F: (e, q, 3, 3) deformation gradient of the static state, None for the reference geometry.
     """
     e, q = block.dx.shape
     out = np.empty((e, q, 6, phi.shape[2]))
+    inverse = None if F is None else np.linalg.inv(F)
     for j in range(phi.shape[2]):
         g = np.matmul(phi[block.cells, :, j].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))
-        if H is not None:
-            g = np.matmul(np.swapaxes(np.eye(3) + H, -1, -2), g)
+        if inverse is not None:
+            g = np.matmul(g, inverse)
         out[..., j] = engineering(0.5 * (g + np.swapaxes(g, -1, -2)))
     return out
 
 
+def spatial_elasticity(elasticity: Array, F: Array) -> Array:
+    """(e, q, 6, 6) Hooke matrix in the axes of the deformed body: c_ijkl = F_iA F_jB F_kC F_lD C_ABCD / det F.
+
+    Stress modes made with it are the change of the Cauchy stress seen by the material (Truesdell's rate), so that
+    they add to the static Cauchy stress.
+    """
+    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    # sigma = L S in Voigt components; L^T takes engineering strain back
+    L = F[..., i[:, None], i[None]] * F[..., j[:, None], j[None]]
+    L[..., 3:] += F[..., i[:, None], j[None, 3:]] * F[..., j[:, None], i[None, 3:]]
+    return np.matmul(np.matmul(L, elasticity), np.swapaxes(L, -1, -2)) / np.linalg.det(F)[..., None, None]
+
+
 def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
-    """Strain and stress at the integration points, cells in the mesh's order."""
-    strain = [modal_strain(b, phi, state.H[i] if state.H else None) for i, b in enumerate(model.d.blocks)]
-    stress = [_hooke(model, i, s) for i, s in enumerate(strain)]
+    """Strain and stress at the integration points, cells in the mesh's order.
+
+    About a nonlinear state everything is in the axes of space, for the deformed body: static Cauchy stress,
+    strain and stress modes; else in the reference geometry.
+    """
+    strain, stress = [], []
+    for i, block in enumerate(model.d.blocks):
+        F = np.eye(3) + state.H[i] if state.H is not None and state.prestress == "nonlinear" else None
+        strain.append(modal_strain(block, phi, F))
+        stress.append(_hooke(model, i, strain[-1], F))
     points = [np.einsum("qk,eki->eqi", b.N, model.d.mesh.points[b.cells]) for b in model.d.blocks]
     static = [cauchy(state, i) for i in range(len(model.d.blocks))]
     m = phi.shape[2]
@@ -44,9 +66,9 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
     )
 
 
-def _hooke(model: BodyModel, block: int, strain: Array) -> Array:
-    e, q, _, m = strain.shape
-    stress = np.matmul(model.material.elasticity, strain.reshape(-1, 6, m)).reshape(e, q, 6, m)
+def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Array:
+    C = model.material.elasticity if F is None else spatial_elasticity(model.material.elasticity, F)
+    stress = np.matmul(C, strain)
     return stress if model.factor is None else stress * model.factor[block][:, :, None, None]
 
 
