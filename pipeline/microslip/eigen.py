@@ -10,9 +10,10 @@ import ctypes
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -90,10 +91,10 @@ class Pardiso(DirectSolver):
         error = ctypes.c_int32(0)
         solver = self._mkl
 
-        def number(value: int):  # noqa: ANN202
+        def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
 
-        def pointer(array: Array, kind: type):  # noqa: ANN202
+        def pointer(array: Array, kind: type) -> Any:
             return array.ctypes.data_as(ctypes.POINTER(kind))
 
         solver._mkl_pardiso(
@@ -236,7 +237,8 @@ def search(
 
     Args:
         pencil: K and M; M positive semidefinite. shift: (rad/s)^2; 0 for a held body, negative for a free one.
-        tolerance: residual of (K - shift M)^-1 M over its eigenvalue. rigid: (n, r) M-orthonormal vectors with K R = 0, kept as the first r pairs.
+        tolerance: residual of (K - shift M)^-1 M over its eigenvalue. rigid: (n, r) M-orthonormal vectors with
+            K R = 0, kept as the first r pairs.
 
     Raises:
         Unstable: eigenvalues below `shift`. NotConverged: Lanczos failed.
@@ -277,10 +279,10 @@ def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: floa
     for _ in range(6):
         below = _count_below(pencil, found.upper_shift, values)
         if below == len(values):
-            refound = len(values) - len(found.values)
-            return _finish(
-                pencil, values, vectors, True, found.upper_shift, refound, found.solves + pencil.solves - before
-            )
+            refound, solves = len(values) - len(found.values), found.solves + pencil.solves - before
+            if not refound:
+                return replace(found, certified=True, solves=solves)
+            return _finish(pencil, values, vectors, True, found.upper_shift, refound, solves)
         if below < len(values):
             raise NotConverged(
                 f"{len(values)} eigenvalues were returned below {np.sqrt(abs(found.upper_shift)) / 2 / np.pi:.6g} Hz "

@@ -26,7 +26,11 @@ def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen
     M_times = _mass_product(model)
 
     def shifted(s: float) -> sp.csr_matrix:
-        return sp.csr_matrix((K_upper.data - s * M_upper.data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
+        if s == 0:
+            return K_upper
+        data = -s * M_upper.data
+        data += K_upper.data
+        return sp.csr_matrix((data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
 
     return eigen.Pencil(shifted, K_times, M_times, len(diagonal), _norm(K_upper), _norm(M_upper), solver)
 
