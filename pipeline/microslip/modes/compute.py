@@ -142,8 +142,8 @@ def _divergence(settings: BodySettings, speed: float, count: int, model: BodyMod
     if not speed and not model.loaded:
         return (
             f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
-            f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as the "
-            "shortest of the cell); refine the mesh or check length_unit"
+            f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as "
+            "the shortest of the cell); refine the mesh or check length_unit"
         )
     remedy = "lower the speed"
     if settings.rotation.prestress == "none" and speed:
