@@ -328,11 +328,14 @@ def read_basis(path: Path | str) -> ModalBasis:
         UserError: see `open_file`; a missing or misshapen part is named.
     """
     with open_file(path) as file:
-        try:
-            basis = _read(file)
-        except (*_DAMAGE, RecursionError) as error:
-            raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); write it again") from error
-    return basis
+        return _read_or_refuse(file, Path(path))
+
+
+def _read_or_refuse(file: h5py.File, path: Path) -> ModalBasis:
+    try:
+        return _read(file)
+    except (*_DAMAGE, RecursionError) as error:
+        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); write it again") from error
 
 
 def _array(group: h5py.Group, name: str, *shape: int | None) -> Array:
