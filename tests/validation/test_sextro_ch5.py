@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from microslip.case import load_case, run_case
 from microslip.workflow import load_mesh, mesh_stage, open_job
 

@@ -10,12 +10,12 @@ from .discretise import Discretisation, FacetBlock
 from .operators import internal_force, spin_projector
 
 
-def body_force(mass_full: sp.spmatrix, acceleration: Array) -> Array:
+def body_force(mass_full: sp.csr_matrix, acceleration: Array) -> Array:
     """Forces of a uniform acceleration field (3,), m/s2, such as gravity: M (1 x a)."""
     return np.outer(mass_full @ np.ones(mass_full.shape[0]), acceleration)
 
 
-def centrifugal(mass_full: sp.spmatrix, position: Array, axis: Array, point: Array) -> Array:
+def centrifugal(mass_full: sp.csr_matrix, position: Array, axis: Array, point: Array) -> Array:
     """Centrifugal forces per (rad/s)^2 at the given positions: -f_zc0 of Sextro Eq. (2.3-29) with x + u.
 
     Args:

@@ -183,7 +183,7 @@ def _assemble_group(
     T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
     elastic = omega > 0
     modal = (T[:, elastic] / omega[elastic] ** 2) @ T[:, elastic].T
-    Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)  # type: ignore[operator]
+    Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
     G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes, skew(model.axis), Mphi, optimize=True)
     stresses: dict[str, StressSet] = {}
     if settings.output.gauss or settings.output.nodal_stress:
@@ -217,7 +217,7 @@ def _assemble_group(
 
 
 def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:
-    total = float(model.M_full.sum())  # type: ignore[attr-defined]
+    total = float(model.M_full.sum())
     volume = model.d.volume * model.material.density
     return {
         "certified": float(found.certified),

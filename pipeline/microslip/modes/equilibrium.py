@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
 from ..eigen import DirectSolver, Unstable
@@ -47,7 +48,7 @@ class BodyModel:
     factor: list[Array] | None
     thermal_strain: list[Array] | None
     M: Array
-    M_full: object
+    M_full: sp.csr_matrix
     K0: Array
     free: FreeUpper
     fixed: Indices
@@ -117,7 +118,7 @@ def softening(model: BodyModel, speed: float) -> Array:
 def centrifugal_force(model: BodyModel, speed: float, u: Array) -> Array:
     """(n, 3) Omega^2 M P (x + u - point), N."""
     position = model.d.mesh.points + u - model.point
-    return speed**2 * (model.M_full @ (position @ spin_projector(model.axis)))  # type: ignore[operator]
+    return speed**2 * (model.M_full @ (position @ spin_projector(model.axis)))
 
 
 def equilibrium(

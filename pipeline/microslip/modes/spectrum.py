@@ -38,7 +38,7 @@ def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen
 def _mass_product(model: BodyModel) -> Callable[[Array], Array]:
     """Products of the mass matrix on the free degrees of freedom with (n_free,) or (n_free, r) arrays."""
     free, n = model.free.free, model.d.mesh.n_points
-    M: sp.csr_matrix = model.M_full  # type: ignore[assignment]
+    M: sp.csr_matrix = model.M_full
     nodes = np.unique(free // 3)
     if len(free) == 3 * len(nodes):  # whole points are held or free: no scattering needed
         M_nodes = M if len(nodes) == n else M[nodes][:, nodes]
