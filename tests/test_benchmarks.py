@@ -1,0 +1,23 @@
+"""The benchmark runs from end to end on a coarse blade (its timings are not judged here)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+pytest.importorskip("gmsh", exc_type=ImportError)
+
+
+def test_the_modal_benchmark_times_every_stage(tmp_path):
+    command = [sys.executable, str(ROOT / "benchmarks" / "modal.py"), "--quick", "--peers", "--work", str(tmp_path)]
+    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stderr
+    for text in ("| microslip |", "| certificate on top |", "| eigensolve / (factor + solves) |", "pattern and gradients"):
+        assert text in done.stdout
