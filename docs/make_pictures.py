@@ -24,8 +24,8 @@ from microslip.case import CaseSettings, _contact, load_case, run_case
 from microslip.data import ModalBasis, ModalGroup
 from microslip.harmonic_balance import peaks, stuck_frequencies
 from microslip.pictures import lettering, plots, views
+from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
-from microslip.plots import response_picture
 from microslip.workflow import modes_stage, open_job
 
 ROOT = HERE.parent

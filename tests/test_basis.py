@@ -19,9 +19,9 @@ import pytest
 import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
+from microslip.basis.hdf5 import HostileFile, inspect, seal, seal_state, trial
+from microslip.basis.integrals import modal_mass
 from microslip.data import Mesh, ModalBasis, UserError
-from microslip.hdf5 import HostileFile, inspect, seal, seal_state, trial
-from microslip.integrate import modal_mass
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "modal_file.md"
@@ -308,8 +308,8 @@ def test_mass_from_the_mesh_needs_no_finite_element_package() -> None:
 @pytest.mark.parametrize("cell_type", ["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"])
 def test_quadrature_of_the_checks_is_that_of_the_assembly(cell_type: str) -> None:
     pytest.importorskip("skfem")
+    from microslip.basis.integrals import _rule, tables
     from microslip.fem.discretise import shape_functions
-    from microslip.integrate import _rule, tables
 
     points, _ = _rule(cell_type)
     N, dN, weights = tables(cell_type)
@@ -385,7 +385,7 @@ def test_files_without_a_seal_are_tried_in_a_process_of_their_own(copy: Path, mo
     assert trial("import os; os.abort()", copy) == "crashes"
     assert trial("while True: pass", copy, seconds=1.0) == "does not come to an end"
     assert trial("raise MemoryError", copy) == "wants too much memory"
-    monkeypatch.setattr("microslip.basis._TRIAL", "import os; os.abort()")
+    monkeypatch.setattr("microslip.basis.files._TRIAL", "import os; os.abort()")
     assert failed(read_basis(copy)) == []  # sealed: no trial
     copy.write_bytes(copy.read_bytes()[:-10])
     assert "HDF5 crashes on it" in refusal(copy)

@@ -274,7 +274,7 @@ def test_flipped_bytes_in_sealed_modal_files(folder: Path, modal_file: Path) -> 
 WORKER = """
 import random, sys
 from pathlib import Path
-from microslip import basis
+from microslip.basis import check_basis, files
 from microslip.data import UserError
 from test_fuzz import flipped
 data, out = Path(sys.argv[1]).read_bytes()[:-120], Path(sys.argv[2])  # without its seal
@@ -287,9 +287,9 @@ for seed in range(int(sys.argv[3]), int(sys.argv[4])):
     out.write_bytes(flipped(data, random.Random(seed)))
     print("seed", seed, flush=True)
     try:
-        with basis._open(out) as file:
-            found = basis._read_or_refuse(file, out)
-        basis.check_basis(found)
+        with files._open(out) as file:
+            found = files._read_or_refuse(file, out)
+        check_basis(found)
     except UserError:
         pass
 print("end", flush=True)

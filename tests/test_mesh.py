@@ -14,7 +14,7 @@ import small
 
 from microslip.data import Mesh, UserError
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
-from microslip.mesh_msh import to_vtk
+from microslip.mesh.msh import to_vtk
 from microslip.topology import CELL_TYPES
 
 pytest.importorskip("meshio")

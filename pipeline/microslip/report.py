@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .basis_checks import check_basis
+from .basis import check_basis
 from .campbell import crossings, track_basis
 from .data import Interface, ModalBasis, ModalGroup
 from .store import write_text

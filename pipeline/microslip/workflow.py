@@ -32,12 +32,9 @@ PACKAGE = Path(__file__).parent
 _READS_BY_GMSH = {".unv"}
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
-_MODES_CODE = (
-    "data.py", "body.py", "mesh.py", "mesh_inp.py", "mesh_msh.py", "rawmesh.py", "topology.py", "integrate.py",
-    "eigen.py", "basis.py", "hdf5.py", "fem", "modes",
-)  # fmt: skip
-_CASE_CODE = ("harmonic_balance.py", "case.py", "plots.py")
-_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "basis_checks.py")
+_MODES_CODE = ("data.py", "body.py", "mesh", "topology.py", "eigen.py", "basis", "fem", "modes")
+_CASE_CODE = ("harmonic_balance.py", "case.py", "pictures/response.py")
+_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "basis/checks.py")
 
 
 @dataclass(frozen=True)
@@ -344,7 +341,7 @@ def response_stage(
         summary = json.loads(summary_file.read_text())
         return summary, summary["failed_points"] == 0
     from .harmonic_balance import response_table
-    from .plots import response_picture
+    from .pictures.response import response_picture
 
     result = run_case(settings, read_basis(basis_file), case_path, report)
     store.write_text(folder / "response.csv", response_table(result.responses))

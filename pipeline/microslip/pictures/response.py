@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .case import CaseResult
+from ..case import CaseResult
 
 
 def response_picture(result: CaseResult, path: Path) -> None:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .data import Array, Indices
-from .rawmesh import Damaged, Numbering, RawMesh
+from ..data import Array, Indices
+from .raw import Damaged, Numbering, RawMesh
 
 _SOLIDS = {
     4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge", 15: "wedge15",

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from .data import Array, Indices, Mesh
-from .topology import CELL_TYPES, FACET_CORNERS
+from ..data import Array, Indices, Mesh
+from ..topology import CELL_TYPES, FACET_CORNERS
 
 # exponents of the monomials each shape function is made of
 _TRI: list[tuple[int, ...]] = [(i, j) for i, j in product(range(3), repeat=2) if i + j <= 2]

@@ -14,8 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .basis_checks import INTERFACE_ROWS, TOLERANCES, Check, check_basis
-from .data import (
+from ..data import (
     VOIGT,
     Array,
     Compliance,
@@ -28,9 +27,10 @@ from .data import (
     StressSet,
     UserError,
 )
+from ..store import complete_or_absent
+from ..topology import CELL_TYPES, FACET_CORNERS
+from .checks import INTERFACE_ROWS, TOLERANCES, Check, check_basis
 from .hdf5 import create, inspect, put, put_scale, seal, seal_state, trial
-from .store import complete_or_absent
-from .topology import CELL_TYPES, FACET_CORNERS
 
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 
@@ -285,7 +285,7 @@ def open_file(path: Path | str) -> h5py.File:
     return _open(path)
 
 
-_TRIAL = "from microslip.basis import _open, _read; _read(_open(path))"
+_TRIAL = "from microslip.basis.files import _open, _read; _read(_open(path))"
 
 
 def _open(path: Path) -> h5py.File:

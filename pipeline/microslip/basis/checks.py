@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .data import Array, Interface, ModalBasis, ModalGroup, Rows
-from .integrate import face_mean, modal_mass
+from ..data import Array, Interface, ModalBasis, ModalGroup, Rows
+from .integrals import face_mean, modal_mass
 
 TOLERANCES = {
     "orthogonality": 1e-9,

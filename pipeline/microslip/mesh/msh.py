@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .data import Array, Indices
-from .rawmesh import NODES, Damaged, Numbering, RawMesh
-from .topology import CELL_TYPES, FACET_CORNERS
+from ..data import Array, Indices
+from ..topology import CELL_TYPES, FACET_CORNERS
+from .raw import NODES, Damaged, Numbering, RawMesh
 
 _TYPES = {
     1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge", 7: "pyramid", 8: "line3",

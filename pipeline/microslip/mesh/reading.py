@@ -1,6 +1,6 @@
 """Any mesh file -> `Mesh`: named faces, unit of length, quality gates.
 
-gmsh's MSH 4.1 and Abaqus files have readers of their own (`mesh_msh`, `mesh_inp`), which keep node numbers and notice
+gmsh's MSH 4.1 and Abaqus files have readers of their own (`msh`, `inp`), which keep node numbers and notice
 damage; every other format goes through meshio, which is called here only. Node orders are VTK's from here on.
 """
 
@@ -10,27 +10,22 @@ import contextlib
 import io
 import re
 import warnings
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from .data import Array, Indices, Mesh, UserError
-from .mesh_inp import read_inp
-from .mesh_msh import is_msh41, read_msh41
-from .rawmesh import Damaged, RawMesh
-from .topology import CELL_TYPES, FACET_CORNERS
+from ..data import Array, Indices, Mesh, UserError
+from ..topology import CELL_TYPES, FACET_CORNERS
+from .inp import read_inp
+from .msh import is_msh41, read_msh41
+from .raw import Damaged, RawMesh
+from .surface import boundary_facets, faces_from_points, match_facets
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
 
 _FARTHEST = 1e9  # m; beyond it a file is damaged, and geometry loses its digits
-_FIRST_ORDER = {"tetra", "hexahedron"}
 _IGNORED = {"vertex", "line", "line3"}
 
 
@@ -201,7 +196,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
     boundary = boundary_facets(mesh)
     faces: dict[str, dict[str, Indices]] = {}
     for name, blocks in raw.facets.items():
-        face = _match_facets(boundary, [renumber[b] for b in blocks])
+        face = match_facets(boundary, [renumber[b] for b in blocks])
         wanted = len({tuple(row) for b in blocks for row in np.sort(b, axis=1).tolist()})
         found = sum(map(len, face.values()))
         if found:
@@ -219,157 +214,3 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
 
 def _kept(indices: Indices) -> Indices:
     return indices[indices >= 0]
-
-
-def boundary_facets(mesh: Mesh) -> dict[str, Indices]:
-    """Facets that belong to one cell only, by type, in the order that makes the normal point outwards."""
-    by_type: dict[str, list[Indices]] = {}
-    for cell_type, cells in mesh.cells.items():
-        kind = CELL_TYPES[cell_type]
-        every = np.concatenate([cells[:, list(f)] for f in kind.facets])
-        by_type.setdefault(kind.facet_type, []).append(every)
-    stacked = {t: np.concatenate(f) for t, f in by_type.items()}
-    result = {}
-    for corners in (3, 4):
-        family = [t for t in stacked if FACET_CORNERS[t] == corners]
-        if not family:
-            continue
-        keys = np.sort(np.concatenate([stacked[t][:, :corners] for t in family]), axis=1)
-        _, inverse, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-        single = (count == 1)[inverse.ravel()]
-        start = 0
-        for t in family:
-            chosen = single[start : start + len(stacked[t])]
-            start += len(stacked[t])
-            if chosen.any():
-                result[t] = stacked[t][chosen]
-    return result
-
-
-def _match_facets(boundary: Mapping[str, Indices], wanted: Iterable[Indices]) -> dict[str, Indices]:
-    """Boundary facets whose corners are those of the wanted ones (which may be first order or turned)."""
-    wanted = list(wanted)
-    result = {}
-    for facet_type, facets in boundary.items():
-        corners = FACET_CORNERS[facet_type]
-        keys = {tuple(row) for w in wanted if w.shape[1] == corners for row in np.sort(w, axis=1).tolist()}
-        if not keys:
-            continue
-        chosen = [i for i, row in enumerate(np.sort(facets[:, :corners], axis=1).tolist()) if tuple(row) in keys]
-        if chosen:
-            result[facet_type] = facets[chosen]
-    return result
-
-
-def faces_from_points(boundary: Mapping[str, Indices], chosen: Indices, n_points: int) -> dict[str, Indices]:
-    """Boundary facets that lie wholly in a set of points."""
-    inside = np.zeros(n_points, dtype=bool)
-    inside[chosen] = True
-    result = {}
-    for facet_type, facets in boundary.items():
-        whole = inside[facets].all(axis=1)
-        if whole.any():
-            result[facet_type] = facets[whole]
-    return result
-
-
-def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
-    """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
-
-    Errors: unconnected parts, coincident points, repeated points in a cell, inside-out cells (by their corners;
-    curved cells are examined at the quadrature points when they are assembled). Warnings: first-order cells.
-    """
-    errors, warnings = [], []
-    for cell_type, cells in mesh.cells.items():
-        repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
-        if repeated.any():
-            errors.append(
-                f"{repeated.sum()} {cell_type} cells name a point twice (first: {_first(repeated)}); they are "
-                "degenerate, remesh"
-            )
-            continue
-        with np.errstate(all="ignore"):  # cells of vanishing size
-            volume = corner_volumes(mesh, cell_type)
-        scale = np.abs(volume).mean()
-        if (flat := ~(np.abs(volume) > 1e-9 * scale)).any():
-            errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {_first(flat)}); remesh")
-        elif (inverted := volume < 0).any():
-            errors.append(
-                f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {_first(inverted)}); "
-                "the node order is not the one of the format, or the mesh is damaged"
-            )
-        if cell_type in _FIRST_ORDER:
-            warnings.append(
-                f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents "
-                "high); use second-order ones"
-            )
-    pairs = _coincident(mesh.points)
-    parts = part_numbers(mesh)
-    if not errors and (overlapping := _overlapping(mesh)):
-        errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
-    if len(pairs):
-        a, b = mesh.node_id[pairs[0]]
-        errors.append(
-            f"{len(pairs)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring cells are not "
-            "joined; merge duplicate nodes"
-        )
-    elif parts.max() > 0:
-        sizes = np.bincount(parts)
-        errors.append(
-            f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points); "
-            "join them or give each its own body"
-        )
-    return errors, warnings
-
-
-def _overlapping(mesh: Mesh) -> int:
-    """Number of facets that more than two cells share."""
-    found = 0
-    for corners in (3, 4):
-        sides = [
-            np.sort(cells[:, list(f[:corners])], axis=1)
-            for cell_type, cells in mesh.cells.items()
-            for f in CELL_TYPES[cell_type].facets
-            if FACET_CORNERS[CELL_TYPES[cell_type].facet_type] == corners
-        ]
-        if sides:
-            found += int((np.unique(np.concatenate(sides), axis=0, return_counts=True)[1] > 2).sum())
-    return found
-
-
-def _first(mask: NDArray[np.bool_]) -> int:
-    return int(np.flatnonzero(mask)[0]) + 1
-
-
-def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
-    """(e,) six times the signed volume between a tetrahedron's corners, or the least such at a brick's corners."""
-    p = mesh.points[mesh.cells[cell_type]]
-    if CELL_TYPES[cell_type].corners == 4:
-        return np.linalg.det(p[:, 1:4] - p[:, :1])
-    bottom = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
-    top = ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
-    edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in (*bottom, *top))
-    return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
-
-
-def _coincident(points: Array) -> Indices:
-    size = np.ptp(points, axis=0).max()
-    return cKDTree(points).query_pairs(1e-9 * size, output_type="ndarray")
-
-
-def part_numbers(mesh: Mesh) -> Indices:
-    """(n,) number of the connected part each point belongs to."""
-    rows = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in mesh.cells.values()])
-    cols = np.concatenate([c[:, 1:].ravel() for c in mesh.cells.values()])
-    graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(mesh.n_points, mesh.n_points))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def longest_over_shortest(mesh: Mesh) -> float:
-    """Largest ratio, over all cells, of a cell's longest edge to its shortest."""
-    worst = 1.0
-    for cell_type, cells in mesh.cells.items():
-        ends = mesh.points[cells[:, np.array(CELL_TYPES[cell_type].edges)]]
-        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-        worst = max(worst, float((length.max(axis=1) / np.maximum(length.min(axis=1), 1e-300)).max(initial=1.0)))
-    return worst

@@ -1,0 +1,16 @@
+"""Any mesh file -> `Mesh`: named faces, unit of length, surface, quality gates. The only caller of meshio."""
+
+from .gates import corner_volumes, longest_over_shortest, mesh_problems, part_numbers
+from .reading import UNITS, read_mesh
+from .surface import boundary_facets, faces_from_points
+
+__all__ = [
+    "UNITS",
+    "boundary_facets",
+    "corner_volumes",
+    "faces_from_points",
+    "longest_over_shortest",
+    "mesh_problems",
+    "part_numbers",
+    "read_mesh",
+]

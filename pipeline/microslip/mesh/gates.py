@@ -1,0 +1,116 @@
+"""What would spoil a solution: degenerate, inside-out, overlapping or unconnected cells, coincident points."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..data import Array, Indices, Mesh
+from ..topology import CELL_TYPES, FACET_CORNERS
+
+_FIRST_ORDER = {"tetra", "hexahedron"}
+
+
+def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
+
+    Errors: unconnected parts, coincident points, repeated points in a cell, inside-out cells (by their corners;
+    curved cells are examined at the quadrature points when they are assembled). Warnings: first-order cells.
+    """
+    errors, warnings = [], []
+    for cell_type, cells in mesh.cells.items():
+        repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
+        if repeated.any():
+            errors.append(
+                f"{repeated.sum()} {cell_type} cells name a point twice (first: {_first(repeated)}); they are "
+                "degenerate, remesh"
+            )
+            continue
+        with np.errstate(all="ignore"):  # cells of vanishing size
+            volume = corner_volumes(mesh, cell_type)
+        scale = np.abs(volume).mean()
+        if (flat := ~(np.abs(volume) > 1e-9 * scale)).any():
+            errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {_first(flat)}); remesh")
+        elif (inverted := volume < 0).any():
+            errors.append(
+                f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {_first(inverted)}); "
+                "the node order is not the one of the format, or the mesh is damaged"
+            )
+        if cell_type in _FIRST_ORDER:
+            warnings.append(
+                f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents "
+                "high); use second-order ones"
+            )
+    pairs = _coincident(mesh.points)
+    parts = part_numbers(mesh)
+    if not errors and (overlapping := _overlapping(mesh)):
+        errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
+    if len(pairs):
+        a, b = mesh.node_id[pairs[0]]
+        errors.append(
+            f"{len(pairs)} pairs of points coincide (first: nodes {a} and {b}), so neighbouring cells are not "
+            "joined; merge duplicate nodes"
+        )
+    elif parts.max() > 0:
+        sizes = np.bincount(parts)
+        errors.append(
+            f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points); "
+            "join them or give each its own body"
+        )
+    return errors, warnings
+
+
+def _overlapping(mesh: Mesh) -> int:
+    """Number of facets that more than two cells share."""
+    found = 0
+    for corners in (3, 4):
+        sides = [
+            np.sort(cells[:, list(f[:corners])], axis=1)
+            for cell_type, cells in mesh.cells.items()
+            for f in CELL_TYPES[cell_type].facets
+            if FACET_CORNERS[CELL_TYPES[cell_type].facet_type] == corners
+        ]
+        if sides:
+            found += int((np.unique(np.concatenate(sides), axis=0, return_counts=True)[1] > 2).sum())
+    return found
+
+
+def _first(mask: NDArray[np.bool_]) -> int:
+    return int(np.flatnonzero(mask)[0]) + 1
+
+
+def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
+    """(e,) six times the signed volume between a tetrahedron's corners, or the least such at a brick's corners."""
+    p = mesh.points[mesh.cells[cell_type]]
+    if CELL_TYPES[cell_type].corners == 4:
+        return np.linalg.det(p[:, 1:4] - p[:, :1])
+    bottom = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
+    top = ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
+    edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in (*bottom, *top))
+    return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
+
+
+def _coincident(points: Array) -> Indices:
+    size = np.ptp(points, axis=0).max()
+    return cKDTree(points).query_pairs(1e-9 * size, output_type="ndarray")
+
+
+def part_numbers(mesh: Mesh) -> Indices:
+    """(n,) number of the connected part each point belongs to."""
+    rows = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in mesh.cells.values()])
+    cols = np.concatenate([c[:, 1:].ravel() for c in mesh.cells.values()])
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(mesh.n_points, mesh.n_points))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def longest_over_shortest(mesh: Mesh) -> float:
+    """Largest ratio, over all cells, of a cell's longest edge to its shortest."""
+    worst = 1.0
+    for cell_type, cells in mesh.cells.items():
+        ends = mesh.points[cells[:, np.array(CELL_TYPES[cell_type].edges)]]
+        length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+        worst = max(worst, float((length.max(axis=1) / np.maximum(length.min(axis=1), 1e-300)).max(initial=1.0)))
+    return worst
