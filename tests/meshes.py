@@ -158,6 +158,18 @@ def twisted_blade(
     return brick(cell_type, n, (thickness, chord, length), (-thickness / 2, -chord / 2, 0), to)
 
 
+def graded(n: int, last: float, both: bool = False) -> Callable[[Array], Array]:
+    """Map of [0, 1] that makes n equal boxes grow from 0 on, the end `last` times as long as the start.
+
+    Linear within a box, so that mid-side nodes stay in the middle. both: small at 0 and 1, for even n.
+    """
+    at = np.linspace(0, 1, n + 1)
+    s = 1 - np.abs(2 * at - 1) if both else at
+    grown = s if last == 1 else np.expm1(np.log(last) * s) / (last - 1)
+    knots = np.where(at > 0.5, 1 - grown / 2, grown / 2) if both else grown
+    return lambda x: np.interp(x, at, knots)
+
+
 def renumbered(mesh: Mesh, seed: int = 0) -> tuple[Mesh, Indices]:
     """The same body with points and cells in another order; new number of each old point."""
     rng = np.random.default_rng(seed)
