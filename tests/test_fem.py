@@ -147,8 +147,9 @@ def test_stiffness_mass_and_stress_stiffness_are_scikit_fems(cell_type):
     assert far(full3(d, stress_stiffness(d, S)), ours(stress_form.assemble(basis), dofs)) < 1e-12
 
 
-def test_many_cells_pass_through_several_batches():
-    """More cells than one batch holds: 2592 tetrahedra."""
+def test_many_cells_pass_through_several_batches(monkeypatch):
+    """More cells than one batch holds: 2592 tetrahedra in batches of 500."""
+    monkeypatch.setattr("microslip.fem.operators._BATCH", 50_000)
     mesh = test_mesh("tetra10", (9, 8, 6))
     d = discretise(mesh)
     basis, dofs = oracle(mesh, "tetra10")

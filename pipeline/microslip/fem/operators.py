@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..data import Array, Indices
 from .discretise import Block, Discretisation
 
-_BATCH = 2048
+_BATCH = 900_000  # node pairs assembled at a time: each batch passes over the whole operator once
 _PAIR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # tensor index pair -> Voigt index (xx yy zz xy yz xz)
 
 
@@ -69,8 +69,9 @@ def to_symmetric(voigt: Array) -> Array:
 
 
 def _batches(block: Block) -> Iterator[slice]:
-    for start in range(0, len(block.cells), _BATCH):
-        yield slice(start, start + _BATCH)
+    size = _BATCH // block.cells.shape[1] ** 2
+    for start in range(0, len(block.cells), size):
+        yield slice(start, start + size)
 
 
 def _scatter(into: Array, positions: Indices, values: Array) -> None:
