@@ -18,6 +18,7 @@ from .errors import UserError as UserError
 Array = NDArray[Any]
 """Real numbers in double precision unless the docstring says otherwise."""
 
+ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
