@@ -361,7 +361,7 @@ class BodySettings(Model):
     name: Name
     description: str = ""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
-    reduction: Literal["eigenmodes"] = "eigenmodes"
+    reduction: Literal["eigenmodes", "macneal", "rubin", "craig-bampton"] = "eigenmodes"
     free: bool = False
     geometry: Geometry
     mesh: Meshing = Field(default_factory=Meshing)

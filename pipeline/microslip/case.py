@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from .body import Model, Name, NotNegative, Number, Numbers, Positive, _tuple, load_toml, override, validate
-from .data import Array, ModalBasis, Rows, UserError
-from .harmonic_balance import FrequencyResponse, JenkinsContact, frequency_response, stuck_frequencies
+from .data import Array, ModalBasis, ModalGroup, Rows, UserError
+from .harmonic_balance import FrequencyResponse, JenkinsContact, Residual, frequency_response, stuck_frequencies
 
 
 class ContactSettings(Model):
@@ -108,17 +108,29 @@ def run_case(
                 f"{path}: contacts: the modal file of '{basis.name}' has no interface '{c.interface}'; it has "
                 f"{', '.join(group.interfaces) or 'none'}"
             )
+    residual = _residual(group, settings, label) if basis.reduction == "macneal" else None
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     responses = {}
     for normal in sweep.normal_forces:
         report(f"friction response at a normal force of {normal:g} N")
         responses[normal] = frequency_response(
-            group, [_contact(c, normal) for c in settings.contacts], force, watch, frequency, report
-        )
+            group, [_contact(c, normal) for c in settings.contacts], force, watch, frequency, report, residual,
+            settings.amplitude,
+        )  # fmt: skip
     free = frequency_response(group, [], force, watch, frequency)
-    stuck = stuck_frequencies(group, [_contact(c, max(sweep.normal_forces)) for c in settings.contacts])
+    stuck = stuck_frequencies(group, [_contact(c, max(sweep.normal_forces)) for c in settings.contacts], residual)
     return CaseResult(settings, responses, free, stuck)
+
+
+def _residual(group: ModalGroup, settings: CaseSettings, label: str) -> Residual:
+    """Residual flexibility among the contacts, the excitation and the monitor, from the file's static compliance."""
+    names = list(group.compliance.labels)
+    left = group.compliance.residual
+    at = [i for c in settings.contacts for i, n in enumerate(names) if n.startswith(f"interface:{c.interface}:")]
+    force = next(i for i, n in enumerate(names) if n.startswith(f"excitation:{settings.excitation}:"))
+    watch = names.index(f"monitor:{settings.monitor}:{label}")
+    return Residual(left[np.ix_(at, at)], left[at, force], left[watch, at], float(left[watch, force]))
 
 
 def _row(rows: Any, name: str, path: Path | str, key: str) -> Rows:

@@ -18,6 +18,7 @@ from .errors import UserError as UserError
 Array = NDArray[Any]
 """Real numbers in double precision unless the docstring says otherwise."""
 
+ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -185,7 +186,9 @@ class ModalGroup:
     Attributes:
         speed: rotation speed, rad/s. harmonic: nodal diameter (0 for a body without cyclic symmetry).
         omega: (m,) angular eigenfrequencies, rad/s, ascending; rigid modes are exactly 0.
-        kind: m texts: ``rigid`` or ``normal`` (other reduction methods add theirs).
+        kind: m texts: ``rigid``, ``normal``, ``attachment`` (Rubin), ``interface``, ``fixed-interface``.
+        to_diagonal: (m, m) V with V^T M_r V = 1, V^T K_r V = diag(omega^2); None if M_r and K_r are diagonal. With
+            it, `omega` and `damping_ratio` are those of the modes V, and phi and all rows stand per coordinate.
         damping_ratio: (m,) D_j of Sextro Eq. (2.4-13).
         M_r, K_r, C_r, G_r: (m, m) reduced matrices; G_r is skew, for the given speed (Eq. (2.3-29)).
         phi: (n, 3, m) shapes, kg^-1/2, in the mesh's point order. May be empty.
@@ -218,6 +221,7 @@ class ModalGroup:
     prestress: str = "none"
     harmonic: int = 0
     spin_softening: bool = True
+    to_diagonal: Array | None = None
 
     @property
     def frequency(self) -> Array:

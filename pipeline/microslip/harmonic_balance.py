@@ -2,8 +2,9 @@
 
 Each contact of a body with a rigid neighbour is a linear 6 x 6 spring on the interface's rows plus, along one
 tangent, a Jenkins element (a spring in series with a slider) whose first harmonic is known in closed form. The
-modal part is eliminated exactly, so the unknowns are the slider displacements only. Rough surfaces, varying
-normal load and more harmonics belong to the later contact stages.
+modal part is eliminated exactly, so the unknowns are the contact coordinates only, and the residual flexibility of
+MacNeal's method (what the kept modes leave of the static compliance) adds to theirs without new states. Rough
+surfaces, varying normal load and more harmonics belong to the later contact stages.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
-from .data import Array, ModalGroup
+from .data import Array, ComplexArray, ModalGroup
 
 Report = Callable[[str], None]
 
@@ -33,6 +35,21 @@ class JenkinsContact:
     slider: int
     tangential: float
     limit: float
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Static compliance that the kept coordinates leave out, among contacts (6 a contact), force and monitor.
+
+    Attributes:
+        contacts: (6c, 6c). force_on_contacts: (6c,) per newton of the excitation. contacts_on_monitor: (6c,).
+        force_on_monitor: displacement of the monitor per newton.
+    """
+
+    contacts: Array
+    force_on_contacts: Array
+    contacts_on_monitor: Array
+    force_on_monitor: float
 
 
 @dataclass(frozen=True)
@@ -74,32 +91,37 @@ def jenkins_harmonic(amplitude: Array, stiffness: float, limit: float) -> tuple[
 
 def frequency_response(
     group: ModalGroup, contacts: list[JenkinsContact], force: Array, monitor: Array, frequency: Array,
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, residual: Residual | None = None, amplitude: float = 1.0,
 ) -> FrequencyResponse:  # fmt: skip
     """Steady response to a harmonic force (Sextro Eqs. (5.1-4) to (5.1-10) with Jenkins elements).
 
     Args:
         group: the reduced body. force: (m,) modal force amplitude, N kg^-1/2. monitor: (m,) row to watch.
         frequency: (f,) Hz, swept in the given order; each point starts from its neighbour.
+        residual: residual flexibility to add (MacNeal). amplitude: force in N that `force` stands for.
 
     Returns:
         The response; points whose Newton iteration failed have ``converged`` False and the sweep goes on.
     """
-    rows = np.array([group.interfaces[c.interface].rows[c.slider] for c in contacts]).reshape(-1, group.n_modes)
-    K = group.K_r + sum(_linear_part(group, c) for c in contacts)
-    count, points = len(contacts), len(frequency)
-    monitored, slips = np.zeros(points, complex), np.zeros((points, count), complex)
+    rows, springs, limits = contact_coordinates(group, contacts)
+    count, points = len(springs), len(frequency)
+    if residual is None:
+        residual = Residual(np.zeros((count, count)), np.zeros(count), np.zeros(count), 0.0)
+    slider = [6 * i + c.slider for i, c in enumerate(contacts)]
+    monitored, slips = np.zeros(points, complex), np.zeros((points, len(contacts)), complex)
     dissipated, converged = np.zeros(points), np.zeros(points, bool)
     u = np.zeros(count, complex)
     for i, f in enumerate(frequency):
         Omega = 2 * np.pi * f
-        S = K - Omega**2 * group.M_r + 1j * Omega * (group.C_r + group.G_r)
+        S = group.K_r - Omega**2 * group.M_r + 1j * Omega * (group.C_r + group.G_r)
         answer = np.linalg.solve(S, np.column_stack([force.astype(complex), rows.T]))
-        free, flexibility = rows @ answer[:, 0], rows @ answer[:, 1:]
-        u, converged[i] = _solve_sliders(contacts, free, flexibility, u)
-        k = _slider_stiffness(contacts, np.abs(u))[0]
-        q = answer[:, 0] - answer[:, 1:] @ (k * u)
-        monitored[i], slips[i] = monitor @ q, u
+        free = rows @ answer[:, 0] + residual.force_on_contacts * amplitude
+        flexibility = rows @ answer[:, 1:] + residual.contacts
+        u, converged[i] = _solve_contacts(springs, limits, free, flexibility, u)
+        k = _stiffness(springs, limits, np.abs(u))[0]
+        monitored[i] = monitor @ answer[:, 0] + residual.force_on_monitor * amplitude
+        monitored[i] -= (monitor @ answer[:, 1:] + residual.contacts_on_monitor) @ (k * u)
+        slips[i] = u[slider]
         dissipated[i] = np.pi * float(np.sum(k.imag * np.abs(u) ** 2))
         if not converged[i]:
             u = np.zeros(count, complex)
@@ -108,46 +130,54 @@ def frequency_response(
     return FrequencyResponse(frequency, monitored, slips, dissipated, converged, np.array([c.limit for c in contacts]))
 
 
-def _linear_part(group: ModalGroup, contact: JenkinsContact) -> Array:
-    rows = group.interfaces[contact.interface].rows
-    springs = contact.stiffness.copy()
-    springs[contact.slider] = 0.0
-    return rows.T @ (springs[:, None] * rows)
+def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:
+    """(6c, m) rows, (6c,) springs and (6c,) friction limits (infinite where the spring is linear) of all contacts."""
+    rows = [group.interfaces[c.interface].rows for c in contacts]
+    springs, limits = np.zeros((len(contacts), 6)), np.full((len(contacts), 6), np.inf)
+    for i, c in enumerate(contacts):
+        springs[i] = c.stiffness
+        springs[i, c.slider], limits[i, c.slider] = c.tangential, c.limit
+    return np.array(rows).reshape(-1, group.n_modes), springs.ravel(), limits.ravel()
 
 
-def _slider_stiffness(contacts: list[JenkinsContact], amplitude: Array) -> tuple[Array, Array]:
-    pairs = [jenkins_harmonic(a, c.tangential, c.limit) for a, c in zip(amplitude, contacts, strict=True)]
+def _stiffness(springs: Array, limits: Array, amplitude: Array) -> tuple[ComplexArray, ComplexArray]:
+    pairs = [jenkins_harmonic(a, k, limit) for a, k, limit in zip(amplitude, springs, limits, strict=True)]
     return np.array([p[0] for p in pairs], dtype=complex), np.array([p[1] for p in pairs], dtype=complex)
 
 
-def _solve_sliders(contacts: list[JenkinsContact], free: Array, D: Array, start: Array) -> tuple[Array, bool]:
-    """u + D k(|u|) u = free by Newton in real and imaginary parts with halved steps, from `start` or from sticking."""
-    stuck = np.linalg.solve(np.eye(len(free)) + D * [c.tangential for c in contacts], free)
+def _solve_contacts(
+    springs: Array, limits: Array, free: ComplexArray, D: ComplexArray, start: ComplexArray
+) -> tuple[ComplexArray, bool]:
+    """u + D k(|u|) u = free by Newton in real and imaginary parts, steps halved; from `start`, then from sticking."""
+    stuck = np.linalg.solve(np.eye(len(free)) + D * springs, free)
     scale = np.abs(free).max(initial=1e-300)
-    for u in (start, stuck, free):
-        u = u.astype(complex)
-        residual = _residual(contacts, free, D, u)
+    u = start
+    for first in (start, stuck, free):
+        u = first.astype(complex)
+        residual = _residual(springs, limits, free, D, u)
         for _ in range(60):
             if np.abs(residual).max(initial=0.0) < 1e-11 * scale:
                 return u, True
-            step = _newton_step(contacts, D, u, residual)
+            step = _newton_step(springs, limits, D, u, residual)
             size = 1.0
             while size > 1e-4:
-                trial = _residual(contacts, free, D, u + size * step)
+                trial = _residual(springs, limits, free, D, u + size * step)
                 if np.linalg.norm(trial) < np.linalg.norm(residual):
                     break
                 size *= 0.5
-            u, residual = u + size * step, _residual(contacts, free, D, u + size * step)
+            u, residual = u + size * step, _residual(springs, limits, free, D, u + size * step)
     return u, False
 
 
-def _residual(contacts: list[JenkinsContact], free: Array, D: Array, u: Array) -> Array:
-    return u + D @ (_slider_stiffness(contacts, np.abs(u))[0] * u) - free
+def _residual(springs: Array, limits: Array, free: ComplexArray, D: ComplexArray, u: ComplexArray) -> ComplexArray:
+    return u + D @ (_stiffness(springs, limits, np.abs(u))[0] * u) - free
 
 
-def _newton_step(contacts: list[JenkinsContact], D: Array, u: Array, residual: Array) -> Array:
+def _newton_step(
+    springs: Array, limits: Array, D: ComplexArray, u: ComplexArray, residual: ComplexArray
+) -> ComplexArray:
     size = np.maximum(np.abs(u), 1e-300)
-    k, slope = _slider_stiffness(contacts, np.abs(u))
+    k, slope = _stiffness(springs, limits, np.abs(u))
     # d(k u) = k du + slope * u * Re(conj(u) du)/|u|
     real = np.diag(k) + np.diag(slope * u * u.real / size)
     imag = 1j * np.diag(k) + np.diag(slope * u * u.imag / size)
@@ -158,15 +188,15 @@ def _newton_step(contacts: list[JenkinsContact], D: Array, u: Array, residual: A
     return step[:n] + 1j * step[n:]
 
 
-def stuck_frequencies(group: ModalGroup, contacts: list[JenkinsContact]) -> Array:
-    """(m,) eigenfrequencies in Hz with every contact sticking."""
-    K = group.K_r.copy()
-    for c in contacts:
-        springs = c.stiffness.copy()
-        springs[c.slider] = c.tangential
-        rows = group.interfaces[c.interface].rows
-        K += rows.T @ (springs[:, None] * rows)
-    return np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) / (2 * np.pi)
+def stuck_frequencies(group: ModalGroup, contacts: list[JenkinsContact], residual: Residual | None = None) -> Array:
+    """(m,) eigenfrequencies in Hz with every contact sticking; residual flexibility in series with the springs."""
+    rows, springs, _ = contact_coordinates(group, contacts)
+    flexibility = np.zeros((len(springs),) * 2) if residual is None else residual.contacts
+    # springs in series with the residual flexibility, also where a spring is zero: k (1 + R k)^-1
+    series = springs[:, None] * np.linalg.inv(np.eye(len(springs)) + flexibility * springs)
+    K = group.K_r + rows.T @ series @ rows
+    values = scipy.linalg.eigh(0.5 * (K + K.T), group.M_r, eigvals_only=True)
+    return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:

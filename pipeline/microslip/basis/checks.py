@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..coordinates import in_modes
 from ..data import Array, Interface, ModalBasis, ModalGroup, Rows
 from .integrals import face_mean, modal_mass
 
@@ -90,14 +91,15 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     found.append(("every number is finite", _not_finite(_numbers(g)), 0.0, ""))
     if found[-1][1]:
         return found
-    normal = all(k in ("rigid", "normal") for k in g.kind)
-    found += _matrix_checks(g, normal)
-    if mesh_is_sound and normal and g.phi.shape[0]:
+    if g.to_diagonal is not None:
+        found += _transformation_checks(g)
+        g = in_modes(g)
+    found += _matrix_checks(g)
+    if mesh_is_sound and g.phi.shape[0]:
         found += _shape_checks(basis, g)
     for name, item in g.interfaces.items():
         found += _interface_checks(basis, g, name, item, mesh_is_sound)
-    if normal:
-        found += _compliance_checks(g)
+    found += _compliance_checks(g)
     for key in ("orthogonality", "backward_error", "mass_error"):
         if key in g.checks:
             found.append((f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""))
@@ -141,18 +143,27 @@ def _numbers(g: ModalGroup) -> list[Any]:
     return found
 
 
-def _matrix_checks(g: ModalGroup, normal: bool) -> _Findings:
+def _transformation_checks(g: ModalGroup) -> _Findings:
+    """The transformation to the reduced body's own modes."""
+    V, top = g.to_diagonal, max(_largest(g.omega**2), 1.0)
+    assert V is not None
+    return [
+        ("to_diagonal: V^T M_r V is the identity", _largest(V.T @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
+        ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(V.T @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
+    ]
+
+
+def _matrix_checks(g: ModalGroup) -> _Findings:
     scale = max(_largest(g.omega**2), 1.0)
     found: _Findings = [
         ("frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * _largest(g.omega), ""),
         ("G_r is skew", _largest(g.G_r + g.G_r.T), 1e-9 * max(_largest(g.G_r), 1e-12), ""),
         ("rigid modes have omega = 0", _largest(g.omega[np.array(g.kind) == "rigid"]), 0.0, ""),
     ]
-    if normal:
-        C = np.diag(2 * g.damping_ratio * g.omega)
-        found.append(("M_r is the identity", _largest(g.M_r - np.eye(g.n_modes)), 1e-9, ""))
-        found.append(("K_r is diag(omega^2)", _largest(g.K_r - np.diag(g.omega**2)) / scale, 1e-9, ""))
-        found.append(("C_r is diag(2 D omega)", _largest(g.C_r - C) / np.sqrt(scale), 1e-9, ""))
+    C = np.diag(2 * g.damping_ratio * g.omega)
+    found.append(("M_r is the identity", _largest(g.M_r - np.eye(g.n_modes)), 1e-9, ""))
+    found.append(("K_r is diag(omega^2)", _largest(g.K_r - np.diag(g.omega**2)) / scale, 1e-9, ""))
+    found.append(("C_r is diag(2 D omega)", _largest(g.C_r - C) / np.sqrt(scale), 1e-9, ""))
     return found
 
 

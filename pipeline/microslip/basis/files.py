@@ -181,6 +181,8 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
         put(modes, name, data, unit, scales=[mode])
     for name, unit in (("M_r", "1"), ("K_r", "s^-2"), ("C_r", "s^-1"), ("G_r", "s^-1")):
         put(modes, name, getattr(g, name), unit, scales=[mode, column])
+    if g.to_diagonal is not None:
+        put(modes, "to_diagonal", g.to_diagonal, "1", scales=[mode, column])
     if g.phi.shape[0]:
         put(modes, "phi", g.phi, "kg^-1/2", scales=[file["node"], file["axis"], mode])
     cyclic = group.create_group("cyclic")
@@ -440,6 +442,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         speed=float(where.attrs["Omega"]), omega=omega, kind=_texts(modes, "kind", m),
         damping_ratio=_array(modes, "damping_ratio", m), M_r=_array(modes, "M_r", m, m), K_r=_array(modes, "K_r", m, m),
         C_r=_array(modes, "C_r", m, m), G_r=_array(modes, "G_r", m, m),
+        to_diagonal=_array(modes, "to_diagonal", m, m) if "to_diagonal" in modes else None,
         phi=_array(modes, "phi", n, 3, m) if "phi" in modes else np.zeros((0, 3, m)),
         interfaces={
             name: _read_interface(file["interfaces"][_escaped(name)], group["interfaces"][_escaped(name)], m)

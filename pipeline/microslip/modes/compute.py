@@ -22,11 +22,12 @@ from ..data import (
 from ..fem.discretise import Discretisation, discretise, free_upper
 from ..fem.operators import skew
 from ..mesh import longest_over_shortest
+from ..reduction import METHODS, Problem, Reduced
 from . import canonical, rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
 from .boundary import check_held, fixed_dofs, with_dead_loads
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
-from .spectrum import leading_rows, make_pencil, rigid_shift, static_compliance
+from .spectrum import leading_rows, make_pencil, rigid_shift, static_answers
 from .stress import gauss_set, nodal_set
 
 Report = Callable[[str], None]
@@ -120,7 +121,9 @@ def _group(
         raise UserError(_divergence(settings, speed, error.count, model)) from error
     B, labels = rows.stacked(settings)
     B_free = B[:, dofs] if B.shape[0] else sp.csr_matrix((0, pencil.n))
-    static = static_compliance(pencil, found, B_free, R, shift)
+    answers = static_answers(pencil, found, B_free, R, shift)
+    static = np.asarray(B_free @ answers)
+    static = 0.5 * (static + static.T)
     if settings.modes.certify:
         report("certifying the spectrum by the inertia count")
         found = eigen.certify(pencil, found, shift)
@@ -132,10 +135,17 @@ def _group(
     phi = canonical.turn_clusters(phi, found.values, lead(phi), zero)
     phi *= canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
     keep = _band(found.values, settings, zero)
-    phi, values = phi[:, :keep], found.values[:keep]
-    omega = np.sqrt(np.maximum(values, 0.0))
-    omega[:zero] = 0.0
-    return _assemble_group(model, settings, state, speed, rows, found, phi, omega, zero, static, B, labels, report)
+    exact = [i for i, label in enumerate(labels) if not label.startswith("monitor:")]
+    problem = Problem(
+        pencil, found.values[:keep], phi[dofs, :keep], zero, B_free[np.array(exact, dtype=int)],
+        tuple(labels[i] for i in exact), answers[:, exact], settings.modes.certify,
+    )  # fmt: skip
+    if settings.reduction != "eigenmodes":
+        report(f"reduction: {settings.reduction}")
+    reduced = METHODS[settings.reduction](problem)
+    phi = np.zeros((3 * model.d.mesh.n_points, len(reduced.kind)))
+    phi[dofs] = reduced.vectors
+    return _assemble_group(model, settings, state, speed, rows, found, phi, reduced, static, B, labels, keep, report)
 
 
 def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
@@ -175,14 +185,13 @@ def _band(values: Array, settings: BodySettings, zero: int) -> int:
 
 def _assemble_group(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, rows: BodyRows, found: eigen.Spectrum,
-    phi: Array, omega: Array, zero: int, static: Array, B: sp.csr_matrix, labels: tuple[str, ...], report: Report,
+    phi: Array, reduced: Reduced, static: Array, B: sp.csr_matrix, labels: tuple[str, ...], kept: int, report: Report,
 ) -> ModalGroup:  # fmt: skip
-    n, m = model.d.mesh.n_points, len(omega)
+    n, m, omega = model.d.mesh.n_points, phi.shape[1], reduced.omega
     shapes = phi.reshape(n, 3, m)
     ratios = settings.damping.ratios(omega)
     T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
-    elastic = omega > 0
-    modal = (T[:, elastic] / omega[elastic] ** 2) @ T[:, elastic].T
+    modal = held_compliance(T, reduced)
     Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
     G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes, skew(model.axis), Mphi, optimize=True)
     stresses: dict[str, StressSet] = {}
@@ -196,24 +205,41 @@ def _assemble_group(
     return ModalGroup(
         speed=speed,
         omega=omega,
-        kind=tuple(["rigid"] * zero + ["normal"] * (m - zero)),
+        kind=reduced.kind,
         damping_ratio=ratios,
-        M_r=np.eye(m),
-        K_r=np.diag(omega**2),
-        C_r=np.diag(2 * ratios * omega),
+        M_r=reduced.M_r,
+        K_r=reduced.K_r,
+        C_r=modal_damping(reduced, 2 * ratios * omega),
+        to_diagonal=reduced.to_diagonal,
         G_r=0.5 * (G - G.T),
         phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
         interfaces=reduced_interfaces(rows, settings, phi, shapes),
         excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
         monitors={k: reduced_rows(v, phi, u) for k, v in rows.monitors.items()},
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
-        compliance=Compliance(labels, static, modal, bool(zero)),
+        compliance=Compliance(labels, static, modal, "rigid" in reduced.kind),
         stresses=stresses,
         u_static=state.u,
-        checks=_checks(found, model, state, m),
+        checks=_checks(found, model, state, kept),
         prestress=state.prestress if (speed or model.loaded) else "none",
         spin_softening=model.spin_softening,
     )
+
+
+def held_compliance(T: Array, reduced: Reduced) -> Array:
+    """(r, r) static compliance that the coordinates hold, for rows T (r, c): T K_r^-1 T^T without the rigid ones."""
+    V = np.eye(len(reduced.kind)) if reduced.to_diagonal is None else reduced.to_diagonal
+    elastic = reduced.omega > 0
+    modes = (T @ V)[:, elastic]
+    return (modes / reduced.omega[elastic] ** 2) @ modes.T
+
+
+def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
+    """(c, c) damping matrix with the given diagonal in the reduced body's own modes."""
+    if reduced.to_diagonal is None:
+        return np.diag(diagonal)
+    back = reduced.M_r @ reduced.to_diagonal  # V^-T, because V^T M_r V = 1
+    return (back * diagonal) @ back.T
 
 
 def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:

@@ -66,8 +66,8 @@ def rigid_shift(model: BodyModel) -> float:
     return -float(0.05**2 * stiffness / model.material.density / length**2)
 
 
-def static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix, R: Array, shift: float) -> Array:
-    """(r, r) displacement of row i under unit force on row j; inertia relief when rigid motions are free.
+def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix, R: Array, shift: float) -> Array:
+    """(n, r) displacement under a unit force on each row; inertia relief when rigid motions are free.
 
     With rigid motions, the part outside the modes found is solved by fixed-point iteration on the shifted
     factorisation, which contracts by |shift| / (lambda_next + |shift|) a step; a body so slender that this would
@@ -75,10 +75,9 @@ def static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_mat
     """
     F = np.asarray(B.T.todense())
     if not F.shape[1]:
-        return np.zeros((0, 0))
+        return np.zeros((pencil.n, 0))
     if not R.shape[1]:
-        C = np.asarray(B @ pencil.solve(F))
-        return 0.5 * (C + C.T)
+        return pencil.solve(F)
     if -shift > 0.3 * found.upper_shift:
         shift = -0.1 * found.upper_shift
         pencil.solver.factorise(pencil.shifted(shift))
@@ -99,8 +98,7 @@ def static_compliance(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_mat
         previous = size
         rest = -shift * pencil.M(step)  # what K leaves of the step: K s = rest + shift M s
         rest -= MX @ (X.T @ rest)
-    C = (T / elastic) @ T.T + np.asarray(B @ u)
-    return 0.5 * (C + C.T)
+    return X[:, R.shape[1] :] @ (T / elastic).T + u
 
 
 def leading_rows(

@@ -1,0 +1,25 @@
+"""Reduction methods behind one interface: which shapes, besides the lowest eigenmodes, span the motion of a body.
+
+The book reduces with eigenmodes alone (Sextro section 2.4) and says itself that the number needed depends on the
+problem. Every other method here makes the static answer to forces on the interface and load rows exact, so that
+stiff contacts hold with few coordinates. A method is one file with one function ``reduce(Problem) -> Reduced``
+and one line in `METHODS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from . import craig_bampton, eigenmodes, rubin
+from .problem import Problem, Reduced
+
+METHODS: dict[str, Callable[[Problem], Reduced]] = {
+    "eigenmodes": eigenmodes.reduce,
+    "macneal": eigenmodes.reduce,
+    "rubin": rubin.reduce,
+    "craig-bampton": craig_bampton.reduce,
+}
+"""Method name -> function. ``macneal`` keeps the eigenmodes: its residual flexibility, the compliance they leave
+out, stands in the file beside them and adds no coordinates."""
+
+__all__ = ["METHODS", "Problem", "Reduced"]
