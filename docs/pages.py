@@ -101,7 +101,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "name": ("", "names the products: `meshes/NAME.msh`, `build/NAME/`"),
     "description": ("", "one line for the report"),
     "length_unit": ("", "unit of every length in this file and of the mesh or CAD file"),
-    "reduction": ("", "method of reduction"),
+    "reduction": ("", "method of reduction, see reduction.md"),
     "free": ("", "the body is meant to float; rigid motions are kept and flagged"),
     "note": ("", "a remark the report repeats"),
     "geometry.build": ("", "a Python file that draws the body with gmsh"),

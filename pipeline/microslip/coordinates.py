@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Array, Interface, ModalGroup, Rows
+from .data import Array, Interface, ModalBasis, ModalGroup, Rows
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
@@ -24,7 +24,7 @@ def in_modes(g: ModalGroup) -> ModalGroup:
 
     return replace(
         g,
-        kind=("normal",) * g.n_modes,
+        kind=("reduced",) * g.n_modes,
         M_r=np.eye(g.n_modes),
         K_r=np.diag(g.omega**2),
         C_r=V.T @ g.C_r @ V,
@@ -37,6 +37,11 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
         to_diagonal=None,
     )
+
+
+def basis_in_modes(basis: ModalBasis) -> ModalBasis:
+    """`in_modes` of every group."""
+    return replace(basis, groups={key: in_modes(g) for key, g in basis.groups.items()})
 
 
 def _fit_residual(i: Interface, shapes: Array, rows: Array) -> Array:

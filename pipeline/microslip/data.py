@@ -19,7 +19,7 @@ Array = NDArray[Any]
 """Real numbers in double precision unless the docstring says otherwise."""
 
 ComplexArray = NDArray[np.complex128]
-Indices = NDArray[np.int64]
+Indices = NDArray[np.signedinteger[Any]]
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the six strain and stress components (Sextro Eqs. (2.2-17), (2.2-19); the same as VTK's)."""

@@ -115,7 +115,7 @@ def frequency_response(
         Omega = 2 * np.pi * f
         S = group.K_r - Omega**2 * group.M_r + 1j * Omega * (group.C_r + group.G_r)
         answer = np.linalg.solve(S, np.column_stack([force.astype(complex), rows.T]))
-        free = rows @ answer[:, 0] + residual.force_on_contacts * amplitude
+        free = np.asarray(rows @ answer[:, 0] + residual.force_on_contacts * amplitude, dtype=complex)
         flexibility = rows @ answer[:, 1:] + residual.contacts
         u, converged[i] = _solve_contacts(springs, limits, free, flexibility, u)
         k = _stiffness(springs, limits, np.abs(u))[0]

@@ -17,6 +17,7 @@ import numpy as np
 
 from .basis import check_basis
 from .campbell import crossings, track_basis
+from .coordinates import basis_in_modes
 from .data import Interface, ModalBasis, ModalGroup
 from .store import write_text
 from .truncation import percent, verdict
@@ -80,6 +81,7 @@ def report_html(
     response: Mapping[str, Any] | None = None,
 ) -> str:  # fmt: skip
     """The page as text; see `write_report`."""
+    basis = basis_in_modes(basis)
     album = _Album(pictures)
     parts = [
         ("Body", _body(basis, album)),

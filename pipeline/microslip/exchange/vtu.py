@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..coordinates import basis_in_modes
 from ..data import Array, ModalBasis, ModalGroup
 from ..store import complete_or_absent
 
@@ -24,6 +25,7 @@ def write_vtu(basis: ModalBasis, path: Path | str) -> None:
     Raises:
         UserError: no permission, no space.
     """
+    basis = basis_in_modes(basis)
     import meshio
 
     data: dict[str, Any] = {}

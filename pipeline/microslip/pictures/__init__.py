@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..campbell import track_basis
+from ..coordinates import basis_in_modes
 from ..data import ModalBasis, ModalGroup
 from ..store import complete_or_absent
 from . import plots
@@ -79,6 +80,7 @@ def draw_all(
         ``mode_<number>_<rpm>rpm``, ``animation_<number>``, ``stress_modes``, ``static``, ``compliance``,
         ``campbell``; what does not apply to the body is not there.
     """
+    basis = basis_in_modes(basis)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Path] = {}
