@@ -478,3 +478,13 @@ def test_gauge_modes_are_strain_modes():
     d = d + displacement_gradient(block, group.u_static)[e, q] @ d
     read = np.array([d[0] ** 2, d[1] ** 2, d[2] ** 2, d[0] * d[1], d[1] * d[2], d[0] * d[2]]) @ strain
     np.testing.assert_allclose(group.gauges["foil"].rows[0], read, rtol=1e-6)
+
+
+def test_extent_and_outline_of_a_patch():
+    """b0 along t1, h0 along t2, and the four corners anticlockwise about the outward normal."""
+    mesh = brick("tetra10", (2, 3, 2), (0.1, 0.07, 0.05))
+    p = patch(mesh, "x1", np.array([0.0, 0.0, 1.0]), "tip")
+    np.testing.assert_allclose(p.extent, [0.07, 0.05], rtol=1e-12)
+    assert len(p.polygon) == 4
+    area = 0.5 * sum(np.cross(a, b) for a, b in zip(p.polygon, np.roll(p.polygon, -1, axis=0), strict=True))
+    np.testing.assert_allclose(area, 0.07 * 0.05 * p.rotation[0], atol=1e-12)

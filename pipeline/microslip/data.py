@@ -102,6 +102,8 @@ class Interface:
         normals: (p, 3) outward unit normals.
         shapes: (p, 3, m) displacement of the points, body axes. May be empty (0 points) if not stored.
         role: ``left``, ``right``, ``ground``, ``load`` or ``bolt``. partner: name of the facing interface.
+        extent: (2,) b0 along t1 and h0 along t2, m (Sextro Fig. 5.1-3). polygon: (k, 3) corners of the convex
+            outline seen along n, m, anticlockwise about n; empty for a face that closes on itself.
         sector_shift: +1 if the partner belongs to the next blade, -1 previous, 0 the same body or ground.
     """
 
@@ -116,6 +118,8 @@ class Interface:
     role: str = "ground"
     partner: str = ""
     sector_shift: int = 0
+    extent: Array = field(default_factory=lambda: np.zeros(2))
+    polygon: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)

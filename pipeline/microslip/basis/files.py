@@ -160,6 +160,10 @@ def _write_frames(file: h5py.File, group: ModalGroup) -> None:
         put(face, "origin", item.origin, "m", scales=[file["axis"]])
         put(face, "rotation", item.rotation, "1", scales=[file["frame_axis"], file["axis"]])
         patch = face.create_group("patch")
+        patch.attrs["b0"], patch.attrs["h0"] = item.extent
+        if len(item.polygon):
+            corner = put_scale(patch, "corner", np.arange(1, len(item.polygon) + 1))
+            put(patch, "polygon", item.polygon, "m", scales=[corner, file["axis"]])
         point = put_scale(patch, "point", np.arange(1, len(item.points) + 1))
         put(patch, "points", item.points, "m", scales=[point, file["axis"]])
         put(patch, "areas", item.areas, "m^2", scales=[point])
@@ -470,6 +474,8 @@ def _read_interface(frame: h5py.Group, group: h5py.Group, m: int) -> Interface:
         _array(frame, "patch/normals", p, 3),
         _array(group, "patch/shapes", p, 3, m) if "patch/shapes" in group else np.zeros((0, 3, m)),
         str(frame.attrs["role"]), str(frame.attrs["partner"]), int(frame.attrs["sector_shift"]),
+        np.array([float(frame["patch"].attrs[k]) for k in ("b0", "h0")]),
+        _array(frame, "patch/polygon", None, 3) if "patch/polygon" in frame else np.zeros((0, 3)),
     )  # fmt: skip
 
 

@@ -119,6 +119,7 @@ def reduced_interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shape
             p.origin, p.rotation, np.asarray(p.B @ phi), p.fit_residual(shapes), p.points, p.areas, p.normals,
             moved if keep else np.zeros((0, 3, phi.shape[1])),
             item.role if item else "load", item.partner if item else "", item.sector_shift if item else 0,
+            p.extent, p.polygon,
         )  # fmt: skip
     return out
 

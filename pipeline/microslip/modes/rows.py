@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 from scipy.optimize import lsq_linear, nnls
+from scipy.spatial import ConvexHull
 
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
@@ -34,6 +35,8 @@ class Patch:
     areas: Array
     normals: Array
     N: sp.csr_matrix
+    extent: Array
+    polygon: Array
 
     def fit_residual(self, phi: Array) -> Array:
         """(m,) share of the patch's motion that no rigid motion explains, for shapes (n, 3, m)."""
@@ -85,7 +88,21 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True)
     cross = np.array([skew(v) for v in r])  # r x u = cross @ u
     W[3:] = np.einsum("ij,pjk->ipk", rotation @ np.linalg.inv(J), cross) * areas[None, :, None]
     B = sp.vstack([_expand(N, W[i]) for i in range(6)]).tocsr()
-    return Patch(origin, rotation, B, points, areas, vectors / areas[:, None], N)
+    nodes = mesh.points[mesh.face_points(face)]
+    extent = np.ptp(nodes @ rotation[1:].T, axis=0)
+    polygon = np.zeros((0, 3)) if closed else _outline(nodes, rotation)
+    return Patch(origin, rotation, B, points, areas, vectors / areas[:, None], N, extent, polygon)
+
+
+def _outline(nodes: Array, rotation: Array) -> Array:
+    """(k, 3) corners of the convex hull of points seen along the first row of `rotation`, anticlockwise."""
+    flat = nodes @ rotation[1:].T
+    hull = ConvexHull(flat).vertices
+    corners = flat[hull]
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    sharp = turn > 1e-6 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)  # not points along a side
+    return nodes[hull[sharp]]
 
 
 def _frame(normal: Array, t2: Array, areas: Array, name: str) -> Array:
