@@ -268,7 +268,7 @@ def test_flipped_bytes_in_sealed_modal_files(folder: Path, modal_file: Path) -> 
                 read_basis(folder / "sealed.h5")
             except UserError:
                 refused += 1
-    assert refused > 140  # the rest hit the seal itself and left the content whole
+    assert refused > 120  # the rest hit the seal itself and left the content whole
 
 
 WORKER = """

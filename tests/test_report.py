@@ -253,7 +253,7 @@ def test_a_bare_file_has_a_page_too(tmp_path: Path) -> None:
 
 def test_a_free_body_says_so() -> None:
     words = said(report_html(small.basis(free=True), {}))
-    assert "6 of them rigid" in words and "inertia relief" in words and "free in space" in words
+    assert "6 of them rigid" in words and "inertia relief" in words and "rigid motions are left free" in words
 
 
 def test_many_patches_are_summed_up() -> None:

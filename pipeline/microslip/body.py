@@ -513,7 +513,7 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
         if not 300 <= m.density <= 25000:
             found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
         stiff = max(m.young) if isinstance(m.young, tuple) else m.young
-        if not 1e5 <= stiff <= 1.3e12:
+        if not 1e8 <= stiff <= 1.3e12:
             found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
     if not 1e-3 <= size <= 50:
         found.append(

@@ -16,17 +16,27 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from .body import Model, Name, NotNegative, Number, Numbers, Positive, _tuple, load_toml, override, validate
 from .data import Array, ModalBasis, ModalGroup, Rows, UserError
-from .harmonic_balance import FrequencyResponse, JenkinsContact, Residual, frequency_response, stuck_frequencies
+from .harmonic_balance import (
+    FrequencyResponse,
+    JenkinsContact,
+    Residual,
+    frequency_response,
+    refined_peaks,
+    stuck_frequencies,
+)
 
 
 class ContactSettings(Model):
-    """A contact of one interface with a rigid neighbour. Stiffnesses in N/m for the whole patch (book: c_N0, c_R0)."""
+    """A contact of one interface with a rigid neighbour. Stiffnesses in N/m for the whole patch (book: c_N0, c_R0).
+
+    width (along t1) and height (along t2) in m are the patch's own if not given.
+    """
 
     interface: Name
     normal_stiffness: Positive
     tangential_stiffness: Positive
-    width: Positive
-    height: Positive
+    width: Positive | None = None
+    height: Positive | None = None
     friction: NotNegative
     slides_along: Literal["t1", "t2"] = "t1"
 
@@ -65,12 +75,19 @@ class CaseSettings(Model):
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Responses by normal force (N), the free response, and the eigenfrequencies with sticking contacts (Hz)."""
+    """Responses by normal force (N), the free response, and the eigenfrequencies with sticking contacts (Hz).
+
+    resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
+    sweep. speed: rad/s. remarks: sentences a reader must know.
+    """
 
     settings: CaseSettings
     responses: dict[float, FrequencyResponse]
     free: FrequencyResponse
     stuck: Array
+    resonances: dict[float, list[tuple[float, float]]]
+    speed: float
+    remarks: tuple[str, ...]
 
 
 def load_case(path: Path | str, assignments: list[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
@@ -108,19 +125,73 @@ def run_case(
                 f"{path}: contacts: the modal file of '{basis.name}' has no interface '{c.interface}'; it has "
                 f"{', '.join(group.interfaces) or 'none'}"
             )
+    contacts = [_sized(c, group, path) for c in settings.contacts]
     residual = _residual(group, settings, label) if basis.reduction == "macneal" else None
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
-    responses = {}
+    responses, resonances = {}, {}
     for normal in sweep.normal_forces:
         report(f"friction response at a normal force of {normal:g} N")
-        responses[normal] = frequency_response(
-            group, [_contact(c, normal) for c in settings.contacts], force, watch, frequency, report, residual,
-            settings.amplitude,
-        )  # fmt: skip
+        pressed = [_contact(c, normal) for c in contacts]
+
+        def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
+            return frequency_response(group, pressed, force, watch, at, residual=residual, amplitude=settings.amplitude)
+
+        responses[normal] = respond(frequency)
+        resonances[normal] = refined_peaks(responses[normal], respond)
     free = frequency_response(group, [], force, watch, frequency)
-    stuck = stuck_frequencies(group, [_contact(c, max(sweep.normal_forces)) for c in settings.contacts], residual)
-    return CaseResult(settings, responses, free, stuck)
+    stuck = stuck_frequencies(group, [_contact(c, max(sweep.normal_forces)) for c in contacts], residual)
+    remarks = tuple(_lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
+    return CaseResult(settings, responses, free, stuck, resonances, group.speed, remarks)
+
+
+def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:
+    found = []
+    for normal, r in responses.items():
+        swing = r.normal_swing.max(axis=1, initial=0.0)
+        if normal and (open_ := swing > normal).any():
+            low, high = r.frequency[open_][[0, -1]]
+            found.append(
+                f"At F_N = {normal:g} N the normal force would swing by up to {swing.max():.3g} N between {low:.4g} "
+                f"and {high:.4g} Hz: the contacts would lift off there, which this stage does not follow."
+            )
+    return found
+
+
+def _too_coarse(group: ModalGroup, settings: CaseSettings) -> list[str]:
+    """Peaks between the points are searched for, but a step wider than a peak may pass over it altogether."""
+    sweep = settings.sweep
+    step = (sweep.stop - sweep.start) / (sweep.points - 1)
+    elastic = group.omega > 0
+    width = 2 * group.damping_ratio[elastic].min(initial=1.0) * sweep.start
+    if step > 4 * width:
+        return [
+            f"The step of {step:.3g} Hz is wide against the half-power width of {width:.3g} Hz at {sweep.start:g} Hz: "
+            "narrow resonances may be passed over; raise sweep.points."
+        ]
+    return []
+
+
+def _not_converged(responses: dict[float, FrequencyResponse]) -> list[str]:
+    return [
+        f"At F_N = {normal:g} N {int(np.sum(~r.converged))} of {len(r.frequency)} points did not converge (first at "
+        f"{r.frequency[~r.converged][0]:.6g} Hz); change sweep.points a little or the normal force."
+        for normal, r in responses.items()
+        if not r.converged.all()
+    ]
+
+
+def _sized(c: ContactSettings, group: ModalGroup, path: Path | str) -> ContactSettings:
+    """The contact with the extents of its patch; given ones that differ by more than 5 % are refused."""
+    b0, h0 = (float(v) for v in group.interfaces[c.interface].extent)
+    for key, own in (("width", b0), ("height", h0)):
+        given = getattr(c, key)
+        if given is not None and abs(given / own - 1) > 0.05:
+            raise UserError(
+                f"{path}: contacts.{c.interface}.{key}: {given:g} m is not the patch's, which is {own:g} m; "
+                "leave it out or correct it (metres)"
+            )
+    return c.model_copy(update={"width": b0, "height": h0})
 
 
 def _residual(group: ModalGroup, settings: CaseSettings, label: str) -> Residual:
@@ -141,7 +212,7 @@ def _row(rows: Any, name: str, path: Path | str, key: str) -> Rows:
 
 def _contact(c: ContactSettings, normal: float) -> JenkinsContact:
     """Springs of a patch of width b0 along t1 and height h0 along t2 (Sextro Eqs. (5.2-39) to (5.2-41), uniform)."""
-    b2, h2 = c.width**2 / 12, c.height**2 / 12
+    b2, h2 = (c.width or 0.0) ** 2 / 12, (c.height or 0.0) ** 2 / 12
     cn, ct = c.normal_stiffness, c.tangential_stiffness
     springs = np.array([cn, ct, ct, ct * (b2 + h2), cn * h2, cn * b2])
     if normal == 0:

@@ -357,6 +357,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
     W = _away_from(known, M_known, pencil.solve(pencil.M(start)))
     Q[:, :block], MQ[:, :block], _ = _mass_qr(W, pencil.M(W))
     wanted = min(count, limit * block)
+    look = wanted + block
     for step in range(limit):
         done = (step + 1) * block
         last, new = slice(done - block, done), slice(done, done + block)
@@ -366,8 +367,9 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
         T[:done, last] += _take_out(W, Q[:, :done], MQ[:, :done])  # and what rounding leaves
         Q[:, new], MQ[:, new], R = _mass_qr(W, pencil.M(W))
         T[new, last] = R
-        if done < wanted + block:
+        if done < look:
             continue
+        look = max(done + block, int(1.1 * done))  # the small eigenproblem is not looked at in every step
         theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].T))
         theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
         if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():

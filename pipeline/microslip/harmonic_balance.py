@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 
-from .data import Array, ComplexArray, ModalGroup
+from .data import Array, ComplexArray, Indices, ModalGroup
 
 Report = Callable[[str], None]
 
@@ -59,7 +60,8 @@ class FrequencyResponse:
     Attributes:
         frequency: (f,) Hz. monitor: (f,) complex 0-peak displacement of the monitored row, m.
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
-        converged: (f,) bool. limit: the friction limits, N, for reports.
+        converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
+            amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
     """
 
     frequency: Array
@@ -68,6 +70,7 @@ class FrequencyResponse:
     dissipated: Array
     converged: Array
     limit: Array
+    normal_swing: Array
 
 
 def jenkins_harmonic(amplitude: Array, stiffness: float, limit: float) -> tuple[Array, Array]:
@@ -110,6 +113,7 @@ def frequency_response(
     slider = [6 * i + c.slider for i, c in enumerate(contacts)]
     monitored, slips = np.zeros(points, complex), np.zeros((points, len(contacts)), complex)
     dissipated, converged = np.zeros(points), np.zeros(points, bool)
+    swing = np.zeros((points, len(contacts)))
     u = np.zeros(count, complex)
     for i, f in enumerate(frequency):
         Omega = 2 * np.pi * f
@@ -121,13 +125,14 @@ def frequency_response(
         k = _stiffness(springs, limits, np.abs(u))[0]
         monitored[i] = monitor @ answer[:, 0] + residual.force_on_monitor * amplitude
         monitored[i] -= (monitor @ answer[:, 1:] + residual.contacts_on_monitor) @ (k * u)
-        slips[i] = u[slider]
+        slips[i], swing[i] = u[slider], np.abs(springs[::6] * u[::6])
         dissipated[i] = np.pi * float(np.sum(k.imag * np.abs(u) ** 2))
         if not converged[i]:
             u = np.zeros(count, complex)
         if (i + 1) % max(points // 2, 1) == 0:
             report(f"{i + 1} of {points} frequencies")
-    return FrequencyResponse(frequency, monitored, slips, dissipated, converged, np.array([c.limit for c in contacts]))
+    limit = np.array([c.limit for c in contacts])
+    return FrequencyResponse(frequency, monitored, slips, dissipated, converged, limit, swing)
 
 
 def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:
@@ -166,7 +171,22 @@ def _solve_contacts(
                     break
                 size *= 0.5
             u, residual = u + size * step, _residual(springs, limits, free, D, u + size * step)
-    return u, False
+    return _last_resort(springs, limits, free, D, np.asarray(stuck, dtype=complex))
+
+
+def _last_resort(
+    springs: Array, limits: Array, free: ComplexArray, D: ComplexArray, start: ComplexArray
+) -> tuple[ComplexArray, bool]:
+    """Powell's hybrid method where Newton found no way."""
+    n, scale = len(free), np.abs(free).max(initial=1e-300)
+
+    def real(x: Array) -> Array:
+        r = _residual(springs, limits, free, D, scale * (x[:n] + 1j * x[n:])) / scale
+        return np.concatenate([r.real, r.imag])
+
+    answer = scipy.optimize.root(real, np.concatenate([start.real, start.imag]) / scale, tol=1e-13)
+    u = scale * (answer.x[:n] + 1j * answer.x[n:])
+    return u, bool(np.abs(real(answer.x)).max(initial=0.0) < 1e-9)
 
 
 def _residual(springs: Array, limits: Array, free: ComplexArray, D: ComplexArray, u: ComplexArray) -> ComplexArray:
@@ -200,10 +220,35 @@ def stuck_frequencies(group: ModalGroup, contacts: list[JenkinsContact], residua
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
-    """(frequency in Hz, amplitude in m) of every local maximum of the monitored amplitude."""
+    """(frequency in Hz, amplitude in m) of every local maximum of the monitored amplitude among converged points."""
     a = np.abs(response.monitor)
-    inside = np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
-    return [(float(response.frequency[i]), float(a[i])) for i in inside]
+    return [(float(response.frequency[i]), float(a[i])) for i in _tops(response)]
+
+
+def _tops(response: FrequencyResponse) -> Indices:
+    a, ok = np.abs(response.monitor), response.converged
+    whole = ok[1:-1] & ok[:-2] & ok[2:]
+    return np.flatnonzero(whole & (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
+
+
+def refined_peaks(
+    response: FrequencyResponse, respond: Callable[[Array], FrequencyResponse]
+) -> list[tuple[float, float]]:
+    """`peaks`, each searched for between its two neighbours on the grid, so that the step does not cut it off.
+
+    Args:
+        respond: the response at other frequencies (Hz).
+    """
+    found = []
+    for i in _tops(response):
+        low, high = (float(response.frequency[j]) for j in (i - 1, i + 1))
+        for _ in range(6):  # nine points a round: the bracket shrinks four times
+            r = respond(np.linspace(low, high, 9))
+            a = np.where(r.converged, np.abs(r.monitor), 0.0)
+            top = int(np.clip(a.argmax(), 1, 7))
+            low, high = float(r.frequency[top - 1]), float(r.frequency[top + 1])
+        found.append((float(r.frequency[a.argmax()]), float(a.max())))
+    return found
 
 
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:

@@ -237,7 +237,7 @@ def _body(basis: ModalBasis, album: _Album) -> str:
         ("inertia about the centre xx, yy, zz", _join(inertia[[0, 1, 2], [0, 1, 2]]) + " kg m²"),
         ("xy, yz, xz", _join(inertia[[0, 1, 0], [1, 2, 2]]) + " kg m²"),
         ("mesh", f"{basis.mesh.n_points} points, {text(cells)}, {3 * basis.mesh.n_points} degrees of freedom"),
-        ("held", "free in space" if basis.free else "by its supports"),
+        ("held", "rigid motions are left free" if basis.free else "by its supports"),
         ("damping given as", text(basis.damping_source)),
         ("reduction", text(basis.reduction)),
         *_material(basis.provenance),

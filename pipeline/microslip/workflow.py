@@ -251,7 +251,10 @@ def modes_stage(
     for warning in warnings:
         report(f"warning: {warning}")
     temperature = nodal_temperature(job, mesh)
-    basis = modal_basis(mesh, job.settings, temperature, report, provenance(job, mesh_file))
+    try:
+        basis = modal_basis(mesh, job.settings, temperature, report, provenance(job, mesh_file))
+    except UserError as error:
+        raise UserError(f"{job.path}: {error}") from error
     report(f"writing {product}")
     write_basis(product, basis)
     store.note_product(product, inputs, warnings=warnings)
@@ -349,6 +352,8 @@ def response_stage(
     store.write_text(folder / "response.csv", response_table(result.responses))
     with store.complete_or_absent(pictures["response"]) as temporary:
         response_picture(result, temporary)
+    for remark in result.remarks:
+        report(f"warning: {remark}")
     summary = summarise(result)
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
     store.note_product(summary_file, inputs)
@@ -357,19 +362,19 @@ def response_stage(
 
 def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
-    from .harmonic_balance import peaks
-
     rows = []
-    for normal, response in result.responses.items():
-        for frequency, amplitude in peaks(response):
+    for normal, resonances in result.resonances.items():
+        for frequency, amplitude in resonances:
             rows.append({"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude})
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
     return {
         "case": result.settings.name,
         "description": result.settings.description,
+        "rotation_speed_rpm": result.speed * 30 / np.pi,
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
         "resonances": rows,
         "failed_points": failed,
+        "remarks": list(result.remarks),
     }
 
 
@@ -383,6 +388,9 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
 
     product, folder = job.build_folder / "report.html", job.build_folder / "pictures"
     remarks = _remarks(job)
+    if response is not None:
+        remarks += response.get("remarks", [])
+        response = {k: v for k, v in response.items() if k != "remarks"}
     inputs = {
         "basis": store.hash_file(job.basis_file),
         "response": response,
@@ -432,6 +440,11 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
     Returns:
         The report's path, and whether every point of the response converged.
     """
+    if job.case_file is not None and (named := load_case(job.case_file)[0].body) != job.settings.name:
+        raise UserError(
+            f"{job.case_file}: body: it names '{named}', but the body beside it is '{job.settings.name}'; "
+            "make them agree"
+        )
     modes_stage(job, force=force, report=report)
     response, converged = None, True
     if job.case_file is not None:

@@ -23,7 +23,8 @@ def mesh_cad(settings_file: str, out: str) -> None:
     mesh = dict(settings.get("mesh", {}))
     size = mesh["size"] = default_size() if mesh.get("size") is None else mesh["size"]
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)  # elements around a full circle, as far as
-    gmsh.option.setNumber("Mesh.MeshSizeMin", positive_size("mesh.size", size) / 3)
+    smallest = min([positive_size("mesh.size", size), *mesh.get("local", {}).values()])
+    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest / 3)
     finish(mesh, out)
 
 
