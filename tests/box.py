@@ -75,8 +75,6 @@ direction = "x"
 interface = "tip"
 normal_stiffness = 1e7
 tangential_stiffness = 1e6
-width = 0.02
-height = 0.03
 friction = 0.3
 
 [sweep]
