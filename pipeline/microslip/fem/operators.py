@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..data import Array, Indices
 from .discretise import Block, Discretisation
 
-_BATCH = 900_000  # node pairs assembled at a time: each batch passes over the whole operator once
+_BATCH = 300_000  # node pairs assembled at a time: temporaries stay below the 32 MB that malloc hands back at once
 _PAIR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # tensor index pair -> Voigt index (xx yy zz xy yz xz)
 
 
