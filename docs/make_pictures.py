@@ -20,7 +20,7 @@ from pages import HERE, body_reference, fill, play, table
 from microslip import truncation
 from microslip.basis import read_basis
 from microslip.campbell import track_basis
-from microslip.case import CaseSettings, _contact, load_case, run_case
+from microslip.case import CaseSettings, _contact, _sized, load_case, run_case
 from microslip.data import ModalBasis, ModalGroup
 from microslip.harmonic_balance import peaks, stuck_frequencies
 from microslip.pictures import lettering, plots, views
@@ -182,7 +182,9 @@ def convergence() -> None:
 
 def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
     settings, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
-    return settings.model_copy(update=changes)
+    group = basis.groups[0, 0]
+    sized = tuple(_sized(c, group, "blade.toml") for c in settings.contacts)
+    return settings.model_copy(update={"contacts": sized, **changes})
 
 
 def stuck(group: ModalGroup, settings: CaseSettings, normal: float = 780.0) -> np.ndarray:
@@ -199,7 +201,10 @@ def contact() -> None:
     ]
     fill("blade.md", "stuck", table(["resonance", "printed, Hz", "sticking contacts, Hz", "deviation"], rows))
     rows = []
-    for normal, response in sorted(result.responses.items(), reverse=True):
+    near = {"start": 90.0, "stop": 130.0, "points": 8001}  # fine enough for the sharpest peak
+    settings = blade_case(basis)
+    fine = run_case(settings.model_copy(update={"sweep": settings.sweep.model_copy(update=near)}), basis, "blade.toml")
+    for normal, response in sorted(fine.responses.items(), reverse=True):
         f, a = max((p for p in peaks(response) if p[0] < 200), key=lambda p: p[1])
         i = int(np.argmin(np.abs(response.frequency - f)))
         rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{1e6 * response.dissipated[i]:.0f}"])
@@ -262,7 +267,7 @@ def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
 
     def row(text: str, b: ModalBasis) -> None:
         result = run_case(settings.model_copy(update={"sweep": near}), b, "blade.toml")
-        best = [max(peaks(r), key=lambda p: p[1]) for r in result.responses.values()]
+        best = [max(found, key=lambda p: p[1]) for found in result.resonances.values()]
         rows.append([text, *(f"{1e6 * a:.0f} um at {f:.2f} Hz" for f, a in best)])
 
     row("as in the files: 285 mm, D = 0.1 %", basis)
