@@ -214,6 +214,38 @@ class Support(Model):
     directions: Directions = "xyz"
 
 
+class Cyclic(Model):
+    """The body is one of `sectors` alike round the rotation axis; right is left turned by 2 pi / sectors."""
+
+    sectors: Annotated[int, Field(ge=3, le=1000)]
+    left: FaceName = "cyclic_left"
+    right: FaceName = "cyclic_right"
+    nodal_diameters: (
+        Literal["all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], BeforeValidator(_tuple)]
+    ) = "all"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Cyclic:
+        if self.left == self.right:
+            raise ValueError("left and right must be two faces")
+        if self.nodal_diameters != "all":
+            wanted = self.nodal_diameters
+            if not wanted or len(set(wanted)) < len(wanted):
+                raise ValueError("nodal_diameters must name each of them once, or be \"all\"")
+            if max(wanted) > self.sectors // 2:
+                raise ValueError(
+                    f"nodal_diameters: {max(wanted)} is more than {self.sectors} sectors can have "
+                    f"({self.sectors // 2}); higher orders alias onto these"
+                )
+        return self
+
+    @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Nodal diameters asked for, ascending."""
+        every = range(self.sectors // 2 + 1)
+        return tuple(every) if self.nodal_diameters == "all" else tuple(sorted(self.nodal_diameters))
+
+
 class Rotation(Model):
     """Rotation about an axis and the speeds to analyse.
 
@@ -368,6 +400,7 @@ class BodySettings(Model):
     material: MaterialSettings
     temperature: Temperature = Field(default_factory=Temperature)
     supports: Annotated[tuple[Support, ...], BeforeValidator(_tuple)] = ()
+    cyclic: Cyclic | None = None
     rotation: Rotation = Field(default_factory=Rotation)
     loads: Annotated[tuple[Load, ...], BeforeValidator(_tuple)] = ()
     interfaces: Annotated[tuple[InterfaceSettings, ...], BeforeValidator(_tuple)] = ()
@@ -386,6 +419,8 @@ class BodySettings(Model):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{kind}: the name '{min(twice)}' is used twice; rename one")
+        if self.cyclic and self.free:
+            raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self
 
 

@@ -27,8 +27,8 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         kind=("reduced",) * g.n_modes,
         M_r=np.eye(g.n_modes),
         K_r=np.diag(g.omega**2),
-        C_r=V.T @ g.C_r @ V,
-        G_r=V.T @ g.G_r @ V,
+        C_r=V.conj().T @ g.C_r @ V,
+        G_r=V.conj().T @ g.G_r @ V,
         phi=g.phi @ V,
         interfaces={k: face(i) for k, i in g.interfaces.items()},
         excitations={k: rows(r) for k, r in g.excitations.items()},
@@ -50,6 +50,6 @@ def _fit_residual(i: Interface, shapes: Array, rows: Array) -> Array:
         return np.zeros(rows.shape[1])
     t, w = i.rotation.T @ rows[:3], i.rotation.T @ rows[3:]
     fit = t[None] + np.cross(w.T[:, None, :], (i.points - i.origin)[None], axis=2).transpose(1, 2, 0)
-    left = np.sqrt(np.einsum("p,pim->m", i.areas, (shapes - fit) ** 2))
-    whole = np.sqrt(np.einsum("p,pim->m", i.areas, shapes**2))
+    left = np.sqrt(np.einsum("p,pim->m", i.areas, np.abs(shapes - fit) ** 2))
+    whole = np.sqrt(np.einsum("p,pim->m", i.areas, np.abs(shapes) ** 2))
     return np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)

@@ -143,7 +143,7 @@ class StressSet:
 
 @dataclass(frozen=True)
 class Rows:
-    """Named rows on the generalised coordinates: ``values = rows @ q`` for read-outs, ``rows.T @ f`` for forces.
+    """Named rows on the generalised coordinates: ``values = rows @ q`` for read-outs, ``rows.conj().T @ f`` for forces.
 
     Attributes:
         rows: (r, m). labels: r texts. unit: of one row times a unit coordinate's displacement.
@@ -187,8 +187,12 @@ class Compliance:
 class ModalGroup:
     """The reduced body at one rotation speed (and one nodal diameter).
 
+    Of a cyclic sector at a nodal diameter 0 < k < N/2 everything that is linear in the shapes is complex (phi, rows,
+    strain, stress, G_r, compliance); ``rows @ q`` reads and ``rows^H @ f`` loads. The right-hand neighbour moves as
+    R u exp(+i k 2 pi / N), and the shapes are normalised on one sector: phi^H M phi = 1.
+
     Attributes:
-        speed: rotation speed, rad/s. harmonic: nodal diameter (0 for a body without cyclic symmetry).
+        speed: rotation speed, rad/s.
         omega: (m,) angular eigenfrequencies, rad/s, ascending; rigid modes are exactly 0.
         kind: m texts: ``rigid``, ``normal``, ``attachment`` (Rubin), ``interface``, ``fixed-interface``.
         to_diagonal: (m, m) V with V^T M_r V = 1, V^T K_r V = diag(omega^2); None if M_r and K_r are diagonal. With
@@ -248,6 +252,7 @@ class ModalBasis:
         damping_source: text that says where the ratios come from (``ratio``, ``rayleigh``, ``table``).
         free: True if rigid motions remain.
         reduction: name of the method.
+        sectors: N; 1 for a body without cyclic symmetry. Then mass, centre and inertia are those of one sector.
         provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
     """
 
@@ -263,3 +268,4 @@ class ModalBasis:
     free: bool
     reduction: str
     provenance: Mapping[str, str]
+    sectors: int = 1

@@ -148,8 +148,8 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     V, top = g.to_diagonal, max(_largest(g.omega**2), 1.0)
     assert V is not None
     return [
-        ("to_diagonal: V^T M_r V is the identity", _largest(V.T @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
-        ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(V.T @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
+        ("to_diagonal: V^T M_r V is the identity", _largest(V.conj().T @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
+        ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(V.conj().T @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
     ]
 
 
@@ -157,7 +157,7 @@ def _matrix_checks(g: ModalGroup) -> _Findings:
     scale = max(_largest(g.omega**2), 1.0)
     found: _Findings = [
         ("frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * _largest(g.omega), ""),
-        ("G_r is skew", _largest(g.G_r + g.G_r.T), 1e-9 * max(_largest(g.G_r), 1e-12), ""),
+        ("G_r is skew", _largest(g.G_r + g.G_r.conj().T), 1e-9 * max(_largest(g.G_r), 1e-12), ""),
         ("rigid modes have omega = 0", _largest(g.omega[np.array(g.kind) == "rigid"]), 0.0, ""),
     ]
     C = np.diag(2 * g.damping_ratio * g.omega)
@@ -207,13 +207,13 @@ def _compliance_checks(g: ModalGroup) -> _Findings:
     if not len(T):
         return found
     elastic = g.omega > 0
-    modal = (T[:, elastic] / g.omega[elastic] ** 2) @ T[:, elastic].T
+    modal = (T[:, elastic] / g.omega[elastic] ** 2) @ T[:, elastic].conj().T
     error = _largest(modal - g.compliance.modal) / max(_largest(modal), 1e-300)
     found.append(("modal compliance follows from the rows", error, 1e-9, ""))
     static = g.compliance.static
-    error = _largest(static - static.T) / max(_largest(static), 1e-300)
+    error = _largest(static - static.conj().T) / max(_largest(static), 1e-300)
     found.append(("static compliance is symmetric", error, 1e-9, ""))
-    d = np.sqrt(np.maximum(np.diag(static), 1e-300))
+    d = np.sqrt(np.maximum(np.diag(static).real, 1e-300))
     scaled = g.compliance.residual / np.outer(d, d)
     worst = float(np.linalg.eigvalsh(scaled).min()) if np.isfinite(scaled).all() else -np.inf
     found.append(("static compliance is not below its modal part", max(-worst, 0.0), 1e-6, ""))

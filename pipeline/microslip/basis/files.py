@@ -30,7 +30,7 @@ from ..data import (
 from ..store import complete_or_absent
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import INTERFACE_ROWS, TOLERANCES, Check, check_basis
-from .hdf5 import create, inspect, put, put_scale, seal, seal_state, trial
+from .hdf5 import IMAGINARY, create, inspect, put, put_scale, seal, seal_state, trial
 
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 
@@ -113,8 +113,8 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> None:
     put(rotation, "direction", basis.rotation_axis, "1", scales=[file["axis"]])
     put(rotation, "point", basis.rotation_point, "m", scales=[file["axis"]])
     cyclic = file.create_group("cyclic")
-    cyclic.attrs["N"] = 1
-    cyclic.attrs["sector_angle"] = 2 * np.pi
+    cyclic.attrs["N"] = basis.sectors
+    cyclic.attrs["sector_angle"] = 2 * np.pi / basis.sectors
 
 
 def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
@@ -190,7 +190,7 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     if g.phi.shape[0]:
         put(modes, "phi", g.phi, "kg^-1/2", scales=[file["node"], file["axis"], mode])
     cyclic = group.create_group("cyclic")
-    cyclic.attrs["N"], cyclic.attrs["harmonic"], cyclic.attrs["real"] = 1, g.harmonic, 1
+    cyclic.attrs["harmonic"], cyclic.attrs["real"] = g.harmonic, int(not np.iscomplexobj(g.phi))
     _write_rows(group, g, mode)
     labels = np.array(g.compliance.labels, dtype="U")
     row, col = (put_scale(group, f"compliance_{k}", labels) for k in ("row", "column"))
@@ -357,7 +357,10 @@ def _array(group: h5py.Group, name: str, *shape: int | None) -> Array:
         raise ValueError(f"{group.name}/{name} has shape {found}, expected {wanted}")
     if dataset.dtype.kind != "f":
         raise ValueError(f"{group.name}/{name} does not hold floating-point numbers")
-    return np.asarray(dataset[()], dtype=np.float64)
+    real = np.asarray(dataset[()], dtype=np.float64)
+    if not name.endswith(IMAGINARY) and name + IMAGINARY in group:
+        return real + 1j * _array(group, name + IMAGINARY, *shape)
+    return real
 
 
 def _indices(group: h5py.Group, name: str, columns: int | None, limit: int) -> Indices:
@@ -388,8 +391,9 @@ def _names(group: h5py.Group) -> list[str]:
 
 
 def _read(file: h5py.File) -> ModalBasis:
-    if int(file["cyclic"].attrs["N"]) != 1:
-        raise ValueError("it holds a cyclic sector, which this version does not read")
+    sectors = int(file["cyclic"].attrs["N"])
+    if sectors < 1:
+        raise ValueError(f"/cyclic: its attribute N is {sectors}")
     mesh = _read_mesh(file["mesh"])
     groups = {}
     for name, where in file.items():
@@ -406,7 +410,7 @@ def _read(file: h5py.File) -> ModalBasis:
         rotation_axis=_array(file, "rotation/direction", 3), rotation_point=_array(file, "rotation/point", 3),
         damping_source=str(file.attrs["damping_source"]),
         free=bool(file.attrs["free"]), reduction=str(file.attrs["reduction"]),
-        provenance={k: str(v) for k, v in file["provenance"].attrs.items()},
+        provenance={k: str(v) for k, v in file["provenance"].attrs.items()}, sectors=sectors,
     )  # fmt: skip
 
 

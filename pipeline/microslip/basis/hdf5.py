@@ -19,6 +19,8 @@ import h5py
 import numpy as np
 
 _SEAL = b"\nmicroslip seal, sha256 of all bytes before this line: "
+IMAGINARY = "_imag"
+"""Ends the name of the dataset that holds the imaginary part of the dataset beside it."""
 _SEAL_LENGTH = len(_SEAL) + 64 + 1
 _DEPTH, _OBJECTS, _EXPANSION = 12, 200_000, 64
 
@@ -83,8 +85,14 @@ def put(
     group: h5py.Group, name: str, data: Any, unit: str = "", dims: tuple[str, ...] = (),
     scales: Sequence[h5py.Dataset] = (),
 ) -> h5py.Dataset:  # fmt: skip
-    """Write a dataset with its unit and its dimensions, named by `dims` or by `scales` (one for every axis)."""
+    """Write a dataset with its unit and its dimensions, named by `dims` or by `scales` (one for every axis).
+
+    Complex numbers become two datasets, the imaginary part under the name with `IMAGINARY` behind it.
+    """
     data = np.asarray(data)
+    if np.iscomplexobj(data):
+        put(group, name + IMAGINARY, data.imag, unit, dims, scales)
+        data = data.real
     if data.dtype.kind == "U":
         data = np.char.encode(data, "utf-8") if data.size else data.astype("S1")
     dataset = group.create_dataset(name, data=data, track_times=False)

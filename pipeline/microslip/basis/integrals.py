@@ -92,12 +92,12 @@ def tables(cell_type: str) -> tuple[Array, Array, Array]:
 
 
 def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
-    """(m, m) integral of phi_i . phi_j over the volume (m3 times the unit of phi squared), and the volume, m3.
+    """(m, m) integral of conj(phi_i) . phi_j over the volume (m3 times the unit of phi squared), and the volume, m3.
 
     Args:
         phi: (n, 3, m) shapes.
     """
-    total, volume = np.zeros((phi.shape[2], phi.shape[2])), 0.0
+    total, volume = np.zeros((phi.shape[2], phi.shape[2]), dtype=phi.dtype), 0.0
     for cell_type, cells in mesh.cells.items():
         N, dN, weights = tables(cell_type)
         for chunk in np.array_split(cells, max(1, len(cells) // 20000)):
@@ -105,14 +105,14 @@ def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
             for q, w in enumerate(weights):
                 dv = w * np.linalg.det(np.einsum("dk,eki->edi", dN[q], x))
                 u = np.tensordot(N[q], phi[chunk], axes=(0, 1)).reshape(-1, phi.shape[2])
-                total += u.T @ (np.repeat(dv, 3)[:, None] * u)
+                total += u.conj().T @ (np.repeat(dv, 3)[:, None] * u)
                 volume += float(dv.sum())
     return total, volume
 
 
 def face_mean(points: Array, blocks: Mapping[str, Indices], values: Array) -> tuple[float, Array, Array]:
     """Area (m2), area centre (3,) and area mean of nodal values (n, ...) of a face."""
-    area, centre, mean = np.float64(0), np.zeros(3), np.zeros(values.shape[1:])
+    area, centre, mean = np.float64(0), np.zeros(3), np.zeros(values.shape[1:], dtype=values.dtype)
     for facet_type, facets in blocks.items():
         N, dN, weights = tables(facet_type)
         x = points[facets]

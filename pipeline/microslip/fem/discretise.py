@@ -156,6 +156,16 @@ class FreeUpper:
         n = len(self.free)
         return sp.csr_matrix((values.reshape(-1)[self.gather], self.indices, self.indptr), shape=(n, n))
 
+    def restrict(self, forces: Array) -> Array:
+        """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
+        return forces[self.free]
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""
+        whole = np.zeros((3 * n, *unknowns.shape[1:]), dtype=unknowns.dtype)
+        whole[self.free] = unknowns
+        return whole
+
 
 def free_upper(pattern: Pattern, fixed: Indices) -> FreeUpper:
     """Drop the rows and columns of the fixed degrees of freedom and keep the upper triangle."""

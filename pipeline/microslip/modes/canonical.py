@@ -42,13 +42,13 @@ def turn_clusters(phi: Array, values: Array, rows: Array, zero: int = 0) -> Arra
             continue
         T = rows[:, run]
         norms = np.linalg.norm(T, axis=1)
-        Q = np.eye(size)
+        Q = np.eye(size, dtype=phi.dtype)
         done = 0
         for i in np.flatnonzero(norms > 1e-3 * norms.max()) if norms.max() > 0 else []:
             v = (T[i] @ Q)[done:]
             if np.linalg.norm(v) < 1e-3 * norms[i]:
                 continue
-            H, _ = np.linalg.qr(np.column_stack([v, np.eye(len(v))]))
+            H, _ = np.linalg.qr(np.column_stack([v.conj(), np.eye(len(v))]))
             Q[:, done:] = Q[:, done:] @ H
             done += 1
             if done == size - 1:
@@ -58,9 +58,12 @@ def turn_clusters(phi: Array, values: Array, rows: Array, zero: int = 0) -> Arra
 
 
 def signs(rows: Array) -> Array:
-    """(m,) +1 or -1 that makes the entry of largest magnitude positive; of near ties (1e-6) the lowest row rules."""
+    """(m,) factors of magnitude 1 that make the entry of largest magnitude real and positive.
+
+    Of near ties (1e-6) the lowest row rules. Real rows get +1 or -1.
+    """
     size = np.abs(rows)
     top = size.max(axis=0)
     first = (size >= (1 - 1e-6) * top).argmax(axis=0)
-    s = np.sign(rows[first, np.arange(rows.shape[1])])
-    return np.where(s == 0, 1.0, s)
+    entry, size = rows[first, np.arange(rows.shape[1])].conj(), top
+    return np.divide(entry, size, out=np.ones_like(entry), where=size > 0)

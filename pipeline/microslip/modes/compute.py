@@ -193,7 +193,7 @@ def _assemble_group(
     T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
     modal = held_compliance(T, reduced)
     Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
-    G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes, skew(model.axis), Mphi, optimize=True)
+    G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes.conj(), skew(model.axis), Mphi, optimize=True)
     stresses: dict[str, StressSet] = {}
     if settings.output.gauss or settings.output.nodal_stress:
         report("strain and stress modes")
@@ -211,7 +211,7 @@ def _assemble_group(
         K_r=reduced.K_r,
         C_r=modal_damping(reduced, 2 * ratios * omega),
         to_diagonal=reduced.to_diagonal,
-        G_r=0.5 * (G - G.T),
+        G_r=0.5 * (G - G.conj().T),
         phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
         interfaces=reduced_interfaces(rows, settings, phi, shapes),
         excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},

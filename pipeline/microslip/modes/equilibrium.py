@@ -155,9 +155,7 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
         relaxed = stress_of(model, [np.zeros_like(e) for e in model.thermal_strain])
         force = force - internal_force(model.d, relaxed, None)
     solver.factorise(model.free.matrix(model.K0))
-    flat = np.zeros(3 * n)
-    flat[model.free.free] = solver.solve(force.reshape(-1)[model.free.free])
-    u = flat.reshape(n, 3)
+    u = model.free.expand(solver.solve(model.free.restrict(force.reshape(-1))), n).reshape(n, 3)
     H = [displacement_gradient(b, u) for b in model.d.blocks]
     stress = stress_of(model, [green_strain(h, nonlinear=False) for h in H])
     K = _tangent(model, H, stress) + soft
@@ -203,7 +201,7 @@ def _newton_at(
 
     A millionth of the body stands for u where less moves: heated between walls a body does not move at all.
     """
-    n, free = model.d.mesh.n_points, model.free.free
+    n, free = model.d.mesh.n_points, model.free
     omega = speed * np.sqrt(level)
     soft = softening(model, omega)
     if model.thermal_strain is not None and level < 1:
@@ -217,12 +215,11 @@ def _newton_at(
         if steps and (steps[-1] < 1e-9 or (len(steps) > 1 and steps[-1] < 1e-5 and steps[-1] > 0.3 * steps[-2])):
             return StaticState(u, H, stress, K + soft if model.spin_softening else K, "nonlinear", len(steps))
         outer = level * model.dead_load + centrifugal_force(model, omega, u)
-        residual = (outer - internal_force(model.d, stress, H)).reshape(-1)[free]
-        solver.factorise(model.free.matrix(K + soft))
+        residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))
+        solver.factorise(free.matrix(K + soft))
         if (negative := solver.negative()) and len(steps) > 3:
             raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
-        change = np.zeros(3 * n)
-        change[free] = solver.solve(residual)
+        change = free.expand(solver.solve(residual), n)
         u = u + change.reshape(n, 3)
         steps.append(float(np.abs(change).max() / max(np.abs(u).max(), 1e-6 * size)))
         if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * size:

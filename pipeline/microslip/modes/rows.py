@@ -46,8 +46,8 @@ class Patch:
         w = self.rotation.T @ rigid[3:]
         r = self.points - self.origin
         fit = t[None] + np.cross(w.T[:, None, :], r[None], axis=2).transpose(1, 2, 0)
-        left = np.sqrt(np.einsum("p,pim->m", self.areas, (u - fit) ** 2))
-        whole = np.sqrt(np.einsum("p,pim->m", self.areas, u**2))
+        left = np.sqrt(np.einsum("p,pim->m", self.areas, np.abs(u - fit) ** 2))
+        whole = np.sqrt(np.einsum("p,pim->m", self.areas, np.abs(u) ** 2))
         return np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
 
 

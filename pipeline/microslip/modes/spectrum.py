@@ -115,5 +115,5 @@ def leading_rows(
 
 def _strong(phi: Array, place: Indices) -> Indices:
     """Degrees of freedom with the largest motion over all modes, a few of them; of ties the first in `place`."""
-    power = (phi[place] ** 2).sum(axis=1)
+    power = (np.abs(phi[place]) ** 2).sum(axis=1)
     return place[np.argsort(-np.round(power / power.max(), 6), kind="stable")[:6]]

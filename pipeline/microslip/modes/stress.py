@@ -19,7 +19,7 @@ def modal_strain(block: Block, phi: Array, F: Array | None) -> Array:
         F: (e, q, 3, 3) deformation gradient of the static state, None for the reference geometry.
     """
     e, q = block.dx.shape
-    out = np.empty((e, q, 6, phi.shape[2]))
+    out = np.empty((e, q, 6, phi.shape[2]), dtype=phi.dtype)
     inverse = None if F is None else np.linalg.inv(F)
     for j in range(phi.shape[2]):
         g = np.matmul(phi[block.cells, :, j].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))
@@ -107,7 +107,7 @@ def nodal_set(model: BodyModel, state: StaticState, phi: Array, batch: int = 8) 
     smoothers = [smoother(b, n) for b in model.d.blocks]
     weights = np.sum([w for _, w in smoothers], axis=0)
     S = sp.hstack([matrix for matrix, _ in smoothers]).tocsr()
-    strain, stress = np.empty((n, 6, m)), np.empty((n, 6, m))
+    strain, stress = np.empty((n, 6, m), dtype=phi.dtype), np.empty((n, 6, m), dtype=phi.dtype)
     for start in range(0, m, batch):
         part = gauss_set(model, state, phi[:, :, start : start + batch])
         count = part.strain.shape[2]
