@@ -147,9 +147,10 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     """The transformation to the reduced body's own modes."""
     V, top = g.to_diagonal, max(_largest(g.omega**2), 1.0)
     assert V is not None
+    H = V.conj().T
     return [
-        ("to_diagonal: V^T M_r V is the identity", _largest(V.conj().T @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
-        ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(V.conj().T @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
+        ("to_diagonal: V^T M_r V is the identity", _largest(H @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
+        ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(H @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
     ]
 
 
