@@ -16,9 +16,10 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
+from microslip.modes.compute import held_compliance
 from microslip.modes.equilibrium import make_model
 from microslip.modes.spectrum import make_pencil
-from microslip.reduction import METHODS
+from microslip.reduction import METHODS, Problem
 from microslip.reduction.craig_bampton import fixed_interface_modes
 
 STATICALLY_EXACT = ("rubin", "craig-bampton")
@@ -204,3 +205,54 @@ def test_craig_bampton_without_interfaces_is_refused():
     mesh = brick("tetra10", (3, 2, 2), (0.1, 0.06, 0.05))
     with pytest.raises(UserError, match="interfaces"):
         modal_basis(mesh, body(supports=[{"face": "x0"}], modes={"count": 4}, reduction="craig-bampton"))
+
+
+class DenseSolver(eigen.DirectSolver):
+    """Of complex Hermitian matrices given whole."""
+
+    name = "dense"
+
+    def factorise(self, upper):
+        self.A = upper
+
+    def solve(self, b):
+        return np.linalg.solve(self.A, b)
+
+    def negative(self):
+        return int((np.linalg.eigvalsh(self.A) < 0).sum())
+
+
+def problems_with_turned_phases() -> tuple[Problem, Problem]:
+    """A real problem, and the same with every degree of freedom turned by a phase of its own: D K D^H, B D^H."""
+    rng = np.random.default_rng(7)
+    n, m = 40, 5
+    root, weight = rng.standard_normal((n, n)), rng.standard_normal((n, n))
+    K, M = root @ root.T + np.eye(n), 0.1 * weight @ weight.T + np.eye(n)
+    B = rng.standard_normal((6, n))
+    phase = np.exp(2j * np.pi * rng.random(n))
+    values, X = scipy.linalg.eigh(K, M, subset_by_index=(0, m - 1))
+    labels = (*(f"interface:a:{c}" for c in "abcde"), "excitation:e:force")
+
+    def problem(D):
+        A, C, rows = D[:, None] * K * D.conj(), D[:, None] * M * D.conj(), B * D.conj()
+        pencil = eigen.Pencil(
+            lambda s: A - s * C, lambda x: A @ x, lambda x: C @ x, n, np.abs(A).max(), np.abs(C).max(), DenseSolver()
+        )  # fmt: skip
+        static = np.linalg.solve(A, rows.conj().T)
+        return Problem(pencil, values, D[:, None] * X, 0, sp.csr_matrix(rows), labels, static)
+
+    return problem(np.ones(n)), problem(phase)
+
+
+@pytest.mark.parametrize("method", ["eigenmodes", "macneal", "rubin"])
+def test_hermitian_problems_reduce_as_their_real_twins(method):
+    """Turned phases change no frequency and no compliance, and every row reads the same size."""
+    real, turned = problems_with_turned_phases()
+    a, b = METHODS[method](real), METHODS[method](turned)
+    assert np.iscomplexobj(b.vectors) and a.kind == b.kind
+    np.testing.assert_allclose(b.omega, a.omega, rtol=1e-9)
+    Ta, Tb = real.rows @ a.vectors, turned.rows @ b.vectors
+    np.testing.assert_allclose(np.abs(Tb), np.abs(Ta), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(held_compliance(Tb, b), held_compliance(Ta, a), rtol=1e-7, atol=1e-9)
+    back = b.M_r if b.to_diagonal is None else b.to_diagonal.conj().T @ b.M_r @ b.to_diagonal
+    np.testing.assert_allclose(back, np.eye(len(back)), atol=1e-9)

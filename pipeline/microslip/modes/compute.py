@@ -227,19 +227,19 @@ def _assemble_group(
 
 
 def held_compliance(T: Array, reduced: Reduced) -> Array:
-    """(r, r) static compliance that the coordinates hold, for rows T (r, c): T K_r^-1 T^T without the rigid ones."""
+    """(r, r) static compliance that the coordinates hold, for rows T (r, c): T K_r^-1 T^H without the rigid ones."""
     V = np.eye(len(reduced.kind)) if reduced.to_diagonal is None else reduced.to_diagonal
     elastic = reduced.omega > 0
     modes = (T @ V)[:, elastic]
-    return (modes / reduced.omega[elastic] ** 2) @ modes.T
+    return (modes / reduced.omega[elastic] ** 2) @ modes.conj().T
 
 
 def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
     """(c, c) damping matrix with the given diagonal in the reduced body's own modes."""
     if reduced.to_diagonal is None:
         return np.diag(diagonal)
-    back = reduced.M_r @ reduced.to_diagonal  # V^-T, because V^T M_r V = 1
-    return (back * diagonal) @ back.T
+    back = reduced.M_r @ reduced.to_diagonal  # V^-H, because V^H M_r V = 1
+    return (back * diagonal) @ back.conj().T
 
 
 def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:

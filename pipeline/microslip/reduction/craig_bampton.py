@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from .. import eigen
 from ..data import Array, UserError
-from .problem import Problem, Reduced, diagonalised
+from .problem import Problem, Reduced, diagonalised, hermitian
 
 
 def reduce(problem: Problem) -> Reduced:
@@ -33,16 +33,15 @@ def reduce(problem: Problem) -> Reduced:
             'reduction: "craig-bampton" needs a body that its supports hold; use "rubin" for one with rigid motions'
         )
     B = problem.rows[chosen]
-    compliance = np.asarray(B @ problem.static[:, chosen])
-    constraint_modes = np.linalg.solve(0.5 * (compliance + compliance.T), problem.static[:, chosen].T).T
+    stiffness = hermitian(np.linalg.inv(hermitian(np.asarray(B @ problem.static[:, chosen]))))
+    constraint_modes = problem.static[:, chosen] @ stiffness
     fixed = fixed_interface_modes(problem.pencil, B, len(problem.values), problem.certify)
     vectors = np.hstack([constraint_modes, fixed.vectors])
     r = len(chosen)
-    M_r = vectors.T @ problem.pencil.M(vectors)
-    M_r = 0.5 * (M_r + M_r.T)
+    M_r = hermitian(vectors.conj().T @ problem.pencil.M(vectors))
     M_r[r:, r:] = np.eye(len(fixed.values))
     K_r = np.zeros_like(M_r)
-    K_r[:r, :r] = np.linalg.inv(0.5 * (compliance + compliance.T))
+    K_r[:r, :r] = stiffness
     K_r[r:, r:] = np.diag(fixed.values)
     kind = ("interface",) * r + ("fixed-interface",) * len(fixed.values)
     return diagonalised(vectors, kind, M_r, K_r)
@@ -61,22 +60,21 @@ def fixed_interface_modes(pencil: eigen.Pencil, B: sp.csr_matrix, count: int, ce
 
 
 class _Constrained(eigen.DirectSolver):
-    """Solutions of A x + B^T f = b, B x = 0 from a direct solver of A.
+    """Solutions of A x + B^H f = b, B x = 0 from a direct solver of A.
 
     The count of negative eigenvalues on {B x = 0} follows from Haynsworth's inertia additivity:
-    n(A) + n(-B A^-1 B^T) - rows of B.
+    n(A) + n(-B A^-1 B^H) - rows of B.
     """
 
     def __init__(self, inner: eigen.DirectSolver, B: sp.csr_matrix) -> None:
         self.inner, self.B, self.name = inner, B, inner.name
-        self._gram = scipy.linalg.cho_factor(np.asarray((B @ B.T).todense()))
+        self._gram = scipy.linalg.cho_factor((B @ B.conj().T).toarray())
         self._answers = self._flexibility = np.zeros((0, 0))
 
     def factorise(self, upper: sp.csr_matrix) -> None:
         self.inner.factorise(upper)
-        self._answers = self.inner.solve(np.asarray(self.B.T.todense()))
-        flexibility = np.asarray(self.B @ self._answers)
-        self._flexibility = 0.5 * (flexibility + flexibility.T)
+        self._answers = self.inner.solve(self.B.conj().T.toarray())
+        self._flexibility = hermitian(np.asarray(self.B @ self._answers))
 
     def solve(self, b: Array) -> Array:
         x = self.inner.solve(b)
@@ -87,5 +85,5 @@ class _Constrained(eigen.DirectSolver):
         return self.inner.negative() + of_flexibility - self.B.shape[0]
 
     def without_reactions(self, forces: Array) -> Array:
-        """Take out of forces the part B^T f that the constraint carries."""
-        return forces - self.B.T @ scipy.linalg.cho_solve(self._gram, self.B @ forces)
+        """Take out of forces the part B^H f that the constraint carries."""
+        return forces - self.B.conj().T @ scipy.linalg.cho_solve(self._gram, self.B @ forces)

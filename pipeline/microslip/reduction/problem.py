@@ -16,6 +16,9 @@ from ..eigen import Pencil
 class Problem:
     """The unreduced body on its free degrees of freedom and the answers that are known of it.
 
+    Real and symmetric, or complex and Hermitian (a sector at a nodal diameter); rows read ``rows @ u`` and load
+    ``rows.conj().T @ f``.
+
     Attributes:
         pencil: K and M with a direct solver. values, vectors: the (m,) lowest eigenvalues and (n, m) shapes, rigid
             ones first. rigid: how many of them are rigid. certify: whether further spectra are to be certified.
@@ -40,7 +43,7 @@ class Reduced:
     Attributes:
         vectors: (n, c) shape of each coordinate. kind: c texts (``rigid``, ``normal``, ``attachment``,
             ``interface``, ``fixed-interface``). M_r, K_r: (c, c).
-        to_diagonal: (c, c) V with V^T M_r V = 1 and V^T K_r V = diag(omega^2), None if they are diagonal already.
+        to_diagonal: (c, c) V with V^H M_r V = 1 and V^H K_r V = diag(omega^2), None if they are diagonal already.
         omega: (c,) rad/s, ascending, of the reduced body.
     """
 
@@ -52,6 +55,11 @@ class Reduced:
     to_diagonal: Array | None = None
 
 
+def hermitian(A: Array) -> Array:
+    """The Hermitian part of a square matrix that differs from it by rounding."""
+    return 0.5 * (A + A.conj().T)
+
+
 def diagonal(vectors: Array, kind: tuple[str, ...], values: Array, rigid: int) -> Reduced:
     """`Reduced` for shapes that are M-orthonormal and K-orthogonal."""
     omega = np.sqrt(np.maximum(values, 0.0))
@@ -61,5 +69,5 @@ def diagonal(vectors: Array, kind: tuple[str, ...], values: Array, rigid: int) -
 
 def diagonalised(vectors: Array, kind: tuple[str, ...], M_r: Array, K_r: Array) -> Reduced:
     """`Reduced` in physical coordinates, with the transformation to its own modes beside it."""
-    values, V = scipy.linalg.eigh(0.5 * (K_r + K_r.T), 0.5 * (M_r + M_r.T))
+    values, V = scipy.linalg.eigh(hermitian(K_r), hermitian(M_r))
     return Reduced(vectors, kind, M_r, K_r, np.sqrt(np.maximum(values, 0.0)), V)
