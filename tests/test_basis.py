@@ -261,6 +261,7 @@ TAMPERED = {
     "frame": ("interfaces/right/rotation", swapped),
     "patch areas": ("interfaces/right/patch/areas", scaled(1.5, 3)),
     "modal compliance": (AT + "compliance_modal", scaled(1.001, (0, 0))),
+    "eigenmodes alone": (AT + "compliance_plain", scaled(1.001, (0, 0))),
     "static compliance": (AT + "compliance_static", scaled(0.5, (13, 13))),
     "mass": ("body/mass", lambda a: a * 1.001),
     "one point of the mesh": ("mesh/xyz", scaled(1.5, 150)),
@@ -424,7 +425,7 @@ def test_every_missing_part_is_named(tmp_path: Path) -> None:
     parts += [AT + p for p in ("modes", "rotation", "rotation/u_static", "checks", "excitation", "monitor", "gauge")]
     parts += [AT + p for p in ("interfaces/right", "interfaces/right/T", "interfaces/right/fit_residual")]
     parts += [AT + "monitor/tip-probe/" + p for p in ("T", "row", "static", "point")]
-    parts += [AT + p for p in ("compliance_static", "compliance_modal", "compliance_row", "cyclic")]
+    parts += [AT + p for p in ("compliance_static", "compliance_modal", "compliance_plain", "compliance_row", "cyclic")]
     parts += [AT + p for p in ("stress/gauss/T", "stress/gauss/points", "stress/gauss/weights", "strain/gauss/T")]
     parts += [AT + p for p in ("rotation/sigma_static/gauss", "strain")]
     for part in parts:

@@ -85,6 +85,7 @@ def test_interfaces_rows_compliance_and_stress_come_back_exactly(file: Path) -> 
     assert texts(compliance["row"]) == list(g.compliance.labels)
     assert equal(compliance["static"], g.compliance.static)
     assert equal(compliance["modal"], g.compliance.modal)
+    assert equal(compliance["plain"], g.compliance.plain)
     nodes = fields(s["stress_nodes"])
     assert equal(nodes["stress"], g.stresses["nodes"].stress)
     assert equal(nodes["strain"], g.stresses["nodes"].strain)

@@ -170,12 +170,20 @@ class Compliance:
             elastic part about the rigid motion, when the body is free).
         modal: (r, r) sum of T_i T_j / omega^2 over the kept elastic modes.
         inertia_relief: True if the body is free.
+        eigenmodes: (r, r) the part that the eigenmodes of the band hold alone, whatever the method added to or made
+            of them; None where nothing but eigenmodes is kept, see `plain`.
     """
 
     labels: tuple[str, ...]
     static: Array
     modal: Array
     inertia_relief: bool
+    eigenmodes: Array | None = None
+
+    @property
+    def plain(self) -> Array:
+        """(r, r) what a basis of as many plain eigenmodes would hold: the book's reference."""
+        return self.modal if self.eigenmodes is None else self.eigenmodes
 
     @property
     def residual(self) -> Array:

@@ -194,8 +194,9 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     _write_rows(group, g, mode)
     labels = np.array(g.compliance.labels, dtype="U")
     row, col = (put_scale(group, f"compliance_{k}", labels) for k in ("row", "column"))
-    for name, matrix in (("compliance_static", g.compliance.static), ("compliance_modal", g.compliance.modal)):
-        put(group, name, matrix, "displacement of the row per unit force of the column, SI", scales=[row, col])
+    unit = "displacement of the row per unit force of the column, SI"
+    for name in ("static", "modal", "plain"):
+        put(group, f"compliance_{name}", getattr(g.compliance, name), unit, scales=[row, col])
     group["compliance_static"].attrs["inertia_relief"] = int(g.compliance.inertia_relief)
     for name, s in sorted(g.stresses.items()):
         _write_stress(group, name, s, mode)
@@ -461,6 +462,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         compliance=Compliance(
             labels, _array(group, "compliance_static", r, r), _array(group, "compliance_modal", r, r),
             bool(group["compliance_static"].attrs["inertia_relief"]),
+            _array(group, "compliance_plain", r, r),
         ),
         stresses={name: _read_stress(group, name, m) for name in group["stress"]} if "stress" in group else {},
         u_static=_array(state, "u_static", n, 3),

@@ -105,6 +105,7 @@ def _group(g: ModalGroup) -> dict[str, Any]:
             "row": np.array(g.compliance.labels, dtype=object).reshape(-1, 1),
             "static": g.compliance.static,
             "modal": g.compliance.modal,
+            "plain": g.compliance.plain,
             "inertia_relief": float(g.compliance.inertia_relief),
         },
         "stress_nodes": _stress(g),

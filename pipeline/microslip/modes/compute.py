@@ -145,7 +145,9 @@ def _group(
     reduced = METHODS[settings.reduction](problem)
     phi = np.zeros((3 * model.d.mesh.n_points, len(reduced.kind)))
     phi[dofs] = reduced.vectors
-    return _assemble_group(model, settings, state, speed, rows, found, phi, reduced, static, B, labels, keep, report)
+    group = _assemble_group(model, settings, state, speed, rows, found, phi, reduced, static, B, labels, keep, report)
+    plain = held_compliance(np.asarray(B_free @ problem.vectors), METHODS["eigenmodes"](problem))
+    return replace(group, compliance=replace(group.compliance, eigenmodes=plain))
 
 
 def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
