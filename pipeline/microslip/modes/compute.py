@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -99,11 +99,49 @@ def inertia_of(d: Discretisation, density: float) -> tuple[float, Array, Array]:
     return float(m), centre, np.trace(second) * np.eye(3) - second
 
 
+@dataclass(frozen=True)
+class Solution:
+    """Certified modes of one state and the coordinates that the reduction makes of them.
+
+    Attributes:
+        found: every mode solved for; the first `kept` were reduced. reduced: shapes on the free degrees of freedom.
+        answers: (n, r) static answers to the rows B (r, 3 points), named by `labels`. static: (r, r) compliance;
+            eigenmodes: (r, r) the part of it that the kept eigenmodes alone hold.
+    """
+
+    found: eigen.Spectrum
+    kept: int
+    reduced: Reduced
+    answers: Array
+    static: Array
+    eigenmodes: Array
+    B: sp.csr_matrix
+    labels: tuple[str, ...]
+
+
 def _group(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
     solver: eigen.DirectSolver, report: Report,
 ) -> ModalGroup:  # fmt: skip
     pencil = make_pencil(model, state.K, solver)
+    s = solution(model, settings, pencil, speed, motions, rows, report)
+    phi = np.zeros((3 * model.d.mesh.n_points, len(s.reduced.kind)))
+    phi[model.free.free] = s.reduced.vectors
+    group = assemble_group(
+        model, settings, state, speed, rows, s.found, phi, s.reduced, s.static, s.B, s.labels, s.kept, report
+    )
+    return replace(group, compliance=replace(group.compliance, eigenmodes=s.eigenmodes))
+
+
+def solution(
+    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, motions: Array, rows: BodyRows,
+    report: Report,
+) -> Solution:  # fmt: skip
+    """Modes, static answers and reduced coordinates of the stiffness about one state.
+
+    Raises:
+        UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
+    """
     dofs = model.free.free
     R = motions[dofs]
     R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
@@ -114,7 +152,7 @@ def _group(
             f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
             "ask for fewer or refine"
         )
-    report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {solver.name}")
+    report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
@@ -143,11 +181,8 @@ def _group(
     if settings.reduction != "eigenmodes":
         report(f"reduction: {settings.reduction}")
     reduced = METHODS[settings.reduction](problem)
-    phi = np.zeros((3 * model.d.mesh.n_points, len(reduced.kind)))
-    phi[dofs] = reduced.vectors
-    group = _assemble_group(model, settings, state, speed, rows, found, phi, reduced, static, B, labels, keep, report)
     plain = held_compliance(np.asarray(B_free @ problem.vectors), METHODS["eigenmodes"](problem))
-    return replace(group, compliance=replace(group.compliance, eigenmodes=plain))
+    return Solution(found, keep, reduced, answers, static, plain, B, labels)
 
 
 def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
@@ -185,7 +220,7 @@ def _band(values: Array, settings: BodySettings, zero: int) -> int:
     return keep
 
 
-def _assemble_group(
+def assemble_group(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, rows: BodyRows, found: eigen.Spectrum,
     phi: Array, reduced: Reduced, static: Array, B: sp.csr_matrix, labels: tuple[str, ...], kept: int, report: Report,
 ) -> ModalGroup:  # fmt: skip
