@@ -62,15 +62,15 @@ def mac(A: Array, B: Array, weights: Array | None = None) -> Array:
         A: (n, 3, a). B: (n, 3, b). weights: (n,) mass or volume that belongs to each point; None: all equal.
 
     Returns:
-        (a, b) numbers between 0 and 1: (A^T W B)^2 / ((A^T W A) (B^T W B)).
+        (a, b) numbers between 0 and 1: |A^H W B|^2 / ((A^H W A) (B^H W B)).
     """
     w = np.ones(len(A)) if weights is None else weights
     left = A.reshape(-1, A.shape[2])
     WB = (w[:, None, None] * B).reshape(-1, B.shape[2])
-    a = np.einsum("n,nia,nia->a", w, A, A)
-    b = np.einsum("nib,nib->b", w[:, None, None] * B, B)
+    a = np.einsum("n,nia,nia->a", w, A.conj(), A).real
+    b = np.einsum("nib,nib->b", w[:, None, None] * B, B.conj()).real
     scale = np.outer(a, b)
-    return np.divide((left.T @ WB) ** 2, scale, out=np.zeros_like(scale), where=scale > 0)
+    return np.divide(np.abs(left.conj().T @ WB) ** 2, scale, out=np.zeros_like(scale), where=scale > 0)
 
 
 def track(groups: Sequence[ModalGroup], weights: Array | None = None) -> Tracks:
@@ -83,6 +83,16 @@ def track(groups: Sequence[ModalGroup], weights: Array | None = None) -> Tracks:
         The curves in the order of their first mode. Without shapes in the groups mode j is joined to mode j.
         At every step the assignment with the largest sum of MAC is taken; where even that stays below `LINK`
         the curve ends and a new one begins.
+    """
+    modes, omega, macs = follow(groups, weights)
+    return Tracks(np.array([g.speed for g in groups]), modes, omega, macs)
+
+
+def follow(groups: Sequence[ModalGroup], weights: Array | None = None) -> tuple[Indices, Array, Array]:
+    """Join modes from group to group, whatever their parameter (speed, nodal diameter); see `track`.
+
+    Returns:
+        `modes`, `omega` and `mac` as in `Tracks`.
     """
     links = [_link(a, b, weights) for a, b in zip(groups[:-1], groups[1:], strict=True)]
     s = len(groups)
@@ -103,8 +113,7 @@ def track(groups: Sequence[ModalGroup], weights: Array | None = None) -> Tracks:
     for i, group in enumerate(groups):
         here = modes[:, i] >= 0
         omega[here, i] = group.omega[modes[here, i]]
-    speeds = np.array([g.speed for g in groups])
-    return Tracks(speeds, modes, omega, np.array(macs, dtype=float).reshape(len(rows), s - 1))
+    return modes, omega, np.array(macs, dtype=float).reshape(len(rows), s - 1)
 
 
 def _link(a: ModalGroup, b: ModalGroup, weights: Array | None) -> tuple[Indices, Array]:
@@ -132,9 +141,13 @@ def track_basis(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
     groups = [g for (_, h), g in sorted(basis.groups.items()) if h == harmonic]
     if len(groups) < 2:
         return None
-    nodal = groups[0].stresses.get("nodes")
-    weights = nodal.weights if nodal is not None and len(nodal.weights) == basis.mesh.n_points else None
-    return track(groups, weights)
+    return track(groups, point_weights(basis))
+
+
+def point_weights(basis: ModalBasis) -> Array | None:
+    """(n,) volume that belongs to each point, m3, if the file has nodal stresses."""
+    nodal = basis.groups[min(basis.groups)].stresses.get("nodes")
+    return nodal.weights if nodal is not None and len(nodal.weights) == basis.mesh.n_points else None
 
 
 def crossings(tracks: Tracks, orders: Sequence[int]) -> list[Crossing]:

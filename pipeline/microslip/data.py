@@ -261,6 +261,7 @@ class ModalBasis:
         free: True if rigid motions remain.
         reduction: name of the method.
         sectors: N; 1 for a body without cyclic symmetry. Then mass, centre and inertia are those of one sector.
+        cyclic_faces: names of its left and right face in the mesh; right is left turned by 2 pi / N.
         provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
     """
 
@@ -277,3 +278,4 @@ class ModalBasis:
     reduction: str
     provenance: Mapping[str, str]
     sectors: int = 1
+    cyclic_faces: tuple[str, str] = ("cyclic_left", "cyclic_right")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -115,6 +116,7 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> None:
     cyclic = file.create_group("cyclic")
     cyclic.attrs["N"] = basis.sectors
     cyclic.attrs["sector_angle"] = 2 * np.pi / basis.sectors
+    cyclic.attrs["left"], cyclic.attrs["right"] = basis.cyclic_faces if basis.sectors > 1 else ("", "")
 
 
 def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
@@ -412,7 +414,14 @@ def _read(file: h5py.File) -> ModalBasis:
         damping_source=str(file.attrs["damping_source"]),
         free=bool(file.attrs["free"]), reduction=str(file.attrs["reduction"]),
         provenance={k: str(v) for k, v in file["provenance"].attrs.items()}, sectors=sectors,
+        **_cyclic_faces(file, sectors),
     )  # fmt: skip
+
+
+def _cyclic_faces(file: h5py.File, sectors: int) -> dict[str, Any]:
+    if sectors == 1:
+        return {}
+    return {"cyclic_faces": (str(file["cyclic"].attrs["left"]), str(file["cyclic"].attrs["right"]))}
 
 
 def _read_mesh(group: h5py.Group) -> Mesh:
