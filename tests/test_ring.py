@@ -1,0 +1,235 @@
+"""The whole ring from one sector: against the ring's own dense matrices, roots of unity, and what a person gets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+import sector
+from hypothesis import given
+from hypothesis import strategies as st
+
+from microslip.basis import check_basis, read_basis, write_basis
+from microslip.data import Array, ModalBasis, UserError
+from microslip.ring import (
+    aliased,
+    certify_ring,
+    exciting,
+    expand,
+    expand_tensor,
+    multiplicity,
+    replicate,
+    ring_checks,
+    ring_of,
+    rotation,
+    sector_rotation,
+    standing,
+    tied_points,
+)
+
+# --- engine orders and nodal diameters -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("order", "wanted"),
+    [
+        (0, (0, "standing")), (1, (1, "backward")), (11, (11, "backward")), (12, (12, "standing")),
+        (13, (11, "forward")), (23, (1, "forward")), (24, (0, "standing")), (25, (1, "backward")),
+        (35, (11, "backward")), (36, (12, "standing")), (37, (11, "forward")), (48, (0, "standing")),
+    ],
+)  # fmt: skip
+def test_engine_orders_on_24_blades(order: int, wanted: tuple[int, str]) -> None:
+    assert aliased(order, 24) == wanted
+
+
+def test_harmonics_of_an_engine_order_alias_anew() -> None:
+    assert [aliased(5, 24, h) for h in (1, 2, 3, 4, 5)] == [
+        (5, "backward"), (10, "backward"), (9, "forward"), (4, "forward"), (1, "backward"),
+    ]  # fmt: skip
+
+
+@given(st.integers(0, 500), st.integers(3, 97))
+def test_the_sectors_cannot_tell_an_engine_order_from_its_alias(order: int, sectors: int) -> None:
+    """cos(e (theta_j + Omega t)) at the sectors is the wave exp(i e Omega t) exp(+-i k theta_j)."""
+    k, direction = aliased(order, sectors)
+    theta, turned = 2 * np.pi * np.arange(sectors) / sectors, 0.37
+    sign = {"backward": 1, "forward": -1, "standing": 1}[direction]
+    wave = np.exp(1j * order * turned) * np.exp(1j * sign * k * theta)
+    np.testing.assert_allclose(wave.real, np.cos(order * (theta + turned)), rtol=0, atol=1e-10)
+    assert 0 <= k <= sectors // 2
+
+
+@given(st.integers(0, 100), st.integers(3, 97))
+def test_an_engine_order_that_excites_a_nodal_diameter_is_found_by_the_inverse(k: int, sectors: int) -> None:
+    k = k % (sectors // 2 + 1)
+    found = exciting(k, sectors, 3 * sectors)
+    assert len(found) == 3 * multiplicity(k, sectors)  # once or twice in each run of N engine orders
+    assert all(aliased(e, sectors) == (k, direction) for e, direction in found)
+
+
+def test_inverse_for_24_blades() -> None:
+    assert exciting(6, 24, 60) == [
+        (6, "backward"), (18, "forward"), (30, "backward"), (42, "forward"), (54, "backward"),
+    ]  # fmt: skip
+    assert exciting(12, 24, 40) == [(12, "standing"), (36, "standing")]
+
+
+# --- expansion -----------------------------------------------------------------------------------------------------
+
+
+def ring_matrices(basis: ModalBasis) -> tuple[Array, Array, Array]:
+    """Dense K and M of the joined ring on its free degrees of freedom, and the numbers of those."""
+    ring = ring_of(basis, shared=True)
+    K, M = sector.matrices(ring.mesh)
+    held = np.unique(ring.numbers[:, basis.mesh.face_points("bore")])
+    free = np.setdiff1d(np.arange(3 * ring.mesh.n_points), (3 * held[:, None] + np.arange(3)).ravel())
+    return K[np.ix_(free, free)], M[np.ix_(free, free)], free
+
+
+@pytest.fixture(scope="module", params=[5, 6])
+def ring(request: pytest.FixtureRequest) -> tuple[ModalBasis, Array, Array, Array]:
+    basis = sector.basis(request.param)
+    return basis, *ring_matrices(basis)
+
+
+def test_the_ring_has_the_frequencies_of_the_sectors_counted_once_and_twice(ring: tuple) -> None:
+    basis, K, M, _ = ring
+    found = certify_ring(basis)
+    exact = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)) / 2 / np.pi
+    assert found.certified and not found.missing
+    assert found.count == (exact <= found.limit).sum() == sum(found.counts.values())
+    every = np.concatenate(
+        [np.repeat(g.frequency, multiplicity(k, basis.sectors)) for (_, k), g in basis.groups.items()]
+    )
+    every = np.sort(every)[: found.count]
+    np.testing.assert_allclose(every, exact[: found.count], rtol=1e-9)  # rounding of a dense eigensolver
+
+
+def whole(basis: ModalBasis, speed: int = 0) -> tuple[Array, Array]:
+    """(ring dofs, modes) all real ring modes on the joined ring, and their omega."""
+    numbers, columns, omega = ring_of(basis, shared=True), [], []
+    for (s, _), g in basis.groups.items():
+        if s == speed:
+            for member in zip(*(standing(g, basis, j) for j in range(basis.sectors)), strict=True):
+                columns.append(numbers.gather(np.array(member)))
+                omega.append(g.omega)
+    shapes = np.concatenate(columns, axis=2)
+    return shapes.reshape(-1, shapes.shape[2]), np.concatenate(omega)
+
+
+def test_expanded_modes_are_orthonormal_on_the_ring_and_solve_its_eigenproblem(ring: tuple) -> None:
+    basis, K, M, free = ring
+    psi, omega = whole(basis)
+    assert psi.shape[1] == sum(multiplicity(k, basis.sectors) * g.n_modes for (_, k), g in basis.groups.items())
+    psi = psi[free]
+    np.testing.assert_allclose(psi.T @ M @ psi, np.eye(len(omega)), rtol=0, atol=1e-10)
+    error = np.linalg.norm(K @ psi - M @ psi * omega**2, axis=0) / np.linalg.norm(K @ psi, axis=0)
+    assert error.max() < 1e-9  # the sector's eigenvectors are exact to rounding times the condition of K
+
+
+def test_neighbours_agree_on_their_common_face(ring: tuple) -> None:
+    """The right face of sector j is the left face of sector j + 1, for every sector and nodal diameter."""
+    basis = ring[0]
+    left, right = tied_points(
+        basis.mesh, basis.rotation_axis, basis.rotation_point, basis.sectors, basis.cyclic_faces
+    )
+    for g in basis.groups.values():
+        for j in range(basis.sectors):
+            here, there = expand(g, basis, j)[right], expand(g, basis, j + 1)[left]
+            np.testing.assert_allclose(here, there, rtol=0, atol=1e-12 * np.abs(g.phi).max())
+    np.testing.assert_array_equal(expand(g, basis, basis.sectors), g.phi)
+
+
+def test_a_joined_ring_shares_points_and_keeps_its_volume_and_its_other_faces() -> None:
+    basis = sector.basis()
+    apart, joined = ring_of(basis), ring_of(basis, shared=True, named=True)
+    n, common = basis.mesh.n_points, len(basis.mesh.face_points("cyclic_left"))
+    assert apart.mesh.n_points == 6 * n
+    assert joined.mesh.n_points == 6 * (n - common)
+    assert apart.mesh.n_cells == joined.mesh.n_cells == 6 * basis.mesh.n_cells
+    for kind, cells in apart.mesh.cells.items():
+        np.testing.assert_allclose(apart.mesh.points[cells], joined.mesh.points[joined.mesh.cells[kind]], atol=1e-12)
+    assert sorted(joined.mesh.faces) == sorted(f"{f}_{s}" for f in ("bore", "rim", "front", "rear") for s in range(6))
+
+
+def test_a_wedge_that_reaches_the_axis_shares_its_points_there_with_all_sectors() -> None:
+    from meshes import brick
+
+    def wedge(p: Array) -> Array:  # a corner of a bar of square section, about x
+        return p
+
+    box = brick("hexahedron", (1, 2, 2), (1.0, 1.0, 1.0), to=wedge)
+    faces = {"cyclic_left": box.faces["z0"], "cyclic_right": box.faces["y0"]}
+    quarter = replace(box, faces=faces)
+    ring = replicate(quarter, np.array([-1.0, 0, 0]), np.zeros(3), 4, ("cyclic_right", "cyclic_left"))
+    assert ring.mesh.n_points == 2 * 25  # the lattice of a plate of 4 x 4 squares
+    assert len(np.unique(np.round(ring.mesh.points, 9), axis=0)) == 50
+
+
+def test_stress_turns_with_the_sector() -> None:
+    """sigma' = R sigma R^T: a uniaxial stress along a radius stays along the radius of every sector."""
+    basis = sector.basis()
+    g = basis.groups[0, 2]
+    pull = np.zeros((1, 6, 1))
+    pull[0, 2] = 1.0  # zz
+    for j in range(6):
+        radius = sector_rotation(basis, j) @ [0.0, 0.0, 1.0]
+        xx, yy, zz, xy, yz, xz = expand_tensor(pull, g, basis, j)[0, :, 0] / np.exp(2j * np.pi * 2 * j / 6)
+        found = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        np.testing.assert_allclose(found, np.outer(radius, radius), atol=1e-14)
+
+
+def test_the_turn_is_right_handed() -> None:
+    np.testing.assert_allclose(rotation(np.array([0.0, 1.0, 0.0]), np.pi / 2) @ [0, 0, 1], [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(rotation(np.array([0.0, 1.0, 0.0]), 0.3), sector.turn_y(0.3), atol=1e-15)
+
+
+# --- certificate ---------------------------------------------------------------------------------------------------
+
+
+def test_a_missing_nodal_diameter_is_told() -> None:
+    found = certify_ring(sector.basis(6, harmonics=(0, 2)))
+    assert found.missing == (1, 3) and not found.certified
+    assert "without the nodal diameters 1, 3" in ring_checks(sector.basis(6, harmonics=(0, 2)))[-1].remark
+
+
+def test_without_certified_groups_nothing_is_proved() -> None:
+    basis = sector.basis()
+    open_end = {k: replace(g, checks={**g.checks, "certified": 0.0}) for k, g in basis.groups.items()}
+    found = certify_ring(replace(basis, groups=open_end))
+    assert (found.limit, found.count, found.certified) == (0.0, 0, False)
+
+
+def test_fewer_kept_modes_than_counted_lower_the_proved_limit() -> None:
+    basis = sector.basis()
+    g = basis.groups[0, 1]
+    cut = replace(g, checks={**g.checks, "count_below_upper_shift": 7.0})
+    found = certify_ring(replace(basis, groups={**basis.groups, (0, 1): cut}))
+    assert found.limit == min(g.frequency[-1], *(h.checks["upper_shift_hz"] for h in basis.groups.values()))
+
+
+def test_a_wrong_phase_and_a_wrong_scale_are_found() -> None:
+    basis = sector.basis()
+    assert all(c.passed for c in [*check_basis(basis), *ring_checks(basis)])
+    g = basis.groups[0, 1]
+    for spoilt, name in ((g.phi.conj(), "phase rule"), (1.001 * g.phi, "orthonormal")):
+        wrong = replace(basis, groups={**basis.groups, (0, 1): replace(g, phi=spoilt)})
+        assert [c.name for c in ring_checks(wrong) if not c.passed and name in c.name], name
+
+
+def test_faces_that_do_not_meet_are_refused() -> None:
+    basis = sector.basis()
+    mesh, where = basis.mesh, (basis.rotation_axis, basis.rotation_point)
+    with pytest.raises(UserError, match="does not meet 'cyclic_right' point by point"):
+        tied_points(mesh, *where, 7, basis.cyclic_faces)
+    with pytest.raises(UserError, match="no face 'nowhere'"):
+        tied_points(mesh, *where, 6, ("cyclic_left", "nowhere"))
+
+
+def test_the_file_keeps_the_names_of_the_cyclic_faces(tmp_path) -> None:
+    basis = replace(sector.basis(), cyclic_faces=("front", "rear"))
+    write_basis(tmp_path / "b.h5", basis)
+    assert read_basis(tmp_path / "b.h5").cyclic_faces == ("front", "rear")
+    assert np.isnan(certify_ring(basis).phase_rule)  # these do not match: nothing to hold the shapes against
