@@ -190,7 +190,7 @@ def tied_points(
     left, right = (mesh.face_points(f) for f in faces)
     turned = (mesh.points[left] - point) @ rotation(axis, 2 * np.pi / sectors).T + point
     size = float(np.ptp(mesh.points, axis=0).max())
-    distance, nearest = KDTree(mesh.points[right]).query(turned)
+    distance, nearest = (np.asarray(a) for a in KDTree(mesh.points[right]).query(turned))
     if len(left) != len(right) or distance.max() > 1e-6 * size or len(np.unique(nearest)) < len(left):
         raise UserError(
             f"cyclic: face '{faces[0]}' turned by 2 pi / {sectors} does not meet '{faces[1]}' point by point "
@@ -242,9 +242,11 @@ def certify_ring(basis: ModalBasis, speed: int = 0) -> RingCertificate:
     counts = {k: multiplicity(k, N) * int((g.frequency <= limit * slack).sum()) for k, g in groups.items()}
     shown = [g for g in groups.values() if len(g.phi)]
     own = max((_own_orthogonality(basis, in_modes(g)) for g in shown), default=np.nan)
+    orthogonality = max(own, _cross(tuple(groups), N))
+    counts = counts if limit else {}
     return RingCertificate(
-        limit, sum(counts.values()) if limit else 0, counts if limit else {}, missing, max(own, _cross(tuple(groups), N)),
-        _phase_rule(basis, shown), bool(limit > 0 and not missing),
+        limit, sum(counts.values()), counts, missing, orthogonality, _phase_rule(basis, shown),
+        bool(limit > 0 and not missing),
     )  # fmt: skip
 
 
