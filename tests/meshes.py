@@ -59,7 +59,7 @@ def _stencils(cell_type: str) -> Array:
 def brick(
     cell_type: str, n: tuple[int, int, int], size: tuple[float, float, float] = (1.0, 1.0, 1.0),
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0), to: Callable[[Array], Array] | None = None,
-    straight: bool = False, closed: bool = False,
+    straight: bool = False, closed: bool = False, keep: Callable[[Array], Array] | None = None,
 ) -> Mesh:  # fmt: skip
     """A brick with faces ``x0 x1 y0 y1 z0 z1`` (of the brick before it is mapped).
 
@@ -67,9 +67,11 @@ def brick(
         n: boxes along x, y, z. size, origin: m. to: map of positions (p, 3) -> (p, 3).
         straight: True maps the corners only and puts mid nodes at the mean of their corners (not for curved maps).
         closed: True joins y = 0 and y = size (for full pipes, whose map must be periodic).
+        keep: (b, 3) numbers of the boxes along x, y, z -> which of them to build; all if None.
     """
     wrap = np.array([10**9, 2 * n[1] if closed else 10**9, 10**9])
-    boxes = np.stack(np.meshgrid(*[2 * np.arange(k) for k in n], indexing="ij"), axis=-1).reshape(-1, 1, 1, 3)
+    boxes = np.stack(np.meshgrid(*[np.arange(k) for k in n], indexing="ij"), axis=-1).reshape(-1, 3)
+    boxes = 2 * (boxes if keep is None else boxes[keep(boxes)]).reshape(-1, 1, 1, 3)
     lattice = (boxes + _stencils(cell_type)[None]).reshape(-1, _stencils(cell_type).shape[1], 3)
     keys, inverse = np.unique((lattice % wrap).reshape(-1, 3), axis=0, return_inverse=True)
     cells = inverse.reshape(lattice.shape[:2]).astype(np.int64)
