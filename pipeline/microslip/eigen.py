@@ -20,7 +20,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .data import Array, NotConverged
+from .data import Array, Indices, NotConverged
 
 TOLERANCE = 1e-9
 MatVec = Callable[[Array], Array]
@@ -48,11 +48,15 @@ class DirectSolver:
 
 
 class Pardiso(DirectSolver):
-    """MKL PARDISO, real symmetric indefinite (mtype -2), no scaling, no matching, no refinement."""
+    """MKL PARDISO, real symmetric indefinite (mtype -2), no scaling, no matching, no refinement.
+
+    Args:
+        boundary: unknowns to be condensed on (`factorise_condensed`, `sweep`); None for an ordinary solver.
+    """
 
     name = "pardiso"
 
-    def __init__(self) -> None:
+    def __init__(self, boundary: Indices | None = None) -> None:
         # PyPardiso looks for MKL by asking the compiler and walking the environment; the wheel's place is known.
         found = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
         if found:
@@ -64,15 +68,38 @@ class Pardiso(DirectSolver):
         # matching; 18: count non-zeros; 21: 1x1 and 2x2 pivots. PyPardiso's default (iparm 1 = 0) refines twice.
         for i, value in {1: 1, 2: 2, 8: 0, 10: 8, 11: 0, 13: 0, 18: -1, 21: 1, 24: 0}.items():
             self._mkl.set_iparm(i, value)
+        self._boundary = boundary
+        if boundary is not None:
+            self._mkl.set_iparm(36, 2)  # Schur complement, and factors for `sweep`
         self._upper: sp.csr_matrix | None = None
         self._ia = self._ja = np.zeros(0, dtype=np.int32)
 
     def factorise(self, upper: sp.csr_matrix) -> None:
+        self._call(self._phase(upper), np.zeros(upper.shape[0]))
+
+    def _phase(self, upper: sp.csr_matrix) -> int:
         first = self._upper is None
         self._upper = upper
         if first:
             self._ia, self._ja = upper.indptr.astype(np.int32) + 1, upper.indices.astype(np.int32) + 1
-        self._call(12 if first else 22, np.zeros(upper.shape[0]))
+            if self._boundary is not None:
+                self._mkl.perm = np.zeros(upper.shape[0], dtype=np.int32)
+                self._mkl.perm[self._boundary] = 1
+        return 12 if first else 22
+
+    def factorise_condensed(self, upper: sp.csr_matrix) -> Array:
+        """(b, b) Schur complement on the boundary, in its order; `negative` counts for the whole matrix."""
+        assert self._boundary is not None
+        order = np.argsort(self._boundary, kind="stable")  # PARDISO keeps the boundary in ascending order
+        size = len(order)
+        S = self._call(self._phase(upper), np.zeros(upper.shape[0]), out=np.zeros((size, size)))
+        back = np.empty_like(order)
+        back[order] = np.arange(size)
+        return S[np.ix_(back, back)]
+
+    def sweep(self, phase: int, b: Array) -> Array:
+        """Forward (331) or backward (333) substitution with the interior's factors, (n, r)."""
+        return self._call(phase, np.asfortranarray(b, dtype=float))
 
     def solve(self, b: Array) -> Array:
         return self._call(33, np.asfortranarray(b, dtype=float))
@@ -85,9 +112,9 @@ class Pardiso(DirectSolver):
             self._call(-1, np.zeros(self._upper.shape[0]))
             self._upper = None
 
-    def _call(self, phase: int, b: Array) -> Array:
+    def _call(self, phase: int, b: Array, out: Array | None = None) -> Array:
         assert self._upper is not None
-        x = np.zeros_like(b)
+        x = np.zeros_like(b) if out is None else out
         error = ctypes.c_int32(0)
         solver = self._mkl
 
@@ -210,6 +237,7 @@ class Pencil:
         K, M: products with an (n,) or (n, r) array.
         n: degrees of freedom. k_norm, m_norm: infinity norms of K and M (for backward errors).
         solver: keeps the analysis between shifts. solves: right-hand sides solved so far.
+        dtype: float, or complex for a Hermitian pencil.
     """
 
     shifted: Callable[[float], sp.csr_matrix]
@@ -220,6 +248,7 @@ class Pencil:
     m_norm: float
     solver: DirectSolver
     solves: int = 0
+    dtype: type = float
 
     def solve(self, b: Array) -> Array:
         """Solve with the matrix that was factorised last, counting."""
@@ -246,7 +275,7 @@ def search(
     pencil.solver.factorise(pencil.shifted(shift))
     if negative := pencil.solver.negative():
         raise Unstable(negative)
-    known = np.zeros((pencil.n, 0)) if rigid is None else rigid
+    known = np.zeros((pencil.n, 0), dtype=pencil.dtype) if rigid is None else rigid
     zeros = np.zeros(known.shape[1])
     extra, before = 2, pencil.solves
     while True:
@@ -307,11 +336,11 @@ def _finish(
 ) -> Spectrum:
     vectors, MX = _orthonormal(pencil, vectors)
     KX = pencil.K(vectors)
-    values = np.einsum("ij,ij->j", vectors, KX)
+    values = np.einsum("ij,ij->j", vectors.conj(), KX).real
     size = np.abs(vectors).max(axis=0)
     residual = np.abs(KX - MX * values).max(axis=0)
     backward = residual / (size * (pencil.k_norm + np.abs(values) * pencil.m_norm))
-    gram = vectors.T @ MX
+    gram = vectors.conj().T @ MX
     worst = float(np.abs(gram - np.eye(len(values))).max()) if len(values) else 0.0
     return Spectrum(values, vectors, certified, upper, refound, backward, worst, solves)
 
@@ -319,11 +348,11 @@ def _finish(
 def _orthonormal(pencil: Pencil, X: Array) -> tuple[Array, Array]:
     """X and M X, made M-orthonormal symmetrically (Loewdin), which moves every vector as little as possible."""
     MX = pencil.M(X)
-    gram = X.T @ MX
+    gram = X.conj().T @ MX
     if np.abs(gram - np.eye(len(gram))).max(initial=0.0) < 1e-13:
         return X, MX
-    w, Q = np.linalg.eigh(0.5 * (gram + gram.T))
-    root = (Q / np.sqrt(w)) @ Q.T
+    w, Q = np.linalg.eigh(0.5 * (gram + gram.conj().T))
+    root = (Q / np.sqrt(w)) @ Q.conj().T
     return X @ root, MX @ root
 
 
@@ -350,10 +379,10 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
     if 2 * limit * block * pencil.n > 6e8 or limit < 2:
         return _arpack(pencil, count, shift, tolerance, known)
     M_known = pencil.M(known) if known.shape[1] else known
-    Q = np.empty((pencil.n, (limit + 1) * block), order="F")
+    Q = np.empty((pencil.n, (limit + 1) * block), order="F", dtype=pencil.dtype)
     MQ = np.empty_like(Q)
-    T = np.zeros((Q.shape[1], Q.shape[1]))
-    start = np.random.default_rng(2007 + known.shape[1]).standard_normal((pencil.n, block))
+    T = np.zeros((Q.shape[1], Q.shape[1]), dtype=pencil.dtype)
+    start = np.random.default_rng(2007 + known.shape[1]).standard_normal((pencil.n, block)).astype(pencil.dtype)
     W = _away_from(known, M_known, pencil.solve(pencil.M(start)))
     Q[:, :block], MQ[:, :block], _ = _mass_qr(W, pencil.M(W))
     wanted = min(count, limit * block)
@@ -370,7 +399,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
         if done < look:
             continue
         look = max(done + block, int(1.1 * done))  # the small eigenproblem is not looked at in every step
-        theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].T))
+        theta, S = np.linalg.eigh(0.5 * (T[:done, :done] + T[:done, :done].conj().T))
         theta, S = theta[::-1][:wanted], S[:, ::-1][:, :wanted]
         if (np.linalg.norm(R @ S[last], axis=0) < tolerance * np.abs(theta)).all():
             values = shift + 1 / theta
@@ -381,23 +410,23 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
 
 def _take_out(W: Array, Q: Array, MQ: Array) -> Array:
     """Make W M-orthogonal to Q, in place; returns Q^T M W as it was. Arrays stored by columns."""
-    h = MQ.T @ W
+    h = (W.conj().T @ MQ).conj().T
     W -= (h.T @ Q.T).T  # a third faster than Q @ h, which would be stored by rows
     return h
 
 
 def _away_from(known: Array, M_known: Array, X: Array) -> Array:
-    return X - known @ (M_known.T @ X) if known.shape[1] else X
+    return X - known @ (M_known.conj().T @ X) if known.shape[1] else X
 
 
 def _mass_qr(W: Array, MW: Array) -> tuple[Array, Array, Array]:
     """W = Q R with Q^T M Q = 1 from W and M W, by Cholesky twice (the second pass cleans what the first leaves)."""
-    total = np.eye(W.shape[1])
+    total = np.eye(W.shape[1], dtype=W.dtype)
     for _ in range(2):
-        gram = W.T @ MW
-        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        gram = W.conj().T @ MW
+        scale = np.sqrt(np.maximum(np.diag(gram).real, 1e-300))
         gram = gram / np.outer(scale, scale)
-        R = scipy.linalg.cholesky(0.5 * (gram + gram.T) + 1e-15 * np.eye(len(gram))) * scale
+        R = scipy.linalg.cholesky(0.5 * (gram + gram.conj().T) + 1e-15 * np.eye(len(gram))) * scale
         inverse = scipy.linalg.solve_triangular(R, np.eye(len(R)))
         W, MW, total = W @ inverse, MW @ inverse, R @ total
     return W, MW, total
@@ -412,14 +441,14 @@ def _arpack(pencil: Pencil, count: int, shift: float, tolerance: float, known: A
         b = b.reshape(-1)
         return _away_from(known, M_known, pencil.solve(b))
 
-    start = inverse(pencil.M(np.random.default_rng(2007 + known.shape[1]).standard_normal(n)))
+    start = inverse(pencil.M(np.random.default_rng(2007 + known.shape[1]).standard_normal(n).astype(pencil.dtype)))
     try:
         values, vectors = spla.eigsh(
-            spla.LinearOperator((n, n), matvec=lambda x: pencil.K(x.reshape(-1)), dtype=float),
+            spla.LinearOperator((n, n), matvec=lambda x: pencil.K(x.reshape(-1)), dtype=pencil.dtype),
             k=count,
-            M=spla.LinearOperator((n, n), matvec=lambda x: pencil.M(x.reshape(-1)), dtype=float),
+            M=spla.LinearOperator((n, n), matvec=lambda x: pencil.M(x.reshape(-1)), dtype=pencil.dtype),
             sigma=shift,
-            OPinv=spla.LinearOperator((n, n), matvec=inverse, dtype=float),
+            OPinv=spla.LinearOperator((n, n), matvec=inverse, dtype=pencil.dtype),
             ncv=min(n - 1, max(2 * count + 1, 20)),
             v0=start,
             tol=tolerance,
@@ -437,15 +466,16 @@ def _dense(pencil: Pencil, count: int, known: Array) -> tuple[Array, Array]:
     The four-point mass of a few ten-node tetrahedra is singular; what has no mass is condensed (an infinite
     eigenvalue), so that only finite eigenvalues are returned.
     """
-    eye = np.eye(pencil.n)
+    eye = np.eye(pencil.n, dtype=pencil.dtype)
     K, M = pencil.K(eye), pencil.M(eye)
-    weight, Q = np.linalg.eigh(0.5 * (M + M.T))
+    weight, Q = np.linalg.eigh(0.5 * (M + M.conj().T))
     heavy = weight > 1e-12 * weight[-1]
     X, light = Q[:, heavy] / np.sqrt(weight[heavy]), Q[:, ~heavy]
     if light.shape[1]:
-        X = X - light @ np.linalg.solve(light.T @ K @ light, light.T @ (K @ X))
+        X = X - light @ np.linalg.solve(light.conj().T @ K @ light, light.conj().T @ (K @ X))
     if known.shape[1]:
-        away = np.linalg.qr(X.T @ (M @ known), mode="complete")[0]
+        away = np.linalg.qr(X.conj().T @ (M @ known), mode="complete")[0]
         X = X @ away[:, known.shape[1] :]
-    values, S = np.linalg.eigh(0.5 * (X.T @ K @ X + (X.T @ K @ X).T))
+    inner = X.conj().T @ K @ X
+    values, S = np.linalg.eigh(0.5 * (inner + inner.conj().T))
     return values[:count], X @ S[:, :count]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,20 +11,33 @@ import scipy.sparse as sp
 from .. import eigen
 from ..body import BodySettings
 from ..data import Array, Indices
+from ..fem.discretise import FreeUpper
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
 
 
 def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen.Pencil:
-    free = model.free
-    K_upper = free.matrix(K)
-    M_upper = free.matrix(model.M[:, None, None] * np.eye(3))
-    diagonal = K_upper.diagonal()
+    """K x = lambda M x of a body on its free degrees of freedom; K: (p, 3, 3) over the pattern."""
+    parts = pencil_parts(model.free, model.M, K)
+    return eigen.Pencil(
+        parts.shifted, parts.K, _mass_product(model), len(model.free.free), parts.k_norm, parts.m_norm, solver
+    )
 
-    def K_times(x: Array) -> Array:
-        return K_upper @ x + K_upper.T @ x - (diagonal * x.T).T
 
-    M_times = _mass_product(model)
+@dataclass(frozen=True)
+class PencilParts:
+    """K - s M as an upper triangle, products with K and M, and their infinity norms."""
+
+    shifted: Callable[[float], sp.csr_matrix]
+    K: Callable[[Array], Array]
+    M: Callable[[Array], Array]
+    k_norm: float
+    m_norm: float
+
+
+def pencil_parts(free: FreeUpper, M: Array, K: Array) -> PencilParts:
+    """Of the mass (p,) and the stiffness (p, 3, 3) over a pattern, on the free degrees of freedom."""
+    K_upper, M_upper = free.matrix(K), free.matrix(M[:, None, None] * np.eye(3))
 
     def shifted(s: float) -> sp.csr_matrix:
         if s == 0:
@@ -32,7 +46,12 @@ def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen
         data += K_upper.data
         return sp.csr_matrix((data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
 
-    return eigen.Pencil(shifted, K_times, M_times, len(diagonal), _norm(K_upper), _norm(M_upper), solver)
+    return PencilParts(shifted, _symmetric(K_upper), _symmetric(M_upper), _norm(K_upper), _norm(M_upper))
+
+
+def _symmetric(upper: sp.csr_matrix) -> Callable[[Array], Array]:
+    diagonal, lower = upper.diagonal(), upper.T
+    return lambda x: upper @ x + lower @ x - (diagonal * x.T).T
 
 
 def _mass_product(model: BodyModel) -> Callable[[Array], Array]:

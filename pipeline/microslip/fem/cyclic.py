@@ -1,0 +1,231 @@
+"""One sector of a cyclic body: its two cut faces paired node by node, and the unknowns that remain.
+
+The sector at +2 pi / N about the rotation axis (the right-hand neighbour) moves as R u exp(+i k 2 pi / N), where R
+turns vectors by the sector angle and k is the nodal diameter. The neighbour's left cut face is this sector's right one:
+
+    u_right = R u_left exp(+i k 2 pi / N),     all other displacements are free,
+
+so the unknowns are u = T_k q with T_k = T_0 + exp(+i k 2 pi / N) T_R (D. L. Thomas, Int. J. Numer. Methods Eng. 14
+(1979) 81). The static state has k = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from ..data import Array, Indices, Mesh, UserError
+from .discretise import FreeUpper, Pattern, free_upper
+
+_CLOSE = 1e-3  # share of the distance to the nearest other node within which two nodes are one
+
+
+def turned(axis: Array, angle: float) -> Array:
+    """(3, 3) right-handed rotation by an angle (rad) about a direction (Rodrigues)."""
+    n = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+
+
+@dataclass(frozen=True)
+class CutFaces:
+    """The paired nodes of the two cut faces: node ``right[i]`` is node ``left[i]`` turned by the sector angle.
+
+    Attributes:
+        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R. mismatch: largest distance of a pair, m.
+    """
+
+    sectors: int
+    left: Indices
+    right: Indices
+    rotation: Array
+    mismatch: float
+
+    def phase(self, harmonic: int) -> complex | float:
+        """exp(+i k 2 pi / N); a real number for k = 0 and k = N/2."""
+        if harmonic == 0:
+            return 1.0
+        if 2 * harmonic == self.sectors:
+            return -1.0
+        return complex(np.exp(2j * np.pi * harmonic / self.sectors))
+
+
+def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array, sectors: int) -> CutFaces:
+    """Pair the nodes of the two cut faces.
+
+    Raises:
+        UserError: the right face is not the left one turned by 2 pi / N about the axis, node by node.
+    """
+    a, b = mesh.face_points(left), mesh.face_points(right)
+    if shared := np.intersect1d(a, b).size:
+        raise UserError(
+            f"cyclic: {shared} nodes lie on '{left}' and on '{right}'; the two cut faces must not touch (a sector that "
+            "reaches the rotation axis cannot be closed; leave a bore)"
+        )
+    x, y = mesh.points[a] - point, mesh.points[b] - point
+    R = turned(axis, 2 * np.pi / sectors)
+    spacing = np.median(cKDTree(y).query(y, k=2)[0][:, 1]) if len(y) > 1 else 1.0
+    distance, nearest = cKDTree(y).query(x @ R.T)
+    if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
+        raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), float(spacing)))
+    return CutFaces(sectors, a, b[nearest], R, float(distance.max()))
+
+
+def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, distance: float, spacing: float) -> str:
+    back = cKDTree(y).query(x @ turned(axis, -2 * np.pi / N).T)[0].max()
+    if back < _CLOSE * spacing:
+        return (
+            f"cyclic: '{right}' is '{left}' turned by -2 pi / {N} about the rotation axis; exchange left and right, or "
+            "turn the axis round"
+        )
+    angle = _angle_between(x, y, axis)
+    if angle and abs(2 * np.pi / angle - N) > 0.01 * N:
+        return (
+            f"cyclic.sectors: the faces '{left}' and '{right}' are {np.degrees(angle):.4g} degrees apart about the "
+            f"rotation axis, which makes {2 * np.pi / angle:.4g} sectors, not {N}; correct sectors, or rotation.axis "
+            "and point"
+        )
+    if len(x) != len(y):
+        why = f"they have {len(x)} and {len(y)} nodes"
+    else:
+        why = f"nodes that should meet are up to {distance:.3g} m apart (neighbouring nodes: {spacing:.3g} m)"
+    return (
+        f"cyclic: '{right}' is not '{left}' turned by 2 pi / {N} about the rotation axis, node by node: {why}; mesh the "
+        "two faces alike (gmsh: setPeriodic), cut faces that do not match are not tied"
+    )
+
+
+def _angle_between(x: Array, y: Array, axis: Array) -> float:
+    """Angle about the axis from the mean of the left face to that of the right, rad, 0 to 2 pi."""
+    n = axis / np.linalg.norm(axis)
+    p, q = (v.mean(axis=0) - (v.mean(axis=0) @ n) * n for v in (x, y))
+    return float(np.arctan2(n @ np.cross(p, q), p @ q) % (2 * np.pi))
+
+
+@dataclass(frozen=True)
+class SectorUnknowns:
+    """The unknowns of a sector: its free degrees of freedom, the cut faces still apart, and their coupling.
+
+    Attributes:
+        apart: upper triangle over the f free degrees of freedom. cut: the pairing.
+        stay: (f, m) T_0. turn: (f, m) T_R. left, right: (b,) positions, among the free, of the degrees of freedom on
+        the cut faces; right ones are `block` (b, b) times the left ones times the phase.
+    """
+
+    apart: FreeUpper
+    cut: CutFaces
+    stay: sp.csr_matrix
+    turn: sp.csr_matrix
+    left: Indices
+    right: Indices
+    block: sp.csr_matrix
+
+    def transformation(self, harmonic: int) -> sp.csr_matrix:
+        """(f, m) T_k; real for k = 0 and N/2."""
+        return (self.stay + self.cut.phase(harmonic) * self.turn).tocsr()
+
+
+def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces) -> SectorUnknowns:
+    """Eliminate the right cut face.
+
+    Raises:
+        UserError: a support holds one of a pair of nodes and not the other, or a direction that turning mixes.
+    """
+    apart = free_upper(pattern, fixed)
+    free_left, free_right = _free_pairs(apart, cut)
+    position = np.full(3 * pattern.n, -1, dtype=np.int64)
+    position[apart.free] = np.arange(len(apart.free))
+    l, r = position[3 * cut.left[:, None] + np.arange(3)], position[3 * cut.right[:, None] + np.arange(3)]
+    pair, i, j = np.nonzero(free_right[:, :, None] & free_left[:, None, :] & (np.abs(cut.rotation) > 1e-14)[None])
+    rows, columns, values = r[pair, i], l[pair, j], cut.rotation[i, j]
+    f = len(apart.free)
+    keep = np.ones(f, dtype=bool)
+    keep[r[free_right]] = False
+    number = np.cumsum(keep) - 1
+    m = int(keep.sum())
+    stay = sp.csr_matrix((np.ones(m), (np.flatnonzero(keep), np.arange(m))), shape=(f, m))
+    turn = sp.csr_matrix((values, (rows, number[columns])), shape=(f, m))
+    left, right = l[free_left], r[free_right]
+    block = sp.csr_matrix((values, (rows, columns)), shape=(f, f))[right][:, left].tocsr()
+    return SectorUnknowns(apart, cut, stay, turn, left, right, block)
+
+
+def _free_pairs(apart: FreeUpper, cut: CutFaces) -> tuple[Array, Array]:
+    """(l, 3) which directions are free on the left and on the right node of each pair."""
+    left, right = (np.isin(3 * nodes[:, None] + np.arange(3), apart.free) for nodes in (cut.left, cut.right))
+    R = np.abs(cut.rotation) > 1e-12
+    mixed = (R[None] & (right[:, :, None] != left[:, None, :])).any(axis=(1, 2))
+    if mixed.any():
+        raise UserError(
+            f"supports: {int(mixed.sum())} pairs of nodes on the cut faces are not held alike once turned by the sector "
+            "angle; hold whole nodes on both faces (all of xyz), or the direction of the rotation axis alone"
+        )
+    return left, right
+
+
+@dataclass(frozen=True)
+class CyclicUpper:
+    """The upper triangle over the unknowns of nodal diameter 0; stands where a `FreeUpper` stands.
+
+    Attributes:
+        unknowns: the sector's. indptr, indices: CSR of the upper triangle. collect: (entries, 9 p) sums the entries of
+        a flattened (p, 3, 3) operator.
+    """
+
+    unknowns: SectorUnknowns
+    transformation: sp.csr_matrix
+    indptr: Indices
+    indices: Indices
+    collect: sp.csr_matrix
+
+    @property
+    def free(self) -> Indices:
+        """Free degrees of freedom of the sector with its cut faces apart."""
+        return self.unknowns.apart.free
+
+    def matrix(self, values: Array) -> sp.csr_matrix:
+        """CSR upper triangle of an operator (p, 3, 3)."""
+        n = len(self.indptr) - 1
+        return sp.csr_matrix((self.collect @ values.reshape(-1), self.indices, self.indptr), shape=(n, n))
+
+    def restrict(self, forces: Array) -> Array:
+        """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
+        return self.transformation.T @ forces[self.free]
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""
+        return self.unknowns.apart.expand(self.transformation @ unknowns, n)
+
+
+def cyclic_upper(unknowns: SectorUnknowns, size: int) -> CyclicUpper:
+    """The symmetric static problem of a sector; size: pairs of points in the pattern."""
+    T = unknowns.transformation(0)
+    upper = unknowns.apart
+    i = np.repeat(np.arange(len(upper.indptr) - 1), np.diff(upper.indptr))
+    j = upper.indices.astype(np.int64)
+    a, b, c, entry = _products(T, i, j)
+    m = T.shape[1]
+    key, where = np.unique(np.minimum(a, b) * m + np.maximum(a, b), return_inverse=True)
+    row, column = np.divmod(key, m)
+    collect = sp.csr_matrix((c, (where, upper.gather[entry])), shape=(len(key), 9 * size))
+    indptr = np.searchsorted(row, np.arange(m + 1)).astype(np.int32)
+    return CyclicUpper(unknowns, T, indptr, column.astype(np.int32), collect)
+
+
+def _products(T: sp.csr_matrix, i: Array, j: Array) -> tuple[Array, Array, Array, Array]:
+    """Where entry (i, j) of a symmetric matrix goes in T^T K T: unknowns a, b, factor c, and the entry's number."""
+    count = np.diff(T.indptr)
+    times = count[i] * count[j]
+    entry = np.repeat(np.arange(len(i)), times)
+    within = np.arange(len(entry)) - np.repeat(np.cumsum(times) - times, times)
+    first, second = np.divmod(within, count[j[entry]])
+    at_a, at_b = T.indptr[i[entry]] + first, T.indptr[j[entry]] + second
+    a, b = T.indices[at_a].astype(np.int64), T.indices[at_b].astype(np.int64)
+    c = T.data[at_a] * T.data[at_b]
+    diagonal = i[entry] == j[entry]
+    c = np.where(~diagonal & (a == b), 2 * c, c)  # (i, j) and (j, i) both land on the diagonal
+    keep = ~diagonal | (a <= b)
+    return a[keep], b[keep], c[keep], entry[keep]
