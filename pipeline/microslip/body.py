@@ -385,6 +385,13 @@ class Output(Model):
     patch_shapes: bool = True
     gauss: bool = True
     nodal_stress: bool = True
+    stress_nodal_diameters: (
+        Literal["all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], BeforeValidator(_tuple)]
+    ) = "all"
+
+    def stress_at(self, harmonic: int) -> bool:
+        """Whether strain and stress modes are wanted of a nodal diameter."""
+        return self.stress_nodal_diameters == "all" or harmonic in self.stress_nodal_diameters
 
 
 class BodySettings(Model):

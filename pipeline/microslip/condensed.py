@@ -152,7 +152,7 @@ class HarmonicSolver(DirectSolver):
         stay: Indices,
     ) -> None:  # fmt: skip
         self.condensed, self.name = condensed, condensed.name
-        self._P = sp.vstack([sp.identity(block.shape[0]), phase * block]).tocsr()
+        self._P = sp.csr_matrix(sp.vstack([sp.csr_matrix(sp.identity(block.shape[0])), phase * block]))
         self._T, self._stay = transformation, stay
         self._reduced: Array = np.zeros((0, 0))
         self._factor: tuple[Array, bool] | None = None

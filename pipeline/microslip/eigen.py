@@ -211,7 +211,7 @@ class Spectrum:
     Attributes:
         values: (m,) ascending, (rad/s)^2. vectors: (n, m) M-orthonormal.
         certified: True if the inertia count at `upper_shift` found exactly m eigenvalues below it.
-        upper_shift: (rad/s)^2, between the last value returned and the next one.
+        upper_shift: (rad/s)^2, between the last value returned and the next one. gap: those two.
         refound: how many members Lanczos had missed and a second search found.
         backward_error: (m,) |K x - lambda M x| over |K| |x| + |lambda| |M| |x|.
         orthogonality: largest entry of |X^T M X - 1|.
@@ -222,6 +222,7 @@ class Spectrum:
     vectors: Array
     certified: bool
     upper_shift: float
+    gap: tuple[float, float]
     refound: int
     backward_error: Array
     orthogonality: float
@@ -248,7 +249,7 @@ class Pencil:
     m_norm: float
     solver: DirectSolver
     solves: int = 0
-    dtype: type = float
+    dtype: Any = float
 
     def solve(self, b: Array) -> Array:
         """Solve with the matrix that was factorised last, counting."""
@@ -283,12 +284,12 @@ def search(
         values, vectors = _lanczos(pencil, max(wanted, 1), shift, tolerance, known)
         every = len(values) < max(wanted, 1) or len(zeros) + len(values) >= pencil.n  # no further one exists
         values, vectors = np.concatenate([zeros, values]), np.hstack([known, vectors])
-        keep, upper = _gap(values, count)
+        keep, gap = _gap(values, count)
         if keep or every:
             break
         extra *= 4
     keep = keep or len(values)
-    return _finish(pencil, values[:keep], vectors[:, :keep], False, upper, 0, pencil.solves - before)
+    return _finish(pencil, values[:keep], vectors[:, :keep], False, 0.5 * sum(gap), gap, 0, pencil.solves - before)
 
 
 def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: float = TOLERANCE) -> Spectrum:
@@ -311,7 +312,7 @@ def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: floa
             refound, solves = len(values) - len(found.values), found.solves + pencil.solves - before
             if not refound:
                 return replace(found, certified=True, solves=solves)
-            return _finish(pencil, values, vectors, True, found.upper_shift, refound, solves)
+            return _finish(pencil, values, vectors, True, found.upper_shift, found.gap, refound, solves)
         if below < len(values):
             raise NotConverged(
                 f"{len(values)} eigenvalues were returned below {np.sqrt(abs(found.upper_shift)) / 2 / np.pi:.6g} Hz "
@@ -332,8 +333,9 @@ def _count_below(pencil: Pencil, upper: float, values: Array) -> int:
 
 
 def _finish(
-    pencil: Pencil, values: Array, vectors: Array, certified: bool, upper: float, refound: int, solves: int
-) -> Spectrum:
+    pencil: Pencil, values: Array, vectors: Array, certified: bool, upper: float, gap: tuple[float, float],
+    refound: int, solves: int,
+) -> Spectrum:  # fmt: skip
     vectors, MX = _orthonormal(pencil, vectors)
     KX = pencil.K(vectors)
     values = np.einsum("ij,ij->j", vectors.conj(), KX).real
@@ -342,7 +344,7 @@ def _finish(
     backward = residual / (size * (pencil.k_norm + np.abs(values) * pencil.m_norm))
     gram = vectors.conj().T @ MX
     worst = float(np.abs(gram - np.eye(len(values))).max()) if len(values) else 0.0
-    return Spectrum(values, vectors, certified, upper, refound, backward, worst, solves)
+    return Spectrum(values, vectors, certified, upper, gap, refound, backward, worst, solves)
 
 
 def _orthonormal(pencil: Pencil, X: Array) -> tuple[Array, Array]:
@@ -356,13 +358,13 @@ def _orthonormal(pencil: Pencil, X: Array) -> tuple[Array, Array]:
     return X @ root, MX @ root
 
 
-def _gap(values: Array, count: int) -> tuple[int, float]:
-    """How many values to keep, at least `count`, and a shift in the gap after them; 0 if no gap was seen."""
+def _gap(values: Array, count: int) -> tuple[int, tuple[float, float]]:
+    """How many values to keep, at least `count`, and the gap after them; 0 if no gap was seen."""
     for keep in range(max(count, 1), len(values)):
         low, high = values[keep - 1], values[keep]
         if high - low > 1e-5 * abs(high):
-            return keep, 0.5 * (low + high)
-    return 0, values[-1] * (1 + 1e-4) + 1.0
+            return keep, (float(low), float(high))
+    return 0, (float(values[-1]), float(values[-1] * (1 + 2e-4) + 2.0))
 
 
 def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: Array) -> tuple[Array, Array]:

@@ -67,15 +67,20 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
         )
     x, y = mesh.points[a] - point, mesh.points[b] - point
     R = turned(axis, 2 * np.pi / sectors)
-    spacing = np.median(cKDTree(y).query(y, k=2)[0][:, 1]) if len(y) > 1 else 1.0
-    distance, nearest = cKDTree(y).query(x @ R.T)
+    spacing = float(np.median(_nearest(y, y, 2)[0][:, 1])) if len(y) > 1 else 1.0
+    distance, nearest = _nearest(y, x @ R.T)
     if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
-        raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), float(spacing)))
+        raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), spacing))
     return CutFaces(sectors, a, b[nearest], R, float(distance.max()))
 
 
+def _nearest(points: Array, to: Array, count: int = 1) -> tuple[Array, Array]:
+    distance, index = cKDTree(points).query(to, k=count)
+    return np.asarray(distance), np.asarray(index)
+
+
 def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, distance: float, spacing: float) -> str:
-    back = cKDTree(y).query(x @ turned(axis, -2 * np.pi / N).T)[0].max()
+    back = _nearest(y, x @ turned(axis, -2 * np.pi / N).T)[0].max()
     if back < _CLOSE * spacing:
         return (
             f"cyclic: '{right}' is '{left}' turned by -2 pi / {N} about the rotation axis; exchange left and right, or "
@@ -93,8 +98,8 @@ def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, di
     else:
         why = f"nodes that should meet are up to {distance:.3g} m apart (neighbouring nodes: {spacing:.3g} m)"
     return (
-        f"cyclic: '{right}' is not '{left}' turned by 2 pi / {N} about the rotation axis, node by node: {why}; mesh the "
-        "two faces alike (gmsh: setPeriodic), cut faces that do not match are not tied"
+        f"cyclic: '{right}' is not '{left}' turned by 2 pi / {N} about the rotation axis, node by node: {why}; mesh "
+        "the two faces alike (gmsh: setPeriodic), cut faces that do not match are not tied"
     )
 
 
@@ -160,8 +165,8 @@ def _free_pairs(apart: FreeUpper, cut: CutFaces) -> tuple[Array, Array]:
     mixed = (R[None] & (right[:, :, None] != left[:, None, :])).any(axis=(1, 2))
     if mixed.any():
         raise UserError(
-            f"supports: {int(mixed.sum())} pairs of nodes on the cut faces are not held alike once turned by the sector "
-            "angle; hold whole nodes on both faces (all of xyz), or the direction of the rotation axis alone"
+            f"supports: {int(mixed.sum())} pairs of nodes on the cut faces are not held alike once turned by the "
+            "sector angle; hold whole nodes on both faces (all of xyz), or the direction of the rotation axis alone"
         )
     return left, right
 
@@ -194,6 +199,10 @@ class CyclicUpper:
     def restrict(self, forces: Array) -> Array:
         """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
         return self.transformation.T @ forces[self.free]
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+        return B[:, self.free] @ self.transformation
 
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""

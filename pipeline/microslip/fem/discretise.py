@@ -160,6 +160,10 @@ class FreeUpper:
         """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
         return forces[self.free]
 
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+        return B[:, self.free]
+
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""
         whole = np.zeros((3 * n, *unknowns.shape[1:]), dtype=unknowns.dtype)

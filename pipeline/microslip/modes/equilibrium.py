@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
 from ..eigen import DirectSolver, Unstable
+from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import (
     displacement_gradient,
@@ -50,7 +51,7 @@ class BodyModel:
     M: Array
     M_full: sp.csr_matrix
     K0: Array
-    free: FreeUpper
+    free: FreeUpper | CyclicUpper
     fixed: Indices
     dead_load: Array
     axis: Array
@@ -82,7 +83,7 @@ class StaticState:
 
 
 def make_model(
-    d: Discretisation, material: Material, free: FreeUpper, fixed: Indices, axis: Array, point: Array,
+    d: Discretisation, material: Material, free: FreeUpper | CyclicUpper, fixed: Indices, axis: Array, point: Array,
     temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
 ) -> BodyModel:  # fmt: skip
     """Assemble what does not depend on speed. temperature: (n,) K at the nodes, or None for the reference."""

@@ -7,23 +7,101 @@ Hermitian between. The travelling wave -k is the complex conjugate and is not so
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from .. import eigen
+from ..body import BodySettings
 from ..condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
-from ..data import Array
-from ..fem.cyclic import SectorUnknowns
-from .equilibrium import BodyModel
+from ..data import Array, Indices
+from ..fem.cyclic import CyclicUpper, SectorUnknowns, cyclic_upper, pair_cut_faces, sector_unknowns
+from ..fem.discretise import Discretisation
+from .body_rows import BodyRows
+from .boundary import require_face
+from .equilibrium import BodyModel, StaticState
+from .solution import Report, Solution, certified, reduced_solution, search
 from .spectrum import pencil_parts
 
 MatVec = Callable[[Array], Array]
 
 
-def sector_solver(unknowns: SectorUnknowns, backend: str = "auto") -> Condensed:
-    """The solver all nodal diameters and speeds share; it keeps its analysis."""
-    return new_condensed(np.concatenate([unknowns.left, unknowns.right]), backend)
+@dataclass(frozen=True)
+class HarmonicUnknowns:
+    """The unknowns of one nodal diameter; T is T_k (f, m)."""
+
+    sector: SectorUnknowns
+    T: sp.csr_matrix
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+        return (B[:, self.sector.apart.free] @ self.T).tocsr()
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n, r) displacements of the sector's n points from the unknowns (m, r)."""
+        return self.sector.apart.expand(self.T @ unknowns, n)
+
+
+@dataclass(frozen=True)
+class Sector:
+    """A sector ready for its nodal diameters. static: the unknowns of the static state, alike in all sectors."""
+
+    harmonics: tuple[int, ...]
+    unknowns: SectorUnknowns
+    static: CyclicUpper
+    condensed: Condensed
+
+    def solutions(
+        self, model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array,
+        rows: BodyRows, report: Report,
+    ) -> dict[int, Solution]:  # fmt: skip
+        """Nodal diameter -> its modes, static answers and reduced coordinates.
+
+        All are searched on one factorisation of the interior, then certified, then reduced.
+
+        Raises:
+            UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
+        """
+        pencils = sector_pencils(model, state.K, self.unknowns, self.condensed, self.harmonics)
+        first = pencils[self.harmonics[0]]
+        report(
+            f"{len(pencils)} nodal diameters of {self.unknowns.cut.sectors} sectors: {first.n} unknowns, "
+            f"solver {first.solver.name}"
+        )
+        found = []
+        for k, pencil in pencils.items():
+            report(f"eigenmodes: nodal diameter {k}")
+            unknowns = HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
+            found.append(search(model, settings, pencil, unknowns, speed, motions, rows))
+        if settings.modes.certify:
+            report("certifying the spectra by the inertia count")
+            found = certified(found)
+        return {
+            k: reduced_solution(model, settings, s, rows, report)
+            for k, s in zip(pencils, found, strict=True)
+        }  # fmt: skip
+
+    def close(self) -> None:
+        """Release memory."""
+        self.condensed.close()
+
+
+def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis: Array, point: Array) -> Sector:
+    """Pair the cut faces and prepare the solver that all nodal diameters and speeds share.
+
+    Raises:
+        UserError: cut faces that are missing or do not match, supports that hold them differently.
+    """
+    cyclic = settings.cyclic
+    assert cyclic is not None
+    for key, face in (("left", cyclic.left), ("right", cyclic.right)):
+        require_face(d.mesh, face, f"cyclic.{key}")
+    cut = pair_cut_faces(d.mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors)
+    unknowns = sector_unknowns(d.pattern, fixed, cut)
+    boundary = np.concatenate([unknowns.left, unknowns.right])
+    condensed = new_condensed(boundary, settings.modes.solver)
+    return Sector(cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
 
 
 def sector_pencils(
@@ -70,24 +148,3 @@ def _congruent(T: sp.csr_matrix, product: MatVec) -> MatVec:
         return (H @ as_complex(product(as_real(moved)), moved.dtype)).reshape(x.shape)
 
     return congruent
-
-
-def shared_shifts(bands: list[tuple[float, float]]) -> list[float]:
-    """For each band (low, high) a value inside it, as few different ones as possible (interval stabbing).
-
-    A certificate needs one shift above the last eigenvalue kept and below the next one; nodal diameters whose gaps
-    overlap are counted with one factorisation.
-    """
-    chosen = [0.0] * len(bands)
-    waiting: list[int] = []
-    low, high = -np.inf, np.inf
-    for i in [*np.argsort([h for _, h in bands], kind="stable"), None]:
-        if i is not None and max(low, bands[i][0]) < min(high, bands[i][1]):
-            low, high = max(low, bands[i][0]), min(high, bands[i][1])
-            waiting.append(i)
-            continue
-        for j in waiting:
-            chosen[j] = 0.5 * (low + high)
-        if i is not None:
-            (low, high), waiting = bands[i], [i]
-    return chosen

@@ -18,6 +18,7 @@ from .equilibrium import BodyModel
 
 def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen.Pencil:
     """K x = lambda M x of a body on its free degrees of freedom; K: (p, 3, 3) over the pattern."""
+    assert isinstance(model.free, FreeUpper)
     parts = pencil_parts(model.free, model.M, K)
     return eigen.Pencil(
         parts.shifted, parts.K, _mass_product(model), len(model.free.free), parts.k_norm, parts.m_norm, solver

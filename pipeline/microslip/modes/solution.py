@@ -1,0 +1,220 @@
+"""Certified modes of one state, its static answers, and the coordinates that a reduction makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from .. import eigen
+from ..body import BodySettings
+from ..data import Array, UserError
+from ..mesh import longest_over_shortest
+from ..reduction import METHODS, Problem, Reduced
+from . import canonical, rigid
+from .body_rows import BodyRows
+from .equilibrium import BodyModel
+from .spectrum import leading_rows, rigid_shift, static_answers
+
+Report = Callable[[str], None]
+
+
+class Unknowns(Protocol):
+    """What a pencil's unknowns mean on the mesh: `fem.discretise.FreeUpper`, `modes.sector.HarmonicUnknowns`."""
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n, r) displacements of n points from the unknowns (m, r)."""
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
+
+
+@dataclass(frozen=True)
+class Searched:
+    """Modes of one pencil, not yet certified, and its static answers while the factors at the shift are there.
+
+    Attributes:
+        R: (m, r) mass-orthonormal rigid motions. shift: of the search. found: the modes. B: (r, m) rows on the
+        unknowns, named by `labels`. answers: (m, r) displacement under a unit force on each row.
+    """
+
+    pencil: eigen.Pencil
+    unknowns: Unknowns
+    R: Array
+    shift: float
+    found: eigen.Spectrum
+    B: sp.csr_matrix
+    labels: tuple[str, ...]
+    answers: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Certified modes of one state and the coordinates that the reduction makes of them.
+
+    Attributes:
+        found: every mode solved for; the first `kept` were reduced. reduced: shapes on the `unknowns`.
+        answers: (m, r) static answers to the rows named by `labels`. static: (r, r) compliance;
+            eigenmodes: (r, r) the part of it that the kept eigenmodes alone hold.
+    """
+
+    found: eigen.Spectrum
+    kept: int
+    reduced: Reduced
+    answers: Array
+    static: Array
+    eigenmodes: Array
+    unknowns: Unknowns
+    labels: tuple[str, ...]
+
+
+def search(
+    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, speed: float, motions: Array,
+    rows: BodyRows,
+) -> Searched:  # fmt: skip
+    """Modes and static answers of the stiffness about one state.
+
+    Raises:
+        UserError: instability, more modes than degrees of freedom.
+    """
+    R = motions[model.free.free] if motions.shape[1] else np.zeros((pencil.n, 0), dtype=pencil.dtype)
+    R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
+    shift = rigid_shift(model) if R.shape[1] else 0.0
+    wanted = settings.modes.count
+    if wanted > pencil.n - 2:
+        raise UserError(
+            f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
+            "ask for fewer or refine"
+        )
+    try:
+        found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
+    except eigen.Unstable as error:
+        raise UserError(_divergence(settings, speed, error.count, model)) from error
+    B, labels = rows.stacked(settings)
+    B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
+    return Searched(pencil, unknowns, R, shift, found, B, labels, static_answers(pencil, found, B, R, shift))
+
+
+def certified(searched: Sequence[Searched]) -> list[Searched]:
+    """All of them certified complete; pencils that share their factors are counted at as few shifts as possible.
+
+    Raises:
+        NotConverged: no certificate.
+    """
+    shifts = shared_shifts([s.found.gap for s in searched])
+    done = dict.fromkeys(range(len(searched)), searched[0])
+    for i in np.argsort(shifts, kind="stable"):
+        s = searched[i]
+        at = replace(s.found, upper_shift=shifts[i])
+        done[int(i)] = replace(s, found=eigen.certify(s.pencil, at, s.shift))
+    return [done[i] for i in range(len(searched))]
+
+
+def shared_shifts(bands: list[tuple[float, float]]) -> list[float]:
+    """For each band (low, high) a value inside it, as few different ones as possible (interval stabbing).
+
+    A certificate needs one shift above the last eigenvalue kept and below the next one; nodal diameters whose gaps
+    overlap are counted with one factorisation.
+    """
+    chosen = [0.0] * len(bands)
+    waiting: list[int] = []
+    low, high = -np.inf, np.inf
+    for i in [*np.argsort([h for _, h in bands], kind="stable"), None]:
+        if i is not None and max(low, bands[i][0]) < min(high, bands[i][1]):
+            low, high = max(low, bands[i][0]), min(high, bands[i][1])
+            waiting.append(i)
+            continue
+        for j in waiting:
+            chosen[j] = 0.5 * (low + high)
+        if i is not None:
+            (low, high), waiting = bands[i], [i]
+    return chosen
+
+
+def reduced_solution(
+    model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows, report: Report
+) -> Solution:  # fmt: skip
+    """The reduction of certified modes and static answers, in one definite form."""
+    n, zero = model.d.mesh.n_points, s.R.shape[1]
+    static = np.asarray(s.B @ s.answers)
+    static = 0.5 * (static + static.conj().T)
+    place = canonical.by_place(model.d.mesh.points)
+    phi = s.unknowns.expand(s.found.vectors, n)
+    lead = leading_rows(rows, settings, phi, place)
+    vectors = canonical.turn_clusters(s.found.vectors, s.found.values, lead(phi), zero)
+    phi = s.unknowns.expand(vectors, n)
+    vectors = vectors * canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
+    keep = _band(s.found.values, settings, zero)
+    exact = [i for i, label in enumerate(s.labels) if not label.startswith("monitor:")]
+    problem = Problem(
+        s.pencil, s.found.values[:keep], vectors[:, :keep], zero, s.B[np.array(exact, dtype=int)],
+        tuple(s.labels[i] for i in exact), s.answers[:, exact], settings.modes.certify,
+    )  # fmt: skip
+    if settings.reduction != "eigenmodes":
+        report(f"reduction: {settings.reduction}")
+    reduced = METHODS[settings.reduction](problem)
+    plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
+    return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels)
+
+
+def solution(
+    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, motions: Array, rows: BodyRows,
+    report: Report, unknowns: Unknowns | None = None,
+) -> Solution:  # fmt: skip
+    """Modes, static answers and reduced coordinates of the stiffness about one state.
+
+    Raises:
+        UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
+    """
+    report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
+    found = search(model, settings, pencil, unknowns or model.free, speed, motions, rows)
+    if settings.modes.certify:
+        report("certifying the spectrum by the inertia count")
+        found = certified([found])[0]
+    return reduced_solution(model, settings, found, rows, report)
+
+
+def held_compliance(T: Array, reduced: Reduced) -> Array:
+    """(r, r) static compliance that the coordinates hold, for rows T (r, c): T K_r^-1 T^H without the rigid ones."""
+    V = np.eye(len(reduced.kind)) if reduced.to_diagonal is None else reduced.to_diagonal
+    elastic = reduced.omega > 0
+    modes = (T @ V)[:, elastic]
+    return (modes / reduced.omega[elastic] ** 2) @ modes.conj().T
+
+
+def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
+    if not speed and not model.loaded:
+        return (
+            f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
+            f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as "
+            "the shortest of the cell); refine the mesh or check length_unit"
+        )
+    remedy = "lower the speed"
+    if settings.rotation.prestress == "none" and speed:
+        remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
+    elif not speed:
+        remedy = "reduce the loads or the temperature change, or check the material"
+    return (
+        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm {count} eigenvalue{'s are' if count > 1 else ' is'} "
+        f"negative: the body diverges; {remedy}"
+    )
+
+
+def _band(values: Array, settings: BodySettings, zero: int) -> int:
+    if settings.modes.max_frequency is None:
+        return len(values)
+    keep = int(np.searchsorted(values, (2 * np.pi * settings.modes.max_frequency) ** 2, side="right"))
+    if keep <= zero:
+        raise UserError(
+            f"modes.max_frequency: no elastic mode lies below {settings.modes.max_frequency:g} Hz "
+            f"(the first is at {np.sqrt(values[min(zero, len(values) - 1)]) / 2 / np.pi:.6g} Hz); raise it"
+        )
+    if keep == len(values):
+        raise UserError(
+            f"modes.count: {len(values)} modes do not reach modes.max_frequency = {settings.modes.max_frequency:g} Hz; "
+            "raise modes.count"
+        )
+    return keep
