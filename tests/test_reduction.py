@@ -16,8 +16,8 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
-from microslip.modes.solution import held_compliance
 from microslip.modes.equilibrium import make_model
+from microslip.modes.solution import held_compliance
 from microslip.modes.spectrum import make_pencil
 from microslip.reduction import METHODS, Problem
 from microslip.reduction.craig_bampton import fixed_interface_modes

@@ -33,7 +33,8 @@ _READS_BY_GMSH = {".unv"}
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
-    "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "basis", "coordinates.py", "fem", "reduction", "modes",
+    "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "basis", "coordinates.py", "fem",
+    "reduction", "modes",
 )  # fmt: skip
 _CASE_CODE = ("harmonic_balance.py", "case.py", "pictures/response.py")
 _REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "basis/checks.py")
