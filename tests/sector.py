@@ -16,9 +16,8 @@ from microslip.body import BodySettings
 from microslip.data import Array, Compliance, Mesh, ModalBasis, ModalGroup
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, skew, stiffness
-from microslip.modes.body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows  # noqa: F401
+from microslip.modes.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from microslip.modes.canonical import by_place, signs
-from microslip.modes.stress import smoother  # noqa: F401
 
 BORE, RIM, WIDTH = 0.05, 0.12, 0.012  # m
 YOUNG, POISSON, DENSITY = 2.1e11, 0.3, 7850.0
@@ -103,21 +102,19 @@ def tie(body: Mesh, sectors: int, k: int) -> Array:
 def basis(
     sectors: int = 6, count: int = 5, rpm: tuple[float, ...] = (0.0,), harmonics: tuple[int, ...] | None = None
 ) -> ModalBasis:
-    """The cyclic basis; treat it as read-only. A speed makes everything stiffer by 1 + (rpm / 10000)^2."""
+    """The cyclic basis; treat it as read-only. A speed makes everything stiffer by 1 + (rpm / 100000)^2."""
     body, chosen = mesh(sectors), settings(sectors)
     K, M = matrices(body)
     rows = body_rows(body, chosen)
     groups = {
-        (s, k): _group(body, chosen, rows, K * (1 + (speed / 1e4) ** 2), M, k, count, speed * np.pi / 30)
+        (s, k): _group(body, chosen, rows, K * (1 + (speed / 1e5) ** 2), M, k, count, speed * np.pi / 30)
         for s, speed in enumerate(rpm)
         for k in (range(sectors // 2 + 1) if harmonics is None else harmonics)
     }
     ones = np.tile(np.eye(3), (body.n_points, 1))
     total = (ones.T @ M @ ones)[0, 0]
     centre = (ones.T @ M @ body.points.reshape(-1))[:3] / total
-    r = (body.points - centre).reshape(-1)
     spin = np.array([np.cross(e, body.points - centre).reshape(-1) for e in np.eye(3)])
-    assert r.shape == spin[0].shape
     return ModalBasis(
         "sector", body, groups, float(total), centre, spin @ M @ spin.T, np.array([0.0, 1.0, 0.0]), np.zeros(3),
         "ratio", False, "eigenmodes", {"settings": '{"rotation": {"engine_orders": [1, 2, 5, 6]}}'}, sectors,

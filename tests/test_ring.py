@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import Array, ModalBasis, UserError
+from microslip.resonances import families, margins, resonance_csv, resonances, tracks, unanswered, zigzag
 from microslip.ring import (
     aliased,
     certify_ring,
@@ -233,3 +234,100 @@ def test_the_file_keeps_the_names_of_the_cyclic_faces(tmp_path) -> None:
     write_basis(tmp_path / "b.h5", basis)
     assert read_basis(tmp_path / "b.h5").cyclic_faces == ("front", "rear")
     assert np.isnan(certify_ring(basis).phase_rule)  # these do not match: nothing to hold the shapes against
+
+
+# --- resonances ----------------------------------------------------------------------------------------------------
+
+
+def chain(sectors: int, blade: float, coupling: float, mass: float, rpm: tuple[float, ...]) -> ModalBasis:
+    """A ring of oscillators: mass on a spring to the ground, coupled to its neighbours; one mode a nodal diameter.
+
+    In closed form omega_k^2 = (k_b + 2 k_c (1 - cos(2 pi k / N))) / m, at every speed.
+    """
+    template = sector.basis()
+    one = template.groups[0, 0]
+    groups = {}
+    for k in range(sectors // 2 + 1):
+        omega = np.sqrt((blade + 2 * coupling * (1 - np.cos(2 * np.pi * k / sectors))) / mass)
+        for s, speed in enumerate(rpm):
+            groups[s, k] = replace(
+                one, speed=speed * np.pi / 30, omega=np.array([omega]), kind=("normal",), damping_ratio=np.zeros(1),
+                phi=np.zeros((0, 3, 1)), harmonic=k,
+            )  # fmt: skip
+    return replace(template, groups=groups, sectors=sectors)
+
+
+def closed_form(sectors: int, k: int, blade: float, coupling: float, mass: float) -> float:
+    return np.sqrt((blade + 2 * coupling * (1 - np.cos(2 * np.pi * k / sectors))) / mass) / (2 * np.pi)
+
+
+@given(
+    st.integers(3, 40), st.floats(1e4, 1e6), st.floats(0.0, 1e6), st.floats(0.1, 10.0),
+    st.lists(st.integers(1, 90), min_size=1, max_size=6, unique=True),
+)  # fmt: skip
+def test_an_engine_order_meets_only_the_nodal_diameter_it_aliases_onto(
+    sectors: int, blade: float, coupling: float, mass: float, orders: list[int]
+) -> None:
+    """On a ring of oscillators the critical speeds are 60 f_k / e with k = aliased(e), and there are no others."""
+    wanted = {e: 60 * closed_form(sectors, aliased(e, sectors)[0], blade, coupling, mass) / e for e in orders}
+    basis = chain(sectors, blade, coupling, mass, (0.0, 1.01 * max(wanted.values())))
+    found = resonances(basis, orders)
+    assert sorted(r.order for r in found) == sorted(orders)
+    for r in found:
+        assert r.speed * 30 / np.pi == pytest.approx(wanted[r.order], rel=1e-9)
+        assert r.frequency == pytest.approx(r.order * r.speed / (2 * np.pi), rel=1e-12)
+        assert (r.nodal_diameter, r.direction) == aliased(r.order, sectors)
+        assert (r.family, r.mode) == (1, 1)
+    assert [r.speed for r in found] == sorted(r.speed for r in found)
+
+
+def test_margins_vanish_at_the_critical_speed_and_change_sign_there() -> None:
+    critical = 60 * closed_form(24, 6, 1e5, 3e4, 0.3) / 18
+    basis = chain(24, 1e5, 3e4, 0.3, (0.5 * critical, critical, 2 * critical))
+    found = [margins(basis, s, [18])[0] for s in range(3)]
+    np.testing.assert_allclose([m.relative for m in found], [1.0, 0.0, -0.5], atol=1e-12)
+    assert {(m.nodal_diameter, m.direction, m.family) for m in found} == {(6, "forward", 1)}
+    assert margins(basis, 0, [18], within=0.9) == [] and len(margins(basis, 0, [18], within=1.1)) == 1
+
+
+def test_the_excitation_line_passes_every_engine_order_at_its_nodal_diameter() -> None:
+    for sectors in (5, 24):
+        corners, hertz = zigzag(sectors, 20.0, 1500.0)
+        assert hertz[-1] >= 1500.0 and corners[0] == hertz[0] == 0.0
+        for e in range(1, int(hertz[-1] / 20.0) + 1):
+            assert np.interp(20.0 * e, hertz, corners) == pytest.approx(aliased(e, sectors)[0], abs=1e-9)
+    assert len(zigzag(24, 0.0, 1000.0)[0]) == 1
+
+
+def test_families_follow_the_shapes_where_the_frequencies_cross() -> None:
+    """Two families that change places between k = 1 and k = 2 keep their shapes."""
+    basis = sector.basis()
+    swapped = {}
+    for k in range(4):
+        g = basis.groups[0, 1]
+        order = [1, 0, 2, 3, 4] if k >= 2 else [0, 1, 2, 3, 4]
+        swapped[0, k] = replace(g, phi=g.phi[:, :, order] * np.exp(1j * k), harmonic=k)
+    found = families(replace(basis, groups=swapped))
+    assert found.modes[:2].tolist() == [[0, 0, 1, 1], [1, 1, 0, 0]]
+    assert found.of(3, 0) == 1 and found.of(0, 0) == 0
+    np.testing.assert_allclose(found.mac, 1.0)
+
+
+def test_orders_without_their_nodal_diameter_and_the_table() -> None:
+    basis = sector.basis(6, rpm=(0.0, 60000.0), harmonics=(0, 1))
+    assert unanswered(basis, [1, 2, 3, 5, 6]) == [2, 3]
+    found = resonances(basis, [1, 2, 3, 5, 6])
+    assert {r.order for r in found} <= {1, 5, 6} and found
+    table = resonance_csv(found).splitlines()
+    assert table[0].startswith("rpm,Hz,engine order,nodal diameter,wave on the rotor")
+    assert len(table) == len(found) + 1
+    rpm, hertz, order = (float(v) for v in table[1].split(",")[:3])
+    assert hertz == pytest.approx(order * rpm / 60, rel=1e-3)  # both are rounded in the table
+
+
+def test_a_campbell_diagram_of_one_nodal_diameter_holds_only_its_modes() -> None:
+    basis = sector.basis(6, rpm=(0.0, 5000.0))
+    curves = tracks(basis)
+    assert sorted(curves) == [0, 1, 2, 3]
+    for k, t in curves.items():
+        np.testing.assert_allclose(np.sort(t.omega, axis=0), np.array([basis.groups[s, k].omega for s in (0, 1)]).T)

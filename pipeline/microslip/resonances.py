@@ -1,0 +1,188 @@
+"""Families of modes over the nodal diameters, and the engine orders that really excite them.
+
+A force that stands in space excites a mode of the ring only if it has the mode's frequency and the mode's shape:
+e Omega = omega, and e must alias onto the mode's nodal diameter (`ring.aliased`). A Campbell diagram alone shows the
+first condition; both together are the interference diagram, known as SAFE (Singh's Advanced Frequency Evaluation,
+17th Turbomachinery Symposium, 1988) and as ZZENF (zig-zag-shaped excitation line in the nodal diameters versus
+frequency diagram; Wildheim, J. Appl. Mech. 46 (1979) 878).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .campbell import Tracks, crossings, follow, point_weights, track_basis
+from .data import Array, Indices, ModalBasis
+from .ring import aliased
+
+
+@dataclass(frozen=True)
+class Families:
+    """Modes joined over the nodal diameters at one speed.
+
+    Attributes:
+        speed: rad/s. harmonics: (K,) nodal diameters, ascending.
+        modes: (c, K) mode number (0-based) of each family at each nodal diameter, -1 where it does not exist.
+        omega: (c, K) rad/s, nan where it does not exist. mac: (c, K - 1) of each step, nan where there is none.
+    """
+
+    speed: float
+    harmonics: Indices
+    modes: Indices
+    omega: Array
+    mac: Array
+
+    def of(self, harmonic: int, mode: int) -> int:
+        """Number (0-based) of the family to which a mode of a nodal diameter belongs."""
+        column = int(np.flatnonzero(self.harmonics == harmonic)[0])
+        return int(np.flatnonzero(self.modes[:, column] == mode)[0])
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """Engine order `order` meets a mode that it excites.
+
+    Attributes:
+        order: e. nodal_diameter: k onto which it aliases. direction: of the wave on the rotor, see `ring.aliased`.
+        family: 1-based. mode: 1-based, at the lowest speed of its curve. speed: rad/s. frequency: Hz.
+    """
+
+    order: int
+    nodal_diameter: int
+    direction: str
+    family: int
+    mode: int
+    speed: float
+    frequency: float
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far a mode is from an engine order that excites it, at one speed.
+
+    Attributes:
+        order, nodal_diameter, direction, family: see `Resonance`. frequency: of the mode, Hz. excitation: e times
+            the speed, Hz.
+    """
+
+    order: int
+    nodal_diameter: int
+    direction: str
+    family: int
+    frequency: float
+    excitation: float
+
+    @property
+    def relative(self) -> float:
+        """(frequency - excitation) / excitation."""
+        return self.frequency / self.excitation - 1
+
+
+def speeds_of(basis: ModalBasis) -> list[int]:
+    """Indices of the speeds of a modal file."""
+    return sorted({s for s, _ in basis.groups})
+
+
+def harmonics_of(basis: ModalBasis) -> list[int]:
+    """Nodal diameters of a modal file."""
+    return sorted({k for _, k in basis.groups})
+
+
+def families(basis: ModalBasis, speed: int = 0) -> Families:
+    """Join the modes of neighbouring nodal diameters by the MAC of their shapes at one speed (an index).
+
+    Without shapes in the file mode j is joined to mode j. The families are in the order of their first mode.
+    """
+    harmonics = [k for s, k in sorted(basis.groups) if s == speed]
+    groups = [basis.groups[speed, k] for k in harmonics]
+    modes, omega, mac = follow(groups, point_weights(basis))
+    return Families(groups[0].speed, np.array(harmonics), modes, omega, mac)
+
+
+def tracks(basis: ModalBasis) -> dict[int, Tracks]:
+    """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds."""
+    found = {k: track_basis(basis, k) for k in harmonics_of(basis)}
+    return {k: t for k, t in found.items() if t is not None}
+
+
+def resonances(basis: ModalBasis, orders: Iterable[int]) -> list[Resonance]:
+    """Where engine orders meet modes of the nodal diameter they excite, ascending in speed.
+
+    Args:
+        basis: at two speeds or more. orders: engine orders; those that alias onto a nodal diameter that the file
+            does not hold find nothing (`unanswered`).
+    """
+    curves, joined = tracks(basis), families(basis)
+    out = []
+    for order in sorted({e for e in orders if e > 0}):
+        k, direction = aliased(order, basis.sectors)
+        for c in crossings(curves[k], [order]) if k in curves else []:
+            row = curves[k].modes[c.curve]
+            mode = int(row[row >= 0][0])
+            family = joined.of(k, mode) + 1 if row[0] >= 0 else 0
+            out.append(Resonance(order, k, direction, family, mode + 1, c.speed, c.frequency))
+    return sorted(out, key=lambda r: (r.speed, r.order))
+
+
+def unanswered(basis: ModalBasis, orders: Iterable[int]) -> list[int]:
+    """Engine orders whose nodal diameter the file does not hold."""
+    held = harmonics_of(basis)
+    return sorted({e for e in orders if e > 0 and aliased(e, basis.sectors)[0] not in held})
+
+
+def margins(basis: ModalBasis, speed: int, orders: Iterable[int], within: float = np.inf) -> list[Margin]:
+    """Distances of modes from the engine orders that excite them, at one speed (an index), nearest first.
+
+    Args:
+        within: only modes whose frequency differs by less than this part of the excitation's.
+    """
+    joined, out = families(basis, speed), []
+    turns = joined.speed / (2 * np.pi)
+    for order in sorted({e for e in orders if e > 0}) if turns else []:
+        k, direction = aliased(order, basis.sectors)
+        group = basis.groups.get((speed, k))
+        for j, f in enumerate(group.frequency) if group is not None else []:
+            out.append(Margin(order, k, direction, joined.of(k, j) + 1, float(f), order * turns))
+    return sorted((m for m in out if abs(m.relative) < within), key=lambda m: abs(m.relative))
+
+
+def zigzag(sectors: int, turns: float, top: float) -> tuple[Array, Array]:
+    """Corners of the excitation line: (c,) nodal diameters and (c,) Hz, from (0, 0) up to the frequency `top`.
+
+    The line f = e turns, with e reflected at 0 and N/2 as `ring.aliased` does; legs that rise to the right are
+    backward waves, those that rise to the left forward ones.
+
+    Args:
+        turns: revolutions per second.
+    """
+    legs = int(np.ceil(top / (turns * sectors / 2))) if turns > 0 else 0
+    corners = np.arange(legs + 1)
+    return np.where(corners % 2, sectors / 2, 0.0), corners * turns * sectors / 2
+
+
+HEAD = ("rpm", "Hz", "engine order", "nodal diameter", "wave on the rotor", "family", "mode")
+
+
+def rows(found: Sequence[Resonance]) -> list[tuple[str, ...]]:
+    """Cells under `HEAD`."""
+    return [
+        (
+            f"{r.speed * 30 / np.pi:.1f}", f"{r.frequency:.2f}", str(r.order), str(r.nodal_diameter), r.direction,
+            str(r.family or ""), str(r.mode),
+        )
+        for r in found
+    ]  # fmt: skip
+
+
+def resonance_csv(found: Sequence[Resonance]) -> str:
+    """The table as comma-separated text, with a head."""
+    return "\n".join(",".join(row) for row in [HEAD, *rows(found)]) + "\n"
+
+
+def family_ranges(found: Families) -> Mapping[int, tuple[float, float]]:
+    """Family (0-based) -> lowest and highest frequency over the nodal diameters, Hz."""
+    f = found.omega / (2 * np.pi)
+    return {c: (float(np.nanmin(f[c])), float(np.nanmax(f[c]))) for c in range(len(f))}
