@@ -400,7 +400,9 @@ class BodySettings(Model):
     name: Name
     description: str = ""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
-    reduction: Literal["eigenmodes", "macneal", "rubin", "craig-bampton"] = "eigenmodes"
+    reduction: Literal[
+        "eigenmodes", "macneal", "rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"
+    ] = "eigenmodes"
     free: bool = False
     geometry: Geometry
     mesh: Meshing = Field(default_factory=Meshing)

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from .body import Model, Name, NotNegative, Number, Numbers, Positive, _tuple, load_toml, override, validate
+from .coordinates import in_modes
 from .data import Array, ModalBasis, ModalGroup, Rows, UserError
 from .harmonic_balance import (
     FrequencyResponse,
@@ -112,6 +113,8 @@ def run_case(
     if (settings.speed, 0) not in basis.groups:
         raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
     group = basis.groups[settings.speed, 0]
+    beside = basis.reduction == "macneal" or len(group.omega) < group.n_modes  # statics that no mode carries
+    group = in_modes(group) if beside else group
     force = settings.amplitude * _row(group.excitations, settings.excitation, path, "excitation").rows[0]
     monitored = _row(group.monitors, settings.monitor, path, "monitor")
     label = f"u_{settings.direction}"
@@ -126,7 +129,7 @@ def run_case(
                 f"{', '.join(group.interfaces) or 'none'}"
             )
     contacts = [_sized(c, group, path) for c in settings.contacts]
-    residual = _residual(group, settings, label) if basis.reduction == "macneal" else None
+    residual = _residual(group, settings, label) if beside else None
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     responses, resonances = {}, {}

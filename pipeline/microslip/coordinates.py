@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,15 @@ from .data import Array, Interface, ModalBasis, ModalGroup, Rows
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
-    """The same body in modal coordinates: M_r = 1, K_r = diag(omega^2); itself where it stands so already."""
+    """The same body in modal coordinates: M_r = 1, K_r = diag(omega^2); itself where it stands so already.
+
+    Coordinates without mass and interface forces are left out: the compliance they hold is then missing in
+    `Compliance.modal` and counts as residual.
+    """
     V = g.to_diagonal
     if V is None:
         return g
+    p = len(g.omega)
 
     def face(i: Interface) -> Interface:
         shapes = i.shapes @ V
@@ -24,8 +30,8 @@ def in_modes(g: ModalGroup) -> ModalGroup:
 
     return replace(
         g,
-        kind=("reduced",) * g.n_modes,
-        M_r=np.eye(g.n_modes),
+        kind=own_kind(g),
+        M_r=np.eye(p),
         K_r=np.diag(g.omega**2),
         C_r=V.conj().T @ g.C_r @ V,
         G_r=V.conj().T @ g.G_r @ V,
@@ -35,8 +41,71 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         monitors={k: rows(r) for k, r in g.monitors.items()},
         gauges={k: rows(r) for k, r in g.gauges.items()},
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
+        compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
         to_diagonal=None,
     )
+
+
+def own_kind(g: ModalGroup) -> tuple[str, ...]:
+    """What each of the frequencies `omega` belongs to."""
+    if g.to_diagonal is None:
+        return g.kind
+    elastic = "reduced" if len(g.omega) == g.n_modes else "normal"
+    return tuple(elastic if w > 0 else "rigid" for w in g.omega)
+
+
+def _modal(g: ModalGroup) -> Array:
+    """Compliance in the modes alone: what the massless coordinates or the forces add to it is taken out again."""
+    rows = _compliance_rows(g)
+    return g.compliance.modal - static_part(rows, g.compliance.labels, g.kind, g.K_r)
+
+
+def _compliance_rows(g: ModalGroup) -> Array:
+    found = {f"interface:{n}:{c}": i.rows[j] for n, i in g.interfaces.items() for j, c in enumerate(_SIX)}
+    for kind, named in (("excitation", g.excitations), ("monitor", g.monitors)):
+        found |= {f"{kind}:{n}:{c}": r.rows[j] for n, r in named.items() for j, c in enumerate(r.labels)}
+    return np.array([found[label] for label in g.compliance.labels]).reshape(-1, g.n_modes)
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """A^-1 b; not a number where a file's A cannot be inverted."""
+    try:
+        return np.linalg.solve(A, b)
+    except np.linalg.LinAlgError:
+        return np.full_like(b, np.nan)
+
+
+_SIX = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+
+
+def held(
+    T: Array, labels: Sequence[str], kind: Sequence[str], K_r: Array, omega: Array, V: Array | None
+) -> Array:
+    """(r, r) static compliance that the coordinates hold over rows T (r, m); a free body's elastic part.
+
+    The sum of (T V)_j (T V)_j^H / omega_j^2 over the elastic modes, and what coordinates without mass or interface
+    forces add to it.
+
+    Args:
+        labels: of the rows. kind: of the coordinates. K_r: (m, m). omega: (p,). V: (m, p) their modes; None: 1.
+    """
+    elastic = omega > 0
+    modes = (T if V is None else T @ V)[:, elastic]
+    return (modes / omega[elastic] ** 2) @ modes.conj().T + static_part(T, labels, kind, K_r)
+
+
+def static_part(T: Array, labels: Sequence[str], kind: Sequence[str], K_r: Array) -> Array:
+    """(r, r) static compliance of the coordinates that carry no motion of their own."""
+    held = np.zeros((len(T), len(T)), dtype=T.dtype)
+    light = np.flatnonzero(np.array(kind) == "massless-interface")
+    if len(light):
+        held += T[:, light] @ _solved(K_r[np.ix_(light, light)], T[:, light].conj().T)
+    force = np.flatnonzero(np.array(kind) == "interface-force")
+    if len(force):  # a force on an interface is the coordinate itself
+        rows = [i for i, label in enumerate(labels) if label.startswith("interface:")]
+        held[:, rows] = T[:, force]
+        held[rows, :] = T[:, force].conj().T
+    return held
 
 
 def basis_in_modes(basis: ModalBasis) -> ModalBasis:

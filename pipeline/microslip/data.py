@@ -201,11 +201,13 @@ class ModalGroup:
 
     Attributes:
         speed: rotation speed, rad/s.
-        omega: (m,) angular eigenfrequencies, rad/s, ascending; rigid modes are exactly 0.
-        kind: m texts: ``rigid``, ``normal``, ``attachment`` (Rubin), ``interface``, ``fixed-interface``.
-        to_diagonal: (m, m) V with V^T M_r V = 1, V^T K_r V = diag(omega^2); None if M_r and K_r are diagonal. With
-            it, `omega` and `damping_ratio` are those of the modes V, and phi and all rows stand per coordinate.
-        damping_ratio: (m,) D_j of Sextro Eq. (2.4-13).
+        omega: (m,) angular eigenfrequencies, rad/s, ascending, with nothing on the interfaces; rigid modes are
+            exactly 0.
+        kind: m texts, see `reduction.problem.Reduced`.
+        to_diagonal: (m, p) V with V^H M_r V = 1, V^H K_r V = diag(omega^2); None if M_r and K_r are diagonal. With
+            it, `omega` and `damping_ratio` are those of the p modes V, and phi and all rows stand per coordinate.
+            p < m where some coordinates have no mass or are forces.
+        damping_ratio: (m,) or (p,) D_j of Sextro Eq. (2.4-13).
         M_r, K_r, C_r, G_r: (m, m) reduced matrices; G_r is skew, for the given speed (Eq. (2.3-29)).
         phi: (n, 3, m) shapes, kg^-1/2, in the mesh's point order. May be empty.
         interfaces, excitations, monitors, gauges: see the classes; gauge rows read strain.
@@ -246,7 +248,8 @@ class ModalGroup:
 
     @property
     def n_modes(self) -> int:
-        return len(self.omega)
+        """Number of generalised coordinates."""
+        return len(self.kind)
 
 
 @dataclass(frozen=True)

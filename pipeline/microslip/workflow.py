@@ -23,6 +23,7 @@ from . import __version__, store
 from .basis import read_basis, write_basis
 from .body import BodySettings, implausible, load_body, load_toml
 from .case import CaseResult, load_case, run_case
+from .coordinates import own_kind
 from .data import Array, Mesh, ModalBasis, UserError
 from .mesh import UNITS, mesh_problems, read_mesh
 
@@ -498,9 +499,9 @@ def basis_summary(basis: ModalBasis) -> list[str]:
     for (_, harmonic), g in sorted(basis.groups.items()):
         state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = "certified complete" if g.checks.get("certified") else "NOT certified"
-        lines.append(f"{state}, nodal diameter {harmonic}: {g.n_modes} modes, {proof}")
+        lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
         lines += [
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
-            for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, g.kind, strict=True))
+            for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, own_kind(g), strict=True))
         ]
     return lines

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..coordinates import in_modes
+from ..coordinates import held, in_modes
 from ..data import Array, Interface, ModalBasis, ModalGroup, Rows
 from .integrals import face_mean, modal_mass
 
@@ -91,6 +91,9 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     found.append(("every number is finite", _not_finite(_numbers(g)), 0.0, ""))
     if found[-1][1]:
         return found
+    found += _compliance_checks(g)
+    if _all_rows(g) is None:
+        return found
     if g.to_diagonal is not None:
         found += _transformation_checks(g)
         g = in_modes(g)
@@ -99,7 +102,6 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         found += _shape_checks(basis, g)
     for name, item in g.interfaces.items():
         found += _interface_checks(basis, g, name, item, mesh_is_sound)
-    found += _compliance_checks(g)
     for key in ("orthogonality", "backward_error", "mass_error"):
         if key in g.checks:
             found.append((f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""))
@@ -110,9 +112,11 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
 
 
 def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
-    m, n, r = g.n_modes, basis.mesh.n_points, len(g.compliance.labels)
+    m, n, r, own = g.n_modes, basis.mesh.n_points, len(g.compliance.labels), len(g.omega)
+    V = np.eye(own) if g.to_diagonal is None else g.to_diagonal
     wanted: list[tuple[Array, tuple[int, ...]]] = [(a, (m, m)) for a in (g.M_r, g.K_r, g.C_r, g.G_r)]
-    wanted += [(g.damping_ratio, (m,)), (g.u_static, (n, 3)), (g.phi, (n if g.phi.shape[0] else 0, 3, m))]
+    wanted += [(g.damping_ratio, (own,)), (V, (m, own)), (g.u_static, (n, 3))]
+    wanted += [(g.phi, (n if g.phi.shape[0] else 0, 3, m))]
     wanted += [(a, (r, r)) for a in (g.compliance.static, g.compliance.modal, g.compliance.plain)]
     for i in g.interfaces.values():
         p = len(i.areas)
@@ -124,7 +128,8 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
     for s in g.stresses.values():
         k = len(s.weights)
         wanted += [(s.strain, (k, 6, m)), (s.stress, (k, 6, m)), (s.static_stress, (k, 6)), (s.points, (k, 3))]
-    return len(g.kind) == m and all(a.shape == shape for a, shape in wanted)
+    forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
+    return forces in (0, motions) and own <= m and all(a.shape == shape for a, shape in wanted)
 
 
 def _every_row(g: ModalGroup) -> list[Rows]:
@@ -149,7 +154,7 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     assert V is not None
     H = V.conj().T
     return [
-        ("to_diagonal: V^T M_r V is the identity", _largest(H @ g.M_r @ V - np.eye(g.n_modes)), 1e-9, ""),
+        ("to_diagonal: V^T M_r V is the identity", _largest(H @ g.M_r @ V - np.eye(len(g.omega))), 1e-9, ""),
         ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(H @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),
     ]
 
@@ -207,8 +212,7 @@ def _compliance_checks(g: ModalGroup) -> _Findings:
         return [("compliance rows are stored", 1.0, 0.0, "a label names a row that the file does not hold")]
     if not len(T):
         return found
-    elastic = g.omega > 0
-    modal = (T[:, elastic] / g.omega[elastic] ** 2) @ T[:, elastic].conj().T
+    modal = held(T, g.compliance.labels, g.kind, g.K_r, g.omega, g.to_diagonal)
     error = _largest(modal - g.compliance.modal) / max(_largest(modal), 1e-300)
     found.append(("modal compliance follows from the rows", error, 1e-9, ""))
     static = g.compliance.static

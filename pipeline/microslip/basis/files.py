@@ -178,17 +178,19 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     mode = put_scale(modes, "mode", np.arange(1, g.n_modes + 1))
     column = put_scale(modes, "mode_column", np.arange(1, g.n_modes + 1))
     group["mode"] = mode
+    fewer = len(g.omega) < g.n_modes
+    own = put_scale(modes, "own_mode", np.arange(1, len(g.omega) + 1)) if fewer else mode
     for name, data, unit in (
         ("omega", g.omega, "rad/s"),
         ("frequency", g.frequency, "Hz"),
         ("damping_ratio", g.damping_ratio, "1"),
-        ("kind", np.array(g.kind, dtype="U"), ""),
     ):
-        put(modes, name, data, unit, scales=[mode])
+        put(modes, name, data, unit, scales=[own])
+    put(modes, "kind", np.array(g.kind, dtype="U"), scales=[mode])
     for name, unit in (("M_r", "1"), ("K_r", "s^-2"), ("C_r", "s^-1"), ("G_r", "s^-1")):
         put(modes, name, getattr(g, name), unit, scales=[mode, column])
     if g.to_diagonal is not None:
-        put(modes, "to_diagonal", g.to_diagonal, "1", scales=[mode, column])
+        put(modes, "to_diagonal", g.to_diagonal, "1", scales=[mode, own if fewer else column])
     if g.phi.shape[0]:
         put(modes, "phi", g.phi, "kg^-1/2", scales=[file["node"], file["axis"], mode])
     cyclic = group.create_group("cyclic")
@@ -450,17 +452,18 @@ def _read_mesh(group: h5py.Group) -> Mesh:
 def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mesh) -> ModalGroup:
     modes = group["modes"]
     omega = _array(modes, "omega", None)
-    m, n = len(omega), mesh.n_points
-    if not np.allclose(_array(modes, "frequency", m) * 2 * np.pi, omega, rtol=1e-12, atol=0, equal_nan=True):
+    kind = _texts(modes, "kind")
+    p, m, n = len(omega), len(kind), mesh.n_points
+    if not np.allclose(_array(modes, "frequency", p) * 2 * np.pi, omega, rtol=1e-12, atol=0, equal_nan=True):
         raise ValueError(f"{modes.name}/frequency is not omega / (2 pi)")
     state = group["rotation"]
     labels = _texts(group, "compliance_row")
     r = len(labels)
     return ModalGroup(
-        speed=float(where.attrs["Omega"]), omega=omega, kind=_texts(modes, "kind", m),
-        damping_ratio=_array(modes, "damping_ratio", m), M_r=_array(modes, "M_r", m, m), K_r=_array(modes, "K_r", m, m),
+        speed=float(where.attrs["Omega"]), omega=omega, kind=kind,
+        damping_ratio=_array(modes, "damping_ratio", p), M_r=_array(modes, "M_r", m, m), K_r=_array(modes, "K_r", m, m),
         C_r=_array(modes, "C_r", m, m), G_r=_array(modes, "G_r", m, m),
-        to_diagonal=_array(modes, "to_diagonal", m, m) if "to_diagonal" in modes else None,
+        to_diagonal=_array(modes, "to_diagonal", m, p) if "to_diagonal" in modes else None,
         phi=_array(modes, "phi", n, 3, m) if "phi" in modes else np.zeros((0, 3, m)),
         interfaces={
             name: _read_interface(file["interfaces"][_escaped(name)], group["interfaces"][_escaped(name)], m)

@@ -95,6 +95,7 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         "frequency": _column(g.frequency),
         "damping_ratio": _column(g.damping_ratio),
         "kind": np.array(g.kind, dtype=object).reshape(-1, 1),
+        "to_diagonal": np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal,
         "phi": g.phi,
         "u_static": g.u_static,
         "interfaces": _struct(g.interfaces, _interface),

@@ -128,9 +128,10 @@ def assemble_group(
     ratios = settings.damping.ratios(omega)
     B, labels = rows.stacked(settings)
     T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
-    modal = held_compliance(T, reduced)
+    modal = held_compliance(T, reduced, labels)
     Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
     G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes.conj(), skew(model.axis), Mphi, optimize=True)
+    G = without_massless(G, reduced)
     stresses: dict[str, StressSet] = {}
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
@@ -154,7 +155,7 @@ def assemble_group(
         excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
         monitors={k: reduced_rows(v, phi, u) for k, v in rows.monitors.items()},
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
-        compliance=Compliance(labels, s.static, modal, "rigid" in reduced.kind, s.eigenmodes),
+        compliance=Compliance(labels, s.static, modal, bool((omega == 0).any()), s.eigenmodes),
         stresses=stresses,
         u_static=state.u,
         checks=_checks(s.found, model, state, s.kept),
@@ -162,6 +163,14 @@ def assemble_group(
         harmonic=harmonic,
         spin_softening=model.spin_softening,
     )
+
+
+def without_massless(G: Array, reduced: Reduced) -> Array:
+    """(c, c) gyroscopic matrix with the inertia of the modes alone where some coordinates carry no mass."""
+    if "massless-interface" not in reduced.kind or reduced.to_diagonal is None:
+        return G
+    onto = reduced.to_diagonal @ reduced.to_diagonal.conj().T @ reduced.M_r
+    return onto.conj().T @ G @ onto
 
 
 def modal_damping(reduced: Reduced, diagonal: Array) -> Array:

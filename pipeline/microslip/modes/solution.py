@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from .. import eigen
 from ..body import BodySettings
+from ..coordinates import held
 from ..data import Array, UserError
 from ..mesh import longest_over_shortest
 from ..reduction import METHODS, Problem, Reduced
@@ -151,7 +152,7 @@ def reduced_solution(
     exact = [i for i, label in enumerate(s.labels) if not label.startswith("monitor:")]
     problem = Problem(
         s.pencil, s.found.values[:keep], vectors[:, :keep], zero, s.B[np.array(exact, dtype=int)],
-        tuple(s.labels[i] for i in exact), s.answers[:, exact], settings.modes.certify,
+        tuple(s.labels[i] for i in exact), s.answers[:, exact], settings.modes.certify, s.shift,
     )  # fmt: skip
     if settings.reduction != "eigenmodes":
         report(f"reduction: {settings.reduction}")
@@ -177,12 +178,13 @@ def solution(
     return reduced_solution(model, settings, found, rows, report)
 
 
-def held_compliance(T: Array, reduced: Reduced) -> Array:
-    """(r, r) static compliance that the coordinates hold, for rows T (r, c): T K_r^-1 T^H without the rigid ones."""
-    V = np.eye(len(reduced.kind)) if reduced.to_diagonal is None else reduced.to_diagonal
-    elastic = reduced.omega > 0
-    modes = (T @ V)[:, elastic]
-    return (modes / reduced.omega[elastic] ** 2) @ modes.conj().T
+def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) -> Array:
+    """(r, r) static compliance that the coordinates hold over rows T (r, c), see `coordinates.held`.
+
+    Args:
+        labels: of the rows, needed where forces are coordinates.
+    """
+    return held(T, labels, reduced.kind, reduced.K_r, reduced.omega, reduced.to_diagonal)
 
 
 def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:

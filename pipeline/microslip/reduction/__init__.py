@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from . import craig_bampton, eigenmodes, rubin
+from . import craig_bampton, dual, eigenmodes, massless, rubin
 from .problem import Problem, Reduced
 
 METHODS: dict[str, Callable[[Problem], Reduced]] = {
@@ -18,6 +18,8 @@ METHODS: dict[str, Callable[[Problem], Reduced]] = {
     "macneal": eigenmodes.reduce,
     "rubin": rubin.reduce,
     "craig-bampton": craig_bampton.reduce,
+    "dual-craig-bampton": dual.reduce,
+    "massless-boundary": massless.reduce,
 }
 """Method name -> function. ``macneal`` keeps the eigenmodes: its residual flexibility, the compliance they leave
 out, stands in the file beside them and adds no coordinates."""

@@ -16,50 +16,89 @@ import scipy.sparse as sp
 
 from .. import eigen
 from ..data import Array, UserError
-from .problem import Problem, Reduced, diagonalised, hermitian
+from .problem import Problem, Reduced, diagonalised, hermitian, own_modes
 
 
 def reduce(problem: Problem) -> Reduced:
     """Interface coordinates first (6 a patch, in the order of the rows), then fixed-interface modes.
 
+    A body with rigid motions gets as many inertia-relief shapes between the two: how it yields, held at its
+    interfaces, to its own inertia in those motions. With them a force that accelerates the body is answered exactly.
+
     Raises:
-        UserError: a body with rigid motions, or without interfaces.
+        UserError: a body without interfaces, or whose interfaces leave it a rigid motion.
     """
-    chosen = [i for i, label in enumerate(problem.labels) if label.startswith("interface:")]
-    if not chosen:
-        raise UserError('reduction: "craig-bampton" keeps interface coordinates, but the body has no [[interfaces]]')
-    if problem.rigid:
-        raise UserError(
-            'reduction: "craig-bampton" needs a body that its supports hold; use "rubin" for one with rigid motions'
-        )
+    chosen = problem.interface("craig-bampton")
     B = problem.rows[chosen]
-    stiffness = hermitian(np.linalg.inv(hermitian(np.asarray(B @ problem.static[:, chosen]))))
-    constraint_modes = problem.static[:, chosen] @ stiffness
-    fixed = fixed_interface_modes(problem.pencil, B, len(problem.values), problem.certify)
-    vectors = np.hstack([constraint_modes, fixed.vectors])
-    r = len(chosen)
+    constraint_modes, stiffness, relief = static_shapes(problem, B, problem.static[:, chosen])
+    count = len(problem.values) - problem.rigid
+    fixed = fixed_interface_modes(problem.pencil, B, count, problem.certify, problem.shift)
+    for _ in range(2):
+        relief = relief - fixed.vectors @ (problem.pencil.M(fixed.vectors).conj().T @ relief)
+    values, relief = own_modes(problem.pencil, relief)
+    vectors = np.hstack([constraint_modes, relief, fixed.vectors])
+    r, inner = len(chosen), np.concatenate([values, fixed.values])
     M_r = hermitian(vectors.conj().T @ problem.pencil.M(vectors))
-    M_r[r:, r:] = np.eye(len(fixed.values))
+    M_r[r:, r:] = np.eye(len(inner))
     K_r = np.zeros_like(M_r)
     K_r[:r, :r] = stiffness
-    K_r[r:, r:] = np.diag(fixed.values)
-    kind = ("interface",) * r + ("fixed-interface",) * len(fixed.values)
-    return diagonalised(vectors, kind, M_r, K_r)
+    K_r[r:, r:] = np.diag(inner)
+    kind = ("interface",) * r + ("inertia-relief",) * len(values) + ("fixed-interface",) * len(fixed.values)
+    return diagonalised(vectors, kind, M_r, K_r, problem.rigid)
 
 
-def fixed_interface_modes(pencil: eigen.Pencil, B: sp.csr_matrix, count: int, certify: bool) -> eigen.Spectrum:
+def static_shapes(problem: Problem, B: sp.csr_matrix, answers: Array) -> tuple[Array, Array, Array]:
+    """Constraint modes (n, b), their stiffness (b, b) and inertia-relief shapes (n, rigid), without solving again.
+
+    With the elastic answers U of forces on the rows (F = B U, the body relieved by its inertia) and the rigid
+    motions R, every static state is U f + R a, in balance with R^H B^H f = 0. Constraint modes have B u = 1; the
+    inertia-relief shapes answer the loads M R with B u = 0: u = R a - U f with R^H B^H f = 1.
+
+    Raises:
+        UserError: the interfaces leave a rigid motion free.
+    """
+    R = problem.vectors[:, : problem.rigid]
+    held = np.asarray(B @ R)
+    b, r = held.shape
+    if r and np.linalg.matrix_rank(held, 1e-9 * np.abs(held).max(initial=1e-300)) < r:
+        raise UserError(
+            'reduction: "craig-bampton" needs interfaces that hold the body against its rigid motions; add an '
+            'interface or use "rubin"'
+        )
+    F = hermitian(np.asarray(B @ answers))
+    f, a = _balanced(F, held, np.eye(b), np.zeros((r, b)))
+    g, c = _balanced(F, -held, np.zeros((b, r)), -np.eye(r))
+    return answers @ f + R @ a, hermitian(f), R @ c - answers @ g
+
+
+def _balanced(F: Array, held: Array, motion: Array, resultant: Array) -> tuple[Array, Array]:
+    """f, a of F f + held a = motion and held^H f = resultant, scaled so that units do not matter."""
+    if not held.shape[1]:
+        return np.linalg.solve(F, motion), np.zeros((0, motion.shape[1]))
+    row = 1 / np.sqrt(np.diag(F).real)
+    scaled = row[:, None] * held
+    column = 1 / np.linalg.norm(scaled, axis=0)
+    scaled = scaled * column
+    whole = np.block([[row[:, None] * F * row, scaled], [scaled.conj().T, np.zeros((len(column), len(column)))]])
+    answer = np.linalg.solve(whole, np.vstack([row[:, None] * motion, column[:, None] * resultant]))
+    return row[:, None] * answer[: len(F)], column[:, None] * answer[len(F) :]
+
+
+def fixed_interface_modes(
+    pencil: eigen.Pencil, B: sp.csr_matrix, count: int, certify: bool, shift: float = 0.0
+) -> eigen.Spectrum:
     """The lowest eigenpairs of K x = lambda M x under B x = 0, certified like the free ones."""
-    solver = _Constrained(pencil.solver, B)
+    solver = Constrained(pencil.solver, B)
 
     def inside(product: eigen.MatVec) -> eigen.MatVec:
         return lambda x: solver.without_reactions(product(x))
 
     held = replace(pencil, solver=solver, K=inside(pencil.K), M=inside(pencil.M), solves=0)
-    found = eigen.search(held, count)
-    return eigen.certify(held, found) if certify else found
+    found = eigen.search(held, count, shift)
+    return eigen.certify(held, found, shift) if certify else found
 
 
-class _Constrained(eigen.DirectSolver):
+class Constrained(eigen.DirectSolver):
     """Solutions of A x + B^H f = b, B x = 0 from a direct solver of A.
 
     The count of negative eigenvalues on {B x = 0} follows from Haynsworth's inertia additivity:

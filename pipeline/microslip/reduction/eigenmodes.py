@@ -7,5 +7,4 @@ from .problem import Problem, Reduced, diagonal
 
 def reduce(problem: Problem) -> Reduced:
     """Nothing is added."""
-    kind = ("rigid",) * problem.rigid + ("normal",) * (len(problem.values) - problem.rigid)
-    return diagonal(problem.vectors, kind, problem.values, problem.rigid)
+    return diagonal(problem.vectors, problem.kind, problem.values, problem.rigid)
