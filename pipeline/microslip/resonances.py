@@ -21,12 +21,13 @@ from .ring import aliased
 
 @dataclass(frozen=True)
 class Families:
-    """Modes joined over the nodal diameters at one speed.
+    """Modes joined over the nodal diameters at the lowest speed, and followed from there to another speed.
 
     Attributes:
         speed: rad/s. harmonics: (K,) nodal diameters, ascending.
         modes: (c, K) mode number (0-based) of each family at each nodal diameter, -1 where it does not exist.
-        omega: (c, K) rad/s, nan where it does not exist. mac: (c, K - 1) of each step, nan where there is none.
+        omega: (c, K) rad/s, nan where it does not exist. mac: (c, K - 1) of each step at the lowest speed, nan where
+            there is none.
     """
 
     speed: float
@@ -36,9 +37,10 @@ class Families:
     mac: Array
 
     def of(self, harmonic: int, mode: int) -> int:
-        """Number (0-based) of the family to which a mode of a nodal diameter belongs."""
+        """Number (0-based) of the family to which a mode of a nodal diameter belongs, -1 if it belongs to none."""
         column = int(np.flatnonzero(self.harmonics == harmonic)[0])
-        return int(np.flatnonzero(self.modes[:, column] == mode)[0])
+        found = np.flatnonzero(self.modes[:, column] == mode)
+        return int(found[0]) if len(found) else -1
 
 
 @dataclass(frozen=True)
@@ -92,14 +94,31 @@ def harmonics_of(basis: ModalBasis) -> list[int]:
 
 
 def families(basis: ModalBasis, speed: int = 0) -> Families:
-    """Join the modes of neighbouring nodal diameters by the MAC of their shapes at one speed (an index).
+    """Join the modes of neighbouring nodal diameters by the MAC of their shapes.
 
-    Without shapes in the file mode j is joined to mode j. The families are in the order of their first mode.
+    They are joined once, at the lowest speed, so that a family keeps its number; at another speed (an index) each
+    of their modes is the one that the curve over the speed leads to. Without shapes in the file mode j is joined to
+    mode j. The families are in the order of their first mode.
     """
-    harmonics = [k for s, k in sorted(basis.groups) if s == speed]
-    groups = [basis.groups[speed, k] for k in harmonics]
-    modes, omega, mac = follow(groups, point_weights(basis))
-    return Families(groups[0].speed, np.array(harmonics), modes, omega, mac)
+    harmonics = np.array(harmonics_of(basis))
+    first = speeds_of(basis)[0]
+    modes, omega, mac = follow([basis.groups[first, k] for k in harmonics.tolist()], point_weights(basis))
+    at = speeds_of(basis).index(speed)
+    if at:
+        modes, omega = modes.copy(), np.full_like(omega, np.nan)
+        for column, k in enumerate(harmonics.tolist()):
+            modes[:, column] = _carried(tracks(basis)[k], modes[:, column], at)
+            here = modes[:, column] >= 0
+            omega[here, column] = basis.groups[speed, k].omega[modes[here, column]]
+    return Families(basis.groups[speed, int(harmonics[0])].speed, harmonics, modes, omega, mac)
+
+
+def _carried(curves: Tracks, modes: Indices, at: int) -> Indices:
+    """The modes at station `at` of the curves that begin as `modes` (-1: none)."""
+    table = np.full(int(curves.modes.max()) + 2, -1, dtype=np.int64)  # the last entry, -1, is for none
+    begun = curves.modes[:, 0] >= 0
+    table[curves.modes[begun, 0]] = curves.modes[begun, at]
+    return table[modes]
 
 
 def tracks(basis: ModalBasis) -> dict[int, Tracks]:

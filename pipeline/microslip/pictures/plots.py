@@ -159,15 +159,16 @@ def _end_labels(axes: Axes, labels: list[tuple[float, float, str, str]], last: f
         axes.annotate(text, at, xytext=shift, color=colour, annotation_clip=False, **where)
 
 
-def _order_label(axes: Axes, order: int, last: float, top: float) -> None:
+def _order_label(axes: Axes, order: int, last: float, top: float, text: str = "") -> None:
     """On the line, near where it leaves the picture."""
     from matplotlib.patheffects import withStroke
 
-    x = min(last, 60 * top / order) * 0.96
+    x = min(last, 60 * top / order) * (0.93 if text else 0.96)
     behind = [withStroke(linewidth=6, foreground="white")]
     axes.text(
-        x, order * x / 60, f"EO {order}", ha="center", va="center", fontsize=8, color="#3c424e", path_effects=behind
-    )
+        x, order * x / 60, text or f"EO {order}", ha="center", va="center", fontsize=8, color="#3c424e",
+        path_effects=behind,
+    )  # fmt: skip
 
 
 def _mark(axes: Axes, found: Sequence[Crossing]) -> None:
