@@ -15,6 +15,15 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from .body import Model, Name, NotNegative, Number, Numbers, Positive, _tuple, load_toml, override, validate
+from .compliance import (
+    BULK_AND_SURFACE,
+    SURFACE,
+    Share,
+    contact_share,
+    facing,
+    statics_beside,
+    without_bulk,
+)
 from .coordinates import in_modes
 from .data import Array, ModalBasis, ModalGroup, Rows, UserError
 from .harmonic_balance import (
@@ -25,12 +34,14 @@ from .harmonic_balance import (
     refined_peaks,
     stuck_frequencies,
 )
+from .truncation import INTERFACE_ROWS
 
 
 class ContactSettings(Model):
     """A contact of one interface with a rigid neighbour. Stiffnesses in N/m for the whole patch (book: c_N0, c_R0).
 
-    width (along t1) and height (along t2) in m are the patch's own if not given.
+    width (along t1) and height (along t2) in m are the patch's own if not given. includes: which compliance the
+    stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
     """
 
     interface: Name
@@ -40,6 +51,7 @@ class ContactSettings(Model):
     height: Positive | None = None
     friction: NotNegative
     slides_along: Literal["t1", "t2"] = "t1"
+    includes: Literal["surface", "bulk+surface"] | None = None
 
 
 class Sweep(Model):
@@ -112,9 +124,9 @@ def run_case(
     """
     if (settings.speed, 0) not in basis.groups:
         raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
-    group = basis.groups[settings.speed, 0]
-    beside = basis.reduction == "macneal" or len(group.omega) < group.n_modes  # statics that no mode carries
-    group = in_modes(group) if beside else group
+    stored = basis.groups[settings.speed, 0]
+    beside = statics_beside(stored, basis.reduction)
+    group = in_modes(stored) if beside else stored
     force = settings.amplitude * _row(group.excitations, settings.excitation, path, "excitation").rows[0]
     monitored = _row(group.monitors, settings.monitor, path, "monitor")
     label = f"u_{settings.direction}"
@@ -129,13 +141,14 @@ def run_case(
                 f"{', '.join(group.interfaces) or 'none'}"
             )
     contacts = [_sized(c, group, path) for c in settings.contacts]
-    residual = _residual(group, settings, label) if beside else None
+    springs, counted = _counted_once(contacts, stored, basis.reduction, path)
+    residual = _residual(group, settings, label, basis.reduction, beside)
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     responses, resonances = {}, {}
     for normal in sweep.normal_forces:
         report(f"friction response at a normal force of {normal:g} N")
-        pressed = [_contact(c, normal) for c in contacts]
+        pressed = [_contact(c, normal, s) for c, s in zip(contacts, springs, strict=True)]
 
         def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
             return frequency_response(group, pressed, force, watch, at, residual=residual, amplitude=settings.amplitude)
@@ -143,9 +156,73 @@ def run_case(
         responses[normal] = respond(frequency)
         resonances[normal] = refined_peaks(responses[normal], respond)
     free = frequency_response(group, [], force, watch, frequency)
-    stuck = stuck_frequencies(group, [_contact(c, max(sweep.normal_forces)) for c in contacts], residual)
-    remarks = tuple(_lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
+    closed = [_contact(c, max(sweep.normal_forces), s) for c, s in zip(contacts, springs, strict=True)]
+    stuck = stuck_frequencies(group, closed, residual)
+    remarks = tuple(counted + _lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
     return CaseResult(settings, responses, free, stuck, resonances, group.speed, remarks)
+
+
+Springs = tuple[float, float, float]
+"""Stiffness of a patch along n, t1 and t2, N/m."""
+
+
+def _counted_once(
+    contacts: list[ContactSettings], group: ModalGroup, reduction: str, path: Path | str
+) -> tuple[list[Springs], list[str]]:  # fmt: skip
+    """The springs of every contact without the bulk that the basis holds, and what a reader must know of it.
+
+    Raises:
+        UserError: a stiffness that is said to count the bulk, but is stiffer than the bulk alone.
+    """
+    springs, remarks, names = [], [], tuple(c.interface for c in contacts)
+    for c in contacts:
+        b = facing(group, c.interface, names)
+        shares = [contact_share(group, reduction, row, c.interface, b) for row in ("u_n", "u_t1", "u_t2")]
+        given = (c.normal_stiffness, c.tangential_stiffness, c.tangential_stiffness)
+        kept = given
+        if c.includes == BULK_AND_SURFACE:
+            kept = _taken_out(c, given, shares, path)
+        springs.append(kept)
+        remarks.append(_what_is_counted(c, given, kept, shares, reduction))
+    return springs, list(dict.fromkeys(r for r in remarks if r))
+
+
+def _taken_out(c: ContactSettings, given: Springs, shares: list[Share], path: Path | str) -> Springs:
+    kept = [without_bulk(k, s) for k, s in zip(given, shares, strict=True)]
+    for k, new, s, key in zip(given, kept, shares, ("normal", "tangential", "tangential"), strict=True):
+        if not 0 < new < np.inf:
+            raise UserError(
+                f"{path}: contacts.{c.interface}.{key}_stiffness: {k:g} N/m is said to count the bulk of the body, but "
+                f"the bulk alone, which the basis holds, is as soft as {s.contacts / s.beyond:.3g} N/m ({s.label}); "
+                f'write includes = "{SURFACE}" if it is the stiffness of the surface, or lower it'
+            )
+    return (kept[0], kept[1], kept[2])
+
+
+def _what_is_counted(
+    c: ContactSettings, given: Springs, kept: Springs, shares: list[Share], reduction: str
+) -> str:  # fmt: skip
+    """A sentence where the bulk stands in the basis too, or is added to a law of the surface; else nothing."""
+    s = shares[0]
+    held = f"the basis ({reduction}) already holds {s.beyond:.4g} m/N of the body's own elasticity there ({s.label})"
+    if c.includes == SURFACE and s.left:
+        return (
+            f"Compliance counted once: the contact stiffness is that of the surface, so {s.left:.4g} m/N of bulk that "
+            f"the {reduction} leave out ({s.label}) is added to it from the file."
+        )
+    most = max(k * s.beyond / s.contacts for k, s in zip(given, shares, strict=True))
+    if most < 0.01:  # no reader would see it
+        return ""
+    if c.includes == BULK_AND_SURFACE:
+        new, old = (", ".join(f"{k:.4g}" for k in springs) for springs in (kept, given))
+        return f"Compliance counted once: {held}, so the springs along n, t1, t2 become {new} N/m instead of {old} N/m."
+    if c.includes is None:
+        return (
+            f"Compliance may be counted twice: {held}, a spring of {s.contacts / s.beyond:.3g} N/m at each contact. If "
+            f"normal_stiffness = {c.normal_stiffness:.3g} N/m counts it too, as E A / l0 of the book does, write "
+            f'includes = "{BULK_AND_SURFACE}"; if it is that of the surface alone, write includes = "{SURFACE}".'
+        )
+    return ""
 
 
 def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:
@@ -197,14 +274,28 @@ def _sized(c: ContactSettings, group: ModalGroup, path: Path | str) -> ContactSe
     return c.model_copy(update={"width": b0, "height": h0})
 
 
-def _residual(group: ModalGroup, settings: CaseSettings, label: str) -> Residual:
-    """Residual flexibility among the contacts, the excitation and the monitor, from the file's static compliance."""
+def _residual(
+    group: ModalGroup, settings: CaseSettings, label: str, reduction: str, beside: bool
+) -> Residual | None:  # fmt: skip
+    """Residual flexibility among contacts, excitation and monitor: beside the modes, or for laws of the surface."""
     names = list(group.compliance.labels)
-    left = group.compliance.residual
+    bring = np.ones(len(names))
+    if not beside:
+        wanting = [c.interface for c in settings.contacts if c.includes == SURFACE and _leaves(group, c, reduction)]
+        if not wanting:
+            return None
+        counted = tuple(f"interface:{c.interface}:" for c in settings.contacts if c.interface not in wanting)
+        bring[[name.startswith(counted) for name in names]] = 0.0
+    left = group.compliance.residual * np.outer(bring, bring)
     at = [i for c in settings.contacts for i, n in enumerate(names) if n.startswith(f"interface:{c.interface}:")]
     force = next(i for i, n in enumerate(names) if n.startswith(f"excitation:{settings.excitation}:"))
     watch = names.index(f"monitor:{settings.monitor}:{label}")
     return Residual(left[np.ix_(at, at)], left[at, force], left[watch, at], float(left[watch, force]))
+
+
+def _leaves(group: ModalGroup, c: ContactSettings, reduction: str) -> bool:
+    """Whether a basis leaves static compliance at a contact, beyond rounding."""
+    return any(contact_share(group, reduction, row, c.interface).left for row in INTERFACE_ROWS)
 
 
 def _row(rows: Any, name: str, path: Path | str, key: str) -> Rows:
@@ -213,12 +304,16 @@ def _row(rows: Any, name: str, path: Path | str, key: str) -> Rows:
     return rows[name]
 
 
-def _contact(c: ContactSettings, normal: float) -> JenkinsContact:
-    """Springs of a patch of width b0 along t1 and height h0 along t2 (Sextro Eqs. (5.2-39) to (5.2-41), uniform)."""
+def _contact(c: ContactSettings, normal: float, springs: Springs | None = None) -> JenkinsContact:
+    """Springs of a patch of width b0 along t1 and height h0 along t2 (Sextro Eqs. (5.2-39) to (5.2-41), uniform).
+
+    Args:
+        springs: along n, t1, t2 if not those of the settings.
+    """
     b2, h2 = (c.width or 0.0) ** 2 / 12, (c.height or 0.0) ** 2 / 12
-    cn, ct = c.normal_stiffness, c.tangential_stiffness
-    springs = np.array([cn, ct, ct, ct * (b2 + h2), cn * h2, cn * b2])
+    cn, c1, c2 = springs or (c.normal_stiffness, c.tangential_stiffness, c.tangential_stiffness)
+    six = np.array([cn, c1, c2, c2 * b2 + c1 * h2, cn * h2, cn * b2])
     if normal == 0:
-        springs = np.zeros(6)
+        six = np.zeros(6)
     slider = 1 if c.slides_along == "t1" else 2
-    return JenkinsContact(c.interface, springs, slider, ct if normal else 0.0, c.friction * normal)
+    return JenkinsContact(c.interface, six, slider, six[slider], c.friction * normal)

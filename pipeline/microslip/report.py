@@ -17,6 +17,7 @@ import numpy as np
 
 from .basis import check_basis
 from .campbell import crossings, track_basis
+from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
 from .data import Interface, ModalBasis, ModalGroup
 from .store import write_text
@@ -81,7 +82,7 @@ def report_html(
     response: Mapping[str, Any] | None = None,
 ) -> str:  # fmt: skip
     """The page as text; see `write_report`."""
-    basis = basis_in_modes(basis)
+    stored, basis = basis, basis_in_modes(basis)
     album = _Album(pictures)
     parts = [
         ("Body", _body(basis, album)),
@@ -89,7 +90,8 @@ def report_html(
         ("Modes", _modes(basis, album)),
         ("Stresses", _stresses(basis, album)),
         ("Interfaces", _interfaces(basis, album)),
-        ("How many modes are enough", _truncation(basis, album)),
+        ("How many modes are enough", _truncation(stored, basis, album)),
+        ("Compliance counted once", _counted_once(stored)),
         ("Loads and read-outs", _rows(basis)),
         ("Friction response", _response(response, album)),
         ("Checks", _checks(basis)),
@@ -403,9 +405,9 @@ def fit_sentence(name: str, interface: Interface, group: ModalGroup) -> str:
     )
 
 
-def _truncation(basis: ModalBasis, album: _Album) -> str:
+def _truncation(stored: ModalBasis, basis: ModalBasis, album: _Album) -> str:
     group = _groups(basis)[0]
-    found = verdict(group)
+    found = verdict(group, statics_beside(_groups(stored)[0], basis.reduction), basis.sectors)
     if not found.coordinates:
         return _say(found.sentence)
     rows = [
@@ -421,6 +423,36 @@ def _truncation(basis: ModalBasis, album: _Album) -> str:
         + _hidden("Every coordinate", _table(head, rows))
         + album.take("compliance", "Share of the static compliance over the number of modes kept.")
     )
+
+
+def _counted_once(basis: ModalBasis) -> str:
+    """Per interface coordinate: what the basis holds, what is left to a contact law, what must not be in it."""
+    group = _groups(basis)[0]
+    found = shares(group, basis.reduction, basis.sectors)
+    if not found:
+        return ""
+    solver = basis.reduction in SUPPLIED
+    head = ["coordinate", "static compliance", "held by the basis", *(["added by the solver"] if solver else [])]
+    head += ["left to the law (bulk)", "spring the law must bring", "must not be in the law"]
+    pairs = [s for s in found if s.kind == "squeeze"]
+    words = "A law that counts bulk and surface (E A / l0) belongs to plain eigenmodes; the last column tells what of "
+    words += 'it this basis holds already. Say in case.toml which one it is: includes = "bulk+surface" or "surface".'
+    table = _table(head, [_share_row(s, solver) for s in found])
+    return (
+        _say(sentence(basis, group))
+        + (_table(head, [_share_row(s, solver) for s in pairs]) if pairs else "")
+        + _say(words, kind="plain")
+        + _hidden("Each interface coordinate", table)
+    )
+
+
+def _share_row(s: Share, solver: bool) -> list[str]:
+    def amount(value: float) -> str:
+        return f"{_number(value)} {s.unit}" if value else "nothing"
+
+    spring = "N m/rad" if s.kind == "rotation" else "N/m"
+    row = [text(s.label), amount(s.static), amount(s.held)] + ([amount(s.supplied)] if solver else [])
+    return [*row, amount(s.left), f"{_number(s.law_stiffness)} {spring}" if s.left else "none", amount(s.beyond)]
 
 
 def _rows(basis: ModalBasis) -> str:

@@ -60,38 +60,56 @@ class Verdict:
     remarks: tuple[str, ...]
 
 
-def verdict(group: ModalGroup) -> Verdict:
+def verdict(group: ModalGroup, beside: bool = False, sectors: int = 1) -> Verdict:
     """Examine a group's static compliance.
+
+    Args:
+        group: in its own modes, real or complex. beside: whether the file holds the rest for the solver to add.
+            sectors: of a ring, else 1.
 
     Returns:
         One `Coordinate` per interface, excitation and monitor row, one more for each pair of interfaces of this
         body that face each other round the ring, the sentence and the remarks.
     """
-    found = coordinates(group)
-    return Verdict(found, _sentence(found, group.n_modes), _remarks(found))
+    found = coordinates(group, sectors)
+    return Verdict(found, _sentence(found, group.n_modes, beside), _remarks(found, sectors))
 
 
-def coordinates(group: ModalGroup) -> tuple[Coordinate, ...]:
+def coordinates(group: ModalGroup, sectors: int = 1) -> tuple[Coordinate, ...]:
     """The rows of the check; see `verdict`."""
     labels = group.compliance.labels
     static = group.compliance.static
     T = np.array([_row(group, label) for label in labels]).reshape(len(labels), group.n_modes)
     found = [
-        _coordinate(group, *_describe(group, label), np.eye(len(labels))[i], static, T)
+        _coordinate(group, *describe(group, label), np.eye(len(labels))[i], static, T)
         for i, label in enumerate(labels)
     ]
-    for a, b in _ring_pairs(group):
-        pick = np.array([float(label in (f"interface:{a}:u_n", f"interface:{b}:u_n")) for label in labels])
-        found.append(_coordinate(group, f"{a} + {b} squeezed", "squeeze", "m/N", pick, static, T))
+    for a, b in ring_pairs(group):
+        pick, words = closing(group, a, b, sectors), "squeezed" if sectors == 1 else "across the gap"
+        found.append(_coordinate(group, f"{a} + {b} {words}", "squeeze", "m/N", pick, static, T))
     return tuple(found)
+
+
+def closing(group: ModalGroup, a: str, b: str, sectors: int = 1) -> Array:
+    """(r,) weights p so that p @ u closes the gap at the contacts a and b; p @ C @ conj(p) is its compliance.
+
+    A body between two neighbours: both outward normal motions, equal forces press from both sides. A ring of N bodies
+    at nodal diameter k: b of the next sector moves as exp(2 pi i k / N) times b of this one, in frames that turn
+    along, so the gap between a and the neighbour's b closes by u_n(a) + exp(2 pi i k / N) u_n(b).
+    """
+    labels = group.compliance.labels
+    turn = group.interfaces[a].sector_shift * group.harmonic * 2 * np.pi / sectors if sectors > 1 else 0.0
+    phase = np.exp(1j * turn) if 2 * group.harmonic % sectors and sectors > 1 else np.cos(turn).round()
+    weights = {f"interface:{a}:u_n": 1.0, f"interface:{b}:u_n": phase}
+    return np.array([weights.get(label, 0.0) for label in labels])
 
 
 def _coordinate(
     group: ModalGroup, label: str, kind: str, unit: str, pick: Array, static: Array, T: Array
 ) -> Coordinate:  # fmt: skip
     omega = np.where(group.omega > 0, group.omega, np.inf)
-    parts = np.cumsum((pick @ T / omega) ** 2)
-    whole = float(pick @ static @ pick)
+    parts = np.cumsum(np.abs(pick @ T / omega) ** 2)
+    whole = float((pick @ static @ pick.conj()).real)
     return Coordinate(label, kind, unit, whole, float(parts[-1]), parts / whole if whole > 0 else np.zeros_like(parts))
 
 
@@ -103,7 +121,7 @@ def _row(group: ModalGroup, label: str) -> Array:
     return rows.rows[rows.labels.index(row)]
 
 
-def _describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
+def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
     """Plain label, kind and unit of a compliance row."""
     kind, name, row = label.split(":", 2)
     if kind == "interface":
@@ -113,7 +131,7 @@ def _describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
     return f"{name} {row}", kind, "m3/Pa" if pressure else "m/N"
 
 
-def _ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:
+def ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:
     """Left and right contacts of this body that name each other as partner, each pair once.
 
     Bolted patches that face each other belong to two bodies; pressing them squeezes nothing.
@@ -121,7 +139,9 @@ def _ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:
     found = []
     for name, item in group.interfaces.items():
         facing = group.interfaces.get(item.partner)
-        if item.role == "right" and facing is not None and facing.role == "left" and facing.partner == name:
+        known = all(f"interface:{n}:u_n" in group.compliance.labels for n in (name, item.partner))
+        mutual = facing is not None and facing.role == "left" and facing.partner == name
+        if item.role == "right" and mutual and known:
             found.append((name, item.partner))
     return found
 
@@ -134,7 +154,7 @@ def percent(share: float) -> str:
     return f"{value:.1f} %" if value >= 0.1 or value <= 0 else f"{value:.1g} %"
 
 
-def _sentence(found: tuple[Coordinate, ...], count: int) -> str:
+def _sentence(found: tuple[Coordinate, ...], count: int, beside: bool) -> str:
     """How many modes are enough, or that eigenmodes cannot hold the compliance: one sentence."""
     single = [c for c in found if c.kind == "translation"]
     what = "a force on one contact"
@@ -144,16 +164,18 @@ def _sentence(found: tuple[Coordinate, ...], count: int) -> str:
     if not single:
         return "The body has no interface, excitation or monitor, so there is no compliance to check."
     held, good = _held(single, count, what)
+    outlook = _SUPPLIED if beside else _OUTLOOK
     squeezed = [c for c in found if c.kind == "squeeze" and c.share < 0.9]
     if not squeezed:
-        return held + ("." if good else f"; {_OUTLOOK}.")
+        return held + ("." if good else f"; {outlook}.")
     c = min(squeezed, key=lambda c: c.share)
     return (
         f"{held}, {'but' if good else 'and'} eigenmodes cannot hold what a squeeze between both neighbours takes "
-        f"({percent(c.share)} of {c.static:.3g} m/N held): {_OUTLOOK}."
+        f"({percent(c.share)} of {c.static:.3g} m/N held): {outlook}."
     )
 
 
+_SUPPLIED = "the solver must add what stands beside the modes in the file"
 _OUTLOOK = "put the residual compliance into the contact law or use a basis with static modes"
 
 
@@ -169,13 +191,13 @@ def _held(single: list[Coordinate], count: int, what: str) -> tuple[str, bool]:
     return f"{count} modes are not enough: they hold {percent(worst.share)} at {worst.label} ({trend})", False
 
 
-def _remarks(found: tuple[Coordinate, ...]) -> tuple[str, ...]:
+def _remarks(found: tuple[Coordinate, ...], sectors: int) -> tuple[str, ...]:
     out = []
     turning = [c for c in found if c.kind == "rotation"]
     if turning and (worst := min(turning, key=lambda c: c.share)).share < 0.9:
         out.append(f"Turning a contact patch is held less well: {percent(worst.share)} for {worst.label}.")
     for c in found:
-        if c.kind == "squeeze" and c.residual > 0:
+        if c.kind == "squeeze" and c.residual > 0 and sectors == 1:
             out.append(
                 f"With equal forces pressed on both contacts ({c.label.removesuffix(' squeezed')}) the body yields "
                 f"{c.static:.3g} m/N, a spring of {1 / c.static:.3g} N/m; the modes leave out {c.residual:.3g} m/N."

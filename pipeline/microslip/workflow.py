@@ -23,6 +23,7 @@ from . import __version__, store
 from .basis import read_basis, write_basis
 from .body import BodySettings, implausible, load_body, load_toml
 from .case import CaseResult, load_case, run_case
+from .compliance import sentence
 from .coordinates import own_kind
 from .data import Array, Mesh, ModalBasis, UserError
 from .mesh import UNITS, mesh_problems, read_mesh
@@ -37,8 +38,8 @@ _MODES_CODE = (
     "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "basis", "coordinates.py", "fem",
     "reduction", "modes",
 )  # fmt: skip
-_CASE_CODE = ("harmonic_balance.py", "case.py", "pictures/response.py")
-_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "basis/checks.py")
+_CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")
+_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "compliance.py", "basis/checks.py")
 
 
 @dataclass(frozen=True)
@@ -504,4 +505,6 @@ def basis_summary(basis: ModalBasis) -> list[str]:
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
             for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, own_kind(g), strict=True))
         ]
+    if any(group.interfaces for group in basis.groups.values()):
+        lines.append(f"compliance: {sentence(basis, basis.groups[min(basis.groups)])}")
     return lines
