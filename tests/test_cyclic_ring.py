@@ -1,0 +1,399 @@
+"""One sector at every nodal diameter against the full ring of all sectors, meshed and assembled without symmetry.
+
+The ring's matrices are real; their projection on waves of nodal diameter k (`rings.Ring.fourier`) has the sector's
+spectrum. Rounding: relative errors of eigenvalues are bounded by eps |K| / (lambda |M|), here 1e-11.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import rings
+import scipy.linalg
+import scipy.sparse as sp
+from meshes import body, moved, nearest, rotation_matrix
+
+from microslip.modes import modal_basis
+from microslip.modes.rows import patch
+from microslip.modes.stress import gauss_set, nodal_set
+
+SPEED = 600.0  # rad/s; the equilibrium moves by 1 mm, frequencies by up to a tenth
+RPM = SPEED * 30 / np.pi
+COUNT = 12
+FORCE = (0.6, 0.5, -0.4)
+
+
+@cache
+def sector(cell_type: str = "hexahedron20", sectors: int = 6):
+    return rings.bladed_sector(cell_type, sectors)
+
+
+@cache
+def ring(cell_type: str = "hexahedron20", sectors: int = 6):
+    return rings.full_ring(sector(cell_type, sectors), sectors)
+
+
+def settings(sectors: int, mesh, rpm: float = RPM, **more):
+    tip = mesh.points[tip_of(mesh)].tolist()
+    described = {
+        "supports": [{"face": "bore"}],
+        "cyclic": {"sectors": sectors},
+        "interfaces": [
+            {"name": "right", "face": "contact_right", "role": "right", "partner": "left", "sector_shift": 1,
+             "t2": [0.0, 0.0, 1.0]},
+            {"name": "left", "face": "contact_left", "role": "left", "partner": "right", "sector_shift": -1,
+             "t2": [0.0, 0.0, 1.0]},
+        ],
+        "excitations": [{"name": "gas", "face": "front", "direction": list(FORCE)}],
+        "monitors": [{"name": "tip", "point": tip}],
+        "rotation": {"speeds_rpm": [rpm], "prestress": "nonlinear"},
+        "modes": {"count": COUNT},
+    }  # fmt: skip
+    return body(**(described | more))
+
+
+def tip_of(mesh) -> int:
+    return nearest(mesh, mesh.points[mesh.face_points("contact_right")].mean(axis=0))
+
+
+@cache
+def basis(cell_type: str = "hexahedron20", sectors: int = 6, rpm: float = RPM, stresses: bool = False, **more):
+    mesh = sector(cell_type, sectors)
+    if stresses:
+        more = {**more, "output": {"gauss": True, "nodal_stress": True}}
+    return modal_basis(mesh, settings(sectors, mesh, rpm, **more))
+
+
+@cache
+def whole(cell_type: str = "hexahedron20", sectors: int = 6, speed: float = SPEED):
+    """The ring's own matrices at speed."""
+    plain = body(supports=[{"face": "bore"}], rotation={"prestress": "nonlinear"})
+    return rings.matrices(ring(cell_type, sectors).mesh, plain, speed)
+
+
+def groups(cell_type: str = "hexahedron20", sectors: int = 6, rpm: float = RPM, **more):
+    """(nodal diameter, group), all of them."""
+    found = basis(cell_type, sectors, rpm, **more)
+    assert found.sectors == sectors
+    assert sorted(found.groups) == [(0, k) for k in range(sectors // 2 + 1)]
+    return [(k, found.groups[0, k]) for k in range(sectors // 2 + 1)]
+
+
+def on_ring(shape, k: int, cell_type: str = "hexahedron20", sectors: int = 6):
+    """(free degrees of freedom of the ring, m) of a sector's (n, 3, m)."""
+    expanded = ring(cell_type, sectors).expand(shape, k)
+    return expanded.reshape(-1, shape.shape[2])[whole(cell_type, sectors).free]
+
+
+CASES = [("hexahedron20", 6, 0.0), ("hexahedron20", 6, RPM), ("tetra10", 5, RPM)]
+
+
+# ---------------------------------------------------------------- spectra
+
+
+@pytest.mark.parametrize(("cell_type", "sectors", "rpm"), CASES)
+def test_frequencies_of_every_nodal_diameter(cell_type, sectors, rpm):
+    """Even and odd numbers of sectors, at rest and about the nonlinear equilibrium (Newton ends at 1e-9 of u)."""
+    full = whole(cell_type, sectors, rpm * np.pi / 30)
+    for k, group in groups(cell_type, sectors, rpm):
+        K, M, _, _ = full.fourier(ring(cell_type, sectors), k)
+        exact = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True, subset_by_index=[0, len(group.omega) - 1]))
+        assert len(group.omega) >= COUNT and group.harmonic == k
+        np.testing.assert_allclose(group.omega, exact, rtol=1e-9 if rpm else 1e-10)
+        assert group.checks["certified"] == 1
+
+
+def test_the_ring_has_each_of_them_once_or_twice():
+    """The ring solved as a body without symmetry: simple for k = 0 and N/2, pairs between; none more, none less."""
+    mesh = ring().mesh
+    described = body(
+        supports=[{"face": "bore"}], modes={"count": 24}, rotation={"speeds_rpm": [RPM], "prestress": "nonlinear"}
+    )
+    alone = modal_basis(mesh, described).groups[0, 0].omega
+    union = [w for k, group in groups() for w in np.repeat(group.omega, 1 if k in (0, 3) else 2)]
+    assert min(group.omega[-1] for _, group in groups()) > alone[-1]  # all of them were asked for
+    np.testing.assert_allclose(np.sort(union)[: len(alone)], alone, rtol=1e-9)
+
+
+def test_the_direction_of_the_wave():
+    """The sector's shape continued by R u exp(+i k 2 pi / N) is an eigenvector of the ring; by -k it is none."""
+    full = whole()
+    norm = np.abs(full.K).sum(axis=1).max()
+    for k, group in groups():
+        x = on_ring(group.phi, k)
+        error = np.abs(full.K @ x - (full.M @ x) * group.omega**2).max(axis=0) / np.abs(x).max(axis=0) / norm
+        assert error.max() < 1e-12
+        if 0 < k < 3:
+            assert np.iscomplexobj(group.phi)
+            wrong = on_ring(group.phi, -k)
+            error = np.abs(full.K @ wrong - (full.M @ wrong) * group.omega**2).max(axis=0)
+            assert (error / np.abs(wrong).max(axis=0) / norm).max() > 1e-4
+        else:
+            assert np.isrealobj(group.phi)
+
+
+def test_expanded_modes_are_orthonormal_on_the_ring():
+    """Waves of k and -k (the conjugates) and all nodal diameters together: X^H M X = N, X^H K X = N omega^2."""
+    full, waves, omega = whole(), [], []
+    for k, group in groups():
+        x = on_ring(group.phi, k)
+        waves += [x] if k in (0, 3) else [x, x.conj()]
+        omega += [group.omega] * (1 if k in (0, 3) else 2)
+    X, w = np.hstack(waves), np.concatenate(omega)
+    np.testing.assert_allclose(X.conj().T @ (full.M @ X) / 6, np.eye(len(w)), atol=1e-9)
+    stiff = X.conj().T @ (full.K @ X) / 6
+    np.testing.assert_allclose(stiff, np.diag(w**2), atol=1e-9 * w.max() ** 2)
+
+
+def test_axis_and_point_of_the_rotation():
+    """The same sector turned and moved in space: same frequencies; its cyclic faces are found about that axis."""
+    turn, shift = rotation_matrix((0.7, -0.4, 1.1)), np.array([0.3, -0.2, 0.5])
+    mesh = moved(sector(), turn, shift)
+    rotation = {
+        "speeds_rpm": [RPM], "axis": (turn @ rings.AXIS).tolist(), "point": shift.tolist(),
+    }  # fmt: skip
+    described = settings(6, mesh, rotation=rotation, interfaces=[])
+    found = modal_basis(mesh, described)
+    for k, group in groups():
+        np.testing.assert_allclose(found.groups[0, k].omega, group.omega, rtol=1e-9)
+    reverse = replace_axis(rotation, -1.0)  # left and right are named for the positive sense
+    with pytest.raises(Exception, match="cyclic"):
+        modal_basis(mesh, settings(6, mesh, rotation=reverse, interfaces=[]))
+
+
+def replace_axis(rotation: dict, sign: float) -> dict:
+    return {**rotation, "axis": [sign * v for v in rotation["axis"]]}
+
+
+# ---------------------------------------------------------------- static state
+
+
+def test_static_displacement_and_stress_at_speed():
+    """Every sector the same, turned: displacement, and Cauchy stress at the integration points and at the nodes."""
+    full = whole()
+    for _, group in groups(stresses=True):
+        u = full.state.u[ring().nodes[0]]
+        np.testing.assert_allclose(group.u_static, u, atol=1e-8 * np.abs(u).max())
+    shape = np.zeros((ring().mesh.n_points, 3, 1))
+    gauss, nodes = gauss_set(full.model, full.state, shape), nodal_set(full.model, full.state, shape)
+    mine = basis(stresses=True).groups[0, 0].stresses
+    scale = np.abs(gauss.static_stress).max()
+    first = len(mine["gauss"].static_stress)  # the ring's cells begin with sector 0
+    np.testing.assert_allclose(mine["gauss"].static_stress, gauss.static_stress[:first], atol=1e-8 * scale)
+    np.testing.assert_allclose(mine["nodes"].static_stress, nodes.static_stress[ring().nodes[0]], atol=1e-8 * scale)
+
+
+def test_stress_modes_are_those_of_the_expanded_shape():
+    """At the nodes of the cyclic faces both sectors' cells count, the neighbour's turned and shifted in phase."""
+    full = whole()
+    for k, group in groups(stresses=True):
+        wave = ring().expand(group.phi[:, :, :4].astype(complex), k)
+        for location, make in (("gauss", gauss_set), ("nodes", nodal_set)):
+            real, imag = (make(full.model, full.state, np.ascontiguousarray(part)) for part in (wave.real, wave.imag))
+            mine = group.stresses[location]
+            place = slice(len(mine.points)) if location == "gauss" else ring().nodes[0]
+            for what in ("strain", "stress"):
+                exact = getattr(real, what)[place] + 1j * getattr(imag, what)[place]
+                np.testing.assert_allclose(getattr(mine, what)[:, :, :4], exact, atol=1e-9 * np.abs(exact).max())
+
+
+# ---------------------------------------------------------------- rows, loads, response
+
+
+def sector_patch(j: int, name: str):
+    """The six rows of a contact of sector j, on the ring."""
+    hint = ring().turns[j] @ np.array([0.0, 0.0, 1.0])
+    return patch(ring().mesh, f"{name}_{j}", hint, name)
+
+
+def test_interface_rows_of_every_sector():
+    """Rows of the contacts of all sectors, fitted on the ring in turned frames: those of the sector times the phase."""
+    for k, group in groups():
+        wave = ring().expand(group.phi, k).reshape(-1, group.phi.shape[2])
+        for name, face in (("right", "contact_right"), ("left", "contact_left")):
+            mine = group.interfaces[name].rows
+            for j in range(6):
+                np.testing.assert_allclose(
+                    sector_patch(j, face).B @ wave,
+                    mine * np.exp(2j * np.pi * j * k / 6),
+                    atol=1e-9 * np.abs(mine).max(),
+                )
+
+
+def engine_order_load(e: int):
+    """(free,) load of order e: in sector j the sector's force turned, with the phase e 2 pi j / N (ahead: a pattern
+    that stands in space is met by sector j + 1 before sector j when the rotor turns in the + direction)."""
+    local = sector_force()
+    out = np.zeros((ring().mesh.n_points, 3), dtype=complex)
+    for j, nodes in enumerate(ring().nodes):
+        np.add.at(out, nodes, (local @ ring().turns[j].T) * np.exp(2j * np.pi * e * j / 6))
+    return out.reshape(-1)[whole().free]
+
+
+def sector_force():
+    """(n, 3) N: a unit force spread over the front of the sector."""
+    from microslip.fem.discretise import face_blocks
+    from microslip.fem.loads import traction
+
+    blocks = face_blocks(sector(), "front")
+    area = sum(np.linalg.norm(b.area, axis=2).sum() for b in blocks)
+    return traction(blocks, sector().n_points, np.array(FORCE) / np.linalg.norm(FORCE) / area)
+
+
+@pytest.mark.parametrize("e", range(9))
+def test_forced_response_to_engine_orders(e):
+    """Amplitude and phase at the tips of all sectors, orders below and above N/2 (k = e mod N, or the conjugate of
+    N - e mod N), near a resonance and between; the modes left out are added by their static compliance."""
+    k = e % 6
+    k, forward = (k, False) if k <= 3 else (6 - k, True)
+    group = basis().groups[0, k]
+    eta, full = 0.02, whole()
+    T, F = group.monitors["tip"].rows, group.excitations["gas"].rows
+    C = group.compliance
+    labels = list(C.labels)
+    tip, gas = [labels.index(f"monitor:tip:u_{c}") for c in "xyz"], labels.index("excitation:gas:force")
+    static = C.residual[tip, gas]
+    if forward:
+        T, F, static = T.conj(), F.conj(), static.conj()
+    place = tip_of(sector())
+    for Omega in (0.05 * group.omega[0], 0.999 * group.omega[0], 0.5 * (group.omega[0] + group.omega[1])):
+        q = (F.conj().T @ np.ones(1)) / ((1 + 1j * eta) * group.omega**2 - Omega**2)
+        mine = T @ q + static / (1 + 1j * eta)
+        u = np.zeros(3 * ring().mesh.n_points, dtype=complex)
+        u[full.free] = rings.response(full, engine_order_load(e), Omega, eta)
+        u = u.reshape(-1, 3)
+        exact = u[ring().nodes[0][place]]
+        left_out = (Omega / group.omega[-1]) ** 2  # dynamic part of the modes left out over their static one
+        scale = np.abs(exact).max() * 1e-9 + left_out * np.abs(static).max() * 1.05
+        np.testing.assert_allclose(mine, exact, atol=scale)
+        for j in range(6):
+            phase = np.exp(2j * np.pi * e * j / 6)
+            np.testing.assert_allclose(
+                u[ring().nodes[j][place]], ring().turns[j] @ exact * phase, atol=1e-8 * np.abs(exact).max()
+            )
+
+
+def test_static_compliance_at_every_nodal_diameter():
+    """Unit forces on a row in all sectors, turned and shifted in phase: what all rows of sector 0 read on the ring."""
+    from microslip.modes.body_rows import body_rows
+
+    described = settings(6, sector())
+    B, labels = body_rows(sector(), described).stacked(described)
+    full = whole()
+    lu = sp.linalg.splu(full.K.tocsc())
+    for k, group in groups():
+        load = np.zeros((ring().mesh.n_points, 3, len(labels)), dtype=complex)
+        unit = np.asarray(B.todense()).T.reshape(-1, 3, len(labels))
+        for j, nodes in enumerate(ring().nodes):
+            turned = np.einsum("ab,nbr->nar", ring().turns[j], unit)
+            np.add.at(load, nodes, turned * np.exp(2j * np.pi * k * j / 6))
+        flat = load.reshape(-1, len(labels))[full.free]
+        u = np.zeros((3 * ring().mesh.n_points, len(labels)), dtype=complex)
+        u[full.free] = lu.solve(flat.real) + 1j * lu.solve(flat.imag)
+        first = u.reshape(-1, 3, len(labels))[ring().nodes[0]].reshape(-1, len(labels))
+        exact = B @ first
+        assert group.compliance.labels == labels
+        size = np.sqrt(np.abs(np.outer(exact.diagonal(), exact.diagonal())))
+        assert (np.abs(group.compliance.static - exact) / size).max() < 1e-8
+        np.testing.assert_allclose(group.compliance.static, group.compliance.static.conj().T, atol=0, rtol=1e-12)
+
+
+# ---------------------------------------------------------------- Coriolis
+
+
+def test_gyroscopic_matrix_of_every_nodal_diameter():
+    """G_r is the ring's, on the expanded shapes, per sector: skew-Hermitian."""
+    full = whole()
+    for k, group in groups():
+        x = on_ring(group.phi, k)
+        exact = x.conj().T @ (full.G @ x) / 6
+        np.testing.assert_allclose(group.G_r, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_forward_and_backward_waves_against_the_ring():
+    """Coriolis modes of the sector on its normal modes are Ritz vectors of the ring's quadratic problem.
+
+    (K + i w G - w^2 M) u = 0 on all degrees of freedom; 200 modes leave 1e-6 of the split of the first ones.
+    """
+    full = whole()
+    found = modal_basis(sector(), settings(6, sector(), modes={"count": 200}))
+    for k in range(4):
+        group = found.groups[0, k]
+        K, M, G, _ = full.fourier(ring(), k)
+        exact, _ = rings.whirl(K, M, G, 10)
+        mine, _ = rings.whirl(np.diag(group.omega**2).astype(complex), np.eye(group.n_modes), group.G_r, 10)
+        np.testing.assert_allclose(np.sort(mine), np.sort(exact), rtol=1e-6)
+        backward, forward = mine[mine > 0].min(), -mine[mine < 0].max()
+        if 0 < k < 3:
+            assert abs(backward - forward) > 1e-5 * forward
+        else:
+            np.testing.assert_allclose(backward, forward, rtol=1e-9)
+
+
+# ---------------------------------------------------------------- neighbours in contact
+
+
+def coupled_ring(stiffness: float):
+    """K of the ring with springs (N/m, all directions) between the mean motions of facing contacts."""
+    full = whole()
+    n = 3 * ring().mesh.n_points
+    K = sp.csr_matrix((n, n))
+    for j in range(6):
+        right, left = sector_patch(j, "contact_right"), sector_patch((j + 1) % 6, "contact_left")
+        gap = right.rotation.T @ right.B[:3] - left.rotation.T @ left.B[:3]
+        K = K + stiffness * (gap.T @ gap)
+    return full.K + sp.csr_matrix(K)[full.free][:, full.free]
+
+
+@pytest.mark.parametrize(("reduction", "rtol"), [("rubin", 2e-5), ("craig-bampton", 2e-3)])
+def test_neighbours_in_contact_couple_at_every_nodal_diameter(reduction, rtol):
+    """Springs between right and the next sector's left: reduced sector against the ring (Rubin and Craig-Bampton hold
+    the compliance of the contacts; plain eigenmodes of the same number are off by per cents)."""
+    stiffness = 1e9
+    K = coupled_ring(stiffness)
+    full, turn = whole(), ring().turns[1]
+    errors = []
+    for method in (reduction, "eigenmodes"):
+        found = modal_basis(sector(), settings(6, sector(), reduction=method))
+        for k in range(4):
+            group = found.groups[0, k]
+            right, left = group.interfaces["right"], group.interfaces["left"]
+            wave = np.exp(2j * np.pi * k / 6)
+            gap = right.rotation.T @ right.rows[:3] - wave * (turn @ left.rotation.T @ left.rows[:3])
+            mine = scipy.linalg.eigh(group.K_r + stiffness * gap.conj().T @ gap, group.M_r, eigvals_only=True)
+            U, _ = ring().fourier(k, full.free)
+            exact = scipy.linalg.eigh(
+                (U.conj().T @ K @ U).toarray(), (U.conj().T @ full.M @ U).toarray(), eigvals_only=True,
+                subset_by_index=[0, 3],
+            )  # fmt: skip
+            errors.append(np.abs(np.sqrt(mine[:4] / exact) - 1).max())
+    assert max(errors[:4]) < rtol
+    assert max(errors[4:]) > 100 * max(errors[:4])
+
+
+# ---------------------------------------------------------------- what is asked for
+
+
+def test_nodal_diameters_asked_for():
+    """Only those are solved, each as among all of them."""
+    found = modal_basis(sector(), settings(6, sector(), cyclic={"sectors": 6, "nodal_diameters": [2, 0]}))
+    assert sorted(found.groups) == [(0, 0), (0, 2)]
+    for k in (0, 2):
+        np.testing.assert_allclose(found.groups[0, k].omega, basis().groups[0, k].omega, rtol=1e-10)
+
+
+def test_a_ring_of_another_number_of_sectors_is_refused():
+    with pytest.raises(Exception, match="cyclic"):
+        modal_basis(sector(), settings(7, sector()))
+
+
+def test_faces_that_do_not_match_are_refused():
+    """A point of the right face pushed along it by a hundredth of a cell."""
+    mesh = sector()
+    points = mesh.points.copy()
+    points[mesh.face_points("cyclic_right")[3]] += [0.0, 2e-4, 0.0]
+    with pytest.raises(Exception, match="cyclic"):
+        modal_basis(replace(mesh, points=points), settings(6, mesh))
