@@ -100,7 +100,7 @@ def test_frequencies_of_every_nodal_diameter(cell_type, sectors, rpm):
     full = whole(cell_type, sectors, rpm * np.pi / 30)
     for k, group in groups(cell_type, sectors, rpm):
         K, M, _, _ = full.fourier(ring(cell_type, sectors), k)
-        exact = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True, subset_by_index=[0, len(group.omega) - 1]))
+        exact = rings.spectrum(K, M, len(group.omega))
         assert len(group.omega) >= COUNT and group.harmonic == k
         np.testing.assert_allclose(group.omega, exact, rtol=1e-9 if rpm else 1e-10)
         assert group.checks["certified"] == 1
@@ -348,33 +348,48 @@ def coupled_ring(stiffness: float):
     return full.K + sp.csr_matrix(K)[full.free][:, full.free]
 
 
-@pytest.mark.parametrize(("reduction", "rtol"), [("rubin", 2e-5), ("craig-bampton", 2e-3)])
-def test_neighbours_in_contact_couple_at_every_nodal_diameter(reduction, rtol):
-    """Springs between right and the next sector's left: reduced sector against the ring (Rubin and Craig-Bampton hold
-    the compliance of the contacts; plain eigenmodes of the same number are off by per cents)."""
-    stiffness = 1e9
-    K = coupled_ring(stiffness)
-    full, turn = whole(), ring().turns[1]
+def coupled_errors(reduction: str, count: int, stiffness: float):
+    """(4, 4) relative error of the first four frequencies at each nodal diameter, neighbours joined by springs."""
+    K, full, turn = coupled_ring(stiffness), whole(), ring().turns[1]
+    found = modal_basis(sector(), settings(6, sector(), reduction=reduction, modes={"count": count}))
     errors = []
-    for method in (reduction, "eigenmodes"):
-        found = modal_basis(sector(), settings(6, sector(), reduction=method))
-        for k in range(4):
-            group = found.groups[0, k]
-            right, left = group.interfaces["right"], group.interfaces["left"]
-            wave = np.exp(2j * np.pi * k / 6)
-            gap = right.rotation.T @ right.rows[:3] - wave * (turn @ left.rotation.T @ left.rows[:3])
-            mine = scipy.linalg.eigh(group.K_r + stiffness * gap.conj().T @ gap, group.M_r, eigvals_only=True)
-            U, _ = ring().fourier(k, full.free)
-            exact = scipy.linalg.eigh(
-                (U.conj().T @ K @ U).toarray(), (U.conj().T @ full.M @ U).toarray(), eigvals_only=True,
-                subset_by_index=[0, 3],
-            )  # fmt: skip
-            errors.append(np.abs(np.sqrt(mine[:4] / exact) - 1).max())
-    assert max(errors[:4]) < rtol
-    assert max(errors[4:]) > 100 * max(errors[:4])
+    for k in range(4):
+        group = found.groups[0, k]
+        right, left = group.interfaces["right"], group.interfaces["left"]
+        neighbour = np.exp(2j * np.pi * k / 6) * turn
+        gap = right.rotation.T @ right.rows[:3] - neighbour @ left.rotation.T @ left.rows[:3]
+        mine = scipy.linalg.eigh(group.K_r + stiffness * gap.conj().T @ gap, group.M_r, eigvals_only=True)
+        U, _ = ring().fourier(k, full.free)
+        exact = rings.spectrum(*((U.conj().T @ A @ U).toarray() for A in (K, full.M)), 4)
+        errors.append(np.sqrt(mine[:4]) / exact - 1)
+    return np.array(errors)
+
+
+@pytest.mark.parametrize(
+    ("reduction", "few", "many"), [("eigenmodes", 4e-2, 3e-3), ("rubin", 1e-5, 1e-9), ("craig-bampton", 4e-3, 2e-4)]
+)
+def test_neighbours_in_contact_couple_at_every_nodal_diameter(reduction, few, many):
+    """Springs (1e9 N/m) between the mean motion of right and of the next sector's left: reduced sectors are Ritz
+    bodies of the ring, so they err upwards. They converge with the modes kept, by the frequency ratio to the power 2
+    (eigenmodes, Craig-Bampton) or 4 and more (Rubin); measured 2.9e-2, 5.8e-6, 3.0e-3 with 12, 2.0e-3, 5.2e-10, 9.7e-5
+    with 48."""
+    with_few, with_many = (coupled_errors(reduction, count, 1e9) for count in (12, 48))
+    assert min(with_few.min(), with_many.min()) > -1e-10
+    assert with_few.max() < few
+    assert with_many.max() < many
 
 
 # ---------------------------------------------------------------- what is asked for
+
+
+def test_cut_faces_of_any_name():
+    """They are in the basis for whoever expands it."""
+    mesh = sector()
+    faces = {{"cyclic_left": "a", "cyclic_right": "b"}.get(name, name): f for name, f in mesh.faces.items()}
+    cyclic = {"sectors": 6, "left": "a", "right": "b", "nodal_diameters": [1]}
+    found = modal_basis(replace(mesh, faces=faces), settings(6, mesh, cyclic=cyclic))
+    assert found.cyclic_faces == ("a", "b")
+    np.testing.assert_allclose(found.groups[0, 1].omega, basis().groups[0, 1].omega, rtol=1e-10)
 
 
 def test_nodal_diameters_asked_for():

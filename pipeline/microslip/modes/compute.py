@@ -78,11 +78,13 @@ def modal_basis(
         solver.close()
         if sector is not None:
             sector.close()
-    return ModalBasis(
+    basis = ModalBasis(
         settings.name, mesh, groups, mass, centre, inertia, model.axis, point, settings.damping.source,
         bool(motions.shape[1]), settings.reduction, dict(provenance or {}),
-        settings.cyclic.sectors if settings.cyclic else 1,
     )  # fmt: skip
+    if (cyclic := settings.cyclic) is None:
+        return basis
+    return replace(basis, sectors=cyclic.sectors, cyclic_faces=(cyclic.left, cyclic.right))
 
 
 def _guess(state: StaticState | None, before: float, speed: float) -> StaticState | None:
@@ -138,7 +140,7 @@ def assemble_group(
         if settings.output.gauss:
             stresses["gauss"] = gauss_set(model, state, shapes)
         if settings.output.nodal_stress:
-            stresses["nodes"] = nodal_set(model, state, shapes)
+            stresses["nodes"] = nodal_set(model, state, shapes, harmonic)
     u = state.u.reshape(-1)
     return ModalGroup(
         speed=speed,

@@ -93,7 +93,7 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     factorisation, which contracts by |shift| / (lambda_next + |shift|) a step; a body so slender that this would
     hardly contract is factorised again, with a smaller shift.
     """
-    F = np.asarray(B.T.todense())
+    F = np.asarray(B.conj().T.todense())
     if not F.shape[1]:
         return np.zeros((pencil.n, 0))
     if not R.shape[1]:
@@ -105,20 +105,20 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     MX = pencil.M(X)
     elastic = found.values[R.shape[1] :]
     T = np.asarray(B @ X[:, R.shape[1] :])
-    rest = F - MX @ (X.T @ F)
+    rest = F - MX @ (X.conj().T @ F)
     u = np.zeros_like(rest)
     previous = np.inf
     for _ in range(60):
         step = pencil.solve(rest)
-        step -= X @ (MX.T @ step)
+        step -= X @ (MX.conj().T @ step)
         u += step
         size = np.abs(step).max() / max(np.abs(u).max(), 1e-300)
         if size < 1e-13 or (size < 1e-8 and size > 0.3 * previous):  # no further gain above rounding
             break
         previous = size
         rest = -shift * pencil.M(step)  # what K leaves of the step: K s = rest + shift M s
-        rest -= MX @ (X.T @ rest)
-    return X[:, R.shape[1] :] @ (T / elastic).T + u
+        rest -= MX @ (X.conj().T @ rest)
+    return X[:, R.shape[1] :] @ (T / elastic).conj().T + u
 
 
 def leading_rows(

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, StressSet
+from ..fem.cyclic import CutFaces, CyclicUpper
 from ..fem.discretise import Block
 from ..fem.operators import engineering
 from ..topology import CELL_TYPES
@@ -101,22 +102,53 @@ def _polynomials(x: Array, corners: int) -> Array:
     return np.column_stack([ones, a, b, c, a * b, b * c, a * c, a * b * c])
 
 
-def nodal_set(model: BodyModel, state: StaticState, phi: Array, batch: int = 8) -> StressSet:
-    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), `batch` modes at a time."""
+def nodal_set(model: BodyModel, state: StaticState, phi: Array, harmonic: int = 0, batch: int = 8) -> StressSet:
+    """The Gauss-point set smoothed to the nodes (location ``nodal-averaged``), `batch` modes at a time.
+
+    On the cut faces of a cyclic sector the neighbour's cells count too, turned and in the phase of the nodal diameter
+    `harmonic`.
+    """
     n, m = model.d.mesh.n_points, phi.shape[2]
     smoothers = [smoother(b, n) for b in model.d.blocks]
-    weights = np.sum([w for _, w in smoothers], axis=0)
+    volumes = np.sum([w for _, w in smoothers], axis=0)
+    cut = model.free.unknowns.cut if isinstance(model.free, CyclicUpper) else None
+    weights = volumes.copy()
+    if cut is not None:
+        weights[cut.left] = weights[cut.right] = volumes[cut.left] + volumes[cut.right]
     S = sp.hstack([matrix for matrix, _ in smoothers]).tocsr()
+
+    def smooth(values: Array, shear: float, phase: complex | float = 1.0) -> Array:
+        sums = (S @ values.reshape(len(values), -1)).reshape(n, *values.shape[1:])
+        joined = sums if cut is None else _with_neighbours(sums, cut, shear, phase)
+        return joined / weights.reshape(-1, *[1] * (values.ndim - 1))
+
+    phase = 1.0 if cut is None else cut.phase(harmonic)
     strain, stress = np.empty((n, 6, m), dtype=phi.dtype), np.empty((n, 6, m), dtype=phi.dtype)
     for start in range(0, m, batch):
         part = gauss_set(model, state, phi[:, :, start : start + batch])
-        count = part.strain.shape[2]
-        for field, values in ((strain, part.strain), (stress, part.stress)):
-            smooth = (S @ values.reshape(-1, 6 * count)) / weights[:, None]
-            field[:, :, start : start + count] = smooth.reshape(n, 6, count)
+        some = slice(start, start + batch)
+        strain[:, :, some], stress[:, :, some] = smooth(part.strain, 2.0, phase), smooth(part.stress, 1.0, phase)
     static = np.concatenate([cauchy(state, i).reshape(-1, 6) for i in range(len(model.d.blocks))])
-    share = model.d.volume * weights / weights.sum()
-    return StressSet("nodal-averaged", model.d.mesh.points, strain, stress, (S @ static) / weights[:, None], share)
+    share = model.d.volume * volumes / volumes.sum()
+    return StressSet("nodal-averaged", model.d.mesh.points, strain, stress, smooth(static, 1.0), share)
+
+
+def turned_voigt(rotation: Array, shear: float) -> Array:
+    """(6, 6) turn of stresses (shear = 1) or strains with engineering shear (shear = 2) in the order `VOIGT`."""
+    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    turn = rotation[i[:, None], i[None]] * rotation[j[:, None], j[None]]
+    turn[:, 3:] += rotation[i[:, None], j[None, 3:]] * rotation[j[:, None], i[None, 3:]]
+    size = np.where(np.arange(6) < 3, 1.0, shear)
+    return turn * size[:, None] / size
+
+
+def _with_neighbours(sums: Array, cut: CutFaces, shear: float, phase: complex | float) -> Array:
+    """Sums (n, 6, ...) at the nodes, on the cut faces with the share of the cells beyond them."""
+    forth, back = (turned_voigt(R, shear) for R in (cut.rotation, cut.rotation.T))
+    out = sums.copy()
+    out[cut.left] += np.einsum("ab,nb...->na...", back, sums[cut.right]) * np.conj(phase)
+    out[cut.right] = np.einsum("ab,nb...->na...", forth, out[cut.left]) * phase
+    return out
 
 
 def von_mises(stress: Array) -> Array:
