@@ -27,6 +27,7 @@ from .compliance import sentence
 from .coordinates import own_kind
 from .data import Array, Mesh, ModalBasis, UserError
 from .mesh import UNITS, mesh_problems, read_mesh
+from .quality import sentences
 
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
@@ -501,6 +502,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = "certified complete" if g.checks.get("certified") else "NOT certified"
         lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
+        lines += [f"  {text}" for text in sentences(g, basis.reduction)]
         lines += [
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
             for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, own_kind(g), strict=True))

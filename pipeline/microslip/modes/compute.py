@@ -160,7 +160,7 @@ def assemble_group(
         compliance=Compliance(labels, s.static, modal, bool((omega == 0).any()), s.eigenmodes),
         stresses=stresses,
         u_static=state.u,
-        checks=_checks(s.found, model, state, s.kept),
+        checks={**_checks(s.found, model, state, s.kept), **s.indicators},
         prestress=state.prestress if (speed or model.loaded) else "none",
         harmonic=harmonic,
         spin_softening=model.spin_softening,

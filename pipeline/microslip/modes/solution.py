@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from ..body import BodySettings
 from ..coordinates import held
 from ..data import Array, UserError
 from ..mesh import longest_over_shortest
-from ..reduction import METHODS, Problem, Reduced
+from ..reduction import METHODS, Problem, Reduced, stuck
 from . import canonical, rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
@@ -39,7 +39,8 @@ class Searched:
 
     Attributes:
         R: (m, r) mass-orthonormal rigid motions. shift: of the search. found: the modes. B: (r, m) rows on the
-        unknowns, named by `labels`. answers: (m, r) displacement under a unit force on each row.
+        unknowns, named by `labels`. answers: (m, r) displacement under a unit force on each row. stuck: angular
+        frequencies with every interface held (`reduction.stuck`).
     """
 
     pencil: eigen.Pencil
@@ -50,6 +51,7 @@ class Searched:
     B: sp.csr_matrix
     labels: tuple[str, ...]
     answers: Array
+    stuck: Array
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Solution:
     Attributes:
         found: every mode solved for; the first `kept` were reduced. reduced: shapes on the `unknowns`.
         answers: (m, r) static answers to the rows named by `labels`. static: (r, r) compliance;
-            eigenmodes: (r, r) the part of it that the kept eigenmodes alone hold.
+            eigenmodes: (r, r) the part of it that the kept eigenmodes alone hold. indicators: see `reduction.stuck`.
     """
 
     found: eigen.Spectrum
@@ -70,6 +72,7 @@ class Solution:
     eigenmodes: Array
     unknowns: Unknowns
     labels: tuple[str, ...]
+    indicators: Mapping[str, float]
 
 
 def search(
@@ -96,7 +99,10 @@ def search(
         raise UserError(_divergence(settings, speed, error.count, model)) from error
     B, labels = rows.stacked(settings)
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
-    return Searched(pencil, unknowns, R, shift, found, B, labels, static_answers(pencil, found, B, R, shift))
+    answers = static_answers(pencil, found, B, R, shift)
+    at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
+    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(R.shape[1]))
+    return Searched(pencil, unknowns, R, shift, found, B, labels, answers, held)
 
 
 def certified(searched: Sequence[Searched]) -> list[Searched]:
@@ -158,7 +164,12 @@ def reduced_solution(
         report(f"reduction: {settings.reduction}")
     reduced = METHODS[settings.reduction](problem)
     plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
-    return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels)
+    T = np.asarray(s.B @ reduced.vectors)
+    held = held_compliance(T, reduced, s.labels)
+    quality = stuck.indicators(
+        settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero
+    )  # fmt: skip
+    return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality)
 
 
 def solution(

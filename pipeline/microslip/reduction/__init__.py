@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from . import craig_bampton, dual, eigenmodes, massless, rubin
+from . import craig_bampton, dual, eigenmodes, massless, rubin, stuck
 from .problem import Problem, Reduced
 
 METHODS: dict[str, Callable[[Problem], Reduced]] = {
@@ -24,4 +24,4 @@ METHODS: dict[str, Callable[[Problem], Reduced]] = {
 """Method name -> function. ``macneal`` keeps the eigenmodes: its residual flexibility, the compliance they leave
 out, stands in the file beside them and adds no coordinates."""
 
-__all__ = ["METHODS", "Problem", "Reduced"]
+__all__ = ["METHODS", "Problem", "Reduced", "stuck"]

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from .. import eigen
 from ..data import Array, UserError
-from .problem import Problem, Reduced, diagonalised, hermitian, own_modes
+from .problem import Problem, Reduced, diagonalised, hermitian, own_modes, without_modes
 
 
 def reduce(problem: Problem) -> Reduced:
@@ -33,9 +33,7 @@ def reduce(problem: Problem) -> Reduced:
     constraint_modes, stiffness, relief = static_shapes(problem, B, problem.static[:, chosen])
     count = len(problem.values) - problem.rigid
     fixed = fixed_interface_modes(problem.pencil, B, count, problem.certify, problem.shift)
-    for _ in range(2):
-        relief = relief - fixed.vectors @ (problem.pencil.M(fixed.vectors).conj().T @ relief)
-    values, relief = own_modes(problem.pencil, relief)
+    values, relief = own_modes(problem.pencil, without_modes(problem.pencil, fixed.vectors, relief))
     vectors = np.hstack([constraint_modes, relief, fixed.vectors])
     r, inner = len(chosen), np.concatenate([values, fixed.values])
     M_r = hermitian(vectors.conj().T @ problem.pencil.M(vectors))
@@ -90,10 +88,17 @@ def fixed_interface_modes(
     """The lowest eigenpairs of K x = lambda M x under B x = 0, certified like the free ones."""
     solver = Constrained(pencil.solver, B)
 
-    def inside(product: eigen.MatVec) -> eigen.MatVec:
-        return lambda x: solver.without_reactions(product(x))
+    def inside(product: eigen.MatVec, outside: float) -> eigen.MatVec:
+        """The operator between shapes that keep the constraint; a number on those across it."""
 
-    held = replace(pencil, solver=solver, K=inside(pencil.K), M=inside(pencil.M), solves=0)
+        def times(x: Array) -> Array:
+            along = solver.without_reactions(x)
+            return solver.without_reactions(product(along)) + outside * (x - along)
+
+        return times
+
+    stiff = 1e3 * pencil.k_norm  # what the constraint forbids lies above every frequency that is asked for
+    held = replace(pencil, solver=solver, K=inside(pencil.K, stiff), M=inside(pencil.M, pencil.m_norm), solves=0)
     found = eigen.search(held, count, shift)
     return eigen.certify(held, found, shift) if certify else found
 

@@ -56,11 +56,7 @@ class Problem:
 
     def residual(self, chosen: Indices | slice) -> Array:
         """(n, b) residual attachment modes of some rows: what the kept modes leave of their static answers."""
-        X, M = self.vectors, self.pencil.M
-        left = self.static[:, chosen]
-        for _ in range(2):  # the second pass takes out what rounding left
-            left = left - X @ (M(X).conj().T @ left)
-        return left
+        return without_modes(self.pencil, self.vectors, self.static[:, chosen])
 
 
 @dataclass(frozen=True)
@@ -106,6 +102,14 @@ def diagonalised(vectors: Array, kind: tuple[str, ...], M_r: Array, K_r: Array, 
     """`Reduced` in physical coordinates, with the transformation to its own modes beside it."""
     values, V = scipy.linalg.eigh(hermitian(K_r), hermitian(M_r))
     return Reduced(vectors, kind, M_r, K_r, frequencies(values, rigid), V)
+
+
+def without_modes(pencil: Pencil, X: Array, shapes: Array) -> Array:
+    """(n, b) shapes with the M-orthonormal modes X taken out; the second pass takes out what rounding left."""
+    MX = pencil.M(X)
+    for _ in range(2):
+        shapes = shapes - X @ (MX.conj().T @ shapes)
+    return shapes
 
 
 def own_modes(pencil: Pencil, shapes: Array, smallest: float = 1e-13) -> tuple[Array, Array]:
