@@ -141,6 +141,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "rotation.speeds_rpm": ("rpm", "speeds to analyse, rising"),
     "rotation.prestress": ("", "how the stiffness at speed is made, see [modes](modes.md#equilibrium-at-speed)"),
     "rotation.spin_softening": ("", "whether -Omega^2 M P is in K"),
+    "rotation.gyroscopic": ("", "whether the modes with gyroscopic coupling are computed at speed, see rotation.md"),
     "rotation.engine_orders": ("", "lines of the Campbell diagram"),
     "loads.kind": ("", "a static load that acts at every speed"),
     "loads.face": ("", "of a pressure or a force"),

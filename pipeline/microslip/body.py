@@ -258,6 +258,7 @@ class Rotation(Model):
     speeds_rpm: Numbers = (0.0,)
     prestress: Literal["nonlinear", "linear", "none"] = "nonlinear"
     spin_softening: bool = True
+    gyroscopic: bool = True
     engine_orders: Annotated[tuple[EngineOrder, ...], BeforeValidator(_tuple)] = ()
 
     @model_validator(mode="after")

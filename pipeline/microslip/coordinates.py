@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Array, Interface, ModalBasis, ModalGroup, Rows
+from .data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
@@ -42,6 +42,8 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         gauges={k: rows(r) for k, r in g.gauges.items()},
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
         compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
+        run_up=_run_up(g.run_up, V),
+        gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
         to_diagonal=None,
     )
 
@@ -106,6 +108,18 @@ def static_part(T: Array, labels: Sequence[str], kind: Sequence[str], K_r: Array
         held[:, rows] = T[:, force]
         held[rows, :] = T[:, force].conj().T
     return held
+
+
+def _run_up(r: RunUp | None, V: Array) -> RunUp | None:
+    if r is None:
+        return None
+    W = V.conj().T
+    return RunUp(W @ r.N @ V, W @ r.P @ V, W @ r.euler, W @ r.centrifugal)
+
+
+def _gyroscopic(modes: GyroscopicModes | None, V: Array, M_r: Array) -> GyroscopicModes | None:
+    """Shapes in the coordinates V^-1 q = V^H M_r q."""
+    return modes and replace(modes, shapes=V.conj().T @ (M_r @ modes.shapes))
 
 
 def basis_in_modes(basis: ModalBasis) -> ModalBasis:

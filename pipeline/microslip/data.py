@@ -192,6 +192,59 @@ class Compliance:
 
 
 @dataclass(frozen=True)
+class GyroscopicModes:
+    """Complex modes q = x exp(i omega t) of M_r q'' + G_r q' + K_r q = 0, in the frame that turns with the body.
+
+    Attributes:
+        omega: (w,) rad/s, ascending in magnitude. Of a real group positive, one a pair of conjugates; of a complex one
+            all, a negative omega being the conjugate shape at |omega|. shapes: (m, w) complex, x^H M_r x = 1, in the
+            coordinates of the group. growth: (w,) 1/s, zeros where stable.
+        sense: (w,) between -1 and 1: mean sense of the orbits about the axis. direction: w texts ``forward`` (with
+            the rotation), ``backward``, ``mixed``. error: (w,) bound of the relative error of omega against the
+            unreduced body, NaN where none is known.
+    """
+
+    omega: Array
+    shapes: ComplexArray
+    growth: Array
+    sense: Array
+    direction: tuple[str, ...]
+    error: Array
+
+    @property
+    def stable(self) -> bool:
+        """True if no mode grows."""
+        return not bool((self.growth > 0).any())
+
+    @property
+    def frequency(self) -> Array:
+        """(w,) Hz, never negative."""
+        return np.abs(self.omega) / (2 * np.pi)
+
+
+@dataclass(frozen=True)
+class RunUp:
+    """What a change of the rotation speed adds, about the static state at the group's speed Omega_0.
+
+    At speed Omega and angular acceleration alpha (Sextro Eqs. (2.1-17), (2.3-19)):
+
+        M_r q'' + (C_r + 2 Omega N) q' + (K_r + (Omega_0^2 - Omega^2) P + alpha N) q
+            = f + (Omega^2 - Omega_0^2) centrifugal + alpha euler
+
+    Attributes:
+        N: (m, m) phi^H M (n x phi), skew-Hermitian: circulatory per rad/s^2, and G_r = 2 Omega_0 N.
+        P: (m, m) phi^H M (1 - n n^T) phi, Hermitian: spin softening per (rad/s)^2.
+        euler: (m,) -phi^H M (n x r), load per rad/s^2. centrifugal: (m,) phi^H M (1 - n n^T) r, load per (rad/s)^2;
+            r = x + u_static from the axis. Both vanish for nodal diameters other than 0.
+    """
+
+    N: Array
+    P: Array
+    euler: Array
+    centrifugal: Array
+
+
+@dataclass(frozen=True)
 class ModalGroup:
     """The reduced body at one rotation speed (and one nodal diameter).
 
@@ -217,6 +270,7 @@ class ModalGroup:
         checks: name -> number (orthogonality, backward error, certified count, ...).
         prestress: ``none``, ``linear`` or ``nonlinear``: how K was made. harmonic: nodal diameter.
         spin_softening: whether -Omega^2 M P is in K.
+        run_up: what a change of the speed adds, or None. gyroscopic: modes with G_r, or None (at rest).
     """
 
     speed: float
@@ -240,6 +294,8 @@ class ModalGroup:
     harmonic: int = 0
     spin_softening: bool = True
     to_diagonal: Array | None = None
+    run_up: RunUp | None = None
+    gyroscopic: GyroscopicModes | None = None
 
     @property
     def frequency(self) -> Array:

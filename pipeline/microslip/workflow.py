@@ -25,7 +25,8 @@ from .body import BodySettings, implausible, load_body, load_toml
 from .case import CaseResult, load_case, run_case
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, Mesh, ModalBasis, UserError
+from .data import Array, GyroscopicModes, Mesh, ModalBasis, UserError
+from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
 
@@ -36,8 +37,8 @@ _READS_BY_GMSH = {".unv"}
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
-    "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "basis", "coordinates.py", "fem",
-    "reduction", "modes",
+    "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
+    "coordinates.py", "fem", "reduction", "modes",
 )  # fmt: skip
 _CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")
 _REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "compliance.py", "basis/checks.py")
@@ -491,6 +492,17 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
     raise UserError(f"{case_path}: body: no body.toml of a body '{name}' is beside it or in {root / 'geometry' / name}")
 
 
+def whirl_rows(modes: GyroscopicModes) -> list[str]:
+    """A line for each mode with gyroscopic coupling."""
+    out = []
+    for f, way, sense, growth, error in zip(
+        modes.frequency, modes.direction, modes.sense, modes.growth, modes.error, strict=True
+    ):
+        sure = "" if np.isnan(error) else f"   within {100 * error:.2g} %"
+        out.append(f"{f:14.6g} Hz   {way} ({sense:+.2f}){sure}" + (f"   GROWS {growth:.3g} 1/s" if growth else ""))
+    return out
+
+
 def basis_summary(basis: ModalBasis) -> list[str]:
     """What a modal file holds, in lines for the terminal."""
     extent = np.ptp(basis.mesh.points, axis=0) * 1e3
@@ -507,6 +519,9 @@ def basis_summary(basis: ModalBasis) -> list[str]:
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
             for i, (f, d, k) in enumerate(zip(g.frequency, g.damping_ratio, own_kind(g), strict=True))
         ]
+        if g.gyroscopic is not None:
+            lines.append(f"  with gyroscopic coupling, in the rotating frame. {stability_sentence(g.gyroscopic)}")
+            lines += [f"  {i + 1:4d}  {row}" for i, row in enumerate(whirl_rows(g.gyroscopic))]
     if any(group.interfaces for group in basis.groups.values()):
         lines.append(f"compliance: {sentence(basis, basis.groups[min(basis.groups)])}")
     return lines

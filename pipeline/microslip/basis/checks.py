@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..coordinates import held, in_modes
-from ..data import Array, Interface, ModalBasis, ModalGroup, Rows
+from ..data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp
+from ..gyroscopic import stability_sentence
 from .integrals import face_mean, modal_mass
 
 TOLERANCES = {
@@ -98,6 +99,10 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         found += _transformation_checks(g)
         g = in_modes(g)
     found += _matrix_checks(g)
+    if g.run_up is not None:
+        found += _run_up_checks(g, g.run_up)
+    if g.gyroscopic is not None:
+        found += _gyroscopic_checks(g, g.gyroscopic)
     if mesh_is_sound and g.phi.shape[0]:
         found += _shape_checks(basis, g)
     for name, item in g.interfaces.items():
@@ -128,6 +133,11 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
     for s in g.stresses.values():
         k = len(s.weights)
         wanted += [(s.strain, (k, 6, m)), (s.stress, (k, 6, m)), (s.static_stress, (k, 6)), (s.points, (k, 3))]
+    if (r_up := g.run_up) is not None:
+        wanted += [(r_up.N, (m, m)), (r_up.P, (m, m)), (r_up.euler, (m,)), (r_up.centrifugal, (m,))]
+    if (y := g.gyroscopic) is not None:
+        w = len(y.omega)
+        wanted += [(y.shapes, (m, w)), (y.growth, (w,)), (y.sense, (w,)), (y.error, (w,))]
     forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
     return forces in (0, motions) and own <= m and all(a.shape == shape for a, shape in wanted)
 
@@ -139,6 +149,10 @@ def _every_row(g: ModalGroup) -> list[Rows]:
 def _numbers(g: ModalGroup) -> list[Any]:
     found: list[Any] = [g.speed, g.omega, g.damping_ratio, g.M_r, g.K_r, g.C_r, g.G_r, g.phi, g.u_static]
     found += [g.compliance.static, g.compliance.modal, g.compliance.plain]
+    if g.run_up is not None:
+        found += [g.run_up.N, g.run_up.P, g.run_up.euler, g.run_up.centrifugal]
+    if g.gyroscopic is not None:
+        found += [g.gyroscopic.omega, g.gyroscopic.shapes, g.gyroscopic.growth, g.gyroscopic.sense]
     for i in g.interfaces.values():
         found += [i.rows, i.fit_residual, i.rotation, i.origin, i.areas, i.points, i.normals, i.shapes]
     for rows in _every_row(g):
@@ -171,6 +185,29 @@ def _matrix_checks(g: ModalGroup) -> _Findings:
     found.append(("K_r is diag(omega^2)", _largest(g.K_r - np.diag(g.omega**2)) / scale, 1e-9, ""))
     found.append(("C_r is diag(2 D omega)", _largest(g.C_r - C) / np.sqrt(scale), 1e-9, ""))
     return found
+
+
+def _run_up_checks(g: ModalGroup, r: RunUp) -> _Findings:
+    """N turns a shape by a quarter about the axis and P takes out what moves along it, so N^H N <= P <= 1."""
+    top = 2 * abs(g.speed) * max(_largest(r.N), 1e-12)
+    return [
+        ("G_r is 2 Omega N", _largest(g.G_r - 2 * g.speed * r.N), 1e-9 * max(top, 1e-12), ""),
+        ("run-up: N is skew", _largest(r.N + r.N.conj().T), 1e-9, ""),
+        ("run-up: P is symmetric", _largest(r.P - r.P.conj().T), 1e-9, ""),
+        ("run-up: P is at most the mass", max(float(np.linalg.eigvalsh(r.P)[-1]) - 1, 0.0), 1e-9, ""),
+        ("run-up: N^T N is at most P", max(-float(np.linalg.eigvalsh(r.P - r.N.conj().T @ r.N)[0]), 0.0), 1e-9, ""),
+    ]
+
+
+def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:
+    """The complex modes against their own equation; a mode that grows is told, not a fault of the file."""
+    s, x = y.growth + 1j * y.omega, y.shapes
+    rest = s**2 * (g.M_r @ x) + s * (g.G_r @ x) + g.K_r @ x
+    top = _largest(g.omega**2) + _largest(g.G_r) * _largest(g.omega) + _largest(s) ** 2
+    return [
+        ("gyroscopic: modes satisfy their equation", _largest(rest) / max(top, 1e-300), 1e-8, stability_sentence(y)),
+        ("gyroscopic: every mode has a direction", float(len(y.direction) != len(y.omega)), 0.0, ""),
+    ]
 
 
 def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:

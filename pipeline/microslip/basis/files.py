@@ -19,12 +19,14 @@ from ..data import (
     VOIGT,
     Array,
     Compliance,
+    GyroscopicModes,
     Indices,
     Interface,
     Mesh,
     ModalBasis,
     ModalGroup,
     Rows,
+    RunUp,
     StressSet,
     UserError,
 )
@@ -205,6 +207,10 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     for name, s in sorted(g.stresses.items()):
         _write_stress(group, name, s, mode)
     _write_state(group, g, axis)
+    if g.run_up is not None:
+        _write_run_up(group, g.run_up, mode, column)
+    if g.gyroscopic is not None:
+        _write_gyroscopic(group, g.gyroscopic, mode)
     checks = group.create_group("checks")
     for name, value in sorted(g.checks.items()):
         put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
@@ -250,6 +256,28 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     put(where, "u_static", g.u_static, "m", scales=[file["node"], file["axis"]])
     for name, s in sorted(g.stresses.items()):
         put(where.require_group("sigma_static"), name, s.static_stress, "Pa", ("place", "component"))
+
+
+def _write_run_up(group: h5py.Group, r: RunUp, mode: h5py.Dataset, column: h5py.Dataset) -> None:
+    where = group.create_group("run_up")
+    put(where, "N", r.N, "1", scales=[mode, column])
+    put(where, "P", r.P, "1", scales=[mode, column])
+    put(where, "euler", r.euler, "kg^1/2 m", scales=[mode])
+    put(where, "centrifugal", r.centrifugal, "kg^1/2 m", scales=[mode])
+
+
+def _write_gyroscopic(group: h5py.Group, modes: GyroscopicModes, mode: h5py.Dataset) -> None:
+    where = group.create_group("gyroscopic")
+    where.attrs["stable"] = int(modes.stable)
+    where.attrs["frame"] = "turns with the body; q = shapes exp(i omega t); forward: with the rotation"
+    whirl = put_scale(where, "whirl", np.arange(1, len(modes.omega) + 1))
+    put(where, "omega", modes.omega, "rad/s", scales=[whirl])
+    put(where, "frequency", modes.frequency, "Hz", scales=[whirl])
+    put(where, "growth", modes.growth, "s^-1", scales=[whirl])
+    put(where, "sense", modes.sense, "1", scales=[whirl])
+    put(where, "direction", np.array(modes.direction, dtype="U"), scales=[whirl])
+    put(where, "error", modes.error, "1", scales=[whirl])
+    put(where, "shapes", modes.shapes, "1", scales=[mode, whirl])
 
 
 def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset) -> None:
@@ -364,7 +392,9 @@ def _array(group: h5py.Group, name: str, *shape: int | None) -> Array:
         raise ValueError(f"{group.name}/{name} does not hold floating-point numbers")
     real = np.asarray(dataset[()], dtype=np.float64)
     if not name.endswith(IMAGINARY) and name + IMAGINARY in group:
-        return real + 1j * _array(group, name + IMAGINARY, *shape)
+        both = real.astype(np.complex128)  # parts put in one by one keep the signs of zeros
+        both.imag = _array(group, name + IMAGINARY, *shape)
+        return both
     return real
 
 
@@ -481,6 +511,23 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         checks={name: float(_array(group["checks"], name)) for name in group["checks"]},
         prestress=str(state.attrs["prestress"]), harmonic=int(group["cyclic"].attrs["harmonic"]),
         spin_softening=bool(state.attrs["spin_softening"]),
+        run_up=_read_run_up(group["run_up"], m) if "run_up" in group else None,
+        gyroscopic=_read_gyroscopic(group["gyroscopic"], m) if "gyroscopic" in group else None,
+    )  # fmt: skip
+
+
+def _read_run_up(where: h5py.Group, m: int) -> RunUp:
+    return RunUp(
+        _array(where, "N", m, m), _array(where, "P", m, m), _array(where, "euler", m), _array(where, "centrifugal", m)
+    )
+
+
+def _read_gyroscopic(where: h5py.Group, m: int) -> GyroscopicModes:
+    omega = _array(where, "omega", None)
+    w = len(omega)
+    return GyroscopicModes(
+        omega, _array(where, "shapes", m, w).astype(complex), _array(where, "growth", w), _array(where, "sense", w),
+        _texts(where, "direction", w), _array(where, "error", w),
     )  # fmt: skip
 
 

@@ -12,18 +12,21 @@ from ..body import BodySettings
 from ..data import (
     Array,
     Compliance,
+    GyroscopicModes,
     Mesh,
     ModalBasis,
     ModalGroup,
+    RunUp,
     StressSet,
 )
 from ..fem.discretise import Discretisation, discretise, free_upper
-from ..fem.operators import skew
+from ..gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
 from .boundary import check_held, fixed_dofs, with_dead_loads
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
+from .run_up import run_up_terms
 from .sector import Sector, make_sector
 from .solution import Solution, held_compliance, solution
 from .spectrum import make_pencil
@@ -132,8 +135,9 @@ def assemble_group(
     T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
     modal = held_compliance(T, reduced, labels)
     Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
-    G = 2 * speed * np.einsum("nia,ij,njb->ab", shapes.conj(), skew(model.axis), Mphi, optimize=True)
-    G = without_massless(G, reduced)
+    run_up = run_up_terms(model, state, shapes, Mphi, harmonic)
+    run_up = without_massless(run_up, reduced)
+    G = 2 * speed * run_up.N
     stresses: dict[str, StressSet] = {}
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
@@ -151,7 +155,9 @@ def assemble_group(
         K_r=reduced.K_r,
         C_r=modal_damping(reduced, 2 * ratios * omega),
         to_diagonal=reduced.to_diagonal,
-        G_r=0.5 * (G - G.conj().T),
+        G_r=G,
+        run_up=run_up,
+        gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
         phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
         interfaces=reduced_interfaces(rows, settings, phi, shapes),
         excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
@@ -167,12 +173,28 @@ def assemble_group(
     )
 
 
-def without_massless(G: Array, reduced: Reduced) -> Array:
-    """(c, c) gyroscopic matrix with the inertia of the modes alone where some coordinates carry no mass."""
+def without_massless(r: RunUp, reduced: Reduced) -> RunUp:
+    """The same with the inertia of the modes alone where some coordinates carry no mass."""
     if "massless-interface" not in reduced.kind or reduced.to_diagonal is None:
-        return G
+        return r
     onto = reduced.to_diagonal @ reduced.to_diagonal.conj().T @ reduced.M_r
-    return onto.conj().T @ G @ onto
+    left = onto.conj().T
+    return RunUp(left @ r.N @ onto, left @ r.P @ onto, left @ r.euler, left @ r.centrifugal)
+
+
+def _gyroscopic(
+    settings: BodySettings, speed: float, reduced: Reduced, run_up: RunUp, found: eigen.Spectrum, kept: int
+) -> GyroscopicModes | None:
+    """Modes with gyroscopic coupling at speed, with the bound that the certified spectrum allows."""
+    if not (speed and settings.rotation.gyroscopic):
+        return None
+    V = np.eye(len(reduced.omega)) if reduced.to_diagonal is None else reduced.to_diagonal
+    N, P = V.conj().T @ run_up.N @ V, V.conj().T @ run_up.P @ V
+    values = [found.upper_shift, *found.values[kept : kept + 1]] if found.certified else [0.0]
+    next_omega = float(np.sqrt(max(min(values), 0.0)))
+    known = Certified(P, speed, next_omega, kept if reduced.to_diagonal is None else 0)
+    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, np.diag(reduced.omega**2), N, known)
+    return replace(own, shapes=V @ own.shapes)
 
 
 def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
