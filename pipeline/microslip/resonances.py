@@ -10,12 +10,13 @@ frequency diagram; Wildheim, J. Appl. Mech. 46 (1979) 878).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .campbell import Tracks, crossings, follow, point_weights, track_basis
-from .data import Array, Indices, ModalBasis
+from .coordinates import in_modes
+from .data import Array, Indices, ModalBasis, ModalGroup
 from .ring import aliased
 
 
@@ -93,6 +94,28 @@ def harmonics_of(basis: ModalBasis) -> list[int]:
     return sorted({k for _, k in basis.groups})
 
 
+def eigenmodes(group: ModalGroup) -> ModalGroup:
+    """The group cut to its eigenmodes, which come first: frequencies and shapes without what a reduction adds.
+
+    Of a body reduced to other coordinates (Craig-Bampton) the modes up to the certified bound remain.
+    """
+    if group.to_diagonal is not None or "reduced" in group.kind:
+        group = in_modes(group)
+        count = int((group.frequency <= group.checks.get("upper_shift_hz", np.inf)).sum())
+    else:
+        count = sum(kind in ("normal", "rigid") for kind in group.kind)
+    if count == group.n_modes:
+        return group
+    return replace(
+        group, omega=group.omega[:count], kind=group.kind[:count], damping_ratio=group.damping_ratio[:count],
+        phi=group.phi[:, :, :count],
+    )  # fmt: skip
+
+
+def _groups(basis: ModalBasis) -> dict[tuple[int, int], ModalGroup]:
+    return {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
+
+
 def families(basis: ModalBasis, speed: int = 0) -> Families:
     """Join the modes of neighbouring nodal diameters by the MAC of their shapes.
 
@@ -102,12 +125,14 @@ def families(basis: ModalBasis, speed: int = 0) -> Families:
     """
     harmonics = np.array(harmonics_of(basis))
     first = speeds_of(basis)[0]
-    modes, omega, mac = follow([basis.groups[first, k] for k in harmonics.tolist()], point_weights(basis))
+    groups = _groups(basis)
+    modes, omega, mac = follow([groups[first, k] for k in harmonics.tolist()], point_weights(basis))
     at = speeds_of(basis).index(speed)
     if at:
         modes, omega = modes.copy(), np.full_like(omega, np.nan)
+        curves = tracks(basis)
         for column, k in enumerate(harmonics.tolist()):
-            modes[:, column] = _carried(tracks(basis)[k], modes[:, column], at)
+            modes[:, column] = _carried(curves[k], modes[:, column], at)
             here = modes[:, column] >= 0
             omega[here, column] = basis.groups[speed, k].omega[modes[here, column]]
     return Families(basis.groups[speed, int(harmonics[0])].speed, harmonics, modes, omega, mac)
@@ -123,7 +148,8 @@ def _carried(curves: Tracks, modes: Indices, at: int) -> Indices:
 
 def tracks(basis: ModalBasis) -> dict[int, Tracks]:
     """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds."""
-    found = {k: track_basis(basis, k) for k in harmonics_of(basis)}
+    cut = replace(basis, groups=_groups(basis))
+    found = {k: track_basis(cut, k) for k in harmonics_of(basis)}
     return {k: t for k, t in found.items() if t is not None}
 
 
@@ -163,7 +189,7 @@ def margins(basis: ModalBasis, speed: int, orders: Iterable[int], within: float 
     for order in sorted({e for e in orders if e > 0}) if turns else []:
         k, direction = aliased(order, basis.sectors)
         group = basis.groups.get((speed, k))
-        for j, f in enumerate(group.frequency) if group is not None else []:
+        for j, f in enumerate(eigenmodes(group).frequency) if group is not None else []:
             out.append(Margin(order, k, direction, joined.of(k, j) + 1, float(f), order * turns))
     return sorted((m for m in out if abs(m.relative) < within), key=lambda m: abs(m.relative))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ import numpy as np
 from ..campbell import track_basis
 from ..coordinates import basis_in_modes
 from ..data import ModalBasis, ModalGroup
+from ..resonances import eigenmodes
+from ..ring import multiplicity
 from ..store import complete_or_absent
 from . import plots
 from .scene import quiet_vtk
@@ -34,6 +37,9 @@ MOST_MODES = 40
 
 ANIMATED, STRESSED = 3, 6
 """Modes that move, and modes whose stress is shown."""
+
+RING_ROWS, RING_COLUMNS, WAVES = 4, 3, 2
+"""Nodal diameters and modes on the sheet of the ring, and waves that move."""
 
 _PROBE = """
 from microslip.pictures.scene import quiet_vtk
@@ -78,7 +84,9 @@ def draw_all(
     Returns:
         Picture name -> file, in the order of the report: ``mesh``, ``interfaces``, ``modes_<rpm>rpm`` (sheets),
         ``mode_<number>_<rpm>rpm``, ``animation_<number>``, ``stress_modes``, ``static``, ``compliance``,
-        ``campbell``; what does not apply to the body is not there.
+        ``campbell``; of a cyclic sector also ``ring_modes_<rpm>rpm``, ``ring_wave_nd<k>``, ``nodal_diameters`` and
+        ``safe``, while the pictures of the sector itself are those of its lowest nodal diameter (real parts of the
+        shapes). What does not apply to the body is not there.
     """
     basis = basis_in_modes(basis)
     folder = Path(folder)
@@ -90,9 +98,23 @@ def draw_all(
     first = basis.groups[min(basis.groups)]
     if (path := plots.compliance_plot(basis, first, folder / "compliance.png")) is not None:
         drawn["compliance"] = path
-    if (tracks := track_basis(basis)) is not None:
+    if basis.sectors > 1:
+        drawn |= _diagrams(basis, folder, engine_orders)
+    elif (tracks := track_basis(basis)) is not None:
         drawn["campbell"] = plots.campbell_plot(basis, tracks, engine_orders, folder / "campbell.png")
     return drawn
+
+
+def _diagrams(basis: ModalBasis, folder: Path, engine_orders: Sequence[int]) -> dict[str, Path]:
+    """What only a cyclic body has."""
+    from . import diagrams
+
+    found = {
+        "nodal_diameters": diagrams.nodal_diameter_plot(basis, folder / "nodal_diameters.png"),
+        "safe": diagrams.safe_plot(basis, engine_orders, folder / "safe.png"),
+        "campbell": diagrams.cyclic_campbell_plot(basis, engine_orders, folder / "campbell.png"),
+    }
+    return {name: path for name, path in found.items() if path is not None}
 
 
 def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
@@ -108,10 +130,13 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
 
     studio = views.open_studio(basis)
     try:
+        if basis.sectors > 1:
+            drawn |= _ring(basis, studio, folder, report)
+            studio = replace(studio, basis=_sector(basis))
         report("pictures of mesh and interfaces")
         keep("mesh", views.mesh_picture(studio))
         keep("interfaces", views.interface_picture(studio))
-        shown = [g for g in _ends(basis) if len(g.phi)]
+        shown = [g for g in _ends(studio.basis) if len(g.phi)]
         if shown:
             camera = views.mode_camera(studio, shown, MOST_MODES)
             for group in shown:
@@ -124,7 +149,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
             keep("stress_modes", views.stress_sheet(studio, shown[0], STRESSED, camera))
-        keep("static", views.static_picture(studio, _ends(basis)[-1]))
+        keep("static", views.static_picture(studio, _ends(studio.basis)[-1]))
     finally:
         studio.stage.close()
     return drawn
@@ -134,6 +159,41 @@ def _ends(basis: ModalBasis) -> list[ModalGroup]:
     """The groups of the lowest and the highest speed (one if they are the same)."""
     keys = sorted(k for k in basis.groups if k[1] == min(basis.groups)[1])
     return [basis.groups[k] for k in dict.fromkeys((keys[0], keys[-1]))]
+
+
+def _sector(basis: ModalBasis) -> ModalBasis:
+    """The sector at its lowest nodal diameter as a body of its own: its eigenmodes, real parts of complex shapes."""
+    lowest = min(k for _, k in basis.groups)
+    groups = {}
+    for (speed, k), g in basis.groups.items():
+        if k == lowest:
+            count = eigenmodes(g).n_modes
+            stresses = {n: replace(s, stress=s.stress.real[..., :count]) for n, s in g.stresses.items()}
+            groups[speed, k] = replace(eigenmodes(g), phi=g.phi.real[:, :, :count], stresses=stresses)
+    return replace(basis, name=f"{basis.name}, nodal diameter {lowest}", groups=groups)
+
+
+def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> dict[str, Path]:
+    """Standing shapes of the first nodal diameters and two waves, at the lowest speed."""
+    from . import lettering, ring_views
+
+    groups = {k: g for (s, k), g in sorted(basis.groups.items()) if s == min(basis.groups)[0] and len(g.phi)}
+    if not groups:
+        return {}
+    ring = ring_views.open_ring(basis, studio.stage)
+    chosen = list(groups.values())[:RING_ROWS]
+    report("pictures of the ring")
+    camera = ring_views.ring_camera(ring, 0.3 * ring_views.AREA)
+    sheet = folder / f"ring_modes_{_rpm(chosen[0])}.png"
+    _save(ring_views.ring_sheet(ring, chosen, RING_COLUMNS, camera), sheet)
+    drawn, camera = {sheet.stem: sheet}, ring_views.ring_camera(ring)
+    for g in [g for g in chosen if multiplicity(g.harmonic, basis.sectors) == 2][:WAVES]:
+        report(f"animation of nodal diameter {g.harmonic}")
+        path = folder / f"ring_wave_nd{g.harmonic:02d}.gif"
+        with complete_or_absent(path) as temporary:
+            lettering.save_gif(str(temporary), ring_views.ring_wave(ring, g, 0, camera), 60)
+        drawn[path.stem] = path
+    return drawn
 
 
 def _rpm(group: ModalGroup) -> str:

@@ -15,6 +15,7 @@ from ..resonances import (
     Families,
     Margin,
     Resonance,
+    eigenmodes,
     families,
     family_ranges,
     harmonics_of,
@@ -64,7 +65,7 @@ def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     _plain(axes)
     ends = dict.fromkeys((speeds_of(basis)[0], speeds_of(basis)[-1]))
     shown = [families(basis, s) for s in ends]
-    top = 1.05 * max(float(basis.groups[s, k].frequency.max()) for s in ends for k in harmonics_of(basis))
+    top = 1.05 * max(float(eigenmodes(basis.groups[s, k]).frequency.max()) for s in ends for k in harmonics_of(basis))
     for i, (speed, found) in enumerate(zip(ends, shown, strict=True)):
         _family_lines(axes, found, top, solid=i == 0)
         _others(axes, basis, speed, found, top)
@@ -96,7 +97,7 @@ def _family_lines(axes: Axes, found: Families, top: float, solid: bool = True, w
 def _others(axes: Axes, basis: ModalBasis, speed: int, found: Families, top: float) -> None:
     """Modes that belong to no family, as crosses."""
     for k in found.harmonics.tolist():
-        f = basis.groups[speed, k].frequency
+        f = eigenmodes(basis.groups[speed, k]).frequency
         lone = [v for j, v in enumerate(f) if found.of(k, j) < 0 and v <= top]
         axes.plot([k] * len(lone), lone, "x", color=FAINT, markersize=5, zorder=3)
 

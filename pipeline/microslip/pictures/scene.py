@@ -66,8 +66,11 @@ class Surface:
     outline: Indices
 
 
-def surface(mesh: Mesh) -> Surface:
-    """Extract the outside of a mesh once."""
+_COARSE = {3: ((0, 1, 2),), 4: ((0, 1, 2), (0, 2, 3))}
+
+
+def surface(mesh: Mesh, coarse: bool = False) -> Surface:
+    """Extract the outside of a mesh once (coarse: facets by their corners only, a quarter of the triangles)."""
     import pyvista as pv
 
     facets = boundary_facets(mesh)
@@ -75,7 +78,7 @@ def surface(mesh: Mesh) -> Surface:
     keys: dict[tuple[int, ...], int] = {}
     count = 0
     for kind, nodes in facets.items():
-        pattern = np.array(_TRIANGLES[kind])
+        pattern = np.array(_COARSE[_corners(kind)] if coarse else _TRIANGLES[kind])
         flat.append(nodes[:, pattern].reshape(-1, 3))
         owner.append(np.repeat(np.arange(count, count + len(nodes)), len(pattern)))
         sides.append(np.sort(nodes[:, np.array(_SIDES[kind])].reshape(-1, 2), axis=1))

@@ -1,0 +1,171 @@
+"""The whole ring in three dimensions: standing shapes of a few nodal diameters, and waves that travel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..resonances import eigenmodes
+from ..ring import expand, multiplicity, sector_rotation
+from .lettering import captioned, colour_bar, sheet, stacked
+from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
+from .views import AREA, STEEPEST, _map, at_speed, hertz
+
+if TYPE_CHECKING:
+    from .lettering import Picture
+
+MOST_TRIANGLES = 400_000
+"""Of the ring; above, facets are drawn by their corners only."""
+
+SWING = 0.05
+"""Largest displacement of a drawn ring mode, in diameters of the ring."""
+
+COLOURS = "coolwarm"
+DIRECTIONS = ("axial", "circumferential", "radial")
+
+
+@dataclass(frozen=True)
+class RingStudio:
+    """A ring in front of the camera.
+
+    Attributes:
+        basis, stage: of the body. outside: of one sector. triangles: (t, 3) vertices of one sector without its cyclic
+            faces. axes: of the camera. extent: diameter of the ring, m.
+    """
+
+    basis: ModalBasis
+    stage: Stage
+    outside: Surface
+    triangles: Indices
+    axes: Array
+    extent: float
+
+    def points(self) -> Array:
+        """(N v, 3) vertices of the ring at rest."""
+        still = self.basis.mesh.points[self.outside.source] - self.basis.rotation_point
+        turns = [sector_rotation(self.basis, j) for j in range(self.basis.sectors)]
+        return np.concatenate([still @ R.T for R in turns]) + self.basis.rotation_point
+
+    def every(self, of_sector: Indices, count: int) -> Indices:
+        """Indices of all sectors from those of one, which has `count` points."""
+        shift = count * np.arange(self.basis.sectors)
+        return (shift[:, None, None] + of_sector[None]).reshape(-1, of_sector.shape[1])
+
+
+def open_ring(basis: ModalBasis, stage: Stage) -> RingStudio:
+    """Extract the surface of one sector and choose the view: mostly along the axis, a little from above."""
+    outside = surface(basis.mesh)
+    if basis.sectors * len(outside.triangles) > MOST_TRIANGLES:
+        outside = surface(basis.mesh, coarse=True)
+    inside = np.zeros(len(outside.triangles), dtype=bool)
+    for name in basis.cyclic_faces:
+        if name in basis.mesh.faces:
+            inside |= face_triangles(outside, basis.mesh, name)
+    axis = basis.rotation_axis
+    up = np.eye(3)[2 if abs(axis[2]) < 0.7 else 0]
+    up = up - (up @ axis) * axis
+    up /= np.linalg.norm(up)
+    axes = axes_towards(-0.84 * axis + 0.40 * up + 0.26 * np.cross(up, axis), up)
+    arm = basis.mesh.points - basis.rotation_point
+    reach = float(np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1).max())
+    return RingStudio(basis, stage, outside, outside.triangles[~inside], axes, 2 * reach)
+
+
+def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
+    """(N v, 3) complex displacement of the ring's vertices in one mode."""
+    one = _one_mode(group, mode)
+    source = ring.outside.source
+    return np.concatenate([expand(one, ring.basis, j)[source, :, 0] for j in range(ring.basis.sectors)])
+
+
+def _one_mode(group: ModalGroup, mode: int) -> ModalGroup:
+    return replace(group, phi=group.phi[:, :, mode : mode + 1])
+
+
+def _scale(ring: RingStudio, shape: Array) -> float:
+    """Factor that gives a shape (n, 3) of the sector the drawn amplitude, or less where it would bend too steeply."""
+    a, b = ring.outside.sides.T
+    points = ring.basis.mesh.points
+    turn = np.linalg.norm(shape[a] - shape[b], axis=1) / np.linalg.norm(points[a] - points[b], axis=1)
+    largest = float(np.linalg.norm(shape, axis=1).max())
+    return min(SWING * ring.extent / max(largest, 1e-300), STEEPEST / max(float(np.quantile(turn, 0.98)), 1e-300))
+
+
+def _directions(ring: RingStudio) -> Array:
+    """(N v, 3, 3) unit vectors along the axis, the circumference and the radius at each vertex (rows)."""
+    arm = ring.points() - ring.basis.rotation_point
+    axis = ring.basis.rotation_axis
+    radial = arm - np.outer(arm @ axis, axis)
+    radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-300)
+    return np.stack([np.broadcast_to(axis, radial.shape), np.cross(axis, radial), radial], axis=1)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """One mode ready to be drawn: displacement (V, 3), m; its strongest component (V,) over the largest; its name."""
+
+    moved: Array
+    value: Array
+    direction: str
+
+
+def _prepare(ring: RingStudio, group: ModalGroup, mode: int) -> _Shown:
+    moved = _scale(ring, group.phi[:, :, mode]) * wave(ring, group, mode)
+    parts = np.einsum("vdi,vi->dv", _directions(ring), moved)
+    strongest = int((np.abs(parts) ** 2).sum(axis=1).argmax())
+    value = parts[strongest]
+    return _Shown(moved, value / max(float(np.abs(value).max()), 1e-300), DIRECTIONS[strongest])
+
+
+def ring_camera(ring: RingStudio, area: float = 0.45 * AREA) -> Camera:
+    """One camera for all modes of the ring."""
+    return fit(ring.points() * (1 + 1.2 * SWING), ring.axes, area)
+
+
+def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
+    count, stage = len(ring.outside.source), ring.stage
+    triangles = ring.every(ring.triangles, count)
+    points = ring.points()
+    stage.clear()
+    data = stage.skin(points, triangles, np.zeros(len(points)), cmap=COLOURS, clim=(-1.0, 1.0))
+    return data, triangles
+
+
+def ring_sheet(
+    ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera
+) -> Picture:  # fmt: skip
+    """A row of pictures per nodal diameter: its first modes as standing shapes."""
+    data, triangles = _skin(ring, camera)
+    still, tiles = ring.points(), []
+    for group in groups:
+        for j in range(min(modes, eigenmodes(group).n_modes)):
+            shown = _prepare(ring, group, j)
+            ring.stage.reshape(data, triangles, still + shown.moved.real, shown.value.real)  # type: ignore[arg-type]
+            image = ring.stage.shoot(camera)
+            title = f"k = {group.harmonic}, mode {j + 1}: {hertz(group.frequency[j])}"
+            tiles.append(captioned(image, title, f"{shown.direction} displacement", 17))
+    across = min(modes, min(eigenmodes(g).n_modes for g in groups))
+    shape = across * tiles[0].width / (max(len(tiles) // across, 1) * tiles[0].height)
+    title = f"{ring.basis.name}: modes of the ring of {ring.basis.sectors} sectors{at_speed(groups[0])}"
+    note = "Amplified. k: nodal diameter; of each pair (0 < k < N/2) one member is shown, the other is turned."
+    page = sheet(tiles, title, note, shape)
+    return stacked([page, colour_bar(_map(COLOURS), "-1", "1", "named displacement over its largest value", 700)], 4)
+
+
+def ring_wave(ring: RingStudio, group: ModalGroup, mode: int, camera: Camera, steps: int = 20) -> list[Picture]:
+    """Frames of one period of a mode: u = Re(phi exp(i omega t)); for 0 < k < N/2 a wave that runs backward."""
+    data, triangles = _skin(ring, camera)
+    still, shown = ring.points(), _prepare(ring, group, mode)
+    kind = "standing" if multiplicity(group.harmonic, ring.basis.sectors) == 1 else "backward wave"
+    title = f"Nodal diameter {group.harmonic}, {kind}: {hertz(group.frequency[mode])}{at_speed(group)}"
+    frames = []
+    for t in np.arange(steps) * 2 * np.pi / steps:
+        turn = np.exp(1j * t)
+        moved, value = (shown.moved * turn).real, (shown.value * turn).real
+        ring.stage.reshape(data, triangles, still + moved, value)  # type: ignore[arg-type]
+        frames.append(captioned(ring.stage.shoot(camera), title, size=13))
+    return frames
