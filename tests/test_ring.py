@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -331,3 +332,74 @@ def test_a_campbell_diagram_of_one_nodal_diameter_holds_only_its_modes() -> None
     assert sorted(curves) == [0, 1, 2, 3]
     for k, t in curves.items():
         np.testing.assert_allclose(np.sort(t.omega, axis=0), np.array([basis.groups[s, k].omega for s in (0, 1)]).T)
+
+
+# --- pictures ------------------------------------------------------------------------------------------------------
+
+
+def test_every_picture_of_a_cyclic_sector(tmp_path: Path) -> None:
+    """The diagrams and the ring are drawn, are not blank and do not run over their edges."""
+    pytest.importorskip("matplotlib")
+    image = pytest.importorskip("PIL.Image")
+    from microslip import pictures
+
+    reason = pictures.can_draw()
+    basis = sector.basis(6, 3, rpm=(0.0, 60000.0))
+    found = pictures.draw_all(basis, tmp_path, engine_orders=(1, 2, 5, 6), scenes=reason is None)
+    wanted = {"nodal_diameters", "safe", "campbell", "compliance"}
+    if reason is None:
+        wanted |= {"ring_modes_0rpm", "ring_wave_nd01", "ring_wave_nd02", "mesh", "modes_0rpm", "animation_01"}
+    assert wanted <= set(found)
+    for name, path in found.items():
+        with image.open(path) as opened:
+            pixels = np.asarray(opened.convert("RGB"))
+        assert min(pixels.shape[:2]) > 100 and max(pixels.shape[:2]) < 4000, name
+        assert 0.01 < (pixels.min(axis=2) < 240).mean() < 0.9, f"{name} is empty or has no white"
+        border = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
+        assert (border > 240).mean() > 0.97, f"{name} runs over its edge"
+
+
+def test_a_body_that_does_not_turn_has_no_interference_diagram(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from microslip import pictures
+
+    found = pictures.draw_all(sector.basis(6), tmp_path, engine_orders=(1,), scenes=False)
+    assert "nodal_diameters" in found and "safe" not in found and "campbell" not in found
+
+
+def test_the_drawn_wave_is_the_expanded_shape() -> None:
+    pytest.importorskip("pyvista")
+    from microslip.pictures import ring_views, scene
+
+    basis = sector.basis(6)
+    outside = scene.surface(basis.mesh)
+    ring = ring_views.RingStudio(basis, None, outside, outside.triangles, np.eye(3), 1.0)  # type: ignore[arg-type]
+    for k, g in ((k, g) for (_, k), g in basis.groups.items()):
+        moved = ring_views.wave(ring, g, 1).reshape(6, -1, 3)
+        for j in range(6):
+            np.testing.assert_allclose(moved[j], expand(g, basis, j)[outside.source, :, 1], atol=1e-12, err_msg=str(k))
+
+
+def test_a_coarse_surface_has_a_quarter_of_the_triangles_of_ten_node_cells() -> None:
+    pytest.importorskip("pyvista")
+    from meshes import brick
+
+    from microslip.pictures import scene
+
+    mesh = brick("tetra10", (2, 2, 2))
+    fine, coarse = scene.surface(mesh), scene.surface(mesh, coarse=True)
+    assert len(fine.triangles) == 4 * len(coarse.triangles)
+    areas = [
+        np.linalg.norm(scene.triangle_normals(mesh.points[s.source], s.triangles), axis=1).sum() for s in (fine, coarse)
+    ]
+    assert areas[0] == pytest.approx(areas[1], rel=1e-12)
+
+
+def test_only_eigenmodes_enter_the_diagrams() -> None:
+    """Static modes that a reduction adds have a Ritz frequency, which is no frequency of the body."""
+    basis = sector.basis(6, rpm=(0.0, 60000.0))
+    kind = ("normal",) * 3 + ("attachment",) * 2
+    mixed = replace(basis, groups={key: replace(g, kind=kind) for key, g in basis.groups.items()})
+    assert families(mixed, 1).modes.max() == 2
+    assert all(t.modes.max() == 2 for t in tracks(mixed).values())
+    assert len(margins(mixed, 1, [1])) == 3

@@ -132,10 +132,12 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
     try:
         if basis.sectors > 1:
             drawn |= _ring(basis, studio, folder, report)
-            studio = replace(studio, basis=_sector(basis))
         report("pictures of mesh and interfaces")
         keep("mesh", views.mesh_picture(studio))
         keep("interfaces", views.interface_picture(studio))
+        keep("static", views.static_picture(studio, _ends(basis)[-1]))
+        if basis.sectors > 1:
+            studio = replace(studio, basis=_sector(basis))
         shown = [g for g in _ends(studio.basis) if len(g.phi)]
         if shown:
             camera = views.mode_camera(studio, shown, MOST_MODES)
@@ -149,7 +151,6 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
             keep("stress_modes", views.stress_sheet(studio, shown[0], STRESSED, camera))
-        keep("static", views.static_picture(studio, _ends(studio.basis)[-1]))
     finally:
         studio.stage.close()
     return drawn
