@@ -21,12 +21,15 @@ from microslip import truncation
 from microslip.basis import read_basis
 from microslip.campbell import track_basis
 from microslip.case import CaseSettings, _contact, _sized, load_case, run_case
+from microslip.compliance import contact_share, without_bulk
 from microslip.data import ModalBasis, ModalGroup
 from microslip.harmonic_balance import peaks, stuck_frequencies
+from microslip.modes.patches import patch_bounds
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
-from microslip.workflow import modes_stage, open_job
+from microslip.reduction import METHODS
+from microslip.workflow import load_mesh, mesh_stage, modes_stage, open_job
 
 ROOT = HERE.parent
 BUILD = ROOT / "build" / "docs"
@@ -413,6 +416,125 @@ def compliance() -> None:
     save(from_file(BUILD / "compliance.png"), "compliance")
 
 
+BOOK = 840e6  # N/m, the normal contact stiffness that section 5.3 prints
+
+
+def counted_once() -> None:
+    """Whose compliance: the shroud plate of 5.3 squeezed, its share in each basis, what a law may still hold."""
+    found = [(size, *squeezed_plate(size)) for size in (12, 8, 6, 4)]
+    rows = [
+        [f"{size:g}", str(dofs), f"{1e-9 / soft:.4f}e9", f"{1e-9 / stiff:.4f}e9", f"{1e12 * (soft - stiff):.1f}e-12"]
+        for size, dofs, soft, stiff in found
+    ]
+    head = ["element size, mm", "degrees of freedom", "uniform pressure, N/m", "rigid stamp, N/m", "difference, m/N"]
+    fill("reduction.md", "plate", table(head, rows))
+    shares_by_count()
+    groups = {m: made(f"blade-{m}", "blade", *LIGHT, f'reduction="{m}"') for m in METHODS}
+    law_by_method(groups)
+    save(drawn(counted_picture(found)), "counted_once", smooth=True)
+
+
+def short(value: float) -> str:
+    """``1.83e9``."""
+    return f"{value:.3g}".replace("e+0", "e").replace("e+", "e")
+
+
+def squeezed_plate(size: float) -> tuple[int, float, float]:
+    """Degrees of freedom, and compliance of the squeezed plate (m/N): uniform pressure and rigid stamps."""
+    job = open_job(ROOT / "geometry" / "blade", [f'name="plate-{size:g}"', f"mesh.size={size}"], BUILD)
+    mesh, _ = load_mesh(job, mesh_stage(job))
+    return 3 * mesh.n_points, *patch_bounds(mesh, job.settings).squeezed("right", "left")
+
+
+def shares_by_count() -> None:
+    """What a law must bring at each contact besides its surface, over the number of plain eigenmodes."""
+    group = made("blade-120", "blade", *LIGHT, "modes.count=120").groups[0, 0]
+    chosen = {c.label: c for c in truncation.coordinates(group)}
+    rows = []
+    for count in (5, 10, 20, 60, 120):
+        pair = chosen["right + left squeezed"]
+        held = float(pair.shares[count - 1])
+        alone = [chosen[f"right u_{r}"] for r in ("n", "t1", "t2")]
+        springs = [1 / (c.static * (1 - float(c.shares[count - 1]))) for c in alone]
+        law = 2 / (pair.static * (1 - held))
+        rows.append([str(count), truncation.percent(held), *(short(k) for k in (law, *springs))])
+    names = ["squeezed, at each contact", "alone u_n", "alone u_t1", "alone u_t2"]
+    fill("reduction.md", "eigenmode_shares", table(["eigenmodes", "squeeze held", *(f"{n}, N/m" for n in names)], rows))
+
+
+def law_by_method(bases: dict[str, ModalBasis]) -> None:
+    """Per method: what the basis holds of the squeeze, what is left, what 840e6 N/m becomes, and the frequencies."""
+    rows, stuck_rows = [], []
+    for method, basis in bases.items():
+        pair = contact_share(basis.groups[0, 0], method, "u_n", "right", "left")
+        law = without_bulk(BOOK, pair)
+        cells = [pair.held, pair.supplied, pair.left, pair.beyond]
+        shown = ["0" if v < 1e-3 * pair.static else f"{1e9 * v:.3f}e-9" for v in cells]
+        rows.append([f"`{method}`", *shown, short(law)])
+        told = [case_frequencies(basis, includes) for includes in (None, "bulk+surface")]
+        stuck_rows.append([f"`{method}`", *(", ".join(f"{f:.2f}" for f in found) for found in told)])
+    head = ["`reduction`", "basis holds, m/N", "solver adds from the file, m/N", "left to the law (bulk), m/N"]
+    head += ["law must not contain, m/N", "840e6 N/m becomes, N/m"]
+    fill("reduction.md", "law", table(head, rows))
+    head = ["`reduction`", "840e6 N/m as it stands, Hz", 'bulk taken out (`"bulk+surface"`), Hz']
+    fill("reduction.md", "counted_stuck", table(head, stuck_rows))
+
+
+def case_frequencies(basis: ModalBasis, includes: str | None) -> np.ndarray:
+    """The first three frequencies of the blade of 5.3 that sticks between rigid neighbours, Hz."""
+    settings = blade_case(basis)
+    contacts = tuple(c.model_copy(update={"includes": includes}) for c in settings.contacts)
+    sweep = settings.sweep.model_copy(update={"points": 2, "normal_forces": (780.0,)})
+    return run_case(settings.model_copy(update={"contacts": contacts, "sweep": sweep}), basis, "blade.toml").stuck[:3]
+
+
+def counted_picture(found: Sequence[tuple[float, int, float, float]]) -> Any:
+    """Left: one contact's compliance by who holds it. Right: both bounds over the mesh, and the bars' E A / L."""
+    half, book = found[1][2] / 2, 1 / BOOK
+    rest = book - 2 * half
+    parts = {"this body's basis": "#0b4f9c", "neighbour's basis": "#7fb0e0", "contact law": "#d98410"}
+    bars = [
+        ("eigenmodes,\nthe book's law", (0, 0, book)),
+        ("static modes,\nrigid neighbour", (half, 0, book - half)),
+        ("static modes,\nneighbour too", (half, half, rest)),
+        ("counted twice", (half, 0, book)),
+    ]
+    fig = figure(10.5, 3.6)
+    left, right = fig.subplots(1, 2, width_ratios=(1.5, 1))
+    plain(left)
+    plain(right)
+    for y, (_, widths) in enumerate(bars):
+        start = 0.0
+        for width, colour in zip(widths, parts.values(), strict=True):
+            left.barh(y, 1e9 * width, left=1e9 * start, color=colour, edgecolor="white", height=0.62)
+            if width > 0.15e-9:
+                middle = 1e9 * (start + width / 2)
+                left.text(middle, y, f"{1e9 * width:.2f}", ha="center", va="center", color="white", fontsize=11)
+            start += width
+        left.text(1e9 * start + 0.03, y, f"law {short(1 / widths[2])} N/m", va="center")
+    left.axvline(1e9 * book, color="0.25", lw=1, ls="--", zorder=0)
+    left.grid(visible=False)
+    left.set_yticks(range(len(bars)), [name for name, _ in bars])
+    left.invert_yaxis()
+    left.set_xlim(0, 2.35)
+    left.set_xlabel("normal compliance of one contact in nm/N (dashed: 1 / 840e6 N/m)")
+    handles = [left.barh(0, 0, color=c) for c in parts.values()]
+    left.legend(handles, list(parts), ncols=3, loc="lower center", bbox_to_anchor=(0.45, 1.0), frameon=False)
+    dofs = [n for _, n, _, _ in found]
+    right.semilogx(dofs, [1e-9 / s for _, _, s, _ in found], "o-", color="#0b4f9c", label="uniform pressure")
+    right.semilogx(dofs, [1e-9 / s for _, _, _, s in found], "s-", color="#c8382c", label="rigid stamps")
+    for value, name in ((0.91875, "E A / L, plate 77 x 5 x 88"), (0.840, "the book's 72 x 5 x 90")):
+        right.axhline(value, color="0.5", lw=1, ls="--")
+        right.text(dofs[-1], value + 0.002, name, ha="right", va="bottom", fontsize=9, color="0.3")
+    right.set_ylim(0.83, 0.97)
+    right.set_xticks([30e3, 60e3, 120e3, 200e3], ["30 000", "60 000", "120 000", "200 000"])
+    right.minorticks_off()
+    right.set_xlabel("degrees of freedom")
+    right.set_ylabel("squeezed plate in 1e9 N/m")
+    right.legend(frameon=False, fontsize=10, loc="center right", bbox_to_anchor=(1.0, 0.42))
+    return fig
+
+
 # your own model ----------------------------------------------------------------------------------------------------
 
 
@@ -437,7 +559,10 @@ def reference() -> None:
 
 STUDIES = {
     f.__name__: f
-    for f in (reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, compliance, own)
+    for f in (
+        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, compliance, counted_once,
+        own,
+    )  # fmt: skip
 }
 
 

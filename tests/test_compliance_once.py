@@ -308,6 +308,9 @@ def test_the_blade_of_5_3(tmp_path: Path) -> None:
     mesh, _ = load_mesh(job, mesh_stage(job))
     soft, stiff = patch_bounds(mesh, job.settings).squeezed("right", "left")
     assert 1 / soft == pytest.approx(0.9129e9, rel=3e-3)
+    page = (BLADE.parents[1] / "docs" / "reduction.md").read_text()
+    told = next(line for line in page.split("<!-- table plate -->")[1].splitlines() if line.startswith("| 12 |"))
+    assert [float(v) for v in told.split("|")[3:5]] == pytest.approx([1 / soft, 1 / stiff], rel=2e-4)  # as printed
     plate = 2.1e11 * 77e-3 * 5e-3 / 88e-3
     assert 1 / soft == pytest.approx(plate, rel=0.01)  # the plate as a bar; the book's 840e6 takes 72 mm and 90 mm
     assert 0.025 < 1 - stiff / soft < 0.04
