@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from meshes import brick, rotation_matrix
+from meshes import brick, graded, rotation_matrix
 from scipy.spatial import cKDTree
 
 from microslip import eigen
@@ -69,16 +69,18 @@ def bladed_sector(
 
 
 def disc_sector(
-    cell_type: str, sectors: int, inner: float, outer: float, thickness: float, n: tuple[int, int, int]
-) -> Mesh:
-    """A sector of an annular plate about y: n boxes along the circumference, the axis and the radius.
+    cell_type: str, sectors: int, inner: float, outer: float, thickness: float, n: tuple[int, int, int],
+    last: float = 1.0,
+) -> Mesh:  # fmt: skip
+    """A sector of an annular plate about y: n boxes along the circumference, the axis and the radius, the
+    outermost `last` times as high as the innermost.
 
     Faces: bore, rim, cyclic_left, cyclic_right, front, back.
     """
     angle = 2 * np.pi / sectors
 
     def to(p: Array) -> Array:
-        phi, r = angle * (p[:, 0] - 0.5), inner + (outer - inner) * p[:, 2]
+        phi, r = angle * (p[:, 0] - 0.5), inner + (outer - inner) * graded(n[2], last)(p[:, 2])
         return np.column_stack([r * np.sin(phi), thickness * (p[:, 1] - 0.5), r * np.cos(phi)])
 
     mesh = brick(cell_type, n, to=to)
