@@ -120,24 +120,25 @@ def certified(searched: Sequence[Searched]) -> list[Searched]:
     return [done[i] for i in range(len(searched))]
 
 
-def shared_shifts(bands: list[tuple[float, float]]) -> list[float]:
-    """For each band (low, high) a value inside it, as few different ones as possible (interval stabbing).
+def shared_shifts(gaps: Sequence[tuple[float, float]], margin: float = 0.05) -> list[float]:
+    """For each gap (low, high) a value inside it, as few different ones as possible (interval stabbing).
 
     A certificate needs one shift above the last eigenvalue kept and below the next one; nodal diameters whose gaps
     overlap are counted with one factorisation.
+
+    Args:
+        margin: share of a gap that is kept clear at each end, so that no shift comes close to an eigenvalue.
     """
-    chosen = [0.0] * len(bands)
-    waiting: list[int] = []
-    low, high = -np.inf, np.inf
-    for i in [*np.argsort([h for _, h in bands], kind="stable"), None]:
-        if i is not None and max(low, bands[i][0]) < min(high, bands[i][1]):
-            low, high = max(low, bands[i][0]), min(high, bands[i][1])
-            waiting.append(i)
-            continue
-        for j in waiting:
-            chosen[j] = 0.5 * (low + high)
-        if i is not None:
-            (low, high), waiting = bands[i], [i]
+    inner = [(low + margin * (high - low), high - margin * (high - low)) for low, high in gaps]
+    chosen = [0.0] * len(inner)
+    order = sorted(range(len(inner)), key=lambda i: inner[i][1])
+    while order:
+        at = inner[order[0]][1]  # the first end: every gap that has begun by then holds it
+        together = [i for i in order if inner[i][0] <= at]
+        low = max(inner[i][0] for i in together)
+        for i in together:
+            chosen[i] = 0.5 * (low + at)
+        order = [i for i in order if inner[i][0] > at]
     return chosen
 
 
