@@ -154,6 +154,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "interfaces.partner": ("", "name of the interface it faces"),
     "interfaces.sector_shift": ("", "where the partner is: next blade 1, previous -1, else 0"),
     "interfaces.t2": ("", "direction whose projection on the patch becomes t2"),
+    "interfaces.coordinates": ("", "rigid: six; characteristic: six and the softest shapes of the patch"),
+    "interfaces.count": ("", "how many characteristic shapes"),
     "excitations.name": ("", ""),
     "excitations.point": ("*", "where a unit force acts"),
     "excitations.face": ("", "or the face over which it is spread"),

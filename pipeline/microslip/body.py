@@ -297,6 +297,16 @@ class InterfaceSettings(Model):
     partner: str = ""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
     t2: Direction = (0.0, 0.0, 1.0)
+    coordinates: Literal["rigid", "characteristic"] = "rigid"
+    count: Annotated[int, Field(ge=0, le=500)] = 0
+
+    @model_validator(mode="after")
+    def _counted(self) -> InterfaceSettings:
+        if self.coordinates == "characteristic" and (not self.count or self.role == "load"):
+            raise ValueError('coordinates = "characteristic" needs count, the number of shapes, and no role "load"')
+        if self.coordinates == "rigid" and self.count:
+            raise ValueError('count belongs to coordinates = "characteristic"; a rigid patch has six coordinates')
+        return self
 
 
 class Excitation(Model):

@@ -25,7 +25,7 @@ from .compliance import (
     without_bulk,
 )
 from .coordinates import in_modes
-from .data import Array, ModalBasis, ModalGroup, Rows, UserError
+from .data import INTERFACE_ROWS, Array, ModalBasis, ModalGroup, Rows, UserError
 from .harmonic_balance import (
     FrequencyResponse,
     JenkinsContact,
@@ -34,7 +34,6 @@ from .harmonic_balance import (
     refined_peaks,
     stuck_frequencies,
 )
-from .truncation import INTERFACE_ROWS
 
 
 class ContactSettings(Model):
@@ -287,7 +286,8 @@ def _residual(
         counted = tuple(f"interface:{c.interface}:" for c in settings.contacts if c.interface not in wanting)
         bring[[name.startswith(counted) for name in names]] = 0.0
     left = group.compliance.residual * np.outer(bring, bring)
-    at = [i for c in settings.contacts for i, n in enumerate(names) if n.startswith(f"interface:{c.interface}:")]
+    six = [f"interface:{c.interface}:{row}" for c in settings.contacts for row in INTERFACE_ROWS]
+    at = [names.index(row) for row in six]
     force = next(i for i, n in enumerate(names) if n.startswith(f"excitation:{settings.excitation}:"))
     watch = names.index(f"monitor:{settings.monitor}:{label}")
     return Residual(left[np.ix_(at, at)], left[at, force], left[watch, at], float(left[watch, force]))

@@ -23,7 +23,9 @@ def in_modes(g: ModalGroup) -> ModalGroup:
 
     def face(i: Interface) -> Interface:
         shapes = i.shapes @ V
-        return replace(i, rows=i.rows @ V, shapes=shapes, fit_residual=_fit_residual(i, shapes, i.rows @ V))
+        more = i.characteristic @ V if len(i.characteristic) else np.zeros((0, p))
+        fit = _fit_residual(i, shapes, i.rows @ V)
+        return replace(i, rows=i.rows @ V, shapes=shapes, fit_residual=fit, characteristic=more)
 
     def rows(named: Rows) -> Rows:
         return replace(named, rows=named.rows @ V)
@@ -63,10 +65,20 @@ def _modal(g: ModalGroup) -> Array:
 
 
 def _compliance_rows(g: ModalGroup) -> Array:
-    found = {f"interface:{n}:{c}": i.rows[j] for n, i in g.interfaces.items() for j, c in enumerate(_SIX)}
-    for kind, named in (("excitation", g.excitations), ("monitor", g.monitors)):
-        found |= {f"{kind}:{n}:{c}": r.rows[j] for n, r in named.items() for j, c in enumerate(r.labels)}
-    return np.array([found[label] for label in g.compliance.labels]).reshape(-1, g.n_modes)
+    return np.array([compliance_row(g, label) for label in g.compliance.labels]).reshape(-1, g.n_modes)
+
+
+def compliance_row(g: ModalGroup, label: str) -> Array:
+    """(m,) the row that a label of the compliance names.
+
+    Raises:
+        ValueError, KeyError: the group has no such row.
+    """
+    kind, name, row = label.split(":", 2)
+    if kind == "interface":
+        return g.interfaces[name].row(row)
+    rows = {"excitation": g.excitations, "monitor": g.monitors}[kind][name]
+    return rows.rows[rows.labels.index(row)]
 
 
 def _solved(A: Array, b: Array) -> Array:
@@ -75,9 +87,6 @@ def _solved(A: Array, b: Array) -> Array:
         return np.linalg.solve(A, b)
     except np.linalg.LinAlgError:
         return np.full_like(b, np.nan)
-
-
-_SIX = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
 
 
 def held(

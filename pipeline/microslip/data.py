@@ -87,6 +87,9 @@ class Mesh:
         return np.unique(self.point_sets[name])
 
 
+INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+
+
 @dataclass(frozen=True)
 class Interface:
     """One contact patch of a body and its six rows (Sextro Eqs. (5.1-6), (5.1-8)).
@@ -105,6 +108,8 @@ class Interface:
         extent: (2,) b0 along t1 and h0 along t2, m (Sextro Fig. 5.1-3). polygon: (k, 3) corners of the convex
             outline seen along n, m, anticlockwise about n; empty for a face that closes on itself.
         sector_shift: +1 if the partner belongs to the next blade, -1 previous, 0 the same body or ground.
+        characteristic: (c, m) amplitudes, m root-mean-square, of the patch's characteristic shapes, with
+            pattern: (p, 3, c) what one of them moves the points by, body axes. Empty for a rigid patch.
     """
 
     origin: Array
@@ -120,6 +125,21 @@ class Interface:
     sector_shift: int = 0
     extent: Array = field(default_factory=lambda: np.zeros(2))
     polygon: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    characteristic: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    pattern: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
+
+    def row(self, name: str) -> Array:
+        """(m,) one of the rows by its label: ``u_n``, ..., ``phi_t2``, ``c1``, ``c2``, ...
+
+        Raises:
+            ValueError: there is no such row.
+        """
+        if name in INTERFACE_ROWS:
+            return self.rows[INTERFACE_ROWS.index(name)]
+        number = int(name.removeprefix("c"))
+        if not 0 < number <= len(self.characteristic):
+            raise ValueError(f"no characteristic coordinate {name}")
+        return self.characteristic[number - 1]
 
 
 @dataclass(frozen=True)

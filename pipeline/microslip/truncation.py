@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .coordinates import compliance_row
 from .data import Array, ModalGroup
-
-INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def coordinates(group: ModalGroup, sectors: int = 1) -> tuple[Coordinate, ...]:
     """The rows of the check; see `verdict`."""
     labels = group.compliance.labels
     static = group.compliance.static
-    T = np.array([_row(group, label) for label in labels]).reshape(len(labels), group.n_modes)
+    T = np.array([compliance_row(group, label) for label in labels]).reshape(len(labels), group.n_modes)
     found = [
         _coordinate(group, *describe(group, label), np.eye(len(labels))[i], static, T)
         for i, label in enumerate(labels)
@@ -113,20 +112,12 @@ def _coordinate(
     return Coordinate(label, kind, unit, whole, float(parts[-1]), parts / whole if whole > 0 else np.zeros_like(parts))
 
 
-def _row(group: ModalGroup, label: str) -> Array:
-    kind, name, row = label.split(":", 2)
-    if kind == "interface":
-        return group.interfaces[name].rows[INTERFACE_ROWS.index(row)]
-    rows = (group.excitations if kind == "excitation" else group.monitors)[name]
-    return rows.rows[rows.labels.index(row)]
-
-
 def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
     """Plain label, kind and unit of a compliance row."""
     kind, name, row = label.split(":", 2)
     if kind == "interface":
-        turns = row.startswith("phi")
-        return f"{name} {row}", "rotation" if turns else "translation", "rad/(N m)" if turns else "m/N"
+        turns, kinds = row.startswith("phi"), {"u": "translation", "p": "rotation", "c": "shape"}
+        return f"{name} {row}", kinds[row[0]], "rad/(N m)" if turns else "m/N"
     pressure = kind == "excitation" and group.excitations[name].unit == "Pa"
     return f"{name} {row}", kind, "m3/Pa" if pressure else "m/N"
 

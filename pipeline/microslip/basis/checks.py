@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..coordinates import held, in_modes
+from ..coordinates import compliance_row, held, in_modes
 from ..data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp
 from ..gyroscopic import stability_sentence
 from .integrals import face_mean, modal_mass
@@ -19,8 +19,6 @@ TOLERANCES = {
     "mass_error": 1e-8,
 }
 """Upper limits the solver's numbers are held to by `check_basis` (``certified`` must be 1, the rest is information)."""
-
-INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
 
 
 @dataclass(frozen=True)
@@ -128,6 +126,8 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
         wanted += [(i.rows, (6, m)), (i.fit_residual, (m,)), (i.rotation, (3, 3)), (i.origin, (3,))]
         wanted += [(i.areas, (p,)), (i.points, (p, 3)), (i.normals, (p, 3))]
         wanted += [(i.shapes, (p if i.shapes.shape[0] else 0, 3, m))]
+        if c := len(i.characteristic):
+            wanted += [(i.characteristic, (c, m)), (i.pattern, (p, 3, c))]
     for rows in _every_row(g):
         wanted += [(rows.rows, (len(rows.labels), m)), (rows.static, (len(rows.labels),)), (rows.point, (3,))]
     for s in g.stresses.values():
@@ -155,6 +155,7 @@ def _numbers(g: ModalGroup) -> list[Any]:
         found += [g.gyroscopic.omega, g.gyroscopic.shapes, g.gyroscopic.growth, g.gyroscopic.sense]
     for i in g.interfaces.values():
         found += [i.rows, i.fit_residual, i.rotation, i.origin, i.areas, i.points, i.normals, i.shapes]
+        found += [i.characteristic, i.pattern]
     for rows in _every_row(g):
         found += [rows.rows, rows.static, rows.point]
     for s in g.stresses.values():
@@ -271,12 +272,7 @@ def _all_rows(g: ModalGroup) -> Array | None:
     parts = []
     for label in g.compliance.labels:
         try:
-            kind, name, row = label.split(":", 2)
-            if kind == "interface":
-                parts.append(g.interfaces[name].rows[INTERFACE_ROWS.index(row)])
-            else:
-                rows = {"excitation": g.excitations, "monitor": g.monitors}[kind][name]
-                parts.append(rows.rows[rows.labels.index(row)])
+            parts.append(compliance_row(g, label))
         except (ValueError, KeyError):
             return None
     return np.array(parts).reshape(len(parts), g.n_modes)

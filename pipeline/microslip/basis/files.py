@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from ..data import (
+    INTERFACE_ROWS,
     VOIGT,
     Array,
     Compliance,
@@ -32,7 +33,7 @@ from ..data import (
 )
 from ..store import complete_or_absent
 from ..topology import CELL_TYPES, FACET_CORNERS
-from .checks import INTERFACE_ROWS, TOLERANCES, Check, check_basis
+from .checks import TOLERANCES, Check, check_basis
 from .hdf5 import IMAGINARY, create, inspect, put, put_scale, seal, seal_state, trial
 
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
@@ -172,6 +173,10 @@ def _write_frames(file: h5py.File, group: ModalGroup) -> None:
         put(patch, "points", item.points, "m", scales=[point, file["axis"]])
         put(patch, "areas", item.areas, "m^2", scales=[point])
         put(patch, "normals", item.normals, "1", scales=[point, file["axis"]])
+        if len(item.characteristic):
+            shape = put_scale(face, "shape", np.arange(1, len(item.characteristic) + 1))
+            patch["shape"] = shape
+            put(patch, "pattern", item.pattern, "1", scales=[point, file["axis"], shape])
 
 
 def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
@@ -226,6 +231,9 @@ def _write_rows(group: h5py.Group, g: ModalGroup, mode: h5py.Dataset) -> None:
         face = interfaces.create_group(_escaped(name))
         put(face, "T", item.rows, "kg^-1/2; last three m^-1 kg^-1/2", scales=[file["interface_row"], mode])
         put(face, "fit_residual", item.fit_residual, "1", scales=[mode])
+        if len(item.characteristic):
+            face["shape"] = file[f"interfaces/{_escaped(name)}/shape"]
+            put(face, "characteristic", item.characteristic, "kg^-1/2", scales=[face["shape"], mode])
         if item.shapes.shape[0]:
             patch = face.create_group("patch")
             patch["point"] = file[f"interfaces/{_escaped(name)}/patch/point"]
@@ -541,6 +549,8 @@ def _read_interface(frame: h5py.Group, group: h5py.Group, m: int) -> Interface:
         str(frame.attrs["role"]), str(frame.attrs["partner"]), int(frame.attrs["sector_shift"]),
         np.array([float(frame["patch"].attrs[k]) for k in ("b0", "h0")]),
         _array(frame, "patch/polygon", None, 3) if "patch/polygon" in frame else np.zeros((0, 3)),
+        _array(group, "characteristic", None, m) if "characteristic" in group else np.zeros((0, m)),
+        _array(frame, "patch/pattern", p, 3, None) if "characteristic" in group else np.zeros((0, 3, 0)),
     )  # fmt: skip
 
 

@@ -9,14 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..body import BodySettings, Excitation
-from ..data import Array, Interface, Mesh, Rows
+from ..data import INTERFACE_ROWS, Array, Interface, Mesh, Rows
 from ..fem.discretise import face_blocks
 from ..fem.loads import pressure, traction
 from .boundary import AXES, require_face
 from .equilibrium import StaticState
 from .rows import Locator, Patch, patch, point_rows, slope_rows
 
-INTERFACE_LABELS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+INTERFACE_LABELS = INTERFACE_ROWS
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,9 @@ class BodyRows:
             if item.role != "load":
                 parts.append(self.patches[item.name].B)
                 labels += [f"interface:{item.name}:{c}" for c in INTERFACE_LABELS]
+                if (more := self.patches[item.name].characteristic) is not None:
+                    parts.append(more)
+                    labels += [f"interface:{item.name}:c{i + 1}" for i in range(more.shape[0])]
         for kind, named in (("excitation", self.excitations), ("monitor", self.monitors)):
             for name, rows in named.items():
                 parts.append(rows.B)
@@ -120,6 +123,7 @@ def reduced_interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shape
             moved if keep else np.zeros((0, 3, phi.shape[1])),
             item.role if item else "load", item.partner if item else "", item.sector_shift if item else 0,
             p.extent, p.polygon,
+            np.zeros((0, phi.shape[1])) if p.characteristic is None else np.asarray(p.characteristic @ phi), p.pattern,
         )  # fmt: skip
     return out
 

@@ -49,6 +49,34 @@ def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array
         raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
 
 
+PHYSICAL = ("craig-bampton", "dual-craig-bampton", "massless-boundary")
+
+
+def refuse_overlap(mesh: Mesh, settings: BodySettings) -> None:
+    """Refuse interface coordinates of a patch that lies on a support.
+
+    Raises:
+        UserError: with the patch and the support.
+    """
+    kept = [i for i in settings.interfaces if settings.reduction in PHYSICAL or i.coordinates == "characteristic"]
+    for item in kept:
+        for support in settings.supports:
+            held = mesh.face_points(support.face)
+            facets = mesh.faces[item.face].values()
+            count = sum(int(np.isin(f, held).all(axis=1).sum()) for f in facets)
+            if count:
+                raise UserError(
+                    f"interfaces.{item.name}.face: {count} of {sum(map(len, facets))} facets of '{item.face}' lie on "
+                    f"the support '{support.face}', which holds them, so the patch has no coordinates of its own; "
+                    'take them out of one of the two, or use reduction = "rubin" and coordinates = "rigid"'
+                )
+        if settings.cyclic and item.coordinates == "characteristic":
+            raise UserError(
+                f"interfaces.{item.name}.coordinates: characteristic shapes are made of a lone body, not of a sector "
+                '([cyclic]); use "rigid"'
+            )
+
+
 def with_dead_loads(model: BodyModel, mesh: Mesh, settings: BodySettings) -> BodyModel:
     force = np.zeros((mesh.n_points, 3))
     locator = Locator(mesh) if any(load.point for load in settings.loads) else None

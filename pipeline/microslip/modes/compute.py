@@ -24,7 +24,8 @@ from ..gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
-from .boundary import check_held, fixed_dofs, with_dead_loads
+from .boundary import check_held, fixed_dofs, refuse_overlap, with_dead_loads
+from .characteristic import with_characteristic
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .run_up import run_up_terms
 from .sector import Sector, make_sector
@@ -64,11 +65,13 @@ def modal_basis(
     mass, centre, inertia = inertia_of(d, model.material.density)
     motions = rigid.free_motions(mesh.points, centre, fixed)
     check_held(mesh, settings, centre, motions)
+    refuse_overlap(mesh, settings)
     solver = eigen.new_solver(settings.modes.solver)
     state: StaticState | None = None
     before = 0.0
     groups: dict[tuple[int, int], ModalGroup] = {}
     try:
+        rows = with_characteristic(rows, model, settings, motions, solver)
         for number, rpm in enumerate(settings.rotation.speeds_rpm):
             speed = rpm * np.pi / 30
             if len(settings.rotation.speeds_rpm) > 1 or speed:

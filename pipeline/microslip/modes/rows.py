@@ -26,6 +26,7 @@ class Patch:
     Attributes:
         origin: (3,) area centre, m. rotation: (3, 3) rows n, t1, t2. B: (6, 3n) area-weighted rigid fit in that
             frame. points: (p, 3) m. areas: (p,) m2. normals: (p, 3). N: (p, n) shape functions at the points.
+        characteristic: (c, 3n) rows of characteristic coordinates, pattern: (p, 3, c) what one of them moves, if any.
     """
 
     origin: Array
@@ -37,6 +38,8 @@ class Patch:
     N: sp.csr_matrix
     extent: Array
     polygon: Array
+    characteristic: sp.csr_matrix | None = None
+    pattern: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
 
     def fit_residual(self, phi: Array) -> Array:
         """(m,) share of the patch's motion that no rigid motion explains, for shapes (n, 3, m)."""

@@ -30,7 +30,8 @@ def reduce(problem: Problem) -> Reduced:
     """
     chosen = problem.interface("craig-bampton")
     B = problem.rows[chosen]
-    constraint_modes, stiffness, relief = static_shapes(problem, B, problem.static[:, chosen])
+    R = problem.vectors[:, : problem.rigid]
+    constraint_modes, stiffness, relief = static_shapes(R, B, problem.static[:, chosen], '"craig-bampton"')
     count = len(problem.values) - problem.rigid
     fixed = fixed_interface_modes(problem.pencil, B, count, problem.certify, problem.shift)
     values, relief = own_modes(problem.pencil, without_modes(problem.pencil, fixed.vectors, relief))
@@ -45,23 +46,25 @@ def reduce(problem: Problem) -> Reduced:
     return diagonalised(vectors, kind, M_r, K_r, problem.rigid)
 
 
-def static_shapes(problem: Problem, B: sp.csr_matrix, answers: Array) -> tuple[Array, Array, Array]:
+def static_shapes(R: Array, B: sp.csr_matrix, answers: Array, what: str) -> tuple[Array, Array, Array]:
     """Constraint modes (n, b), their stiffness (b, b) and inertia-relief shapes (n, rigid), without solving again.
 
     With the elastic answers U of forces on the rows (F = B U, the body relieved by its inertia) and the rigid
     motions R, every static state is U f + R a, in balance with R^H B^H f = 0. Constraint modes have B u = 1; the
     inertia-relief shapes answer the loads M R with B u = 0: u = R a - U f with R^H B^H f = 1.
 
+    Args:
+        R: (n, rigid) mass-orthonormal. B: (b, n). answers: (n, b). what: needs them, for the message.
+
     Raises:
-        UserError: the interfaces leave a rigid motion free.
+        UserError: the rows leave a rigid motion free.
     """
-    R = problem.vectors[:, : problem.rigid]
     held = np.asarray(B @ R)
     b, r = held.shape
     if r and np.linalg.matrix_rank(held, 1e-9 * np.abs(held).max(initial=1e-300)) < r:
         raise UserError(
-            'reduction: "craig-bampton" needs interfaces that hold the body against its rigid motions; add an '
-            'interface or use "rubin"'
+            f'reduction: {what} needs interfaces that hold the body against its rigid motions; add an interface or '
+            'use "rubin"'
         )
     F = hermitian(np.asarray(B @ answers))
     f, a = _balanced(F, held, np.eye(b), np.zeros((r, b)))
