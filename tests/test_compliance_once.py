@@ -207,6 +207,7 @@ def test_the_gap_of_a_sector_is_the_gap_of_the_whole_ring(k: int) -> None:
     gap = (u[:, 2] - np.roll(u[:, 0], -1)) / phase
     np.testing.assert_allclose(gap, gap[0], atol=1e-13)
     pair = shares(sector(N, k, 2), "eigenmodes", N)[-1]
+    assert law_stiffness(sector(N, k, 2), "eigenmodes", "right", "left", N) == pytest.approx(1 / pair.left)
     assert pair.contacts == 1 and "gap" in pair.label
     assert pair.static == pytest.approx(gap[0].real, rel=1e-12)
     assert 0 < pair.left == pytest.approx(pair.static - pair.held, rel=1e-12)

@@ -80,10 +80,12 @@ def shares(group: ModalGroup, reduction: str, sectors: int = 1) -> tuple[Share, 
     for i, label in enumerate(labels):
         if label.startswith("interface:"):
             found.append(_share(group, reduction, *describe(group, label), np.eye(len(labels))[i], 1))
-    for a, b in ring_pairs(group):
-        pick, words = closing(group, a, b, sectors), "squeezed" if sectors == 1 else "across the gap"
-        found.append(_share(group, reduction, f"{a} + {b} {words}", "squeeze", "m/N", pick, 2 if sectors == 1 else 1))
-    return tuple(found)
+    return (*found, *(_pair(group, reduction, a, b, sectors) for a, b in ring_pairs(group)))
+
+
+def _pair(group: ModalGroup, reduction: str, a: str, b: str, sectors: int) -> Share:
+    pick, words = closing(group, a, b, sectors), "squeezed" if sectors == 1 else "across the gap"
+    return _share(group, reduction, f"{a} + {b} {words}", "squeeze", "m/N", pick, 2 if sectors == 1 else 1)
 
 
 def _share(
@@ -101,17 +103,18 @@ def _share(
     return Share(label, kind, unit, static, held, along(c.plain), supplied, contacts, noise)
 
 
-def contact_share(group: ModalGroup, reduction: str, row: str, a: str, b: str = "") -> Share:
+def contact_share(group: ModalGroup, reduction: str, row: str, a: str, b: str = "", sectors: int = 1) -> Share:
     """The share that decides a law at contact `a`: pressed from both sides if `b` faces it, else alone.
 
     Args:
         row: ``u_n``, ``u_t1`` or ``u_t2``; tangents are taken alone, neighbours do not squeeze along them.
         a: interface. b: the other contact of the same body that is closed at the same time, or nothing.
+        sectors: of a ring, where `b` is the neighbour's; 1 for a body between rigid neighbours.
     """
     labels = group.compliance.labels
     if row == "u_n" and b:
         a, b = (a, b) if (a, b) in ring_pairs(group) else (b, a)
-        return _share(group, reduction, f"{a} + {b} squeezed", "squeeze", "m/N", closing(group, a, b), 2)
+        return _pair(group, reduction, a, b, sectors)
     label = f"interface:{a}:{row}"
     pick = np.array([float(name == label) for name in labels])
     return _share(group, reduction, *describe(group, label), pick, 1)
@@ -125,12 +128,12 @@ def statics_beside(group: ModalGroup, reduction: str) -> bool:
     return reduction in SUPPLIED or len(group.omega) < group.n_modes
 
 
-def law_stiffness(group: ModalGroup, reduction: str, a: str, b: str = "") -> float:
+def law_stiffness(group: ModalGroup, reduction: str, a: str, b: str = "", sectors: int = 1) -> float:
     """Normal stiffness (N/m) a law at contact `a` must bring in series with its surface; inf: the surface only.
 
     With it, pressing the body between `a` and `b` (or on `a` alone) yields what the full model yields.
     """
-    return contact_share(group, reduction, "u_n", a, b).law_stiffness
+    return contact_share(group, reduction, "u_n", a, b, sectors).law_stiffness
 
 
 def without_bulk(stiffness: float, share: Share) -> float:
@@ -155,18 +158,21 @@ def sentence(basis: ModalBasis, group: ModalGroup) -> str:
     found = [s for s in shares(group, basis.reduction, basis.sectors) if s.kind in ("translation", "squeeze")]
     if not found:
         return "The body has no contact, so there is no compliance to share with a law."
+    place = "at each contact" if basis.sectors == 1 else "in each gap"
     left = [s for s in found if s.left]
     if left:
         worst = min(left, key=lambda s: (s.kind != "squeeze", s.held / s.static))
+        place = place if worst.kind == "squeeze" else "there"
         return (
             f"The basis leaves {worst.left:.4g} m/N of the body's elasticity to the contact law ({worst.label}): "
-            f"besides the surface a law must bring a spring of {worst.law_stiffness:.3g} N/m at each contact."
+            f"besides the surface a law must bring a spring of {worst.law_stiffness:.3g} N/m {place}."
         )
     bulk = max(found, key=lambda s: (s.kind == "squeeze", s.beyond / s.static))
+    place = place if bulk.kind == "squeeze" else "there"
     who = "The residual flexibility in the file supplies" if basis.reduction in SUPPLIED else "The basis holds"
     if not bulk.beyond:
         return f"{who} all static compliance at the contacts: a law must bring the surface only."
     return (
         f"{who} all static compliance at the contacts: a law must bring the surface only, and {bulk.beyond:.4g} m/N "
-        f"({bulk.label}, a spring of {bulk.contacts / bulk.beyond:.3g} N/m at each contact) must not be in it again."
+        f"({bulk.label}, a spring of {bulk.contacts / bulk.beyond:.3g} N/m {place}) must not be in it again."
     )
