@@ -260,11 +260,17 @@ class Rotation(Model):
     spin_softening: bool = True
     gyroscopic: bool = True
     engine_orders: Annotated[tuple[EngineOrder, ...], BeforeValidator(_tuple)] = ()
+    range_rpm: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)] | None = None
+    range_points: Annotated[int, Field(ge=2, le=2000)] = 50
+    range_tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-8, le=1e-2)] = 1e-4
+    range_stress: bool = False
 
     @model_validator(mode="after")
     def _sensible(self) -> Rotation:
         if not self.speeds_rpm or min(self.speeds_rpm) < 0 or list(self.speeds_rpm) != sorted(set(self.speeds_rpm)):
             raise ValueError("speeds_rpm must be one or more rising numbers, none negative")
+        if self.range_rpm is not None and self.range_rpm[0] >= self.range_rpm[1]:
+            raise ValueError("range_rpm must be two speeds, the second above the first; for one speed use speeds_rpm")
         return self
 
 

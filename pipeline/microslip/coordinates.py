@@ -20,33 +20,43 @@ def in_modes(g: ModalGroup) -> ModalGroup:
     if V is None:
         return g
     p = len(g.omega)
+    return replace(
+        in_coordinates(g, V),
+        kind=own_kind(g),
+        M_r=np.eye(p),
+        K_r=np.diag(g.omega**2),
+        compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
+        gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
+        to_diagonal=None,
+    )
+
+
+def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
+    """Matrices, shapes, rows and stresses in coordinates p with q = V p; V is (c, m). What is not congruent stays."""
 
     def face(i: Interface) -> Interface:
         shapes = i.shapes @ V
-        more = i.characteristic @ V if len(i.characteristic) else np.zeros((0, p))
+        more = i.characteristic @ V if len(i.characteristic) else np.zeros((0, V.shape[1]))
         fit = _fit_residual(i, shapes, i.rows @ V)
         return replace(i, rows=i.rows @ V, shapes=shapes, fit_residual=fit, characteristic=more)
 
     def rows(named: Rows) -> Rows:
         return replace(named, rows=named.rows @ V)
 
+    H = V.conj().T
     return replace(
         g,
-        kind=own_kind(g),
-        M_r=np.eye(p),
-        K_r=np.diag(g.omega**2),
-        C_r=V.conj().T @ g.C_r @ V,
-        G_r=V.conj().T @ g.G_r @ V,
+        M_r=H @ g.M_r @ V,
+        K_r=H @ g.K_r @ V,
+        C_r=H @ g.C_r @ V,
+        G_r=H @ g.G_r @ V,
         phi=g.phi @ V,
         interfaces={k: face(i) for k, i in g.interfaces.items()},
         excitations={k: rows(r) for k, r in g.excitations.items()},
         monitors={k: rows(r) for k, r in g.monitors.items()},
         gauges={k: rows(r) for k, r in g.gauges.items()},
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
-        compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
         run_up=_run_up(g.run_up, V),
-        gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
-        to_diagonal=None,
     )
 
 
@@ -60,11 +70,12 @@ def own_kind(g: ModalGroup) -> tuple[str, ...]:
 
 def _modal(g: ModalGroup) -> Array:
     """Compliance in the modes alone: what the massless coordinates or the forces add to it is taken out again."""
-    rows = _compliance_rows(g)
+    rows = compliance_rows(g)
     return g.compliance.modal - static_part(rows, g.compliance.labels, g.kind, g.K_r)
 
 
-def _compliance_rows(g: ModalGroup) -> Array:
+def compliance_rows(g: ModalGroup) -> Array:
+    """(r, m) rows in the order of the compliance labels."""
     return np.array([compliance_row(g, label) for label in g.compliance.labels]).reshape(-1, g.n_modes)
 
 

@@ -329,6 +329,47 @@ class ModalGroup:
 
 
 @dataclass(frozen=True)
+class SpeedRange:
+    """The body at every speed of a range in one set of coordinates (of one nodal diameter).
+
+    What depends on speed is the polynomial through the samples, entry by entry; G_r grows with Omega.
+
+    Attributes:
+        samples: s groups at rising speeds in the SAME c coordinates: M_r = 1, K_r the projected stiffness about the
+            equilibrium there, to_diagonal the modes; phi and patch shapes are one array for all.
+        solved: (s,) True where the modes were solved for (certified), False where only the equilibrium was.
+        form: what of the stiffness is interpolated: ``stiffness`` K_r, or its ``root`` K_r^(1/2).
+        shift: a of the variable sqrt(Omega^2 + a) of all polynomials, (rad/s)^2; None: the variable is Omega^2.
+        count: modes kept in a group made from the range.
+        lead: (k, c) read-outs that decide the basis of pairs; the first `signs` of them decide signs (0: phi does).
+        held_out: (h,) rad/s, speeds at which the true stiffness was compared: largest relative frequency error of the
+            kept modes by interpolation, by projection, and in total, (h,) each.
+        tolerance: that the total was held to. points: (p,) rad/s, speeds of the Campbell diagram.
+        gyroscopic: whether groups made from the range have their gyroscopic modes.
+    """
+
+    samples: tuple[ModalGroup, ...]
+    solved: Array
+    form: str
+    shift: float | None
+    count: int
+    lead: Array
+    signs: int
+    held_out: Array
+    interpolation_error: Array
+    projection_error: Array
+    total_error: Array
+    tolerance: float
+    points: Array
+    gyroscopic: bool = False
+
+    @property
+    def speeds(self) -> Array:
+        """(s,) rad/s."""
+        return np.array([g.speed for g in self.samples])
+
+
+@dataclass(frozen=True)
 class ModalBasis:
     """Everything a modal file holds: the body, its mesh, and a `ModalGroup` per speed (and nodal diameter).
 
@@ -341,6 +382,7 @@ class ModalBasis:
         reduction: name of the method.
         sectors: N; 1 for a body without cyclic symmetry. Then mass, centre and inertia are those of one sector.
         cyclic_faces: names of its left and right face in the mesh; right is left turned by 2 pi / N.
+        ranges: nodal diameter -> the body over a range of speeds.
         provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
     """
 
@@ -358,3 +400,4 @@ class ModalBasis:
     provenance: Mapping[str, str]
     sectors: int = 1
     cyclic_faces: tuple[str, str] = ("cyclic_left", "cyclic_right")
+    ranges: Mapping[int, SpeedRange] = field(default_factory=dict)

@@ -25,7 +25,7 @@ from .body import BodySettings, implausible, load_body, load_toml
 from .case import CaseResult, load_case, run_case
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, GyroscopicModes, Mesh, ModalBasis, UserError
+from .data import Array, GyroscopicModes, Mesh, ModalBasis, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
@@ -41,7 +41,9 @@ _MODES_CODE = (
     "coordinates.py", "fem", "reduction", "modes",
 )  # fmt: skip
 _CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")
-_REPORT_CODE = ("pictures", "campbell.py", "report.py", "truncation.py", "compliance.py", "basis/checks.py")
+_REPORT_CODE = (
+    "pictures", "campbell.py", "speed_range.py", "report.py", "truncation.py", "compliance.py", "basis/checks.py",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -524,4 +526,21 @@ def basis_summary(basis: ModalBasis) -> list[str]:
             lines += [f"  {i + 1:4d}  {row}" for i, row in enumerate(whirl_rows(g.gyroscopic))]
     if any(group.interfaces for group in basis.groups.values()):
         lines.append(f"compliance: {sentence(basis, basis.groups[min(basis.groups)])}")
+    return lines + [line for k, r in sorted(basis.ranges.items()) for line in range_summary(k, r)]
+
+
+def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
+    """Samples and held-out errors of a speed range, in lines for the terminal."""
+    rpm = [f"{v:.6g}" for v in r.speeds * 30 / np.pi]
+    solved = [v for v, s in zip(rpm, r.solved, strict=True) if s]
+    lines = [
+        f"{rpm[0]} to {rpm[-1]} rpm, nodal diameter {harmonic}: one basis of {r.samples[0].n_modes} coordinates for "
+        f"{r.count} modes",
+        f"  modes solved for at {', '.join(solved)} rpm; stiffness known at {', '.join(rpm)} rpm",
+    ]
+    held = zip(r.held_out * 30 / np.pi, r.interpolation_error, r.projection_error, r.total_error, strict=True)
+    lines += [
+        f"  held out {v:.6g} rpm: frequency error {total:.1e} (interpolation {a:.1e}, projection {b:.1e})"
+        for v, a, b, total in held
+    ]
     return lines

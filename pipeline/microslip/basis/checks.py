@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..coordinates import compliance_row, held, in_modes
-from ..data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp
+from ..data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp, SpeedRange
 from ..gyroscopic import stability_sentence
 from .integrals import face_mean, modal_mass
 
@@ -54,6 +54,9 @@ def _check_basis(basis: ModalBasis) -> list[Check]:
         where = f"speed_{speed}/nd_{harmonic}"
         for name, value, bound, remark in _group_checks(basis, g, sound):
             out.append(Check(f"{where}: {name}", float(value), bound, bool(value <= bound), remark))
+    for harmonic, r in sorted(basis.ranges.items()):
+        for name, value, bound, remark in _range_checks(basis, r, sound):
+            out.append(Check(f"range/nd_{harmonic}: {name}", float(value), bound, bool(value <= bound), remark))
     return out
 
 
@@ -111,6 +114,28 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     if "certified" in g.checks:
         remark = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
         found.append(("solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, remark))
+    return found
+
+
+def _range_checks(basis: ModalBasis, r: SpeedRange, mesh_is_sound: bool) -> _Findings:
+    """The samples like groups (shapes and patches, which they share, once), and what the range claims of itself."""
+    s, c, h = len(r.samples), r.samples[0].n_modes, len(r.held_out)
+    errors = (r.interpolation_error, r.projection_error, r.total_error)
+    fits = r.solved.shape == (s,) and r.lead.shape[1] == c and 0 < r.count <= c and 0 <= r.signs <= len(r.lead)
+    fits = fits and all(e.shape == (h,) for e in errors) and all(g.n_modes == c for g in r.samples)
+    fits = fits and r.form in ("stiffness", "root")
+    found: _Findings = [("shapes of the arrays agree", 0.0 if fits else 1.0, 0.0, "")]
+    numbers = [r.lead, r.held_out, *errors, r.points, 0.0 if r.shift is None else r.shift, r.tolerance]
+    found.append(("every number is finite", _not_finite(numbers), 0.0, ""))
+    if not fits or found[-1][1]:
+        return found
+    found.append(("speeds of the samples rise", float((np.diff(r.speeds) <= 0).sum()), 0.0, ""))
+    shift = r.speeds[0] ** 2 + (1.0 if r.shift is None else r.shift)
+    found.append(("variable of the polynomials is real", 0.0 if shift > 0 else 1.0, 0.0, ""))
+    found.append(("frequency error at held-out speeds", _largest(r.total_error), r.tolerance, f"{h} speeds"))
+    for i, g in enumerate(r.samples):
+        for name, value, bound, remark in _group_checks(basis, g, mesh_is_sound and i == 0):
+            found.append((f"sample_{i}: {name}", value, bound, remark))
     return found
 
 

@@ -9,6 +9,7 @@ which damage is found before HDF5 meets it.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from ..data import (
     ModalGroup,
     Rows,
     RunUp,
+    SpeedRange,
     StressSet,
     UserError,
 )
@@ -90,6 +92,8 @@ def _write(file: h5py.File, basis: ModalBasis) -> None:
         where.attrs["rpm"] = group.speed * 30 / np.pi
         where.attrs["Omega"] = group.speed
         _write_group(where.create_group(f"nd_{harmonic}"), group, basis.rotation_axis)
+    for harmonic, found in sorted(basis.ranges.items()):
+        _write_range(file.create_group(f"range/nd_{harmonic}"), found, basis.rotation_axis)
 
 
 def _write_root(file: h5py.File, basis: ModalBasis) -> None:
@@ -219,6 +223,28 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     checks = group.create_group("checks")
     for name, value in sorted(g.checks.items()):
         put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
+
+
+_RANGE_FIELDS = ("held_out", "interpolation_error", "projection_error", "total_error", "points")
+
+
+def _write_range(group: h5py.Group, r: SpeedRange, axis: Array) -> None:
+    """The samples as groups like any other; what they share, phi and patch shapes, stands in the first alone."""
+    group.attrs["form"], group.attrs["count"], group.attrs["signs"] = r.form, r.count, r.signs
+    group.attrs["shift"] = np.nan if r.shift is None else r.shift
+    group.attrs["tolerance"], group.attrs["gyroscopic"] = r.tolerance, int(r.gyroscopic)
+    put(group, "solved", r.solved.astype(np.int64), dims=("sample",))
+    put(group, "lead", r.lead, dims=("lead", "mode"))
+    for name in _RANGE_FIELDS:
+        unit = "rad/s" if name in ("held_out", "points") else "1"
+        put(group, name, getattr(r, name), unit, dims=("point" if name == "points" else "held_out",))
+    for i, g in enumerate(r.samples):
+        if i:
+            faces = {k: replace(f, shapes=f.shapes[:0]) for k, f in g.interfaces.items()}
+            g = replace(g, phi=g.phi[:0], interfaces=faces)
+        where = group.create_group(f"sample_{i}")
+        where.attrs["rpm"], where.attrs["Omega"] = g.speed * 30 / np.pi, g.speed
+        _write_group(where, g, axis)
 
 
 _ROW_FIELDS = {"excitation": "excitations", "monitor": "monitors", "gauge": "gauges"}
@@ -447,13 +473,16 @@ def _read(file: h5py.File) -> ModalBasis:
                     groups[key] = _read_group(file, where, group, mesh)
     if not groups:
         raise ValueError("no speed group")
+    ranges = {}
+    for sub, group in file["range"].items() if "range" in file else ():
+        ranges[int(sub.removeprefix("nd_"))] = _read_range(file, group, mesh)
     return ModalBasis(
         name=str(file.attrs["name"]), mesh=mesh, groups=groups, mass=float(_array(file, "body/mass")),
         centre=_array(file, "body/centre", 3), inertia=_array(file, "body/inertia", 3, 3),
         rotation_axis=_array(file, "rotation/direction", 3), rotation_point=_array(file, "rotation/point", 3),
         damping_source=str(file.attrs["damping_source"]),
         free=bool(file.attrs["free"]), reduction=str(file.attrs["reduction"]),
-        provenance={k: str(v) for k, v in file["provenance"].attrs.items()}, sectors=sectors,
+        provenance={k: str(v) for k, v in file["provenance"].attrs.items()}, sectors=sectors, ranges=ranges,
         **_cyclic_faces(file, sectors),
     )  # fmt: skip
 
@@ -536,6 +565,28 @@ def _read_gyroscopic(where: h5py.Group, m: int) -> GyroscopicModes:
     return GyroscopicModes(
         omega, _array(where, "shapes", m, w).astype(complex), _array(where, "growth", w), _array(where, "sense", w),
         _texts(where, "direction", w), _array(where, "error", w),
+    )  # fmt: skip
+
+
+def _read_range(file: h5py.File, group: h5py.Group, mesh: Mesh) -> SpeedRange:
+    samples: list[ModalGroup] = []
+    for i in range(sum(name.startswith("sample_") for name in group)):
+        where = group[f"sample_{i}"]
+        g = _read_group(file, where, where, mesh)
+        if samples:
+            first = samples[0]
+            faces = {k: replace(f, shapes=first.interfaces[k].shapes) for k, f in g.interfaces.items()}
+            g = replace(g, phi=first.phi, interfaces=faces)
+        samples.append(g)
+    if len(samples) < 2:
+        raise ValueError(f"{group.name} holds fewer than two samples")
+    h, shift = len(group["held_out"]), float(group.attrs["shift"])
+    return SpeedRange(
+        samples=tuple(samples), solved=np.asarray(group["solved"][()]).astype(bool), form=str(group.attrs["form"]),
+        shift=None if np.isnan(shift) else shift, count=int(group.attrs["count"]),
+        lead=_array(group, "lead", None, samples[0].n_modes), signs=int(group.attrs["signs"]),
+        tolerance=float(group.attrs["tolerance"]), gyroscopic=bool(group.attrs["gyroscopic"]),
+        **{name: _array(group, name, None if name == "points" else h) for name in _RANGE_FIELDS},
     )  # fmt: skip
 
 

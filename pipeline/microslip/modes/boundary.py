@@ -45,6 +45,8 @@ def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array
         )
     if settings.free and any(settings.rotation.speeds_rpm):
         raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")
+    if settings.free and settings.rotation.range_rpm is not None:
+        raise UserError("rotation.range_rpm: a free body has no equilibrium at speed; hold it or leave the range out")
     if settings.free and settings.loads:
         raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
 

@@ -17,6 +17,7 @@ from ..data import (
     ModalBasis,
     ModalGroup,
     RunUp,
+    SpeedRange,
     StressSet,
 )
 from ..fem.discretise import Discretisation, discretise, free_upper
@@ -80,6 +81,11 @@ def modal_basis(
             before = speed
             made = _groups(model, settings, state, speed, motions, rows, solver, sector, report)
             groups |= {(number, k): group for k, group in made.items()}
+        ranges: dict[int, SpeedRange] = {}
+        if settings.rotation.range_rpm is not None:
+            from .body_range import body_ranges  # which itself calls `assemble_group`
+
+            ranges = body_ranges(model, settings, motions, rows, solver, sector, report)
     finally:
         solver.close()
         if sector is not None:
@@ -87,6 +93,7 @@ def modal_basis(
     basis = ModalBasis(
         settings.name, mesh, groups, mass, centre, inertia, model.axis, point, settings.damping.source,
         bool(motions.shape[1]), settings.reduction, dict(provenance or {}),
+        ranges=ranges,
     )  # fmt: skip
     if (cyclic := settings.cyclic) is None:
         return basis

@@ -1,0 +1,199 @@
+"""The speed ranges of a body, one a nodal diameter: `common_coordinates` fed with finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .. import eigen
+from ..body import BodySettings
+from ..data import Array, ModalGroup, SpeedRange, UserError
+from ..reduction import Reduced
+from . import canonical
+from .body_rows import BodyRows
+from .common import SPARE, Common, Settled, Solved, common_coordinates, lagrange
+from .compute import assemble_group
+from .equilibrium import BodyModel, StaticState, equilibrium
+from .sector import HarmonicUnknowns, Sector, sector_pencils
+from .solution import Solution, Unknowns, solution
+from .spectrum import leading_rows, make_pencil
+
+Report = Callable[[str], None]
+
+
+def body_ranges(
+    model: BodyModel, settings: BodySettings, motions: Array, rows: BodyRows, solver: eigen.DirectSolver,
+    sector: Sector | None, report: Report,
+) -> dict[int, SpeedRange]:  # fmt: skip
+    """Nodal diameter -> one basis for all speeds of `rotation.range_rpm`. Equilibria are shared.
+
+    Raises:
+        UserError: instability inside the range. NotConverged: the tolerance cannot be met.
+    """
+    r = settings.rotation
+    assert r.range_rpm is not None
+    low, high = (v * np.pi / 30 for v in r.range_rpm)
+    report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
+    body = _Body(model, settings, motions, rows, solver, sector, report)
+    found: dict[int, Common] = {}
+    try:
+        for k in sector.harmonics if sector else (0,):
+            if sector:
+                report(f"speed range of nodal diameter {k}")
+            before = found[max(found)] if found else None
+            found[k] = common_coordinates(
+                body.settled(k), body.solve(k), low, high, settings.modes.count, r.range_tolerance, report, before
+            )
+    except UserError as error:
+        raise UserError(str(error).replace("rotation.speeds_rpm", "rotation.range_rpm")) from error
+    return {k: _range(body, k, common) for k, common in found.items()}
+
+
+@dataclass
+class _Body:
+    """What the speeds and nodal diameters of a range share: equilibria, and solutions where all come at once."""
+
+    model: BodyModel
+    settings: BodySettings
+    motions: Array
+    rows: BodyRows
+    solver: eigen.DirectSolver
+    sector: Sector | None
+    report: Report
+    states: dict[float, StaticState] = field(default_factory=dict)
+    pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
+    solutions: dict[float, Mapping[int, Solution]] = field(default_factory=dict)
+
+    def unknowns(self, k: int) -> Unknowns:
+        if self.sector is None:
+            return self.model.free
+        return HarmonicUnknowns(self.sector.unknowns, self.sector.unknowns.transformation(k))
+
+    def settled(self, k: int) -> Callable[[float, Mapping[float, float]], Settled]:
+        """Equilibrium at a speed; Newton starts from the weighted displacements of the speeds known."""
+
+        def settle(speed: float, weights: Mapping[float, float]) -> Settled:
+            if speed not in self.states:
+                self._settle(speed, weights)
+            return Settled(speed, self.pencils[speed][k], self.states[speed])
+
+        return settle
+
+    def _settle(self, speed: float, weights: Mapping[float, float]) -> None:
+        start, prestress = None, self.settings.rotation.prestress
+        if weights:
+            u = np.sum([w * self.states[s].u for s, w in weights.items()], axis=0)
+            start = StaticState(u, None, [], np.zeros(0), prestress)
+        self.report(f"equilibrium at {speed * 30 / np.pi:.6g} rpm")
+        state = equilibrium(self.model, speed, prestress, self.solver, start, self.report)
+        s = self.sector
+        self.pencils[speed] = (
+            {0: make_pencil(self.model, state.K, self.solver)}
+            if s is None
+            else sector_pencils(self.model, state.K, s.unknowns, s.condensed, s.harmonics)
+        )
+        self.states[speed] = state
+
+    def solve(self, k: int) -> Callable[[Settled], Solved]:
+        """Certified modes, and with the methods that use them the static answers and fixed-interface modes."""
+        modes = self.settings.modes.model_copy(update={"count": self.settings.modes.count + SPARE})
+        more = self.settings.model_copy(update={"modes": modes})
+
+        def solve(settled: Settled) -> Solved:
+            speed = settled.speed
+            if speed not in self.solutions:
+                common = (self.motions, self.rows, self.report)
+                self.solutions[speed] = (
+                    {0: solution(self.model, more, settled.pencil, speed, *common)}
+                    if self.sector is None
+                    else self.sector.solutions(self.model, more, self.states[speed], speed, *common)
+                )
+            found = self.solutions[speed][k]
+            shapes = [found.found.vectors]
+            if self.settings.reduction not in ("eigenmodes", "macneal"):
+                shapes += [found.reduced.vectors, found.answers]
+            return Solved(np.hstack(shapes), float(found.found.values[0]), found)
+
+        return solve
+
+
+def _range(body: _Body, k: int, common: Common) -> SpeedRange:
+    model, settings = body.model, body.settings
+    phi = body.unknowns(k).expand(common.V, model.d.mesh.n_points)
+    r, held = settings.rotation, common.held_out
+    assert r.range_rpm is not None
+    return SpeedRange(
+        samples=tuple(_samples(body, k, common, phi)),
+        solved=np.array([s.speed in common.solved for s in common.samples]),
+        form=common.form,
+        shift=common.shift,
+        count=_kept(settings, common),
+        lead=leading_rows(body.rows, settings, phi, canonical.by_place(model.d.mesh.points))(phi),
+        signs=6 if settings.interfaces else 0,
+        held_out=np.array([h.speed for h in held]),
+        interpolation_error=np.array([h.interpolation for h in held]),
+        projection_error=np.array([h.projection for h in held]),
+        total_error=np.array([h.total for h in held]),
+        tolerance=r.range_tolerance,
+        points=np.linspace(*r.range_rpm, r.range_points) * np.pi / 30,
+        gyroscopic=r.gyroscopic,
+    )
+
+
+def _kept(settings: BodySettings, common: Common) -> int:
+    if settings.modes.max_frequency is None:
+        return settings.modes.count
+    return max(s.solution.kept for s in common.solved.values())
+
+
+def _samples(body: _Body, k: int, common: Common, phi: Array) -> list[ModalGroup]:
+    """The body at each sample in the common coordinates; what does not depend on speed is one array for all."""
+    B, labels = body.rows.stacked(body.settings)
+    T = np.asarray(B @ phi) if labels else np.zeros((0, phi.shape[1]))
+    known: Solution = next(iter(common.solved.values())).solution
+    out: list[ModalGroup] = []
+    for settled, K_r, left in zip(common.samples, common.K_r, _missing_compliance(common, T), strict=True):
+        values, Y = np.linalg.eigh(K_r)
+        omega = np.sqrt(np.maximum(values, 0.0))
+        static = T @ np.linalg.solve(K_r, T.conj().T) + left
+        solved = common.solved.get(settled.speed)
+        s = replace(
+            solved.solution if solved else known,
+            reduced=Reduced(common.V, ("common",) * len(omega), np.eye(len(omega)), K_r, omega, Y),
+            static=0.5 * (static + static.conj().T),
+        )
+        group = assemble_group(
+            body.model, _light(body.settings), settled.state, settled.speed, body.rows, s, k, lambda _: None
+        )
+        checks = {"orthogonality": common.orthogonality, "newton_steps": float(settled.state.iterations)}
+        if solved:
+            checks["certified"] = float(s.found.certified)
+        compliance = replace(group.compliance, eigenmodes=None)
+        group = replace(group, checks=checks, compliance=compliance)
+        out.append(_shared(group, out[0]) if out else group)
+    return out
+
+
+def _missing_compliance(common: Common, T: Array) -> Array:
+    """(s, r, r) static compliance that the common coordinates leave out: known where solved, a polynomial between."""
+    at = {s.speed: K for s, K in zip(common.samples, common.K_r, strict=True)}
+    speeds = sorted(common.solved)
+    known = [common.solved[s].solution.static - T @ np.linalg.solve(at[s], T.conj().T) for s in speeds]
+    weights = [lagrange(np.array(speeds), s.speed, common.shift) for s in common.samples]
+    return np.tensordot(np.array(weights), np.array(known), 1)
+
+
+def _light(settings: BodySettings) -> BodySettings:
+    """No gyroscopic modes, and stress modes of all common coordinates at every sample only if asked for."""
+    rotation = settings.rotation.model_copy(update={"gyroscopic": False})
+    output = settings.output
+    if not settings.rotation.range_stress:
+        output = output.model_copy(update={"gauss": False, "nodal_stress": False})
+    return settings.model_copy(update={"output": output, "rotation": rotation})
+
+
+def _shared(group: ModalGroup, first: ModalGroup) -> ModalGroup:
+    faces = {k: replace(i, shapes=first.interfaces[k].shapes) for k, i in group.interfaces.items()}
+    return replace(group, phi=first.phi, interfaces=faces)

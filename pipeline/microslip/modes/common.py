@@ -1,0 +1,394 @@
+"""One set of coordinates for a whole range of rotation speeds, and the proof that it serves.
+
+The shapes found at a few solved speeds span common coordinates V; the exact operators about the equilibria of all
+samples are projected on V, K_r = V^H K V, and interpolated entry by entry (Lagrange, barycentric weights: Berrut and
+Trefethen, SIAM Review 46 (2004) 501). No mode is matched with another or differentiated, so veerings and crossings
+do not matter. Two forms are tried and the better one is kept:
+
+- ``stiffness``: K_r as a polynomial in Omega^2. Exact without prestress (affine) and with linear prestress
+  (quadratic). About a nonlinear equilibrium the shapes turn with the body; in fixed coordinates the small energy of
+  a bending mode is then left of large entries that cancel, and the interpolation is poor.
+- ``root``: K_r^(1/2), whose eigenvalues are the frequencies and whose entries cancel far less, as a polynomial in
+  sqrt(Omega^2 + a): by Southwell's law omega^2 = B (Omega^2 + a) the first frequency is a straight line in it.
+
+Two errors are told apart at held-out speeds, where the true equilibrium and the true K are at hand:
+interpolation (frequencies from the interpolated against those from the projected K) and projection (from the
+projected K against those with the residuals of all modes added to V, each solved for once). The factorisation that
+this takes also counts the eigenvalues below the band, so that a mode which the samples do not know is noticed.
+
+Nothing here knows finite elements: the body comes as two functions. All arrays may be complex (Hermitian K).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .. import eigen
+from ..data import Array, NotConverged
+
+SPAN = 1e-12
+"""Directions of the union of shapes whose squared M-norm is a smaller share than this are rounding."""
+
+SPARE = 4
+"""Modes solved for beyond those wanted: one that comes down into the band between two samples is then known."""
+
+MOST = 12
+"""Samples at most: a range that needs more is better cut in two."""
+
+CLEAR = 0.02
+"""Eigenvalues that differ by this share are told apart by a count between them."""
+
+FAR = 30.0
+"""Where the error is so many times the tolerance, more than one sample is added at a time."""
+
+FORMS = ("stiffness", "root")
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The body in equilibrium at one speed, rad/s: its operators there, and whatever the caller keeps of the state."""
+
+    speed: float
+    pencil: eigen.Pencil
+    state: Any
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Shapes (n, k) of one speed that belong into the common coordinates, its lowest eigenvalue, (rad/s)^2, and what
+    the caller keeps of the solution."""
+
+    shapes: Array
+    lowest: float
+    solution: Any
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Largest relative frequency errors at a speed (rad/s) that is no sample; infinite if a mode is missing."""
+
+    speed: float
+    interpolation: float
+    projection: float
+    total: float
+
+
+@dataclass(frozen=True)
+class Common:
+    """Common coordinates of a range.
+
+    Attributes:
+        V: (n, c) M-orthonormal shapes. samples: the settled body at rising speeds. K_r: (s, c, c) at the samples.
+        solved: speed -> its solution. held_out: the errors found. orthogonality: largest entry of |V^H M V - 1|.
+        form: ``stiffness`` or ``root``. shift: a of the variable sqrt(Omega^2 + a), (rad/s)^2; None for Omega^2.
+    """
+
+    V: Array
+    samples: list[Settled]
+    K_r: Array
+    solved: dict[float, Solved]
+    held_out: list[HeldOut]
+    orthogonality: float
+    form: str
+    shift: float | None
+
+
+# interpolation -----------------------------------------------------------------------------------------------------
+
+
+def variable(speeds: Array | float, shift: float | None) -> Array:
+    """What f is a polynomial of: Omega^2, or sqrt(Omega^2 + shift)."""
+    x = np.asarray(speeds, dtype=float) ** 2
+    return x if shift is None else np.sqrt(x + shift)
+
+
+def lagrange(samples: Array, speed: float, shift: float | None = None) -> Array:
+    """(s,) weights of the samples at a speed: f(speed) = sum of weight times f(sample)."""
+    t, at = variable(samples, shift), float(variable(speed, shift))
+    gap = (at - t) / t[-1]
+    if (hit := np.abs(gap) < 1e-14).any():
+        return np.where(np.arange(len(t)) == int(hit.argmax()), 1.0, 0.0)
+    weights = 1 / (((t[:, None] - t) / t[-1] + np.eye(len(t))).prod(axis=1) * gap)
+    return weights / weights.sum()
+
+
+def root(K: Array) -> Array:
+    """Hermitian square root of a positive definite matrix."""
+    values, Q = np.linalg.eigh(K)
+    return (Q * np.sqrt(np.maximum(values, 0.0))) @ Q.conj().T
+
+
+def interpolated(K: Array, weights: Array, form: str) -> Array:
+    """(c, c) stiffness from those of the samples (s, c, c)."""
+    if form == "stiffness":
+        return np.tensordot(weights, K, 1)
+    S = np.tensordot(weights, np.array([root(k) for k in K]), 1)
+    return S @ S.conj().T
+
+
+def probes(samples: Array, K: Array, form: str, shift: float | None, kept: Sequence[float], count: int) -> list[float]:
+    """Two held-out speeds: those kept, and more where the frequencies are likely to err most.
+
+    The error of a polynomial f through the samples t_i is about its last coefficient f[t_0 .. t_s] times the product
+    of all t - t_i; what that does to the first `count` frequencies is looked at on a grid.
+    """
+    F = K if form == "stiffness" else np.array([root(k) for k in K])
+    t = variable(samples, shift)
+    reach = t[-1] - t[0]
+    last = np.tensordot(1 / ((t[:, None] - t) / reach + np.eye(len(t))).prod(axis=1), F, 1)
+    at = t[0] + 0.5 * reach * (1 - np.cos(np.pi * np.arange(1, 80) / 80))
+    grid = np.sqrt(at if shift is None else at**2 - shift)
+    size = np.abs((at[:, None] - t) / reach).prod(axis=1)
+    power = 1 if form == "stiffness" else 2
+    effect = []
+    for speed, share in zip(grid, size, strict=True):
+        here = np.tensordot(lagrange(samples, float(speed), shift), F, 1)
+        values, changed = (np.abs(np.linalg.eigvalsh(A)[:count]) ** power for A in (here, here + share * last))
+        effect.append(np.abs(np.sqrt(changed / np.maximum(values, 1e-300)) - 1).max() + 1e-9 * share / size.max())
+    found = list(kept)
+    while len(found) < 2:
+        away = np.abs((at[:, None] - variable(np.array(found), shift)) / reach).prod(axis=1) if found else 1.0
+        found.append(float(grid[(np.array(effect) * away).argmax()]))
+    return sorted(found)
+
+
+# common coordinates ------------------------------------------------------------------------------------------------
+
+
+def orthonormal_union(shapes: Array, M: eigen.MatVec) -> tuple[Array, float]:
+    """(n, c) M-orthonormal basis of the span of shapes, rounding left out, and its largest entry of |V^H M V - 1|."""
+    gram = shapes.conj().T @ M(shapes)
+    V = shapes / np.sqrt(np.diag(gram).real)
+    for limit in (SPAN, 0.0, 0.0):  # the second pass cleans what the first leaves; the third confirms
+        gram = V.conj().T @ M(V)
+        gram = 0.5 * (gram + gram.conj().T)
+        worst = float(np.abs(gram - np.eye(len(gram))).max())
+        if worst < 1e-13:
+            break
+        w, Q = np.linalg.eigh(gram)
+        keep = w > limit * w[-1]
+        V = V @ (Q[:, keep] / np.sqrt(w[keep]))
+    return V, worst
+
+
+def projected(K: eigen.MatVec, V: Array) -> Array:
+    K_r = V.conj().T @ K(V)
+    return 0.5 * (K_r + K_r.conj().T)
+
+
+def frequencies(K_r: Array, count: int) -> Array:
+    """(count,) rad/s of the lowest eigenvalues; negative ones count as zero."""
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(K_r)[:count], 0.0))
+
+
+def largest_difference(omega: Array, reference: Array) -> float:
+    """Frequencies are compared in ascending order: eigenvalues move continuously also where modes veer or cross."""
+    return float(np.abs(omega / np.maximum(reference, 1e-300) - 1).max())
+
+
+# held-out speeds ---------------------------------------------------------------------------------------------------
+
+
+def better_frequencies(held: Settled, V: Array, K_r: Array, count: int) -> Array | None:
+    """(count,) rad/s with the residuals of all modes, solved for once, added to V; None if a mode is missing.
+
+    r = (K - theta M) V y is what V leaves of a mode; (K - sigma M)^-1 r is its correction (one step of Davidson's
+    method with the exact inverse), so the error that is left is of second order in that of V.
+    """
+    pencil = held.pencil
+    theta, Y = np.linalg.eigh(K_r)
+    band, sigma = _end_of_band(theta, count)
+    X = V @ Y[:, :band]
+    residual = pencil.K(X) - pencil.M(X) * theta[:band]
+    pencil.solver.factorise(pencil.shifted(sigma))
+    below = pencil.solver.negative()
+    more = pencil.solve(residual)
+    MV = pencil.M(V)
+    for _ in range(2):
+        more = more - V @ (MV.conj().T @ more)
+    size = np.sqrt(np.einsum("ij,ij->j", more.conj(), pencil.M(more)).real)
+    V = V if size.max() < 1e-13 else orthonormal_union(np.hstack([V, more[:, size > 1e-13]]), pencil.M)[0]
+    values = np.linalg.eigvalsh(projected(pencil.K, V))
+    if below != (values < sigma).sum():
+        return None
+    return np.sqrt(np.maximum(values[:count], 0.0))
+
+
+def _end_of_band(theta: Array, count: int) -> tuple[int, float]:
+    """How many values, at least `count`, lie below a shift, and the shift: in the first clear gap, near its lower end.
+
+    The values are upper bounds, the less exact the higher they are, so those above the gap may come down into it.
+    """
+    if len(theta) <= count:
+        return len(theta), float(theta[-1]) * 1.01
+    last = min(count + SPARE, len(theta) - 1)
+    gaps = theta[count : last + 1] / np.maximum(theta[count - 1 : last], 1e-300) - 1
+    clear = np.flatnonzero(gaps > CLEAR)
+    band = count + int(clear[0] if len(clear) else gaps.argmax())
+    return band, float(theta[band - 1]) * (1 + min(0.25 * float(gaps[band - count]), CLEAR))
+
+
+@dataclass
+class _Search:
+    """State of `common_coordinates`: what is known so far."""
+
+    settle: Callable[[float, Mapping[float, float]], Settled]
+    solve: Callable[[Settled], Solved]
+    count: int
+    samples: dict[float, Settled] = field(default_factory=dict)
+    solved: dict[float, Solved] = field(default_factory=dict)
+    held: dict[float, Settled] = field(default_factory=dict)
+    form: str = "root"
+    shift: float | None = None
+    V: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    orthogonality: float = 0.0
+    K_r: dict[float, Array] = field(default_factory=dict)
+
+    def settled(self, speed: float) -> Settled:
+        """Equilibrium at a speed, begun from those known."""
+        known = sorted({*self.samples, *self.held})
+        start = {}
+        if len(known) > 1:
+            start = dict(zip(known, lagrange(np.array(known), speed, self.shift), strict=True))
+        return self.settle(speed, start)
+
+    def add(self, settled: Settled, solved: bool) -> None:
+        """Make a speed a sample; a solved one widens the coordinates."""
+        self.samples[settled.speed] = settled
+        self.held.pop(settled.speed, None)
+        if solved:
+            self.solved[settled.speed] = self.solve(settled)
+            self.V, self.K_r = np.zeros((0, 0)), {}
+
+    def begin(self, low: float, high: float) -> None:
+        """Both ends, and between them the middle of the variable that they suggest."""
+        for speed in (low, high):
+            self.add(self.settled(speed), solved=True)
+        rise = (self.solved[high].lowest - self.solved[low].lowest) / (high**2 - low**2)
+        if rise > 0:
+            self.shift = self.solved[low].lowest / rise - low**2
+        middle = 0.5 * float(variable(low, self.shift) + variable(high, self.shift))
+        square = middle if self.shift is None else middle**2 - self.shift
+        self.add(self.settled(float(np.sqrt(square))), solved=True)
+
+    def begin_like(self, other: Common) -> None:
+        self.form, self.shift = other.form, other.shift
+        for sample in other.samples:
+            self.add(self.settled(sample.speed), sample.speed in other.solved)
+        for h in other.held_out:
+            self.held[h.speed] = self.settled(h.speed)
+
+    def hold_out(self) -> None:
+        speeds = sorted(self.samples)
+        K = np.array([self.K_r[s] for s in speeds])
+        shift = self.shift if self.form == "root" else None
+        for speed in probes(np.array(speeds), K, self.form, shift, list(self.held), self.count):
+            if speed not in self.held:
+                self.held[speed] = self.settled(speed)
+
+    def project(self) -> None:
+        """V and the projected K of every sample, as far as they are not known."""
+        if not self.V.size:
+            lowest = self.samples[min(self.samples)].pencil
+            shapes = np.hstack([self.solved[s].shapes for s in sorted(self.solved)])
+            self.V, self.orthogonality = orthonormal_union(shapes, lowest.M)
+            self.V = self.V @ np.linalg.eigh(projected(lowest.K, self.V))[1]  # modes at the lowest speed
+        for speed, settled in self.samples.items():
+            if speed not in self.K_r:
+                self.K_r[speed] = projected(settled.pencil.K, self.V)
+
+    def examine(self) -> list[HeldOut]:
+        """Errors of the better form at every held-out speed."""
+        held = [self.held[s] for s in sorted(self.held)]
+        exact = [projected(h.pencil.K, self.V) for h in held]
+        true = [better_frequencies(h, self.V, K, self.count) for h, K in zip(held, exact, strict=True)]
+        found = {
+            form: [self._errors(form, h.speed, K, f) for h, K, f in zip(held, exact, true, strict=True)]
+            for form in FORMS
+        }
+        self.form = min(FORMS, key=lambda form: max(h.interpolation for h in found[form]))
+        return found[self.form]
+
+    def _errors(self, form: str, speed: float, exact: Array, true: Array | None) -> HeldOut:
+        speeds = sorted(self.samples)
+        weights = lagrange(np.array(speeds), speed, self.shift if form == "root" else None)
+        between = interpolated(np.array([self.K_r[s] for s in speeds]), weights, form)
+        here, guess = frequencies(exact, self.count), frequencies(between, self.count)
+        interpolation = largest_difference(guess, here)
+        if true is None:
+            return HeldOut(speed, interpolation, np.inf, np.inf)
+        return HeldOut(speed, interpolation, largest_difference(here, true), largest_difference(guess, true))
+
+    def widen(self, found: list[HeldOut], tolerance: float, report: Report) -> None:
+        """Held-out speeds that fail become samples; the one with the largest projection error is solved for."""
+        unknown = max(found, key=lambda h: h.projection)
+        worst = max(found, key=lambda h: h.interpolation)
+        for h in found:
+            solved = h is unknown and h.projection > 0.5 * tolerance
+            far = h.interpolation > FAR * tolerance
+            if solved or far or (h is worst and h.interpolation > 0.5 * tolerance):
+                report(f"one sample more: {_rpm(h.speed)}" + (", with its modes" if solved else ""))
+                self.add(self.held[h.speed], solved)
+        if len(self.held) == len(found):  # both within half of the tolerance, their sum is not
+            self.add(self.held[unknown.speed], True)
+
+
+def common_coordinates(
+    settle: Callable[[float, Mapping[float, float]], Settled], solve: Callable[[Settled], Solved], low: float,
+    high: float, count: int, tolerance: float, report: Report = lambda _: None, before: Common | None = None,
+) -> Common:  # fmt: skip
+    """Common coordinates for all speeds between `low` and `high`, rad/s.
+
+    Both ends and one speed between are solved. Where a held-out speed fails by interpolation it becomes a sample
+    (its equilibrium is known already), where it fails by projection its modes are solved for too, and others are
+    held out in its place.
+
+    Args:
+        settle: (speed, weights) -> equilibrium; the displacements at the speeds settled before, times the weights,
+            are a first guess (none: from rest). solve: equilibrium -> its shapes. count: modes whose frequencies
+            must be right. tolerance: relative error of a frequency allowed at held-out speeds. before: of another
+            nodal diameter, whose samples are taken over.
+
+    Raises:
+        NotConverged: `MOST` samples do not suffice.
+    """
+    search = _Search(settle, solve, count)
+    if before is None:
+        search.begin(low, high)
+    else:
+        search.begin_like(before)
+    while True:
+        search.project()
+        search.hold_out()
+        found = search.examine()
+        for h in found:
+            report(
+                f"held out {_rpm(h.speed)}: interpolation ({search.form}) {h.interpolation:.1e}, "
+                f"projection {h.projection:.1e}"
+            )
+        if max(h.total for h in found) <= tolerance:
+            return _result(search, found)
+        if len(search.samples) >= MOST:
+            raise NotConverged(
+                f"{len(search.samples)} samples between {_rpm(low)} and {_rpm(high)} leave a frequency error of "
+                f"{max(h.total for h in found):.1e}; cut the range in two or raise the tolerance {tolerance:g}"
+            )
+        search.widen(found, tolerance, report)
+
+
+def _result(search: _Search, found: list[HeldOut]) -> Common:
+    speeds = sorted(search.samples)
+    K_r = np.array([search.K_r[s] for s in speeds])
+    shift = search.shift if search.form == "root" else None
+    samples = [search.samples[s] for s in speeds]
+    return Common(search.V, samples, K_r, search.solved, found, search.orthogonality, search.form, shift)
+
+
+def _rpm(speed: float) -> str:
+    return f"{speed * 30 / np.pi:.6g} rpm"

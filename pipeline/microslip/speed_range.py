@@ -1,0 +1,271 @@
+"""The body at any speed of a range, from the samples of its modal file: `group_at`, `basis_at`. Pure numpy and scipy.
+
+How the samples are made and interpolated is told in `modes.common`; the reduction that the body file asks for is
+carried out anew at the speed, within the common coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from . import eigen
+from .coordinates import compliance_rows, in_coordinates
+from .data import (
+    Array,
+    Compliance,
+    GyroscopicModes,
+    ModalBasis,
+    ModalGroup,
+    Rows,
+    RunUp,
+    SpeedRange,
+    StressSet,
+    UserError,
+)
+from .gyroscopic import gyroscopic_modes
+from .modes import canonical
+from .modes.common import interpolated, lagrange, root
+from .modes.compute import modal_damping, without_massless
+from .modes.solution import held_compliance
+from .reduction import METHODS, Problem, Reduced
+
+
+def group_at(basis: ModalBasis, rpm: float, harmonic: int = 0) -> ModalGroup:
+    """The reduced body at a speed of its range, as if it had been solved for there.
+
+    Args:
+        rpm: rotation speed. harmonic: nodal diameter.
+
+    Raises:
+        UserError: no range in the file, a speed outside of it.
+    """
+    r, speed = _range_of(basis, harmonic), rpm * np.pi / 30
+    low, high = r.speeds[[0, -1]]
+    if not low * (1 - 1e-9) <= speed <= high * (1 + 1e-9):
+        raise UserError(
+            f"{rpm:g} rpm is outside the speed range of '{basis.name}', {low * 30 / np.pi:.6g} to "
+            f"{high * 30 / np.pi:.6g} rpm; ask for a speed inside, or widen rotation.range_rpm and make the modes anew"
+        )
+    at = _Evaluated(basis, r, float(np.clip(speed, low, high)))
+    return at.group()
+
+
+def basis_at(basis: ModalBasis, rpm: float) -> ModalBasis:
+    """A modal basis with this one speed, at every nodal diameter that has a range.
+
+    Raises:
+        UserError: see `group_at`.
+    """
+    harmonics = sorted(basis.ranges) or [0]
+    return replace(basis, groups={(0, k): group_at(basis, rpm, k) for k in harmonics}, ranges={})
+
+
+def _range_of(basis: ModalBasis, harmonic: int) -> SpeedRange:
+    if harmonic in basis.ranges:
+        return basis.ranges[harmonic]
+    if basis.ranges:
+        known = ", ".join(str(k) for k in sorted(basis.ranges))
+        raise UserError(f"nodal diameter {harmonic}: '{basis.name}' has speed ranges of {known} only; choose one")
+    raise UserError(
+        f"the modal file of '{basis.name}' has no speed range; write rotation.range_rpm = [low, high] and make the "
+        "modes anew, or choose one of its speeds"
+    )
+
+
+def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> tuple[Array, list[Array]]:
+    """Frequencies (p, m) in rad/s, and modes (c, m) in the common coordinates, at speeds (p,) of a range.
+
+    Much cheaper than `group_at`: nothing of the mesh's size is touched. The modes are orthonormal.
+    """
+    count = count or r.count
+    parts = _StiffnessParts(r)
+    omega, modes = np.empty((len(speeds), count)), []
+    for i, speed in enumerate(speeds):
+        values, Y = parts.modes(float(speed))
+        omega[i] = values[:count]
+        modes.append(Y[:, :count])
+    return omega, modes
+
+
+class _StiffnessParts:
+    """What is interpolated of the samples' stiffness, taken apart once for many speeds."""
+
+    def __init__(self, r: SpeedRange) -> None:
+        self.range = r
+        K = np.array([g.K_r for g in r.samples])
+        self.parts = K if r.form == "stiffness" else np.array([root(k) for k in K])
+
+    def modes(self, speed: float) -> tuple[Array, Array]:
+        """(c,) frequencies, rad/s, and (c, c) orthonormal modes."""
+        part = np.tensordot(lagrange(self.range.speeds, speed, self.range.shift), self.parts, 1)
+        values, Y = np.linalg.eigh(part)
+        if self.range.form == "stiffness":
+            return np.sqrt(np.maximum(values, 0.0)), Y
+        order = np.argsort(np.abs(values), kind="stable")
+        return np.abs(values[order]), Y[:, order]
+
+
+class _Evaluated:
+    """A range at one speed."""
+
+    def __init__(self, basis: ModalBasis, r: SpeedRange, speed: float) -> None:
+        self.basis, self.range, self.speed = basis, r, speed
+        self.weights = lagrange(r.speeds, speed, r.shift)
+        self.K = interpolated(np.array([g.K_r for g in r.samples]), self.weights, r.form)
+        self.T = compliance_rows(r.samples[0])
+
+    def between(self, values: Iterable[Array]) -> Array:
+        """An array of every sample, interpolated entry by entry."""
+        return np.sum([w * v for w, v in zip(self.weights, values, strict=True)], axis=0)
+
+    def group(self) -> ModalGroup:
+        reduced = self._reduced()
+        ratios, labels = self._damping(reduced), self.range.samples[0].compliance.labels
+        common = self._common()
+        g = in_coordinates(common, reduced.vectors)
+        plain = METHODS["eigenmodes"](self.problem)
+        compliance = replace(
+            common.compliance,
+            modal=held_compliance(self.T @ reduced.vectors, reduced, labels),
+            eigenmodes=held_compliance(self.T @ plain.vectors, plain, labels),
+        )
+        run_up = without_massless(g.run_up, reduced) if g.run_up else None
+        return replace(
+            g,
+            omega=reduced.omega,
+            kind=reduced.kind,
+            damping_ratio=ratios,
+            M_r=reduced.M_r,
+            K_r=reduced.K_r,
+            C_r=modal_damping(reduced, 2 * ratios * reduced.omega),
+            G_r=2 * self.speed * run_up.N if run_up else g.G_r,
+            run_up=run_up,
+            gyroscopic=self._gyroscopic(reduced, run_up),
+            to_diagonal=reduced.to_diagonal,
+            compliance=compliance,
+            checks={"held_out_error": float(self.range.total_error.max())},
+        )
+
+    def _gyroscopic(self, reduced: Reduced, run_up: RunUp | None) -> GyroscopicModes | None:
+        if run_up is None or not (self.speed and self.range.gyroscopic):
+            return None
+        V = np.eye(len(reduced.omega)) if reduced.to_diagonal is None else reduced.to_diagonal
+        N = V.conj().T @ run_up.N @ V
+        own = gyroscopic_modes(np.eye(len(N)), 2 * self.speed * N, np.diag(reduced.omega**2), N)
+        return replace(own, shapes=V @ own.shapes)
+
+    def _common(self) -> ModalGroup:
+        """The body at the speed in the common coordinates, but for its stiffness and frequencies."""
+        last, r = self.range.samples[-1], self.range
+        return replace(
+            last,
+            speed=self.speed,
+            K_r=self.K,
+            G_r=last.G_r * (self.speed / last.speed),
+            monitors={k: self._rows([g.monitors[k] for g in r.samples]) for k in last.monitors},
+            gauges={k: self._rows([g.gauges[k] for g in r.samples]) for k in last.gauges},
+            stresses={k: self._stress([g.stresses[k] for g in r.samples]) for k in last.stresses},
+            u_static=self.between(g.u_static for g in r.samples),
+            compliance=self._compliance(),
+            run_up=self._run_up(),
+            prestress=last.prestress if self.speed else r.samples[0].prestress,
+        )
+
+    def _run_up(self) -> RunUp | None:
+        """N and P are the same at all speeds; the loads follow the displaced body."""
+        first = self.range.samples[0].run_up
+        if first is None:
+            return None
+        all_of = [g.run_up for g in self.range.samples if g.run_up is not None]
+        return replace(
+            first, euler=self.between(r.euler for r in all_of), centrifugal=self.between(r.centrifugal for r in all_of)
+        )
+
+    def _rows(self, rows: list[Rows]) -> Rows:
+        return replace(rows[-1], rows=self.between(r.rows for r in rows), static=self.between(r.static for r in rows))
+
+    def _stress(self, sets: list[StressSet]) -> StressSet:
+        return replace(
+            sets[-1],
+            strain=self.between(s.strain for s in sets),
+            stress=self.between(s.stress for s in sets),
+            static_stress=self.between(s.static_stress for s in sets),
+        )
+
+    def _compliance(self) -> Compliance:
+        """What the common coordinates hold at the speed, and the little that they leave out, interpolated."""
+        T = self.T
+
+        def left(g: ModalGroup) -> Array:
+            return g.compliance.static - T @ np.linalg.solve(g.K_r, T.conj().T)
+
+        static = T @ np.linalg.solve(self.K, T.conj().T) + self.between(left(g) for g in self.range.samples)
+        return replace(self.range.samples[0].compliance, static=0.5 * (static + static.conj().T))
+
+    def _damping(self, reduced: Reduced) -> Array:
+        """Rayleigh's damping matrix is affine in K; the other ratios belong to the mode's number."""
+        first = self.range.samples[0]
+        if not self.basis.damping_source.startswith("rayleigh"):
+            return first.damping_ratio[: len(reduced.omega)]
+        alpha, beta = _rayleigh(self.basis.damping_source)
+        return 0.5 * (alpha / reduced.omega + beta * reduced.omega)
+
+    def _reduced(self) -> Reduced:
+        """The body file's reduction, within the common coordinates."""
+        labels = self.range.samples[0].compliance.labels
+        exact = [i for i, label in enumerate(labels) if not label.startswith("monitor:")]
+        T = self.T[exact]
+        values, Y = _StiffnessParts(self.range).modes(self.speed)
+        values, Y = values[: self.range.count] ** 2, self._definite(Y[:, : self.range.count], values)
+        self.problem = Problem(
+            dense_pencil(self.K), values, Y, 0, sp.csr_matrix(T), tuple(labels[i] for i in exact),
+            np.linalg.solve(self.K, T.conj().T),
+        )  # fmt: skip
+        return METHODS[self.basis.reduction](self.problem)
+
+    def _definite(self, Y: Array, omega: Array) -> Array:
+        """Modes with the signs and pairs of the convention."""
+        Y = canonical.turn_clusters(Y, omega[: Y.shape[1]] ** 2, self.range.lead @ Y)
+        phi = self.range.samples[0].phi
+        decisive = self.range.lead[: self.range.signs] if self.range.signs else self.range.lead
+        if not self.range.signs and phi.shape[0]:
+            decisive = phi.reshape(-1, phi.shape[2])[canonical.by_place(self.basis.mesh.points)]
+        return Y * canonical.signs(decisive @ Y)
+
+
+def _rayleigh(source: str) -> tuple[float, float]:
+    """alpha in 1/s and beta in s from ``rayleigh alpha=... 1/s beta=... s``."""
+    words = source.split()
+    found = {w.split("=")[0]: float(w.split("=")[1]) for w in words if "=" in w}
+    return found["alpha"], found["beta"]
+
+
+class Dense(eigen.DirectSolver):
+    """A direct solver of small matrices, for reductions within the common coordinates."""
+
+    name = "dense"
+
+    def factorise(self, upper: sp.csr_matrix) -> None:
+        A = upper.toarray()
+        self.values, self.Q = scipy.linalg.eigh(A, lower=False)
+
+    def solve(self, b: Array) -> Array:
+        return self.Q @ ((self.Q.conj().T @ b).T / self.values).T
+
+    def negative(self) -> int:
+        return int((self.values < 0).sum())
+
+
+def dense_pencil(K: Array) -> eigen.Pencil:
+    """The pencil of K and the identity."""
+    size = float(np.abs(K).sum(axis=1).max())
+
+    def shifted(s: float) -> sp.csr_matrix:
+        return sp.csr_matrix(np.triu(K - s * np.eye(len(K))))
+
+    return eigen.Pencil(shifted, lambda x: K @ x, lambda x: x, len(K), size, 1.0, Dense(), dtype=K.dtype.type)

@@ -1,0 +1,301 @@
+"""One basis for a range of speeds: exact where it must be, its error known where it is not, at every speed inside."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from meshes import STEEL, body, brick, nearest, twisted_blade
+
+from microslip.basis import check_basis, read_basis, write_basis
+from microslip.body import Rotation
+from microslip.data import ModalBasis, UserError
+from microslip.modes import modal_basis
+from microslip.modes.common import Settled, Solved, common_coordinates, interpolated, lagrange, variable
+from microslip.speed_range import basis_at, dense_pencil, frequencies_over, group_at
+
+BLADE = twisted_blade(n=(1, 3, 7), thickness=0.003)
+TOP = 16000.0
+TIP = BLADE.points[nearest(BLADE, BLADE.points[BLADE.face_points("z1")].mean(axis=0))].tolist()
+MIDDLE = BLADE.points[BLADE.face_points("x1")].mean(axis=0).tolist()
+PARTS = {
+    "supports": [{"face": "z0"}],
+    "interfaces": [{"name": "tip", "face": "z1", "t2": [1.0, 0.0, 0.0]}],
+    "excitations": [{"name": "gas", "face": "x1", "pressure": True}],
+    "monitors": [{"name": "end", "point": TIP}],
+    "gauges": [{"name": "strain", "point": MIDDLE, "direction": [0.0, 0.0, 1.0]}],
+}
+
+
+@cache
+def settings(kind: str = "nonlinear", reduction: str = "eigenmodes", top: float = TOP, **rotation: object):
+    rotation = {"speeds_rpm": [0.0], "range_rpm": [0.0, top], "prestress": kind, **rotation}
+    return body(**PARTS, rotation=rotation, modes={"count": 6, "solver": "superlu"}, reduction=reduction)
+
+
+@cache
+def ranged(kind: str = "nonlinear", reduction: str = "eigenmodes", **rotation: object) -> ModalBasis:
+    return modal_basis(BLADE, settings(kind, reduction, **rotation))
+
+
+@cache
+def solved(rpm: float, kind: str = "nonlinear", reduction: str = "eigenmodes"):
+    """The body solved for at one speed: the truth."""
+    at = body(
+        **PARTS, rotation={"speeds_rpm": [rpm], "prestress": kind}, modes={"count": 6, "solver": "superlu"},
+        reduction=reduction,
+    )  # fmt: skip
+    return modal_basis(BLADE, at).groups[0, 0]
+
+
+def frequency_error(basis: ModalBasis, rpm: float, kind: str = "nonlinear") -> float:
+    return float(np.abs(group_at(basis, rpm).omega[:6] / solved(rpm, kind).omega[:6] - 1).max())
+
+
+# interpolation -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shift", [None, 2.0e5])
+def test_lagrange_reproduces_polynomials_of_its_variable(shift: float | None) -> None:
+    samples = np.array([0.0, 310.0, 777.0, 1000.0])
+    for speed in (0.0, 55.5, 777.0, 940.0):
+        w = lagrange(samples, speed, shift)
+        for power in range(4):
+            values = variable(samples, shift) ** power
+            exact = float(variable(speed, shift)) ** power
+            assert w @ values == pytest.approx(exact, rel=0, abs=1e-13 * values.max())
+
+
+def test_the_root_keeps_definiteness_and_commuting_families_exact() -> None:
+    """Diagonal K = B (Omega^2 + a): the roots are straight lines in sqrt(Omega^2 + a)."""
+    speeds, a = np.array([0.0, 400.0]), 3e4
+    K = np.array([np.diag([1.0, 7.0, 30.0]) * (s**2 + a) for s in speeds])
+    found = interpolated(K, lagrange(speeds, 123.0, a), "root")
+    np.testing.assert_allclose(found, np.diag([1.0, 7.0, 30.0]) * (123.0**2 + a), rtol=1e-12, atol=1e-9)
+
+
+# the builder on small matrices, complex ones too -------------------------------------------------------------------
+
+
+def family(stiffness, count: int, tolerance: float = 1e-4, top: float = 100.0):
+    """`common_coordinates` of K(Omega^2) given as a function of x in [0, 1], all modes solved for densely."""
+
+    def settle(speed, weights):
+        return Settled(speed, dense_pencil(stiffness((speed / top) ** 2)), None)
+
+    def solve(settled):
+        values, vectors = np.linalg.eigh(settled.pencil.K(np.eye(settled.pencil.n)))
+        return Solved(vectors[:, : count + 4], float(values[0]), None)
+
+    return common_coordinates(settle, solve, 0.0, top, count, tolerance)
+
+
+def random_hermitian(n: int, seed: int, low: float, high: float) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n)))[0]
+    return (Q * np.geomspace(low, high, n)) @ Q.conj().T
+
+
+def test_complex_hermitian_family_meets_its_tolerance_at_every_speed() -> None:
+    """A family with crossings and veerings in its band; nothing in it is real, nothing is matched mode by mode."""
+    K0, K1, K2 = (random_hermitian(40, s, lo, hi) for s, lo, hi in ((1, 1.0, 1e4), (2, 0.1, 20.0), (3, 0.01, 2.0)))
+
+    def stiffness(x: float) -> np.ndarray:
+        return K0 + x * K1 + 5 * K2 / (1.4 + x)
+
+    found = family(stiffness, 5)
+    assert max(h.total for h in found.held_out) <= 1e-4 and len(found.held_out) >= 2
+    speeds = np.array([s.speed for s in found.samples])
+    assert not set(speeds) & {h.speed for h in found.held_out}
+    assert np.iscomplexobj(found.V) and found.orthogonality < 1e-12
+    for speed in np.linspace(0, 100, 23):
+        K = interpolated(found.K_r, lagrange(speeds, speed, found.shift), found.form)
+        true = np.linalg.eigvalsh(stiffness((speed / 100) ** 2))[:5]
+        assert np.abs(np.sqrt(np.linalg.eigvalsh(K)[:5] / true) - 1).max() < 3e-4  # between the held-out speeds
+
+
+def test_a_mode_that_the_samples_do_not_know_is_noticed() -> None:
+    """One mode is high at the three speeds solved first and dives into the band beside them: the count tells."""
+    rest = np.geomspace(1.0, 1e3, 30)
+    start = family(lambda x: np.diag(np.concatenate([rest, [2e3]])), 3)
+    dive = (start.held_out[1].speed / 100) ** 2 + 0.02
+
+    def stiffness(x: float) -> np.ndarray:
+        return np.diag(np.concatenate([rest, [1.1 + 200 * (x - dive) ** 2]]))
+
+    known = [np.sort(np.diag(stiffness((s.speed / 100) ** 2)))[6] for s in start.samples]
+    assert all(1.1 + 200 * ((s.speed / 100) ** 2 - dive) ** 2 > k for s, k in zip(start.samples, known, strict=True))
+    found = family(stiffness, 3)
+    assert len(start.solved) == 3 and len(found.solved) > 3
+    speeds, at = np.array([s.speed for s in found.samples]), 100 * np.sqrt(dive)
+    K = interpolated(found.K_r, lagrange(speeds, at, found.shift), found.form)
+    np.testing.assert_allclose(np.linalg.eigvalsh(K)[:3], np.linalg.eigvalsh(stiffness(dive))[:3], rtol=3e-4)
+
+
+# bodies ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["none", "linear"])
+def test_without_and_with_linear_prestress_the_interpolation_is_exact(kind: str) -> None:
+    """K is affine, or quadratic, in Omega^2: three samples hold it. The projection error is all there is."""
+    top = 3000.0 if kind == "none" else TOP
+    r = ranged(kind, top=top).ranges[0]
+    assert r.form == "stiffness" and r.shift is None
+    assert r.interpolation_error.max() < 1e-7  # rounding: |K_r| is some 1e8 times the lowest eigenvalue
+    for rpm in (0.31 * top, 0.87 * top):
+        assert frequency_error(ranged(kind, top=top), rpm, kind) < r.tolerance
+
+
+def test_estimate_at_held_out_speeds_is_the_true_error() -> None:
+    """Total error at held-out speeds against bodies solved for there, and not far below it at speeds between."""
+    basis = ranged()
+    r = basis.ranges[0]
+    assert r.form == "root" and (r.total_error <= r.tolerance).all() and len(r.held_out) >= 2
+    for speed, estimate in zip(r.held_out, r.total_error, strict=True):
+        true = frequency_error(basis, speed * 30 / np.pi)
+        assert true == pytest.approx(estimate, rel=0.05, abs=1e-8)
+    between = [frequency_error(basis, rpm) for rpm in np.linspace(0.05, 0.95, 7) * TOP]
+    assert max(between) < 3 * r.total_error.max()
+
+
+def test_projection_estimate_is_the_true_projection_error() -> None:
+    """With a tolerance that three solved speeds meet by projection: the residuals tell the error that is left."""
+    r = ranged(range_tolerance=1e-2).ranges[0]
+    basis = ranged(range_tolerance=1e-2)
+    speed, estimate = r.held_out[r.projection_error.argmax()], r.projection_error.max()
+    true = frequency_error(basis, speed * 30 / np.pi)
+    assert abs(true - r.total_error[r.projection_error.argmax()]) < 0.05 * estimate + 1e-8
+
+
+def test_modes_veer_inside_the_range() -> None:
+    """A thin blade whose second flap mode runs into its first torsion: curves that turn away with exchanged shapes.
+
+    The frequencies hold at the speed of the smallest gap as elsewhere.
+    """
+    mesh = twisted_blade(n=(1, 3, 7), thickness=0.002)
+    what = {"supports": [{"face": "z0"}], "modes": {"count": 5, "solver": "superlu"}}
+    basis = modal_basis(mesh, body(**what, rotation={"range_rpm": [0.0, 24000.0]}))
+    r = basis.ranges[0]
+    omega, modes = frequencies_over(r, np.linspace(0, 24000, 97) * np.pi / 30)
+    gap = omega[:, 2] / omega[:, 1] - 1
+    at = int(gap.argmin())
+    assert 0 < at < 96 and 0 < gap[at] < 0.3 * min(gap[0], gap[-1])
+    overlap = np.abs(modes[0].conj().T @ modes[-1])[1:3, 1:3]
+    assert overlap[0, 1] > overlap[0, 0] and overlap[1, 0] > overlap[1, 1]
+    rpm = 250.0 * at
+    true = modal_basis(mesh, body(**what, rotation={"speeds_rpm": [rpm]})).groups[0, 0]
+    np.testing.assert_allclose(group_at(basis, rpm).omega, true.omega[:5], rtol=2 * r.tolerance)
+
+
+def test_at_a_solved_speed_the_range_gives_what_was_solved_for() -> None:
+    """Frequencies, rows with their signs, static state, gauges, compliance, Coriolis: to rounding of the root."""
+    basis = ranged()
+    r = basis.ranges[0]
+    rpm = float(r.speeds[r.solved][1] * 30 / np.pi)
+    got, true = group_at(basis, rpm), solved(rpm)
+    np.testing.assert_allclose(got.omega, true.omega[:6], rtol=1e-7)
+    np.testing.assert_allclose(got.u_static, true.u_static, atol=1e-8 * np.abs(true.u_static).max())
+    for a, b in ((got.interfaces["tip"], true.interfaces["tip"]), (got.monitors["end"], true.monitors["end"]),
+                 (got.excitations["gas"], true.excitations["gas"]), (got.gauges["strain"], true.gauges["strain"])):  # fmt: skip
+        np.testing.assert_allclose(a.rows, b.rows[:, :6], atol=1e-5 * np.abs(b.rows).max())
+    for kind in ("monitors", "gauges"):
+        for name, b in getattr(true, kind).items():
+            np.testing.assert_allclose(getattr(got, kind)[name].static, b.static, rtol=1e-6)
+    static = np.abs(true.compliance.static).max()
+    np.testing.assert_allclose(got.compliance.static, true.compliance.static, atol=1e-6 * static)
+    np.testing.assert_allclose(got.G_r, true.G_r[:6, :6], atol=1e-5 * np.abs(true.G_r).max())
+    np.testing.assert_allclose(got.phi, true.phi[:, :, :6], atol=1e-5 * np.abs(true.phi).max())
+
+
+def test_rubin_is_statically_exact_at_held_out_speeds() -> None:
+    """The static answers of solved speeds span those between; what is left falls with the tolerance of the range."""
+    errors = []
+    for tolerance in (1e-4, 1e-6):
+        basis = ranged(reduction="rubin", range_tolerance=tolerance)
+        rpm = float(basis.ranges[0].held_out[0] * 30 / np.pi)
+        got, true = group_at(basis, rpm), solved(rpm, reduction="rubin")
+        assert got.kind.count("attachment") == true.kind.count("attachment") == 7
+        exact = [i for i, label in enumerate(got.compliance.labels) if not label.startswith("monitor")]
+        held, static = (c[np.ix_(exact, exact)] for c in (got.compliance.modal, true.compliance.static))
+        d = np.sqrt(np.diag(static))
+        errors.append(np.abs((held - static) / np.outer(d, d)).max())
+        np.testing.assert_allclose(held, got.compliance.static[np.ix_(exact, exact)], atol=1e-9 * held.max())
+    assert errors[0] < 20 * 1e-4 and errors[1] < 20 * 1e-6  # a compliance errs twice as much as a frequency, and more
+
+
+def test_craig_bampton_keeps_interface_coordinates_at_every_speed() -> None:
+    basis = ranged(reduction="craig-bampton")
+    got = group_at(basis, 0.6 * TOP)
+    true = solved(0.6 * TOP, reduction="craig-bampton")
+    assert got.kind[:6] == ("interface",) * 6
+    np.testing.assert_allclose(got.interfaces["tip"].rows[:, :6], np.eye(6), atol=1e-8)
+    np.testing.assert_allclose(got.omega[:4], true.omega[:4], rtol=2e-3)  # different spans, each an upper bound
+    np.testing.assert_allclose(np.diag(got.K_r)[:6], np.diag(true.K_r)[:6], rtol=2e-3)
+
+
+def test_stress_modes_between_the_samples() -> None:
+    """Strain and stress of the modes and of the static state at a speed that is no sample, from the file alone."""
+    rpm = 0.45 * TOP
+    output = {"gauss": False, "nodal_stress": True}
+    base = {**PARTS, "modes": {"count": 3, "solver": "superlu"}, "output": output}
+    mesh = twisted_blade(n=(1, 2, 4), thickness=0.003)
+    base["interfaces"] = base["excitations"] = base["monitors"] = base["gauges"] = ()
+    turning = {"speeds_rpm": [0.0], "range_rpm": [0.0, TOP], "range_stress": True}
+    basis = modal_basis(mesh, body(**base, rotation=turning))
+    got = group_at(basis, rpm).stresses["nodes"]
+    true = modal_basis(mesh, body(**base, rotation={"speeds_rpm": [rpm]})).groups[0, 0].stresses["nodes"]
+    assert np.abs(got.stress - true.stress[..., :3]).max() < 2e-3 * np.abs(true.stress).max()
+    assert np.abs(got.strain - true.strain[..., :3]).max() < 2e-3 * np.abs(true.strain).max()
+    assert np.abs(got.static_stress - true.static_stress).max() < 5e-3 * np.abs(true.static_stress).max()
+
+
+def test_rayleigh_damping_follows_the_frequency() -> None:
+    with_beta = settings().model_copy(update={"damping": body(damping={"alpha": 3.0, "beta": 2e-6}).damping})
+    g = group_at(modal_basis(BLADE, with_beta), 0.5 * TOP)
+    np.testing.assert_allclose(g.damping_ratio, 0.5 * (3.0 / g.omega + 2e-6 * g.omega), rtol=1e-12)
+    np.testing.assert_allclose(np.diag(g.C_r), 3.0 + 2e-6 * g.omega**2, rtol=1e-12)
+
+
+# file and refusals -------------------------------------------------------------------------------------------------
+
+
+def test_the_file_holds_the_range(tmp_path) -> None:
+    """Written and read, the range gives the same numbers; every check passes; a basis of one speed can be written."""
+    basis = ranged(reduction="rubin")
+    write_basis(tmp_path / "basis.h5", basis)
+    again = read_basis(tmp_path / "basis.h5")
+    a, b = (group_at(x, 0.37 * TOP) for x in (basis, again))
+    np.testing.assert_array_equal(a.omega, b.omega)
+    np.testing.assert_array_equal(a.phi, b.phi)
+    np.testing.assert_array_equal(a.interfaces["tip"].shapes, b.interfaces["tip"].shapes)
+    assert [c for c in check_basis(again) if not c.passed] == []
+    assert any(c.name.startswith("range/nd_0: frequency error") for c in check_basis(again))
+    one = basis_at(again, 0.37 * TOP)
+    write_basis(tmp_path / "one.h5", one)
+    assert [c for c in check_basis(read_basis(tmp_path / "one.h5")) if not c.passed] == []
+
+
+def test_a_speed_outside_or_a_file_without_range_is_refused() -> None:
+    for rpm in (-1.0, 1.001 * TOP):
+        with pytest.raises(UserError, match=r"outside the speed range of 'test', 0 to 16000 rpm; ask for"):
+            group_at(ranged(), rpm)
+    group_at(ranged(), TOP)
+    with pytest.raises(UserError, match="no speed range"):
+        group_at(modal_basis(BLADE, body(supports=[{"face": "z0"}], modes={"count": 2})), 100.0)
+
+
+def test_free_bodies_and_single_speeds_are_refused() -> None:
+    with pytest.raises(UserError, match=r"rotation\.range_rpm: a free body has no equilibrium at speed"):
+        modal_basis(
+            brick("tetra10", (1, 1, 2)), body(STEEL, free=True, rotation={"range_rpm": [0.0, 100.0]})
+        )  # fmt: skip
+    for speeds in ([100.0, 100.0], [200.0, 100.0]):
+        with pytest.raises(ValueError, match="the second above the first; for one speed use speeds_rpm"):
+            Rotation(range_rpm=speeds)
+
+
+def test_divergence_inside_the_range_names_its_key() -> None:
+    """Without prestress the first frequency falls to zero: no basis for such speeds, and the key that asks for it."""
+    with pytest.raises(UserError, match=r"rotation\.range_rpm: at .* rpm .* negative"):
+        modal_basis(BLADE, settings("none", top=60000.0))
