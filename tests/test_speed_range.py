@@ -196,9 +196,10 @@ def test_at_a_solved_speed_the_range_gives_what_was_solved_for() -> None:
     got, true = group_at(basis, rpm), solved(rpm)
     np.testing.assert_allclose(got.omega, true.omega[:6], rtol=1e-7)
     np.testing.assert_allclose(got.u_static, true.u_static, atol=1e-8 * np.abs(true.u_static).max())
-    for a, b in ((got.interfaces["tip"], true.interfaces["tip"]), (got.monitors["end"], true.monitors["end"]),
-                 (got.excitations["gas"], true.excitations["gas"]), (got.gauges["strain"], true.gauges["strain"])):  # fmt: skip
-        np.testing.assert_allclose(a.rows, b.rows[:, :6], atol=1e-5 * np.abs(b.rows).max())
+    read = (("interfaces", "tip"), ("monitors", "end"), ("excitations", "gas"), ("gauges", "strain"))
+    for kind, name in read:
+        a, b = (getattr(g, kind)[name].rows for g in (got, true))
+        np.testing.assert_allclose(a, b[:, :6], atol=1e-5 * np.abs(b).max())
     for kind in ("monitors", "gauges"):
         for name, b in getattr(true, kind).items():
             np.testing.assert_allclose(getattr(got, kind)[name].static, b.static, rtol=1e-6)
