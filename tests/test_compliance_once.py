@@ -281,9 +281,9 @@ def test_report_and_summary_say_it(blocks: dict[str, ModalBasis]) -> None:
         said = sentence(basis, basis.groups[0, 0])
         assert basis_summary(basis)[-1] == f"compliance: {said}"
         page = report_html(basis, {})
-        assert "Compliance counted once" in page and "must not be in the law" in page
+        assert "Compliance counted once" in page and "not in the law" in page
         assert ("leaves" in said) == (method == "eigenmodes")
-        assert ("added by the solver" in page) == (method == "macneal")
+        assert ("solver adds" in page) == (method == "macneal")
     bare = dataclasses.replace(small.basis().groups[0, 0], compliance=Compliance((), *np.zeros((2, 0, 0)), False))
     assert "no contact" in sentence(small.basis(), bare)
 

@@ -432,11 +432,12 @@ def _counted_once(basis: ModalBasis) -> str:
     if not found:
         return ""
     solver = basis.reduction in SUPPLIED
-    head = ["coordinate", "static compliance", "held by the basis", *(["added by the solver"] if solver else [])]
-    head += ["left to the law (bulk)", "spring the law must bring", "must not be in the law"]
+    head = ["coordinate", "unit", "static", "basis holds", *(["solver adds"] if solver else [])]
+    head += ["left to the law", "as a spring", "not in the law"]
     pairs = [s for s in found if s.kind == "squeeze"]
-    words = "A law that counts bulk and surface (E A / l0) belongs to plain eigenmodes; the last column tells what of "
-    words += 'it this basis holds already. Say in case.toml which one it is: includes = "bulk+surface" or "surface".'
+    words = "Left to the law: bulk that it must bring besides the surface. Not in the law: bulk that plain eigenmodes "
+    words += "would leave to it and this basis holds already, so that a stiffness like E A / l0 would count it twice. "
+    words += 'Say in case.toml which one a stiffness is: includes = "bulk+surface" or "surface".'
     table = _table(head, [_share_row(s, solver) for s in found])
     return (
         _say(sentence(basis, group))
@@ -448,11 +449,11 @@ def _counted_once(basis: ModalBasis) -> str:
 
 def _share_row(s: Share, solver: bool) -> list[str]:
     def amount(value: float) -> str:
-        return f"{_number(value)} {s.unit}" if value else "nothing"
+        return _number(value) if value else "nothing"
 
     spring = "N m/rad" if s.kind == "rotation" else "N/m"
-    row = [text(s.label), amount(s.static), amount(s.held)] + ([amount(s.supplied)] if solver else [])
-    return [*row, amount(s.left), f"{_number(s.law_stiffness)} {spring}" if s.left else "none", amount(s.beyond)]
+    row = [text(s.label), text(s.unit), amount(s.static), amount(s.held)] + ([amount(s.supplied)] if solver else [])
+    return [*row, amount(s.left), f"{_number(s.law_stiffness)} {spring}" if s.left else "", amount(s.beyond)]
 
 
 def _rows(basis: ModalBasis) -> str:
