@@ -18,7 +18,7 @@ from microslip import eigen
 from microslip.body import BodySettings
 from microslip.data import Array, Indices, Mesh
 from microslip.fem.discretise import discretise, free_upper
-from microslip.fem.operators import skew
+from microslip.frames import skew
 from microslip.mesh import boundary_facets
 from microslip.modes.boundary import fixed_dofs, with_dead_loads
 from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model

@@ -15,7 +15,8 @@ from meshes import brick
 from microslip.body import BodySettings
 from microslip.data import Array, Compliance, Mesh, ModalBasis, ModalGroup
 from microslip.fem.discretise import discretise
-from microslip.fem.operators import isotropic, mass, skew, stiffness
+from microslip.fem.operators import isotropic, mass, stiffness
+from microslip.frames import skew
 from microslip.modes.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from microslip.modes.canonical import by_place, signs
 

@@ -17,7 +17,7 @@ from microslip.basis import check_basis, read_basis, write_basis
 from microslip.coordinates import in_modes
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
-from microslip.fem.operators import skew
+from microslip.frames import skew
 from microslip.gyroscopic import (
     damped_modes,
     general_modes,

@@ -17,8 +17,9 @@ from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.condensed import negative_eigenvalues, new_condensed
 from microslip.data import Mesh, UserError
-from microslip.fem.cyclic import cyclic_upper, pair_cut_faces, sector_unknowns, turned
+from microslip.fem.cyclic import cyclic_upper, pair_cut_faces, sector_unknowns
 from microslip.fem.discretise import discretise
+from microslip.frames import rotation
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model
@@ -90,7 +91,7 @@ def test_a_sector_of_one_row_of_cells_couples_a_node_to_its_own_image() -> None:
 
 def test_displacements_obey_the_phase_rule(sector, mesh: Mesh) -> None:
     _, unknowns = sector
-    R = turned(AXIS, 2 * np.pi / N)
+    R = rotation(AXIS, 2 * np.pi / N)
     for k in range(N // 2 + 1):
         T = unknowns.transformation(k)
         u = unknowns.apart.expand(T @ np.random.default_rng(k).standard_normal(T.shape[1]), mesh.n_points)

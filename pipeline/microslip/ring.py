@@ -17,6 +17,7 @@ from .basis import Check
 from .basis.integrals import modal_mass
 from .coordinates import in_modes
 from .data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
+from .frames import rotation
 
 BACKWARD, FORWARD, STANDING = "backward", "forward", "standing"
 
@@ -60,13 +61,6 @@ def multiplicity(nodal_diameter: int, sectors: int) -> int:
 
 
 # --- expansion -----------------------------------------------------------------------------------------------------
-
-
-def rotation(axis: Array, angle: float) -> Array:
-    """(3, 3) matrix that turns vectors about a unit axis, right-handed (Rodrigues)."""
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=float)
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
 
 
 def sector_rotation(basis: ModalBasis, sector: int) -> Array:

@@ -37,7 +37,7 @@ _READS_BY_GMSH = {".unv"}
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
-    "data.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
+    "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
     "coordinates.py", "fem", "reduction", "modes",
 )  # fmt: skip
 _CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")

@@ -18,16 +18,10 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..data import Array, Indices, Mesh, UserError
+from ..frames import rotation
 from .discretise import FreeUpper, Pattern, free_upper
 
 _CLOSE = 1e-3  # share of the distance to the nearest other node within which two nodes are one
-
-
-def turned(axis: Array, angle: float) -> Array:
-    """(3, 3) right-handed rotation by an angle (rad) about a direction (Rodrigues)."""
-    n = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
 
 
 @dataclass(frozen=True)
@@ -66,7 +60,7 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
             "reaches the rotation axis cannot be closed; leave a bore)"
         )
     x, y = mesh.points[a] - point, mesh.points[b] - point
-    R = turned(axis, 2 * np.pi / sectors)
+    R = rotation(axis, 2 * np.pi / sectors)
     spacing = float(np.median(_nearest(y, y, 2)[0][:, 1])) if len(y) > 1 else 1.0
     distance, nearest = _nearest(y, x @ R.T)
     if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
@@ -80,7 +74,7 @@ def _nearest(points: Array, to: Array, count: int = 1) -> tuple[Array, Array]:
 
 
 def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, distance: float, spacing: float) -> str:
-    back = _nearest(y, x @ turned(axis, -2 * np.pi / N).T)[0].max()
+    back = _nearest(y, x @ rotation(axis, -2 * np.pi / N).T)[0].max()
     if back < _CLOSE * spacing:
         return (
             f"cyclic: '{right}' is '{left}' turned by -2 pi / {N} about the rotation axis; exchange left and right, or "

@@ -159,12 +159,6 @@ def spin_projector(axis: Array) -> Array:
     return np.eye(3) - np.outer(axis, axis)
 
 
-def skew(vector: Array) -> Array:
-    """(3, 3) matrix of the cross product, the tilde of Sextro Eq. (2.1-5)."""
-    x, y, z = vector
-    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
-
-
 def displacement_gradient(block: Block, u: Array) -> Array:
     """(e, q, 3, 3) H_kI = du_k/dX_I for nodal displacements (n, 3) in m."""
     return np.matmul(u[block.cells].transpose(0, 2, 1)[:, None], block.grad.transpose(0, 1, 3, 2))

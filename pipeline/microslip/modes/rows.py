@@ -15,7 +15,8 @@ from scipy.spatial import ConvexHull
 
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
-from ..fem.operators import engineering, skew
+from ..fem.operators import engineering
+from ..frames import skew
 from ..topology import CELL_TYPES
 
 

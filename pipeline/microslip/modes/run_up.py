@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import Array, RunUp
-from ..fem.operators import skew, spin_projector
+from ..fem.operators import spin_projector
+from ..frames import skew
 from .equilibrium import BodyModel, StaticState
 
 
