@@ -403,3 +403,151 @@ def test_only_eigenmodes_enter_the_diagrams() -> None:
     assert families(mixed, 1).modes.max() == 2
     assert all(t.modes.max() == 2 for t in tracks(mixed).values())
     assert len(margins(mixed, 1, [1])) == 3
+
+
+# --- files, report, command line -----------------------------------------------------------------------------------
+
+
+def test_matlab_gets_complex_arrays_and_loads_by_the_conjugate_transpose(tmp_path: Path) -> None:
+    from scipy.io import loadmat
+
+    from microslip.exchange.mat import write_mat
+
+    basis = sector.basis()
+    write_mat(basis, tmp_path / "b.mat")
+    read = loadmat(tmp_path / "b.mat")
+    for (s, k), g in basis.groups.items():
+        found = read[f"speed_{s}" + (f"_nd_{k}" if k else "")]
+        for name, value in (("phi", g.phi), ("K", g.K_r), ("G", g.G_r)):
+            np.testing.assert_array_equal(found[name][0, 0], value)
+            assert found[name][0, 0].dtype == value.dtype
+        np.testing.assert_array_equal(found["Fex1"][0, 0], g.excitations["gas"].rows.conj().T)
+        np.testing.assert_array_equal(found["interfaces"][0, 0]["rim"][0, 0]["T"][0, 0], g.interfaces["rim"].rows)
+        np.testing.assert_array_equal(found["compliance"][0, 0]["static"][0, 0], g.compliance.static)
+    assert read["cyclic"]["sectors"][0, 0][0, 0] == 6
+
+
+def test_the_sector_in_vtu_has_both_parts_of_complex_shapes(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    from microslip.exchange.vtu import mode_label, write_vtu
+
+    basis = sector.basis()
+    write_vtu(basis, tmp_path / "b.vtu")
+    data = meshio.read(tmp_path / "b.vtu").point_data
+    g = basis.groups[0, 1]
+    found = data[f"nd1_mode_{mode_label(g, 0)}_real"] + 1j * data[f"nd1_mode_{mode_label(g, 0)}_imag"]
+    np.testing.assert_allclose(found, g.phi[:, :, 0], atol=1e-6 * np.abs(g.phi).max())
+    assert f"nd0_mode_{mode_label(basis.groups[0, 0], 0)}" in data
+
+
+def test_the_ring_in_vtu_is_the_expanded_surface(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    import xml.etree.ElementTree as ET
+
+    from microslip.exchange.vtu import write_ring
+
+    basis = sector.basis(6, rpm=(0.0, 60000.0))
+    assert write_ring(basis, tmp_path / "ring.pvd", speed=1) == tmp_path / "ring.pvd"
+    sets = ET.parse(tmp_path / "ring.pvd").getroot().findall("Collection/DataSet")
+    assert [(float(d.get("timestep")), d.get("file")) for d in sets] == [(k, f"ring_nd{k:02d}.vtu") for k in range(4)]
+    table = np.genfromtxt(tmp_path / "ring.csv", delimiter=",", skip_header=1)
+    assert len(table) == 20 and set(table[:, 0]) == {60000.0}
+    assert table[:, 4].sum() == 5 + 10 + 10 + 5
+    ring = ring_of(basis)
+    where = {tuple(np.round(p, 9)): i for i, p in enumerate(ring.mesh.points[: basis.mesh.n_points])}
+    for k in range(4):
+        g = basis.groups[1, k]
+        read = meshio.read(tmp_path / f"ring_nd{k:02d}.vtu")
+        assert {c.type for c in read.cells} == {"quad8"}
+        n = len(read.points) // 6
+        own = [where[tuple(np.round(p, 9))] for p in read.points[:n]]
+        scale = np.sqrt(multiplicity(k, 6) / 6)
+        for j in range(6):
+            wanted = scale * expand(g, basis, j)[own, :, 2]
+            part = slice(j * n, (j + 1) * n)
+            found = read.point_data["mode_03_real"][part] + 1j * read.point_data["mode_03_imag"][part]
+            np.testing.assert_allclose(found, wanted, atol=1e-6 * np.abs(g.phi).max())
+    cells = sum(len(c.data) for c in read.cells)
+    assert cells == 6 * (2 * 3 * 2 + 2 * 2 * 1)  # front and rear, bore and rim; the cuts lie inside
+
+
+def test_the_ring_of_a_body_that_is_none_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("meshio")
+    import small
+
+    from microslip.exchange.vtu import write_ring
+
+    with pytest.raises(UserError, match="not cyclic"):
+        write_ring(small.basis(), tmp_path / "r.pvd")
+    with pytest.raises(UserError, match="count from 0"):
+        write_ring(sector.basis(), tmp_path / "r.pvd", speed=1)
+    without = {k: replace(g, phi=np.zeros((0, 3, 5))) for k, g in sector.basis().groups.items()}
+    with pytest.raises(UserError, match="no shapes"):
+        write_ring(replace(sector.basis(), groups=without), tmp_path / "r.pvd")
+    assert not list(tmp_path.iterdir())
+
+
+def said(page: str) -> str:
+    """The words of a page."""
+    import html
+    import re
+
+    body = re.sub(r"<style>.*?</style>", "", page, flags=re.S)
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body))).replace("\xa0", " ")
+
+
+def test_the_report_of_a_cyclic_sector() -> None:
+    from microslip.report import report_html
+
+    basis = sector.basis(6, rpm=(0.0, 60000.0))
+    words = said(report_html(basis, {}))
+    assert "one of 6 alike round the axis" in words and "nodal diameters 0 to 3" in words
+    assert words.count("modes of the ring up to") >= 2
+    assert "k = 0 k = 1 k = 2 k = 3" in words
+    assert f"{basis.groups[0, 2].frequency[1]:#.6g}" in words
+    assert "5 1 forward" in words and "6 0 standing" in words  # engine order, nodal diameter, wave
+    found = resonances(basis, [1, 2, 5, 6])
+    assert found and "True resonances" in words
+    assert all(f"{r.speed * 30 / np.pi:.1f} {r.frequency:.2f} {r.order}" in words for r in found)
+    assert "the cyclic faces obey the phase rule" in words and "checks of the file passed" in words
+
+
+def test_the_report_names_engine_orders_that_the_file_cannot_answer() -> None:
+    from microslip.report import report_html
+
+    words = said(report_html(sector.basis(6, rpm=(0.0, 60000.0), harmonics=(0, 1)), {}))
+    assert "lacks the nodal diameters of the engine orders 2" in words
+    assert "without the nodal diameters 2, 3" in words
+
+
+def test_info_check_and_export_of_a_cyclic_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from microslip.cli import main
+
+    file = tmp_path / "basis.h5"
+    write_basis(file, sector.basis())
+    assert main(["info", str(file)]) == 0
+    out = capsys.readouterr().out
+    assert "one of 6 cyclic sectors" in out and "all 26 modes of the ring" in out and "k =   3" in out
+    assert main(["check", str(file)]) == 0
+    assert "ring of 6: the cyclic faces obey the phase rule" in capsys.readouterr().out
+    assert main(["export", str(file), "--to", "mat", "--ring"]) == 2
+    assert "only vtu can hold the ring" in capsys.readouterr().err
+    pytest.importorskip("meshio")
+    assert main(["export", str(file), "--to", "vtu", "--ring"]) == 0
+    assert (tmp_path / "basis_ring.pvd").is_file() and (tmp_path / "basis_ring_nd03.vtu").is_file()
+
+
+def test_a_case_of_a_cyclic_body_is_refused(tmp_path: Path) -> None:
+    from microslip.case import CaseSettings, run_case
+
+    settings = CaseSettings.model_validate(
+        {
+            "name": "c", "body": "sector", "excitation": "gas", "monitor": "tip", "direction": "y",
+            "contacts": [
+                {"interface": "rim", "normal_stiffness": 1e7, "tangential_stiffness": 1e6, "friction": 0.3}
+            ],
+            "sweep": {"start": 1.0, "stop": 2.0, "points": 3, "normal_forces": [1.0]},
+        }
+    )  # fmt: skip
+    with pytest.raises(UserError, match="one of 6 cyclic sectors"):
+        run_case(settings, sector.basis(), "case.toml")

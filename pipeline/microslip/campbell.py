@@ -7,6 +7,7 @@ Gyroscopic coupling is not in the frequencies of a modal file (its matrix G_r st
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -148,6 +149,15 @@ def point_weights(basis: ModalBasis) -> Array | None:
     """(n,) volume that belongs to each point, m3, if the file has nodal stresses."""
     nodal = basis.groups[min(basis.groups)].stresses.get("nodes")
     return nodal.weights if nodal is not None and len(nodal.weights) == basis.mesh.n_points else None
+
+
+def engine_orders(basis: ModalBasis) -> list[int]:
+    """The engine orders of the body file that a modal file was made from, if it travels with it."""
+    try:
+        orders = json.loads(basis.provenance.get("settings", "{}"))["rotation"]["engine_orders"]
+        return [k for k in orders if isinstance(k, int)]
+    except (ValueError, KeyError, TypeError):
+        return []
 
 
 def crossings(tracks: Tracks, orders: Sequence[int]) -> list[Crossing]:

@@ -121,6 +121,11 @@ def run_case(
     Raises:
         UserError: names that the modal file does not hold.
     """
+    if basis.sectors > 1:
+        raise UserError(
+            f"{path}: body: '{basis.name}' is one of {basis.sectors} cyclic sectors, whose contacts join neighbours; a "
+            "case follows one body alone: leave [cyclic] out of its body.toml to study a lone sector"
+        )
     if (settings.speed, 0) not in basis.groups:
         raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
     stored = basis.groups[settings.speed, 0]

@@ -34,6 +34,8 @@ Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, he
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
 
+Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
+
 PACKAGE = Path(__file__).parent
 
 
@@ -156,8 +158,10 @@ def check(file: Path, /, *, quiet: Quiet = False) -> None:
         file: a basis.h5.
     """
     from .basis import check_basis, read_basis
+    from .ring import ring_checks
 
-    findings = check_basis(read_basis(file))
+    basis = read_basis(file)
+    findings = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in findings if not c.passed]
     for c in findings if not quiet else failed:
         mark = "ok  " if c.passed else "FAIL"
@@ -168,18 +172,26 @@ def check(file: Path, /, *, quiet: Quiet = False) -> None:
 
 
 @app.command
-def export(file: Path, /, *, to: str, output: Output = None) -> None:
+def export(file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int = 0) -> None:
     """Write a modal file in another program's format.
 
     Args:
         file: a basis.h5.
         to: mat (MATLAB, Octave), vtu (ParaView).
+        speed: with --ring: which of the file's speeds, counted from 0.
     """
     from .basis import read_basis
     from .exchange import WRITERS, writer
 
     if to not in WRITERS:
         raise UserError(f"export --to {to}: unknown format; choose one of {', '.join(sorted(WRITERS))}")
+    if ring:
+        if to != "vtu":
+            raise UserError("export --ring: only vtu can hold the ring; leave --ring out for one sector")
+        from .exchange.vtu import write_ring
+
+        print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed))
+        return
     target = output or file.with_suffix(f".{to}")
     writer(to)(read_basis(file), target)
     print(target)
@@ -195,13 +207,15 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     """
     from . import pictures
     from .basis import read_basis
+    from .campbell import engine_orders
     from .report import write_report
 
     basis = read_basis(file)
     page = output or file.with_name("report.html")
     with progress(f"report of {basis.name}", quiet) as tell:
         reason = pictures.can_draw()
-        drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell)
+        orders = engine_orders(basis)
+        drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell, orders)
         write_report(basis, drawn, page, [f"The pictures are missing: {reason}"] if reason else [])
     _say(page, quiet)
 

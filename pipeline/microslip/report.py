@@ -16,10 +16,13 @@ from typing import Any
 import numpy as np
 
 from .basis import check_basis
-from .campbell import crossings, track_basis
+from .campbell import crossings, engine_orders, track_basis
 from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
 from .data import Interface, ModalBasis, ModalGroup
+from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
+from .resonances import rows as resonance_rows
+from .ring import aliased, certificate_words, certify_ring, ring_checks
 from .store import write_text
 from .truncation import percent, verdict
 
@@ -86,7 +89,8 @@ def report_html(
     album = _Album(pictures)
     parts = [
         ("Body", _body(basis, album)),
-        ("Frequencies", _frequencies(basis, album)),
+        ("Frequencies", _frequencies(basis, album) if basis.sectors == 1 else _ring_frequencies(basis, album)),
+        ("Engine orders", _engine_order_section(basis, album) if basis.sectors > 1 else ""),
         ("Modes", _modes(basis, album)),
         ("Stresses", _stresses(basis, album)),
         ("Interfaces", _interfaces(basis, album)),
@@ -204,7 +208,10 @@ def _lead(basis: ModalBasis) -> str:
     band = f" from {elastic[0]:.5g} Hz to {elastic[-1]:.5g} Hz" if len(elastic) else ""
     rigid = int((group.omega == 0).sum())
     free = f", {rigid} of them rigid" if rigid else ""
-    speeds = f" at each of {len(basis.groups)} speeds" if len(basis.groups) > 1 else ""
+    count = len(speeds_of(basis))
+    speeds = f" at each of {count} speeds" if count > 1 else ""
+    if basis.sectors > 1:
+        speeds = f" at nodal diameter {group.harmonic}, one of {len(harmonics_of(basis))} held{speeds}"
     return (
         f'<p class="lead">{group.n_modes} modes{free}{band}{speeds}; mass {_number(basis.mass)} kg. '
         f"{text(certificate(group))}</p>\n"
@@ -234,6 +241,7 @@ def _body(basis: ModalBasis, album: _Album) -> str:
     inertia = _clean(basis.inertia, float(np.abs(basis.inertia).max()))
     rows = [
         ("mass", f"{_number(basis.mass, 6)} kg"),
+        *_sectors(basis),
         ("size along x, y, z", text(" × ".join(f"{v:.4g}" for v in size)) + " mm"),
         ("centre of mass x, y, z", text(centre) + " mm"),
         ("inertia about the centre xx, yy, zz", _join(inertia[[0, 1, 2], [0, 1, 2]]) + " kg m²"),
@@ -249,6 +257,14 @@ def _body(basis: ModalBasis, album: _Album) -> str:
         _table([], [(text(a), b) for a, b in rows], "words")
         + album.take("mesh", "The mesh and its named faces, seen from two opposite sides.")
     )  # fmt: skip
+
+
+def _sectors(basis: ModalBasis) -> list[tuple[str, str]]:
+    if basis.sectors == 1:
+        return []
+    held = number_list(harmonics_of(basis))
+    words = f"one of {basis.sectors} alike round the axis; all numbers here are of one; nodal diameters {held}"
+    return [("sector", text(words))]
 
 
 def _clean(values: Any, scale: float) -> Any:
@@ -320,21 +336,78 @@ def _campbell(basis: ModalBasis, album: _Album) -> str:
     rows = [
         [str(c.order), str(int(tracks.modes[c.curve][tracks.modes[c.curve] >= 0][0]) + 1)]
         + [f"{c.speed * 30 / np.pi:.0f}", f"{c.frequency:.5g}"]
-        for c in crossings(tracks, _engine_orders(basis))
+        for c in crossings(tracks, engine_orders(basis))
     ]
     return out + _hidden("Where engine orders meet modes", _table(["engine order", "mode", "rpm", "Hz"], rows))
 
 
-def _engine_orders(basis: ModalBasis) -> list[int]:
-    try:
-        orders = json.loads(basis.provenance.get("settings", "{}"))["rotation"]["engine_orders"]
-        return [k for k in orders if isinstance(k, int)]
-    except (ValueError, KeyError, TypeError):
-        return []
+def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
+    """Frequencies over the nodal diameters, and what the sector proves of the ring."""
+    speeds, held = speeds_of(basis), harmonics_of(basis)
+    proofs = [certify_ring(basis, s) for s in speeds]
+    out = ""
+    for s, proof in zip(speeds, proofs, strict=True):
+        where = f"{_at(basis.groups[s, held[0]])}: " if len(speeds) > 1 else ""
+        out += _say(f"{where}{certificate_words(proof)}.", kind="" if proof.certified else "warn")
+    out += _say(
+        "Sector j moves as the sector itself times exp(i j k 2 pi / N), k the nodal diameter. A frequency at 0 < k < "
+        "N/2 belongs to two modes of the ring, waves that run forward and backward; no gyroscopic coupling is in it.",
+        kind="plain",
+    )
+    out += album.take("nodal_diameters", "Frequency over nodal diameter; each line is a family of modes.")
+    for i, s in enumerate(speeds):
+        shown = _ring_table([eigenmodes(basis.groups[s, k]) for k in held])
+        out += shown if i == 0 else _hidden(f"Frequencies at {_at(basis.groups[s, held[0]])}", shown)
+    return out
+
+
+def _ring_table(groups: Sequence[ModalGroup]) -> str:
+    head = [f"Hz at {_at(groups[0])}, mode", *(f"k = {g.harmonic}" for g in groups)]
+    rows = [
+        [str(j + 1), *(f"{g.frequency[j]:#.6g}" if j < g.n_modes else "" for g in groups)]
+        for j in range(max(g.n_modes for g in groups))
+    ]
+    return _table(head, rows)
+
+
+def _engine_order_section(basis: ModalBasis, album: _Album) -> str:
+    """Which engine order really excites which mode."""
+    orders = engine_orders(basis)
+    out = _say(
+        "An engine order e excites a mode only if both its frequency and its nodal diameter fit: N sectors feel e as "
+        "the nodal diameter k = e mod N, or N - e mod N if that is smaller.",
+        kind="plain",
+    )
+    pairs = [(e, *aliased(e, basis.sectors)) for e in orders if e > 0]
+    out += _table(["engine order", "nodal diameter", "wave on the rotor"], [[str(v) for v in row] for row in pairs])
+    if lacking := unanswered(basis, orders):
+        out += _say(f"The file lacks the nodal diameters of the engine orders {number_list(lacking)}.", kind="warn")
+    out += album.take("safe", "Interference diagram (SAFE, ZZENF): a resonance is where a diamond lies on a dot.")
+    out += album.take("campbell", "Campbell diagram; circles are true resonances.")
+    found = resonances(basis, orders) if len(speeds_of(basis)) > 1 else []
+    if found:
+        out += "<h3>True resonances</h3>\n" + _table(HEAD, [[text(c) for c in row] for row in resonance_rows(found)])
+    elif pairs and len(speeds_of(basis)) > 1:
+        out += _say("No engine order meets a mode of its nodal diameter between the lowest and the highest speed.")
+    return out + _nearest(basis, orders)
+
+
+def _nearest(basis: ModalBasis, orders: Sequence[int]) -> str:
+    """The modes nearest to the engine orders at the highest speed."""
+    fastest = speeds_of(basis)[-1]
+    rows = [
+        [str(m.order), str(m.nodal_diameter), m.direction, str(m.family or ""), f"{m.frequency:.5g}"]
+        + [f"{m.excitation:.5g}", f"{100 * m.relative:+.1f}&nbsp;%"]
+        for m in margins(basis, fastest, orders)[:12]
+    ]
+    head = ["engine order", "nodal diameter", "wave", "family", "mode in Hz", "excitation in Hz", "mode above it"]
+    speed = _at(basis.groups[fastest, harmonics_of(basis)[0]])
+    return _hidden(f"The modes nearest to an engine order at {speed}", _table(head, rows)) if rows else ""
 
 
 def _modes(basis: ModalBasis, album: _Album) -> str:
-    moving = album.row("animation_")
+    moving = album.row("ring_wave_") + album.row("animation_")
+    rings = "".join(album.take(n, wide=True) for n in [n for n in album.left if n.startswith("ring_modes_")])
     sheets = "".join(album.take(n, wide=True) for n in [n for n in album.left if n.startswith("modes_")])
     single = ""
     for group in _groups(basis):
@@ -343,7 +416,7 @@ def _modes(basis: ModalBasis, album: _Album) -> str:
         if names:
             shown = "".join(album.take(n) for n in names)
             single += _hidden(f"Each mode at {_at(group)}", f'<div class="row">{shown}</div>')
-    return moving + sheets + single
+    return rings + moving + sheets + single
 
 
 def _stresses(basis: ModalBasis, album: _Album) -> str:
@@ -503,7 +576,7 @@ def _cell(value: Any) -> str:
 
 
 def _checks(basis: ModalBasis) -> str:
-    found = check_basis(basis)
+    found = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in found if not c.passed]
     rows = [
         [

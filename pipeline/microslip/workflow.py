@@ -29,6 +29,8 @@ from .data import Array, GyroscopicModes, Mesh, ModalBasis, SpeedRange, UserErro
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
+from .resonances import eigenmodes, harmonics_of, resonance_csv, resonances, speeds_of
+from .ring import certificate_words, certify_ring
 
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
@@ -42,7 +44,8 @@ _MODES_CODE = (
 )  # fmt: skip
 _CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")
 _REPORT_CODE = (
-    "pictures", "campbell.py", "speed_range.py", "report.py", "truncation.py", "compliance.py", "basis/checks.py",
+    "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
+    "compliance.py", "basis/checks.py",
 )  # fmt: skip
 
 
@@ -370,8 +373,8 @@ def response_stage(
 def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
     rows = []
-    for normal, resonances in result.resonances.items():
-        for frequency, amplitude in resonances:
+    for normal, peaks in result.resonances.items():
+        for frequency, amplitude in peaks:
             rows.append({"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude})
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
     return {
@@ -417,6 +420,9 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         remarks.append(f"The pictures of the body are missing: {reason}")
     engine_orders = list(job.settings.rotation.engine_orders)
     drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
+    if basis.sectors > 1 and len(speeds_of(basis)) > 1:
+        found = resonances(basis, engine_orders)
+        store.write_text(job.build_folder / "resonances.csv", resonance_csv(found))
     if response is not None:
         drawn["friction response"] = folder / "response.png"
     report("writing the report")
@@ -512,6 +518,9 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         f"{basis.name}: {basis.mesh.n_points} points, {basis.mesh.n_cells} cells, mass {basis.mass:.6g} kg, "
         f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm, reduction {basis.reduction}",
     ]
+    ranges = [line for k, r in sorted(basis.ranges.items()) for line in range_summary(k, r)]
+    if basis.sectors > 1:
+        return lines + _ring_summary(basis) + ranges
     for (_, harmonic), g in sorted(basis.groups.items()):
         state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = "certified complete" if g.checks.get("certified") else "NOT certified"
@@ -526,7 +535,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
             lines += [f"  {i + 1:4d}  {row}" for i, row in enumerate(whirl_rows(g.gyroscopic))]
     if any(group.interfaces for group in basis.groups.values()):
         lines.append(f"compliance: {sentence(basis, basis.groups[min(basis.groups)])}")
-    return lines + [line for k, r in sorted(basis.ranges.items()) for line in range_summary(k, r)]
+    return lines + ranges
 
 
 def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
@@ -543,4 +552,27 @@ def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
         f"  held out {v:.6g} rpm: frequency error {total:.1e} (interpolation {a:.1e}, projection {b:.1e})"
         for v, a, b, total in held
     ]
+    return lines
+
+
+MOST_COLUMNS = 10
+"""Frequencies shown of each nodal diameter on the terminal."""
+
+
+def _ring_summary(basis: ModalBasis) -> list[str]:
+    """A line of frequencies for each nodal diameter, at each speed."""
+    lines = [f"one of {basis.sectors} cyclic sectors; the numbers above are of one"]
+    for speed in speeds_of(basis):
+        groups = [eigenmodes(basis.groups[speed, k]) for k in harmonics_of(basis)]
+        first = basis.groups[speed, harmonics_of(basis)[0]]
+        state = f"{first.speed * 30 / np.pi:g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
+        lines.append(f"{state}: {certificate_words(certify_ring(basis, speed))}")
+        lines += [f"  {text}" for text in sentences(first, basis.reduction)]
+        for g in groups:
+            more = f"   and {g.n_modes - MOST_COLUMNS} more" if g.n_modes > MOST_COLUMNS else ""
+            shown = "".join(f"{f:10.5g}" for f in g.frequency[:MOST_COLUMNS])
+            lines.append(f"  k = {g.harmonic:3d}  {shown}  Hz{more}")
+    first = basis.groups[min(basis.groups)]
+    if first.interfaces:
+        lines.append(f"compliance at nodal diameter {first.harmonic}: {sentence(basis, first)}")
     return lines

@@ -2,7 +2,9 @@
 
 One struct per speed, ``speed_0`` ..., holds the reduced model under the names such programs use: with ``b = speed_0``
 the system is ``b.M q'' + b.D q' + b.K q = b.Fex1 f``, and ``b.interfaces.<name>.T`` reads, its transpose loads, a
-contact. Numbers are those of the modal file, bit for bit; columns stay columns.
+contact. Numbers are those of the modal file, bit for bit; columns stay columns. A cyclic sector has one struct per
+nodal diameter, ``speed_0_nd_3``; its arrays are complex where the file's are, and the conjugate transpose (``T'`` in
+MATLAB) loads.
 """
 
 from __future__ import annotations
@@ -53,6 +55,7 @@ def mat_tables(basis: ModalBasis) -> dict[str, Any]:
         "reduction": basis.reduction,
         "damping_source": basis.damping_source,
         "free": float(basis.free),
+        "cyclic": {"sectors": float(basis.sectors), "left": basis.cyclic_faces[0], "right": basis.cyclic_faces[1]},
         "mesh": _mesh(basis),
         "body": {"mass": basis.mass, "centre": _column(basis.centre), "inertia": basis.inertia},
         "rotation": {"direction": _column(basis.rotation_axis), "point": _column(basis.rotation_point)},
@@ -90,7 +93,7 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         "C": g.C_r,
         "K": g.K_r,
         "G": g.G_r,
-        "Fex1": np.concatenate(loads).T if loads else np.zeros((g.n_modes, 0)),
+        "Fex1": np.concatenate(loads).conj().T if loads else np.zeros((g.n_modes, 0)),
         "omega": _column(g.omega),
         "frequency": _column(g.frequency),
         "damping_ratio": _column(g.damping_ratio),

@@ -5,18 +5,26 @@ Several speeds stand beside each other in one file, their names then begin with 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from ..coordinates import basis_in_modes
-from ..data import Array, ModalBasis, ModalGroup
-from ..store import complete_or_absent
+from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
+from ..mesh import boundary_facets
+from ..resonances import eigenmodes, speeds_of
+from ..ring import expand, multiplicity, replicate, ring_scale, sector_rotation
+from ..store import complete_or_absent, write_text
 
 
 def write_vtu(basis: ModalBasis, path: Path | str) -> None:
     """Write mesh, shapes and nodal stresses as a VTU file, complete or absent.
+
+    Of a cyclic sector this is the sector alone; its complex fields are two, ``..._real`` and ``..._imag``.
 
     Point data: ``mode_<number>_<Hz>Hz`` (n, 3) in kg^-1/2; ``stress_<number>_<Hz>Hz`` (n, 6) in Pa per unit modal
     coordinate, order xx yy zz xy yz xz (VTK's); ``u_static`` (n, 3) m and ``stress_static`` (n, 6) Pa where there
@@ -63,9 +71,9 @@ def _group_data(basis: ModalBasis, group: ModalGroup, prefix: str) -> dict[str, 
     for j in range(group.n_modes):
         label = mode_label(group, j)
         if len(group.phi) == n:
-            data[f"{prefix}mode_{label}"] = _single(group.phi[:, :, j])
+            data |= _parts(f"{prefix}mode_{label}", group.phi[:, :, j])
         if has_stress and stress is not None:
-            data[f"{prefix}stress_{label}"] = _single(stress.stress[:, :, j])
+            data |= _parts(f"{prefix}stress_{label}", stress.stress[:, :, j])
     if group.u_static.any():
         data[f"{prefix}u_static"] = _single(group.u_static)
     if has_stress and stress is not None and stress.static_stress.any():
@@ -73,5 +81,92 @@ def _group_data(basis: ModalBasis, group: ModalGroup, prefix: str) -> dict[str, 
     return data
 
 
+def _parts(name: str, values: Array) -> dict[str, Any]:
+    """One field, or the two of a complex one."""
+    if not np.iscomplexobj(values):
+        return {name: _single(values)}
+    return {f"{name}_real": _single(values.real), f"{name}_imag": _single(values.imag)}
+
+
 def _single(values: Array) -> Any:
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+# --- the whole ring ------------------------------------------------------------------------------------------------
+
+
+def write_ring(basis: ModalBasis, path: Path | str, speed: int = 0) -> Path:
+    """Write the surface of all sectors of a cyclic body: a VTU file per nodal diameter, bound together by a PVD file.
+
+    ParaView shows the nodal diameter as its time. Point data of the eigenmodes, ``mode_<number>_real`` and
+    ``mode_<number>_imag`` (ring points, 3), kg^-1/2: the ring moves as real cos(omega t) - imag sin(omega t), for
+    0 < k < N/2 a backward wave; both parts by themselves are the two standing modes of the pair, normalised on the
+    ring. ``u_static`` m; cell data ``sector``. The frequencies are in a table (CSV) beside the PVD file.
+
+    Args:
+        path: of the PVD file; the others stand beside it. speed: which of the file's, counted from 0.
+
+    Returns:
+        The PVD file.
+
+    Raises:
+        UserError: not a cyclic body, no such speed, no shapes in the file, no permission, no space.
+    """
+    if basis.sectors == 1:
+        raise UserError(f"{basis.name}: export --ring: the body is not cyclic; leave --ring out")
+    groups = {k: eigenmodes(g) for (s, k), g in sorted(basis.groups.items()) if s == speed}
+    if not groups:
+        raise UserError(f"{basis.name}: export --speed {speed}: the file has {len(speeds_of(basis))}; count from 0")
+    path, (outside, used) = Path(path), _outside(basis)
+    ring = replicate(outside, basis.rotation_axis, basis.rotation_point, basis.sectors)
+    rows = ["rpm,nodal diameter,mode,Hz,modes of the ring"]
+    files = {k: path.with_name(f"{path.stem}_nd{k:02d}.vtu") for k in groups}
+    for k, g in groups.items():
+        thin = replace(g, phi=g.phi[used] if len(g.phi) else g.phi, u_static=g.u_static[used])
+        _write_ring_group(basis, ring.mesh, thin, files[k])
+        twice = multiplicity(k, basis.sectors)
+        rows += [f"{g.speed * 30 / np.pi:.6g},{k},{j + 1},{f:.8g},{twice}" for j, f in enumerate(g.frequency)]
+    write_text(path.with_suffix(".csv"), "\n".join(rows) + "\n")
+    write_text(path, _collection(files))
+    return path
+
+
+def _outside(basis: ModalBasis) -> tuple[Mesh, Indices]:
+    """The surface of a sector without its cyclic faces as a mesh of facets, and its points' numbers."""
+    mesh = basis.mesh
+    cut = [f for name in basis.cyclic_faces for f in mesh.faces.get(name, {}).values()]
+    inside = {tuple(row) for f in cut for row in np.sort(f, axis=1).tolist()}
+    kept = {}
+    for kind, facets in boundary_facets(mesh).items():
+        free = np.array([tuple(row) not in inside for row in np.sort(facets, axis=1).tolist()])
+        kept[kind] = facets[free]
+    used = np.unique(np.concatenate([f.ravel() for f in kept.values()]))
+    return Mesh(mesh.points[used], {t: np.searchsorted(used, f) for t, f in kept.items()}), used
+
+
+def _write_ring_group(basis: ModalBasis, ring: Mesh, group: ModalGroup, path: Path) -> None:
+    import meshio
+
+    scale = ring_scale(group, basis.sectors)
+    waves = [scale * expand(group, basis, j) for j in range(basis.sectors)]
+    data: dict[str, Any] = {}
+    for m in range(group.n_modes):
+        whole = np.concatenate([w[:, :, m] for w in waves])
+        data[f"mode_{m + 1:02d}_real"] = _single(whole.real)
+        data[f"mode_{m + 1:02d}_imag"] = _single(whole.imag)
+    if group.u_static.any():
+        turned = [group.u_static @ sector_rotation(basis, j).T for j in range(basis.sectors)]
+        data["u_static"] = _single(np.concatenate(turned))
+    sector = [np.repeat(np.arange(basis.sectors), len(c) // basis.sectors) for c in ring.cells.values()]
+    mesh = meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector})
+    with complete_or_absent(path) as temporary:
+        meshio.write(temporary, mesh, file_format="vtu")
+
+
+def _collection(files: Mapping[int, Path]) -> str:
+    """A PVD file: the nodal diameter stands as the time."""
+    sets = "".join(f'    <DataSet timestep="{k}" part="0" file="{escape(f.name)}"/>\n' for k, f in files.items())
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n"
+    )
