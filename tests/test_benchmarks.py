@@ -22,3 +22,12 @@ def test_the_modal_benchmark_times_every_stage(tmp_path):
     ratios = ("| certificate on top |", "| eigensolve / (factor + solves) |")
     for text in ("| microslip |", "pattern and gradients", *ratios):
         assert text in done.stdout
+
+
+def test_the_cyclic_benchmark_compares_the_two_ways(tmp_path):
+    command = [sys.executable, str(ROOT / "benchmarks" / "cyclic.py"), "--quick", "--work", str(tmp_path)]
+    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stderr
+    for text in ("| cyclic / real, CPU |", "| cyclic |", "| real |", "condensation"):
+        assert text in done.stdout

@@ -14,8 +14,10 @@ import pytest
 import rings
 import scipy.linalg
 import scipy.sparse as sp
-from meshes import body, moved, nearest, rotation_matrix
+from meshes import body, moved, nearest, rotation_matrix, with_sets
 
+from microslip.data import Mesh, UserError
+from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
 from microslip.modes.rows import patch
 from microslip.modes.stress import gauss_set, nodal_set
@@ -160,7 +162,7 @@ def test_axis_and_point_of_the_rotation():
     for k, group in groups():
         np.testing.assert_allclose(found.groups[0, k].omega, group.omega, rtol=1e-9)
     reverse = replace_axis(rotation, -1.0)  # left and right are named for the positive sense
-    with pytest.raises(Exception, match="cyclic"):
+    with pytest.raises(UserError, match="cyclic"):
         modal_basis(mesh, settings(6, mesh, rotation=reverse, interfaces=[]))
 
 
@@ -401,8 +403,86 @@ def test_nodal_diameters_asked_for():
 
 
 def test_a_ring_of_another_number_of_sectors_is_refused():
-    with pytest.raises(Exception, match="cyclic"):
+    with pytest.raises(UserError, match="cyclic"):
         modal_basis(sector(), settings(7, sector()))
+
+
+def with_line():
+    """The sector with the set ``line``: nodes of the bore on one parallel to the axis."""
+    mesh, bore = sector(), sector().face_points("bore")
+    angle = np.arctan2(mesh.points[bore, 0], mesh.points[bore, 2])
+    return with_sets(mesh, line=bore[np.abs(angle - np.median(angle)) < 1e-6])
+
+
+def test_a_ring_held_where_its_sector_alone_could_turn():
+    """A line of nodes in each sector: alone it turns about the line, six of them hold the disc."""
+    mesh = with_line()
+    whole_ring = rings.full_ring(mesh, 6)
+    line = np.unique(whole_ring.nodes[:, mesh.point_sets["line"]])
+    held = body(supports=[{"face": "line"}])
+    full = rings.matrices(with_sets(whole_ring.mesh, line=line), held)
+    found = modal_basis(mesh, settings(6, mesh, rpm=0.0, supports=[{"face": "line"}]))
+    for k in range(4):
+        K, M, _, _ = full.fourier(whole_ring, k)
+        np.testing.assert_allclose(found.groups[0, k].omega[:8], rings.spectrum(K, M, 8), rtol=1e-9)
+
+
+def test_a_ring_that_nothing_holds_is_refused():
+    with pytest.raises(UserError, match="nothing holds the body against .*rotation about y"):
+        modal_basis(sector(), settings(6, sector(), supports=[{"face": "bore", "directions": "y"}]))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"loads": [{"kind": "gravity", "vector": [0.0, -9.81, 1.0]}]}, "loads.0.vector: gravity across"),
+        ({"loads": [{"kind": "pressure", "face": "cyclic_left", "value": 1.0}]}, "loads.0.face: .*inside the ring"),
+        ({"interfaces": [{"name": "c", "face": "cyclic_right"}]}, "interfaces.c.face: .*inside the ring"),
+        ({"excitations": [{"name": "e", "face": "cyclic_left", "pressure": True}]}, "excitations.e.face: .*inside"),
+    ],
+)
+def test_what_a_sector_cannot_say_of_its_ring_is_refused(wrong, sentence):
+    with pytest.raises(UserError, match=sentence):
+        modal_basis(sector(), settings(6, sector(), **wrong))
+
+
+def test_gravity_along_the_axis_bends_all_sectors_alike():
+    load = {"kind": "gravity", "vector": [0.0, 9.81e4, 0.0]}
+    held = body(supports=[{"face": "bore"}], loads=[load], rotation={"prestress": "nonlinear"})
+    u = rings.matrices(ring().mesh, held).state.u[ring().nodes[0]]
+    found = modal_basis(sector(), settings(6, sector(), rpm=0.0, loads=[load])).groups[0, 2]
+    np.testing.assert_allclose(found.u_static, u, atol=1e-8 * np.abs(u).max())
+
+
+def test_nearly_all_modes():
+    """As many as ARPACK has no room for, at complex nodal diameters."""
+    cyclic = {"sectors": 6, "nodal_diameters": [1]}  # 384 unknowns
+    found = modal_basis(sector(), settings(6, sector(), modes={"count": 380}, cyclic=cyclic)).groups[0, 1]
+    np.testing.assert_allclose(found.omega[:COUNT], basis().groups[0, 1].omega[:COUNT], rtol=1e-9)
+
+
+def flipped() -> Mesh:
+    """A box of five ten-node tetrahedra: over the nodes of its two cut faces lie opposite diagonals."""
+    corners = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)], dtype=float)
+    tets = np.array([[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 3, 6], [4, 0, 5, 6], [7, 3, 5, 6]])
+    inside_out = np.linalg.det(corners[tets[:, 1:]] - corners[tets[:, :1]]) < 0
+    tets[inside_out] = tets[inside_out][:, [0, 2, 1, 3]]
+    ends = np.sort(tets[:, [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]].reshape(-1, 2), axis=1)
+    edges, middle = np.unique(ends, axis=0, return_inverse=True)
+    box = np.vstack([corners, corners[edges].mean(axis=1)])
+    angle, r = 2 * np.pi / 12 * (box[:, 0] - 0.5), 0.1 + 0.05 * box[:, 2]
+    points = np.column_stack([r * np.sin(angle), 0.03 * box[:, 1], r * np.cos(angle)])
+    mesh = Mesh(points, {"tetra10": np.hstack([tets, 8 + middle.reshape(-1, 6)])}, {}, {}, np.arange(1, 27))
+    faces = {}
+    for name, axis, value in (("cyclic_left", 0, 0), ("cyclic_right", 0, 1), ("bore", 2, 0)):
+        on = box[:, axis] == value
+        faces[name] = {t: f[on[f].all(axis=1)] for t, f in boundary_facets(mesh).items()}
+    return replace(mesh, faces=faces)
+
+
+def test_facets_that_do_not_match_over_nodes_that_do_are_refused():
+    with pytest.raises(UserError, match="cyclic: the nodes .* meet, but not their facets"):
+        modal_basis(flipped(), body(supports=[{"face": "bore"}], cyclic={"sectors": 12}, modes={"count": 4}))
 
 
 def test_faces_that_do_not_match_are_refused():
@@ -410,5 +490,5 @@ def test_faces_that_do_not_match_are_refused():
     mesh = sector()
     points = mesh.points.copy()
     points[mesh.face_points("cyclic_right")[3]] += [0.0, 2e-4, 0.0]
-    with pytest.raises(Exception, match="cyclic"):
+    with pytest.raises(UserError, match="cyclic"):
         modal_basis(replace(mesh, points=points), settings(6, mesh))

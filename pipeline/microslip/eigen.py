@@ -374,7 +374,7 @@ def _lanczos(pencil: Pencil, count: int, shift: float, tolerance: float, known: 
     sides for little more than one, a block sees repeated eigenvalues, and the basis stays small because
     shift-invert separates the wanted end. Where the basis would need too much memory ARPACK restarts instead.
     """
-    if count >= pencil.n - 1 or pencil.n < 200:
+    if count >= pencil.n - 2 or pencil.n < 200:  # complex ARPACK has no room for two less
         return _dense(pencil, count, known)
     block = min(4, count)
     limit = int(min(pencil.n - known.shape[1], max(4 * count, count + 60)) // block)

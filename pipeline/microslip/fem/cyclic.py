@@ -68,6 +68,24 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
     return CutFaces(sectors, a, b[nearest], R, float(distance.max()))
 
 
+def refuse_other_facets(mesh: Mesh, left: str, right: str, cut: CutFaces) -> None:
+    """Nodes may meet where facets do not: two triangles over four nodes have two diagonals with the same middle.
+
+    Raises:
+        UserError: facets of the right face are not those of the left one turned.
+    """
+    mate = np.full(mesh.n_points, -1)
+    mate[cut.left] = cut.right
+    for kind in mesh.faces.get(left, {}):
+        moved, there = mate[mesh.faces[left][kind]], mesh.faces[right].get(kind, np.zeros((0, 0), dtype=int))
+        a, b = (np.unique(np.sort(facets, axis=1), axis=0) for facets in (moved, there))
+        if not np.array_equal(a, b):
+            raise UserError(
+                f"cyclic: the nodes of '{left}' and '{right}' meet, but not their facets ({kind}: other diagonals); "
+                "mesh the two faces alike (gmsh: setPeriodic)"
+            )
+
+
 def _nearest(points: Array, to: Array, count: int = 1) -> tuple[Array, Array]:
     distance, index = cKDTree(points).query(to, k=count)
     return np.asarray(distance), np.asarray(index)

@@ -51,6 +51,48 @@ def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array
         raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
 
 
+def refuse_uncyclic(mesh: Mesh, settings: BodySettings) -> None:
+    """Refuse what a sector alone cannot say of its ring: gravity across the axis, faces inside the ring.
+
+    Raises:
+        UserError: with the key.
+    """
+    cyclic, axis = settings.cyclic, np.array(settings.rotation.axis)
+    if cyclic is None:
+        return
+    for number, load in enumerate(settings.loads):
+        pull = np.array(load.vector if load.kind == "gravity" else (0.0, 0.0, 0.0))
+        if np.linalg.norm(np.cross(axis, pull)) > 1e-9 * np.linalg.norm(axis) * np.linalg.norm(pull):
+            raise UserError(
+                f"loads.{number}.vector: gravity across the rotation axis does not pull at all sectors alike; keep its "
+                "part along the axis, or leave it out"
+            )
+    for key, face in _loaded_faces(settings):
+        for cut in (cyclic.left, cyclic.right):
+            if _share_facets(mesh, face, cut):
+                raise UserError(
+                    f"{key}: '{face}' has facets on the cut face '{cut}', which lies inside the ring; choose a face of "
+                    "its surface"
+                )
+
+
+def _loaded_faces(settings: BodySettings) -> list[tuple[str, str]]:
+    """(key, face) of all faces that touch something or are loaded."""
+    named = [
+        (f"{kind}.{item.name}.face", item.face)
+        for kind, items in (("interfaces", settings.interfaces), ("excitations", settings.excitations))
+        for item in items
+    ]
+    named += [(f"loads.{number}.face", load.face) for number, load in enumerate(settings.loads)]
+    return [(key, face) for key, face in named if face is not None]
+
+
+def _share_facets(mesh: Mesh, face: str, cut: str) -> bool:
+    on = np.zeros(mesh.n_points, dtype=bool)
+    on[mesh.face_points(cut)] = True
+    return any(on[facets].all(axis=1).any() for facets in mesh.faces.get(face, {}).values())
+
+
 PHYSICAL = ("craig-bampton", "dual-craig-bampton", "massless-boundary")
 
 

@@ -64,7 +64,11 @@ def modal_basis(
     )  # fmt: skip
     model = with_dead_loads(model, mesh, settings)
     mass, centre, inertia = inertia_of(d, model.material.density)
-    motions = rigid.free_motions(mesh.points, centre, fixed)
+    if sector is None:
+        motions = rigid.free_motions(mesh.points, centre, fixed)
+    else:  # six supports may hold a ring though each lets its sector turn
+        cut = sector.unknowns.cut
+        motions = rigid.free_motions_of_ring(mesh.points, point, fixed, cut.rotation, cut.sectors)
     check_held(mesh, settings, centre, motions)
     refuse_overlap(mesh, settings)
     solver = eigen.new_solver(settings.modes.solver)

@@ -27,12 +27,36 @@ def free_motions(points: Array, centre: Array, fixed: Indices) -> Array:
     fields = rigid_fields(points, centre).reshape(-1, 6)
     size = max(float(np.ptp(points, axis=0).max()), 1e-30)
     scaled = fields / np.array([1, 1, 1, size, size, size])
-    if not len(fixed):
-        return scaled
-    short = np.linalg.qr(scaled[fixed], mode="r")  # the singular values and vectors of many rows in six
+    return scaled if not len(fixed) else scaled @ _null_space(scaled[fixed])
+
+
+def _null_space(rows: Array) -> Array:
+    """(6, r) combinations of six motions that no row moves."""
+    short = np.linalg.qr(rows, mode="r")  # the singular values and vectors of many rows in six
     _, s, vt = np.linalg.svd(short, full_matrices=True)
     rank = int((s > 1e-8 * max(s.max(), 1e-300)).sum())
-    return scaled @ vt[rank:].T
+    return vt[rank:].T
+
+
+def free_motions_of_ring(
+    points: Array, point: Array, fixed: Indices, turn: Array, sectors: int
+) -> Array:
+    """(3n, r) rigid motions of a ring, on its first sector, that the supports of no sector hold.
+
+    Args:
+        points: (n, 3) of the first sector, m. point: of the rotation axis. fixed: of the first sector; the others'
+            turn with them. turn: (3, 3) rotation from a sector to the next.
+    """
+    size = max(float(np.ptp(points, axis=0).max()), 1e-30)
+    nodes, which = np.unique(fixed // 3, return_inverse=True)
+    rows, R = [np.zeros((0, 6))], np.eye(3)
+    for _ in range(sectors):
+        turned = (points[nodes] - point) @ R.T + point
+        seen = np.einsum("ab,nak->nbk", R, rigid_fields(turned, point))  # in the sector's own axes
+        rows.append(seen[which, fixed % 3] / np.array([1, 1, 1, size, size, size]))
+        R = turn @ R
+    scaled = rigid_fields(points, point).reshape(-1, 6) / np.array([1, 1, 1, size, size, size])
+    return scaled if not len(fixed) else scaled @ _null_space(np.concatenate(rows))
 
 
 def describe(points: Array, centre: Array, motions: Array) -> list[str]:

@@ -16,10 +16,10 @@ from .. import eigen
 from ..body import BodySettings
 from ..condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
 from ..data import Array, Indices
-from ..fem.cyclic import CyclicUpper, SectorUnknowns, cyclic_upper, pair_cut_faces, sector_unknowns
+from ..fem.cyclic import CyclicUpper, SectorUnknowns, cyclic_upper, pair_cut_faces, refuse_other_facets, sector_unknowns
 from ..fem.discretise import Discretisation
 from .body_rows import BodyRows
-from .boundary import require_face
+from .boundary import refuse_uncyclic, require_face
 from .equilibrium import BodyModel, StaticState
 from .solution import Report, Solution, certified, reduced_solution, search
 from .spectrum import pencil_parts
@@ -98,6 +98,8 @@ def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis:
     for key, face in (("left", cyclic.left), ("right", cyclic.right)):
         require_face(d.mesh, face, f"cyclic.{key}")
     cut = pair_cut_faces(d.mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors)
+    refuse_other_facets(d.mesh, cyclic.left, cyclic.right, cut)
+    refuse_uncyclic(d.mesh, settings)
     unknowns = sector_unknowns(d.pattern, fixed, cut)
     boundary = np.concatenate([unknowns.left, unknowns.right])
     condensed = new_condensed(boundary, settings.modes.solver)
