@@ -182,6 +182,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "output.shapes": ("", "mode shapes at all nodes"),
     "output.patch_shapes": ("", "mode shapes at the points of contact and load faces"),
     "output.gauss": ("", "strain and stress modes at integration points (the largest part of the file)"),
+    "output.stiffening": ("", "whether the modal file holds how large rigid motion stiffens the body, see rotation.md"),
     "output.nodal_stress": ("", "strain and stress modes smoothed to the nodes"),
 }
 

@@ -402,9 +402,16 @@ class Output(Model):
     patch_shapes: bool = True
     gauss: bool = True
     nodal_stress: bool = True
+    stiffening: bool = False
     stress_nodal_diameters: (
         Literal["all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], BeforeValidator(_tuple)]
     ) = "all"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Output:
+        if self.stiffening and not self.shapes:
+            raise ValueError("stiffening needs shapes = true")
+        return self
 
     def stress_at(self, harmonic: int) -> bool:
         """Whether strain and stress modes are wanted of a nodal diameter."""

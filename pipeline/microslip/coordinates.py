@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp
+from .data import Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
@@ -57,6 +57,7 @@ def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
         gauges={k: rows(r) for k, r in g.gauges.items()},
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
         run_up=_run_up(g.run_up, V),
+        invariants=_invariants(g.invariants, V),
     )
 
 
@@ -135,6 +136,14 @@ def _run_up(r: RunUp | None, V: Array) -> RunUp | None:
         return None
     W = V.conj().T
     return RunUp(W @ r.N @ V, W @ r.P @ V, W @ r.euler, W @ r.centrifugal)
+
+
+def _invariants(i: Invariants | None, V: Array) -> Invariants | None:
+    W = V.conj().T
+    return i and replace(
+        i, shape=i.shape @ V, position_shape=i.position_shape @ V, shape_shape=W @ i.shape_shape @ V,
+        stiffening=W @ i.stiffening @ V,
+    )  # fmt: skip
 
 
 def _gyroscopic(modes: GyroscopicModes | None, V: Array, M_r: Array) -> GyroscopicModes | None:

@@ -264,6 +264,32 @@ class RunUp:
     centrifugal: Array
 
 
+MOTIONS = ("wxx", "wyy", "wzz", "wxy", "wyz", "wxz", "ax", "ay", "az", "bx", "by", "bz")
+"""Rigid motions whose inertia forces stiffen a body: products of angular velocities, accelerations of the reference
+point, angular accelerations."""
+
+
+@dataclass(frozen=True)
+class Invariants:
+    """Inertia shape integrals about a reference point, in body axes, r = x + u_static from that point.
+
+    Attributes:
+        point: (3,) m. mass: kg. first_moment: (3,) integral of rho r. second_moment: (3, 3) of rho r_a r_b.
+        shape: (3, m) of rho phi_a. position_shape: (3, 3, m) of rho r_a phi_b. shape_shape: (3, 3, m, m) of
+            rho conj(phi_ai) phi_bj. So sum_a shape_shape[a, a] = M_r.
+        stiffening: (12, m, m) stiffness per unit of each of `MOTIONS`, or (0, m, m) if it was not asked for.
+    """
+
+    point: Array
+    mass: float
+    first_moment: Array
+    second_moment: Array
+    shape: Array
+    position_shape: Array
+    shape_shape: Array
+    stiffening: Array
+
+
 @dataclass(frozen=True)
 class ModalGroup:
     """The reduced body at one rotation speed (and one nodal diameter).
@@ -291,6 +317,7 @@ class ModalGroup:
         prestress: ``none``, ``linear`` or ``nonlinear``: how K was made. harmonic: nodal diameter.
         spin_softening: whether -Omega^2 M P is in K.
         run_up: what a change of the speed adds, or None. gyroscopic: modes with G_r, or None (at rest).
+        invariants: inertia integrals for large rigid motion, or None (a cyclic sector).
     """
 
     speed: float
@@ -316,6 +343,7 @@ class ModalGroup:
     to_diagonal: Array | None = None
     run_up: RunUp | None = None
     gyroscopic: GyroscopicModes | None = None
+    invariants: Invariants | None = None
 
     @property
     def frequency(self) -> Array:

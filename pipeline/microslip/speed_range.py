@@ -173,6 +173,7 @@ class _Evaluated:
             u_static=self.between(g.u_static for g in r.samples),
             compliance=self._compliance(),
             run_up=self._run_up(),
+            invariants=None,  # they follow the displaced body and are asked for at speeds of their own
             prestress=last.prestress if self.speed else r.samples[0].prestress,
         )
 

@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from ..coordinates import compliance_row, held, in_modes
-from ..data import Array, GyroscopicModes, Interface, ModalBasis, ModalGroup, Rows, RunUp, SpeedRange
+from ..data import (
+    MOTIONS,
+    Array,
+    GyroscopicModes,
+    Interface,
+    Invariants,
+    ModalBasis,
+    ModalGroup,
+    Rows,
+    RunUp,
+    SpeedRange,
+)
 from ..gyroscopic import stability_sentence
 from .integrals import face_mean, modal_mass
 
@@ -99,6 +110,8 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     if g.to_diagonal is not None:
         found += _transformation_checks(g)
         g = in_modes(g)
+    if g.invariants is not None:
+        found += _invariant_checks(basis, g, g.invariants)
     found += _matrix_checks(g)
     if g.run_up is not None:
         found += _run_up_checks(g, g.run_up)
@@ -163,6 +176,10 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
     if (y := g.gyroscopic) is not None:
         w = len(y.omega)
         wanted += [(y.shapes, (m, w)), (y.growth, (w,)), (y.sense, (w,)), (y.error, (w,))]
+    if (i_v := g.invariants) is not None:
+        wanted += [(i_v.point, (3,)), (i_v.first_moment, (3,)), (i_v.second_moment, (3, 3)), (i_v.shape, (3, m))]
+        wanted += [(i_v.position_shape, (3, 3, m)), (i_v.shape_shape, (3, 3, m, m))]
+        wanted += [(i_v.stiffening, (len(MOTIONS) if len(i_v.stiffening) else 0, m, m))]
     forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
     return forces in (0, motions) and own <= m and all(a.shape == shape for a, shape in wanted)
 
@@ -178,6 +195,9 @@ def _numbers(g: ModalGroup) -> list[Any]:
         found += [g.run_up.N, g.run_up.P, g.run_up.euler, g.run_up.centrifugal]
     if g.gyroscopic is not None:
         found += [g.gyroscopic.omega, g.gyroscopic.shapes, g.gyroscopic.growth, g.gyroscopic.sense]
+    if (v := g.invariants) is not None:
+        found += [v.point, v.mass, v.first_moment, v.second_moment, v.shape, v.position_shape, v.shape_shape]
+        found += [v.stiffening]
     for i in g.interfaces.values():
         found += [i.rows, i.fit_residual, i.rotation, i.origin, i.areas, i.points, i.normals, i.shapes]
         found += [i.characteristic, i.pattern]
@@ -223,6 +243,28 @@ def _run_up_checks(g: ModalGroup, r: RunUp) -> _Findings:
         ("run-up: P is at most the mass", max(float(np.linalg.eigvalsh(r.P)[-1]) - 1, 0.0), 1e-9, ""),
         ("run-up: N^T N is at most P", max(-float(np.linalg.eigvalsh(r.P - r.N.conj().T @ r.N)[0]), 0.0), 1e-9, ""),
     ]
+
+
+def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings:
+    """The integrals against the rigid body's numbers, against each other and against the mass-normalised shapes."""
+    size = max(float(np.ptp(basis.mesh.points, axis=0).max()), _largest(basis.centre - v.point), 1e-300)
+    found: _Findings = [("invariants: mass", abs(v.mass / basis.mass - 1), 1e-9, "")]
+    if not g.u_static.any():  # else the body has moved
+        r = basis.centre - v.point
+        about = basis.inertia + basis.mass * (r @ r * np.eye(3) - np.outer(r, r))
+        inertia = np.trace(v.second_moment) * np.eye(3) - v.second_moment
+        found += [
+            ("invariants: centre of mass", _largest(v.first_moment / v.mass - r) / size, 1e-9, ""),
+            ("invariants: inertia", _largest(inertia - about) / (v.mass * size**2), 1e-9, ""),
+        ]
+    mirrored = v.shape_shape.transpose(1, 0, 3, 2).conj()
+    found.append(("invariants: shape_shape is symmetric", _largest(v.shape_shape - mirrored), 1e-9, ""))
+    if g.run_up is not None:
+        n = basis.rotation_axis
+        turn = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
+        N = np.einsum("ab,abij->ij", turn, v.shape_shape)
+        found.append(("invariants: shape_shape gives N", _largest(N - g.run_up.N), 1e-9, ""))
+    return found
 
 
 def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:

@@ -18,12 +18,14 @@ import numpy as np
 
 from ..data import (
     INTERFACE_ROWS,
+    MOTIONS,
     VOIGT,
     Array,
     Compliance,
     GyroscopicModes,
     Indices,
     Interface,
+    Invariants,
     Mesh,
     ModalBasis,
     ModalGroup,
@@ -220,6 +222,8 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
         _write_run_up(group, g.run_up, mode, column)
     if g.gyroscopic is not None:
         _write_gyroscopic(group, g.gyroscopic, mode)
+    if g.invariants is not None:
+        _write_invariants(group, g.invariants)
     checks = group.create_group("checks")
     for name, value in sorted(g.checks.items()):
         put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
@@ -298,6 +302,21 @@ def _write_run_up(group: h5py.Group, r: RunUp, mode: h5py.Dataset, column: h5py.
     put(where, "P", r.P, "1", scales=[mode, column])
     put(where, "euler", r.euler, "kg^1/2 m", scales=[mode])
     put(where, "centrifugal", r.centrifugal, "kg^1/2 m", scales=[mode])
+
+
+def _write_invariants(group: h5py.Group, i: Invariants) -> None:
+    where = group.create_group("invariants")
+    pair = ("axis", "axis_")
+    put(where, "point", i.point, "m", ("axis",))
+    put(where, "mass", i.mass, "kg")
+    put(where, "first_moment", i.first_moment, "kg m", ("axis",))
+    put(where, "second_moment", i.second_moment, "kg m^2", pair)
+    put(where, "shape", i.shape, "kg^1/2", ("axis", "mode"))
+    put(where, "position_shape", i.position_shape, "kg^1/2 m", (*pair, "mode"))
+    put(where, "shape_shape", i.shape_shape, "1", (*pair, "mode", "mode_column"))
+    if len(i.stiffening):
+        motion = put(where, "stiffening", i.stiffening, "per unit of the motion", ("motion", "mode", "mode_column"))
+        motion.attrs["motions"] = " ".join(MOTIONS)
 
 
 def _write_gyroscopic(group: h5py.Group, modes: GyroscopicModes, mode: h5py.Dataset) -> None:
@@ -550,6 +569,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         spin_softening=bool(state.attrs["spin_softening"]),
         run_up=_read_run_up(group["run_up"], m) if "run_up" in group else None,
         gyroscopic=_read_gyroscopic(group["gyroscopic"], m) if "gyroscopic" in group else None,
+        invariants=_read_invariants(group["invariants"], m) if "invariants" in group else None,
     )  # fmt: skip
 
 
@@ -557,6 +577,15 @@ def _read_run_up(where: h5py.Group, m: int) -> RunUp:
     return RunUp(
         _array(where, "N", m, m), _array(where, "P", m, m), _array(where, "euler", m), _array(where, "centrifugal", m)
     )
+
+
+def _read_invariants(where: h5py.Group, m: int) -> Invariants:
+    return Invariants(
+        _array(where, "point", 3), float(_array(where, "mass")), _array(where, "first_moment", 3),
+        _array(where, "second_moment", 3, 3), _array(where, "shape", 3, m), _array(where, "position_shape", 3, 3, m),
+        _array(where, "shape_shape", 3, 3, m, m),
+        _array(where, "stiffening", len(MOTIONS), m, m) if "stiffening" in where else np.zeros((0, m, m)),
+    )  # fmt: skip
 
 
 def _read_gyroscopic(where: h5py.Group, m: int) -> GyroscopicModes:

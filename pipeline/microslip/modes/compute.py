@@ -28,6 +28,7 @@ from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, r
 from .boundary import check_held, fixed_dofs, refuse_overlap, with_dead_loads
 from .characteristic import with_characteristic
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
+from .invariants import inertia_invariants, stiffening_operators, with_stiffening
 from .run_up import run_up_terms
 from .sector import Sector, make_sector
 from .solution import Solution, held_compliance, solution
@@ -85,6 +86,10 @@ def modal_basis(
             before = speed
             made = _groups(model, settings, state, speed, motions, rows, solver, sector, report)
             groups |= {(number, k): group for k, group in made.items()}
+        if settings.output.stiffening and sector is None:
+            report("stiffening by inertia forces")
+            operators = stiffening_operators(model, solver, motions)
+            groups = {key: with_stiffening(g, model, operators) for key, g in groups.items()}
         ranges: dict[int, SpeedRange] = {}
         if settings.rotation.range_rpm is not None:
             from .body_range import body_ranges  # which itself calls `assemble_group`
@@ -172,6 +177,7 @@ def assemble_group(
         G_r=G,
         run_up=run_up,
         gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
+        invariants=None if settings.cyclic else inertia_invariants(model, state, shapes, Mphi),
         phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
         interfaces=reduced_interfaces(rows, settings, phi, shapes),
         excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
