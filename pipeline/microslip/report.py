@@ -375,7 +375,8 @@ def _engine_order_section(basis: ModalBasis, album: _Album) -> str:
     orders = engine_orders(basis)
     out = _say(
         "An engine order e excites a mode only if both its frequency and its nodal diameter fit: N sectors feel e as "
-        "the nodal diameter k = e mod N, or N - e mod N if that is smaller.",
+        "the nodal diameter k = e mod N, or N - e mod N if that is smaller. Resonances and distances hold gyroscopic "
+        "coupling, which splits forward and backward waves, where the file has it.",
         kind="plain",
     )
     pairs = [(e, *aliased(e, basis.sectors)) for e in orders if e > 0]

@@ -17,7 +17,7 @@ import numpy as np
 from .campbell import Tracks, crossings, follow, point_weights, track_basis
 from .coordinates import in_modes
 from .data import Array, Indices, ModalBasis, ModalGroup
-from .ring import aliased
+from .ring import FORWARD, aliased
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,23 @@ def eigenmodes(group: ModalGroup) -> ModalGroup:
     )  # fmt: skip
 
 
+def travelling(group: ModalGroup, direction: str) -> ModalGroup:
+    """The eigenmodes of one sense of travel, with gyroscopic coupling where the group holds it.
+
+    The coupling splits the two waves of 0 < k < N/2: positive omega of `GyroscopicModes` run backward, negative ones
+    forward. Standing waves, and groups without the coupling, keep their frequencies for both.
+    """
+    plain, g = eigenmodes(group), group.gyroscopic
+    if g is None or not g.stable:
+        return plain
+    chosen = np.flatnonzero(g.omega < 0 if direction == FORWARD else g.omega > 0)
+    chosen = chosen[np.argsort(np.abs(g.omega[chosen]), kind="stable")][: plain.n_modes]
+    if len(chosen) < plain.n_modes:
+        return plain
+    phi = group.phi @ g.shapes[:, chosen] if len(group.phi) else plain.phi
+    return replace(plain, omega=np.abs(g.omega[chosen]), phi=phi)
+
+
 def _groups(basis: ModalBasis) -> dict[tuple[int, int], ModalGroup]:
     return {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
 
@@ -146,26 +163,44 @@ def _carried(curves: Tracks, modes: Indices, at: int) -> Indices:
     return table[modes]
 
 
-def tracks(basis: ModalBasis) -> dict[int, Tracks]:
-    """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds."""
-    cut = replace(basis, groups=_groups(basis))
-    found = {k: track_basis(cut, k) for k in harmonics_of(basis)}
-    return {k: t for k, t in found.items() if t is not None}
+def tracks(basis: ModalBasis, direction: str = "") -> dict[int, Tracks]:
+    """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds.
+
+    Args:
+        direction: of the waves, with gyroscopic coupling where the file holds it; empty: without it.
+    """
+    return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, direction)) is not None}
+
+
+def _tracks_of(basis: ModalBasis, harmonic: int, direction: str) -> Tracks | None:
+    """Curves of one nodal diameter, or None."""
+    groups = {
+        key: travelling(g, direction) if direction else eigenmodes(g)
+        for key, g in basis.groups.items()
+        if key[1] == harmonic
+    }
+    return track_basis(replace(basis, groups=groups), harmonic) if groups else None
 
 
 def resonances(basis: ModalBasis, orders: Iterable[int]) -> list[Resonance]:
     """Where engine orders meet modes of the nodal diameter they excite, ascending in speed.
 
+    Gyroscopic coupling is in the frequencies where the file holds it; a forward wave and a backward wave of one nodal
+    diameter then differ.
+
     Args:
         basis: at two speeds or more. orders: engine orders; those that alias onto a nodal diameter that the file
             does not hold find nothing (`unanswered`).
     """
-    curves, joined = tracks(basis), families(basis)
-    out = []
-    for order in sorted({e for e in orders if e > 0}):
-        k, direction = aliased(order, basis.sectors)
-        for c in crossings(curves[k], [order]) if k in curves else []:
-            row = curves[k].modes[c.curve]
+    joined, out = families(basis), []
+    wanted = {e: aliased(e, basis.sectors) for e in sorted({e for e in orders if e > 0})}
+    curves = {wave: _tracks_of(basis, *wave) for wave in set(wanted.values())}
+    for order, (k, direction) in wanted.items():
+        found = curves[k, direction]
+        if found is None:
+            continue
+        for c in crossings(found, [order]):
+            row = found.modes[c.curve]
             mode = int(row[row >= 0][0])
             family = joined.of(k, mode) + 1 if row[0] >= 0 else 0
             out.append(Resonance(order, k, direction, family, mode + 1, c.speed, c.frequency))
@@ -189,7 +224,7 @@ def margins(basis: ModalBasis, speed: int, orders: Iterable[int], within: float 
     for order in sorted({e for e in orders if e > 0}) if turns else []:
         k, direction = aliased(order, basis.sectors)
         group = basis.groups.get((speed, k))
-        for j, f in enumerate(eigenmodes(group).frequency) if group is not None else []:
+        for j, f in enumerate(travelling(group, direction).frequency) if group is not None else []:
             out.append(Margin(order, k, direction, joined.of(k, j) + 1, float(f), order * turns))
     return sorted((m for m in out if abs(m.relative) < within), key=lambda m: abs(m.relative))
 

@@ -234,7 +234,8 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     top = _campbell_ceiling(curves, orders, speeds[-1])
     joined = families(basis)
     found = [r for r in resonances(basis, orders) if r.frequency <= top]
-    excited = {aliased(e, basis.sectors)[0] for e in orders} or set(curves)
+    waves = {aliased(e, basis.sectors) for e in orders} or {(k, "") for k in curves}
+    excited = {wave: t[wave[0]] for wave in sorted(waves) if wave[0] in (t := tracks(basis, wave[1]))}
     hidden = _waves(axes, joined, curves, excited, rpm, top)
     for order in orders:
         axes.plot(rpm, order * rpm / 60, color=FAINT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
@@ -265,22 +266,25 @@ def _campbell_ceiling(curves: dict[int, Tracks], orders: Sequence[int], fastest:
 
 
 def _waves(
-    axes: Axes, joined: Families, curves: dict[int, Tracks], excited: set[int], rpm: Array, top: float
+    axes: Axes, joined: Families, curves: dict[int, Tracks], excited: dict[tuple[int, str], Tracks], rpm: Array,
+    top: float,
 ) -> int:  # fmt: skip
-    """Draw every curve, faint unless its nodal diameter is excited; returns how many families lie above."""
+    """Draw every curve, faint unless its wave is excited; returns how many families lie above."""
     speeds, labels, hidden = rpm * np.pi / 30, [], 0
     for c, row in enumerate(joined.modes):
         members = {int(k): int(j) for k, j in zip(joined.harmonics, row, strict=True) if j >= 0}
         lines = {k: f for k, j in members.items() if (f := _line(curves[k], j, speeds)) is not None}
-        strong = [k for k in lines if k in excited and np.nanmin(lines[k]) <= top]
+        waves = [_line(t, members[k], speeds) for (k, _), t in excited.items() if k in members]
+        strong = [f for f in waves if f is not None and np.nanmin(f) <= top]
         hidden += not any(np.nanmin(f) <= top for f in lines.values())
-        for k, f in lines.items():
-            look: dict[str, Any] = {"linewidth": 1.4} if k in excited else {"linewidth": 0.7, "alpha": 0.35}
-            axes.plot(rpm, np.where(f <= top, f, np.nan), color=_colour(c), **look)
+        for f in [f for k, f in lines.items() if k not in {k for k, _ in excited}]:
+            axes.plot(rpm, np.where(f <= top, f, np.nan), color=_colour(c), linewidth=0.7, alpha=0.35)
+        for f in strong:
+            axes.plot(rpm, np.where(f <= top, f, np.nan), color=_colour(c), linewidth=1.4)
         if strong:
-            k = strong[len(strong) // 2]
-            end = int(np.flatnonzero(np.isfinite(lines[k]) & (lines[k] <= top))[-1])
-            labels.append((float(lines[k][end]), float(rpm[end]), f"family {c + 1}", _colour(c)))
+            f = strong[len(strong) // 2]
+            end = int(np.flatnonzero(np.isfinite(f) & (f <= top))[-1])
+            labels.append((float(f[end]), float(rpm[end]), f"family {c + 1}", _colour(c)))
     _end_labels(axes, labels, float(rpm[-1]), top)
     return hidden
 
