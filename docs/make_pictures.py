@@ -535,6 +535,69 @@ def counted_picture(found: Sequence[tuple[float, int, float, float]]) -> Any:
     return fig
 
 
+# reduction methods -------------------------------------------------------------------------------------------------
+
+
+def reduction() -> None:
+    """Contacts from soft to stiff, the price of every method, and the force in a sticking contact of the blade."""
+    import reduction_study as study
+
+    bodies = {
+        "bar": (study.bar(), 1),
+        "blade": (study.drawn_body("blade", BUILD, "mesh.size=16", "modes.count=10"), 3),
+        "half_pipe": (study.drawn_body("half-pipe", BUILD, "mesh.size=25", "modes.count=20"), 3),
+    }
+    for name, ((mesh, settings), count) in bodies.items():
+        s = study.studied(mesh, settings)
+        fill("reduction.md", name, table(["spring", "full model", *study.METHODS], study.soft_to_stiff(s, count)))
+        if name != "bar":
+            head = ["method", "coordinates", "time, eigenmodes = 1", "all contacts stuck: error of three frequencies"]
+            fill("reduction.md", f"{name}_costs", table(head, study.cost_rows(s)))
+    sticking_force(study)
+
+
+def sticking_force(study: Any) -> None:
+    """Normal force in the right contact of the blade with the case's springs, and its error by basis."""
+    mesh, settings = study.drawn_body("blade", BUILD, "mesh.size=16")
+    chosen = {"10 modes and Rubin's vectors": ("rubin", 10), "20 eigenmodes": ("eigenmodes", 20),
+              "60 eigenmodes": ("eigenmodes", 60), "reference": ("rubin", 120)}  # fmt: skip
+    groups = {}
+    for label, (method, count) in chosen.items():
+        own = {"reduction": method, "modes": settings.modes.model_copy(update={"count": count})}
+        groups[label] = study.modal_basis(mesh, settings.model_copy(update=own)).groups[0, 0]
+    case, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
+    sized = [_sized(c, groups["reference"], "blade.toml") for c in case.contacts]
+    springs = np.concatenate([_contact(c, 780.0).stiffness for c in sized])
+    frequency = np.linspace(60, 1200, 2281)
+    found = {label: np.abs(study.reduced_force(g, springs, frequency)) for label, g in groups.items()}
+    places = np.linspace(0, len(frequency) - 1, 25).astype(int)
+    full = np.abs(study.full_force(mesh, settings, springs, frequency[places]))
+    reference = found.pop("reference")
+    far = np.abs(reference[places] / full - 1).max()
+    text = [f"median error {short(np.median(np.abs(v / reference - 1)))} with {k}" for k, v in found.items()]
+    agree = f"the reference, 120 modes and Rubin's vectors, meets the full model within {far:.0e} at the dots"
+    fill("reduction.md", "force", f"Over 60 to 1200 Hz: {'; '.join(text)}; {agree}.")
+    save(force_picture(frequency, found, reference, frequency[places], full), "reduction_force")
+
+
+def force_picture(
+    f: np.ndarray, found: dict[str, np.ndarray], reference: np.ndarray, at: np.ndarray, full: np.ndarray
+) -> Any:
+    fig = figure(11.0, 4.4)
+    left, right = fig.subplots(1, 2)
+    colours = ("#0b4f9c", "#d98410", "#4a8f3a")
+    for (label, values), colour, style in zip(found.items(), colours, ("-", "--", ":"), strict=True):
+        left.semilogy(f, values, style, color=colour, label=label, lw=1.6)
+        right.semilogy(f, np.maximum(np.abs(values / reference - 1), 1e-7), style, color=colour, label=label, lw=1.4)
+    left.semilogy(at, full, "o", color="black", ms=3.5, label="full model")
+    for axes, name in ((left, "normal force in the right contact, N per N"), (right, "relative error of the force")):
+        plain(axes)
+        axes.set_xlabel("excitation frequency in Hz")
+        axes.set_ylabel(name)
+    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=10, frameon=False)
+    return drawn(fig)
+
+
 # your own model ----------------------------------------------------------------------------------------------------
 
 
@@ -561,7 +624,7 @@ STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, compliance, counted_once,
-        own,
+        reduction, own,
     )  # fmt: skip
 }
 

@@ -126,6 +126,8 @@ def _interface(item: Interface) -> dict[str, Any]:
         "rotation": item.rotation,
         "T": item.rows,
         "fit_residual": _column(item.fit_residual),
+        "characteristic": item.characteristic,
+        "pattern": item.pattern,
         "points": item.points,
         "areas": _column(item.areas),
         "normals": item.normals,
