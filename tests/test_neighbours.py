@@ -16,7 +16,7 @@ from microslip.fem.operators import mass, stiffness
 from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
-from microslip.neighbours import frame_change, relative_rows, stuck
+from microslip.neighbours import closed_gap, frame_change, relative_rows, stuck
 from microslip.ring import phase
 
 N = 6
@@ -80,6 +80,20 @@ def test_stuck_neighbours_couple_through_disc_and_contact(mesh, whole, reduction
                 worst[name] = np.maximum(worst[name], np.abs(omega[:2] / np.sqrt(exact) - 1))
     assert worst[reduction][0] < first and worst[reduction][1] < second
     assert worst["eigenmodes"].min() > 0.1
+
+
+def test_no_relative_motion_is_the_limit_of_stiff_springs(mesh) -> None:
+    """The gap closes as one over the stiffness; plain eigenmodes, whose statics are not held, are not asked."""
+    basis, plain = modal_basis(mesh, settings("rubin")), modal_basis(mesh, settings("eigenmodes"))
+    assert closed_gap(basis) == "right" and closed_gap(plain) is None
+    for k in range(N // 2 + 1):
+        g = basis.groups[0, k]
+        limit, V = stuck(basis, g, "right")
+        assert np.abs(relative_rows(basis, g, "right") @ V[:, :4]).max() < 1e-9 * np.abs(g.phi).max()
+        scale = 1 / np.abs(np.diag(g.compliance.static))[:6]
+        far = [1 - stuck(basis, g, "right", factor * scale)[0][:4] / limit[:4] for factor in (1e5, 1e6)]
+        assert np.abs(far[1]).max() < 1e-4
+        assert np.all(far[1] < 0.2 * far[0])
 
 
 def test_rigid_motions_of_the_ring_move_no_contact(mesh) -> None:

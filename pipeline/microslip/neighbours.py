@@ -43,19 +43,41 @@ def relative_rows(basis: ModalBasis, group: ModalGroup, name: str) -> Array:
     return frame_change(basis, right, left) @ left.rows * phase(group, basis.sectors, 1) - right.rows
 
 
-def stuck(basis: ModalBasis, group: ModalGroup, name: str, stiffness: Array) -> tuple[Array, Array]:
-    """The sector's modes with springs between neighbours, coupled through disc and contact.
+def stuck(
+    basis: ModalBasis, group: ModalGroup, name: str, stiffness: Array | None = None
+) -> tuple[Array, Array]:
+    """The sector's modes with neighbours that stick to each other, coupled through disc and contact.
 
     Args:
-        stiffness: (6,) of the springs on the six relative motions, N/m and N m/rad.
+        stiffness: (6,) of springs on the six relative motions, N/m and N m/rad; None: no relative motion at all.
 
     Returns:
         omega (c,) rad/s and modal coordinates (m, c), normalised with M_r.
     """
     G = relative_rows(basis, group, name)
+    if stiffness is None:
+        size = np.maximum(np.abs(G).max(axis=1, keepdims=True), 1e-300)
+        Z = scipy.linalg.null_space(G / size, rcond=1e-10)
+        values, V = _generalised(Z.conj().T @ group.K_r @ Z, Z.conj().T @ group.M_r @ Z)
+        return np.sqrt(np.maximum(values, 0.0)), Z @ V
     K = group.K_r + G.conj().T @ (np.asarray(stiffness)[:, None] * G)
     values, V = _generalised(0.5 * (K + K.conj().T), group.M_r)
     return np.sqrt(np.maximum(values, 0.0)), V
+
+
+def closed_gap(basis: ModalBasis) -> str | None:
+    """Name of the first interface that faces the next sector and whose statics the basis holds, so that `stuck` holds.
+
+    Plain eigenmodes cannot follow a contact that sticks: of them none is returned.
+    """
+    group = basis.groups[min(basis.groups)]
+    for name, face in group.interfaces.items():
+        if basis.sectors > 1 and face.sector_shift == 1 and face.partner in group.interfaces:
+            rows = [i for i, label in enumerate(group.compliance.labels) if label.startswith(f"interface:{name}:")]
+            static, left = (np.abs(np.diag(C)[rows]) for C in (group.compliance.static, group.compliance.residual))
+            if len(rows) and (left < 1e-3 * static).all():
+                return name
+    return None
 
 
 def _generalised(K: Array, M: Array) -> tuple[Array, Array]:

@@ -355,6 +355,9 @@ def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
         kind="plain",
     )
     out += album.take("nodal_diameters", "Frequency over nodal diameter; each line is a family of modes.")
+    out += album.take(
+        "nodal_diameters_stuck", "The two limits of friction: neighbours apart, and stuck to each other without slip."
+    )
     for i, s in enumerate(speeds):
         shown = _ring_table([eigenmodes(basis.groups[s, k]) for k in held])
         out += shown if i == 0 else _hidden(f"Frequencies at {_at(basis.groups[s, held[0]])}", shown)

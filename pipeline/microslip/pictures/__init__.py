@@ -111,6 +111,7 @@ def _diagrams(basis: ModalBasis, folder: Path, engine_orders: Sequence[int]) -> 
 
     found = {
         "nodal_diameters": diagrams.nodal_diameter_plot(basis, folder / "nodal_diameters.png"),
+        "nodal_diameters_stuck": diagrams.stuck_plot(basis, folder / "nodal_diameters_stuck.png"),
         "safe": diagrams.safe_plot(basis, engine_orders, folder / "safe.png"),
         "campbell": diagrams.cyclic_campbell_plot(basis, engine_orders, folder / "campbell.png"),
     }

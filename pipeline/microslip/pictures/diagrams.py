@@ -11,6 +11,7 @@ import numpy as np
 
 from ..campbell import Tracks
 from ..data import Array, ModalBasis
+from ..neighbours import closed_gap, stuck
 from ..resonances import (
     Families,
     Margin,
@@ -119,6 +120,34 @@ def _nodal_axis(axes: Axes, basis: ModalBasis) -> None:
     axes.set_xticks(range(0, basis.sectors // 2 + 1, step))
     axes.set_xlim(-0.02 * basis.sectors / 2, max(basis.sectors / 2, held[-1]))
     axes.set_xlabel("nodal diameter")
+
+
+def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
+    """Frequency over nodal diameter with open contacts and with neighbours stuck, at the highest speed.
+
+    None where no contact faces the next sector or the basis does not hold its statics.
+    """
+    name = closed_gap(basis)
+    if name is None:
+        return None
+    speed, harmonics = speeds_of(basis)[-1], harmonics_of(basis)
+    found = families(basis, speed)
+    shut = {k: _hertz(stuck(basis, basis.groups[speed, k], name)[0]) for k in harmonics}
+    shown = max(2, len(found.omega) // 2)
+    top = 1.05 * max(float(f[:shown].max()) for f in shut.values())
+    figure = _figure(8.6, 6.0)
+    axes = figure.subplots()
+    _plain(axes)
+    _family_lines(axes, found, top, width=0.8)
+    for k, f in shut.items():
+        axes.plot([k] * int((f <= top).sum()), f[f <= top], "s", color=INK, markersize=5, zorder=4, clip_on=False)
+    axes.set_ylim(0, top)
+    _nodal_axis(axes, basis)
+    axes.set_ylabel("frequency in Hz")
+    axes.set_title(f"{basis.name}: neighbours apart and stuck, {_rpm_text(found.speed)}", fontweight="bold")
+    note = f"lines: contacts open; black squares: the contact '{name}' and its neighbour do not move on each other"
+    _note(axes, note, -0.11)
+    return _save(figure, path)
 
 
 # --- interference --------------------------------------------------------------------------------------------------
