@@ -9,8 +9,9 @@ import pytest
 import scipy.linalg
 import scipy.sparse as sp
 from meshes import body, brick
+from rings import bladed_sector
 
-from microslip import eigen
+from microslip import eigen, neighbours
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
@@ -195,3 +196,46 @@ def test_a_case_uses_the_rigid_coordinates_of_a_patch_that_has_more():
     a = run_case(case, modal_basis(mesh(), plain), "case.toml")
     b = run_case(case, basis("macneal"), "case.toml")
     np.testing.assert_allclose(b.responses[1e9].monitor, a.responses[1e9].monitor, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_every_method_reduces_a_sector_at_every_nodal_diameter(method):
+    """Complex Hermitian at 0 < k < N/2: the file's own checks, and interface statics exact to 1e-8 where promised."""
+    sector = bladed_sector()
+    sides = {"right": "left", "left": "right"}
+    interfaces = [
+        {"name": side, "face": f"contact_{side}", "role": side, "partner": other, "t2": [0.0, 0.0, 1.0],
+         "sector_shift": 1 if side == "right" else -1}
+        for side, other in sides.items()
+    ]  # fmt: skip
+    settings = body(
+        supports=[{"face": "bore"}], cyclic={"sectors": 6}, interfaces=interfaces, modes={"count": 8}, reduction=method
+    )  # fmt: skip
+    made = modal_basis(sector, settings)
+    assert [c.name for c in check_basis(made) if not c.passed] == []
+    assert [np.iscomplexobj(g.phi) for _, g in sorted(made.groups.items())] == [False, True, True, False]
+    for g in made.groups.values():
+        scale = np.sqrt(np.diag(g.compliance.static).real)
+        error = np.abs(g.compliance.residual / np.outer(scale, scale)).max()
+        assert error < 1e-8 or (error > 0.1 and method in ("eigenmodes", "macneal"))
+
+
+def test_characteristic_shapes_of_a_sector_are_refused():
+    shapes = {"name": "right", "face": "contact_right", "coordinates": "characteristic", "count": 2}
+    settings = body(supports=[{"face": "bore"}], cyclic={"sectors": 6}, interfaces=[shapes], modes={"count": 4})
+    with pytest.raises(UserError, match="interfaces.right.coordinates"):
+        modal_basis(bladed_sector(), settings)
+
+
+def test_springs_between_neighbours_refuse_forces_for_coordinates():
+    interfaces = [
+        {"name": side, "face": f"contact_{side}", "role": side, "partner": other, "sector_shift": shift}
+        for side, other, shift in (("right", "left", 1), ("left", "right", -1))
+    ]
+    settings = body(
+        supports=[{"face": "bore"}], cyclic={"sectors": 6, "nodal_diameters": [1]}, interfaces=interfaces,
+        modes={"count": 4}, reduction="dual-craig-bampton",
+    )  # fmt: skip
+    made = modal_basis(bladed_sector(), settings)
+    with pytest.raises(UserError, match="keeps forces"):
+        neighbours.stuck(made, made.groups[0, 1], "right", np.ones(6))

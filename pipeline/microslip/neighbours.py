@@ -53,7 +53,15 @@ def stuck(
 
     Returns:
         omega (c,) rad/s and modal coordinates (m, c), normalised with M_r.
+
+    Raises:
+        UserError: a basis whose coordinates are interface forces.
     """
+    if "interface-force" in group.kind:
+        raise UserError(
+            f'{basis.name}: springs between neighbours need displacements or modes as coordinates, but '
+            f'"{basis.reduction}" keeps forces; use "rubin", "craig-bampton" or "massless-boundary"'
+        )
     G = relative_rows(basis, group, name)
     if stiffness is None:
         size = np.maximum(np.abs(G).max(axis=1, keepdims=True), 1e-300)
