@@ -77,6 +77,10 @@ class Model(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
+GROUND = "ground"
+"""Name of the rigid plane a face may press on."""
+
+
 class FaceRule(Model):
     """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways."""
 
@@ -294,6 +298,47 @@ class Load(Model):
         return self
 
 
+class Closure(Model):
+    """Two faces that may touch in the static state, without friction; Newton finds where they do and how hard.
+
+    against: the face on the other side, or ``ground``, a rigid plane (through `point` with `normal` towards the body;
+    if not given, through the middle of the face).
+    """
+
+    name: Name
+    face: FaceName
+    against: FaceName
+    sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    interference: Length = 0.0
+    point: Point | None = None
+    normal: Direction | None = None
+    modes: Literal["open", "closed"] = "open"
+    slide: PositiveLength | None = None
+    penalty: Positive | None = None
+
+    @model_validator(mode="after")
+    def _sides(self) -> Closure:
+        if self.against == GROUND and self.sector_shift:
+            raise ValueError("sector_shift: the ground has no sectors; write 0 or name a face in against")
+        if self.against != GROUND and (self.point or self.normal):
+            raise ValueError('point and normal describe the ground; write against = "ground" or leave them out')
+        if self.against == self.face and not self.sector_shift:
+            raise ValueError("face and against are the same face of the same body; correct one, or give sector_shift")
+        return self
+
+
+class Bolt(Model):
+    """A tensioned bolt: `preload` (N) presses a face (under its head) and the face against it (under its nut).
+
+    against: ``ground`` for a bolt into something rigid, or the other half of a symmetric joint.
+    """
+
+    name: Name
+    face: FaceName
+    against: FaceName = "ground"
+    preload: Positive
+
+
 class InterfaceSettings(Model):
     """A contact patch. t2: direction whose projection on the patch becomes the second tangent; n points outwards."""
 
@@ -436,6 +481,8 @@ class BodySettings(Model):
     cyclic: Cyclic | None = None
     rotation: Rotation = Field(default_factory=Rotation)
     loads: Annotated[tuple[Load, ...], BeforeValidator(_tuple)] = ()
+    closures: Annotated[tuple[Closure, ...], BeforeValidator(_tuple)] = ()
+    bolts: Annotated[tuple[Bolt, ...], BeforeValidator(_tuple)] = ()
     interfaces: Annotated[tuple[InterfaceSettings, ...], BeforeValidator(_tuple)] = ()
     excitations: Annotated[tuple[Excitation, ...], BeforeValidator(_tuple)] = ()
     monitors: Annotated[tuple[Monitor, ...], BeforeValidator(_tuple)] = ()
@@ -447,11 +494,18 @@ class BodySettings(Model):
 
     @model_validator(mode="after")
     def _names_once(self) -> BodySettings:
-        for kind in ("interfaces", "excitations", "monitors", "gauges"):
+        for kind in ("closures", "bolts", "interfaces", "excitations", "monitors", "gauges"):
             names = [item.name for item in getattr(self, kind)]
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{kind}: the name '{min(twice)}' is used twice; rename one")
+        if self.closures and self.rotation.prestress != "nonlinear":
+            raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
+        if self.cyclic and any(c.modes == "closed" and c.sector_shift for c in self.closures):
+            raise ValueError(
+                'closures: modes = "closed" between neighbouring sectors differs from one nodal diameter to the next '
+                'and is not supported; leave modes = "open" and couple the interfaces afterwards'
+            )
         if self.cyclic and self.free:
             raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self

@@ -291,6 +291,38 @@ class Invariants:
 
 
 @dataclass(frozen=True)
+class ContactState:
+    """Two faces in the static state at speed: how hard they press each other, where, and how near they are.
+
+    Attributes:
+        face, against, sector_shift: what may touch what. interface: name of the interface on `face`, or empty.
+        normal_force: N, size of the resultant. force: (3,) N, on `face`, body axes. centre: (3,) m, of the pressure,
+            in the reference geometry. points: (p, 3) m, areas: (p,) m2, quadrature points of the face, in the order of
+            the interface's. pressure: (p,) Pa. gap: (p,) m, the interference counted, negative where points overlap.
+        closed_share: area in contact over the area of the face. penetration: m, largest mean one of a corner.
+        penalty: Pa/m, the largest used. interference: m. modes: ``open`` (the modes do not know the contact, its force
+            is a dead load) or ``closed`` (they keep its stiffness along the normal).
+    """
+
+    face: str
+    against: str
+    sector_shift: int
+    interface: str
+    normal_force: float
+    force: Array
+    centre: Array
+    points: Array
+    areas: Array
+    pressure: Array
+    gap: Array
+    closed_share: float
+    penetration: float
+    penalty: float
+    interference: float
+    modes: str = "open"
+
+
+@dataclass(frozen=True)
 class ModalGroup:
     """The reduced body at one rotation speed (and one nodal diameter).
 
@@ -318,6 +350,7 @@ class ModalGroup:
         spin_softening: whether -Omega^2 M P is in K.
         run_up: what a change of the speed adds, or None. gyroscopic: modes with G_r, or None (at rest).
         invariants: inertia integrals for large rigid motion, or None (a cyclic sector).
+        contacts: closures of the static state.
     """
 
     speed: float
@@ -344,6 +377,7 @@ class ModalGroup:
     run_up: RunUp | None = None
     gyroscopic: GyroscopicModes | None = None
     invariants: Invariants | None = None
+    contacts: Mapping[str, ContactState] = field(default_factory=dict)
 
     @property
     def frequency(self) -> Array:

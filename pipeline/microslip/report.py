@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from .basis import check_basis
+from .body import GROUND
 from .campbell import crossings, engine_orders, track_basis
 from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
-from .data import Interface, ModalBasis, ModalGroup
+from .data import ContactState, Interface, ModalBasis, ModalGroup
 from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
 from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
@@ -94,6 +95,7 @@ def report_html(
         ("Modes", _modes(basis, album)),
         ("Stresses", _stresses(basis, album)),
         ("Interfaces", _interfaces(basis, album)),
+        ("Static contact", _contacts(basis, album)),
         ("How many modes are enough", _truncation(stored, basis, album)),
         ("Compliance counted once", _counted_once(stored)),
         ("Loads and read-outs", _rows(basis)),
@@ -449,6 +451,41 @@ def _interfaces(basis: ModalBasis, album: _Album) -> str:
         + album.take("interfaces", "Where the patches lie, their points, and their frames n, t1, t2.")
         + ("<h3>Do the patches move as rigid ones?</h3>\n" + rigid if words else "")
     )  # fmt: skip
+
+
+def _contacts(basis: ModalBasis, album: _Album) -> str:
+    """Closures over the speeds; the nodal diameters share one static state."""
+    states = {g.speed: g for g in reversed(_groups(basis))}
+    rows, words = [], []
+    for group in (states[speed] for speed in sorted(states)):
+        words += [f"{_at(group)}: {contact_sentence(name, c)}" for name, c in group.contacts.items()]
+        for name, c in group.contacts.items():
+            middle = ", ".join(f"{v * 1e3:.4g}" for v in _clean(c.centre, float(np.abs(basis.mesh.points).max())))
+            rows.append([
+                text(name), text(_at(group)), _number(c.normal_force), _number(1e-6 * c.pressure.max(initial=0.0)),
+                text(percent(c.closed_share)), text(middle), _number(1e6 * c.gap.min(initial=0.0)),
+                _number(1e6 * c.gap.max(initial=0.0)),
+            ])  # fmt: skip
+    if not rows:
+        return ""
+    head = ["contact", "speed", "normal force in N", "highest pressure in MPa", "area in contact", "centre in mm"]
+    return (
+        _table([*head, "least gap in µm", "widest gap in µm"], rows)
+        + album.take("closure", "Pressure on the faces that touch in the static state.")
+        + _hidden("In words", _say(*words, kind="plain"))
+    )
+
+
+def contact_sentence(name: str, c: ContactState) -> str:
+    """What a closure does in the static state, in words."""
+    other = "the ground" if c.against == GROUND else c.against + (" of the neighbour" if c.sector_shift else "")
+    if not c.normal_force:
+        return f"contact {name}: {c.face} is open against {other}, the gap {1e6 * c.gap.min():.4g} um or wider."
+    kept = "the modes leave it open" if c.modes == "open" else "the modes keep it closed"
+    return (
+        f"contact {name}: {c.face} presses {other} with {c.normal_force:.5g} N on {percent(c.closed_share)} of its "
+        f"area, at most {1e-6 * c.pressure.max():.4g} MPa (penetration left {1e6 * c.penetration:.2g} um); {kept}."
+    )
 
 
 def _fit_summary(contacts: Mapping[str, Interface]) -> str:

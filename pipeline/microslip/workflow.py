@@ -29,6 +29,7 @@ from .data import Array, GyroscopicModes, Mesh, ModalBasis, SpeedRange, UserErro
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
+from .report import contact_sentence
 from .resonances import eigenmodes, harmonics_of, resonance_csv, resonances, speeds_of
 from .ring import certificate_words, certify_ring
 
@@ -525,6 +526,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = "certified complete" if g.checks.get("certified") else "NOT certified"
         lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
+        lines += [f"  {contact_sentence(name, c)}" for name, c in g.contacts.items()]
         lines += [f"  {text}" for text in sentences(g, basis.reduction)]
         lines += [
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"

@@ -12,6 +12,7 @@ from ..coordinates import compliance_row, held, in_modes
 from ..data import (
     MOTIONS,
     Array,
+    ContactState,
     GyroscopicModes,
     Interface,
     Invariants,
@@ -104,6 +105,8 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
     found.append(("every number is finite", _not_finite(_numbers(g)), 0.0, ""))
     if found[-1][1]:
         return found
+    for name, c in g.contacts.items():
+        found += _contact_checks(name, c)
     found += _compliance_checks(g)
     if _all_rows(g) is None:
         return found
@@ -168,6 +171,9 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
             wanted += [(i.characteristic, (c, m)), (i.pattern, (p, 3, c))]
     for rows in _every_row(g):
         wanted += [(rows.rows, (len(rows.labels), m)), (rows.static, (len(rows.labels),)), (rows.point, (3,))]
+    for t in g.contacts.values():
+        k = len(t.areas)
+        wanted += [(t.force, (3,)), (t.centre, (3,)), (t.points, (k, 3)), (t.pressure, (k,)), (t.gap, (k,))]
     for s in g.stresses.values():
         k = len(s.weights)
         wanted += [(s.strain, (k, 6, m)), (s.stress, (k, 6, m)), (s.static_stress, (k, 6)), (s.points, (k, 3))]
@@ -203,6 +209,9 @@ def _numbers(g: ModalGroup) -> list[Any]:
         found += [i.characteristic, i.pattern]
     for rows in _every_row(g):
         found += [rows.rows, rows.static, rows.point]
+    for c in g.contacts.values():
+        found += [c.normal_force, c.force, c.centre, c.points, c.areas, c.pressure, c.gap]
+        found += [c.closed_share, c.penetration, c.penalty, c.interference]
     for s in g.stresses.values():
         found += [s.strain, s.stress, s.static_stress, s.points, s.weights]
     return found
@@ -308,6 +317,24 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
                 found.append((f"interface {name}: rows agree with phi on its face", error, 1e-8, ""))
                 break
     return found
+
+
+def _contact_checks(name: str, c: ContactState) -> _Findings:
+    """A contact presses and never pulls; its force is no more than the integral of its pressure."""
+    total = float(c.areas @ c.pressure)
+    top = max(c.normal_force, 1e-12)  # an open contact has none
+    resultant = abs(float(np.linalg.norm(c.force)) - c.normal_force) / top
+    return [
+        (f"contact {name}: no pressure is negative", max(-float(c.pressure.min(initial=0.0)), 0.0), 0.0, ""),
+        (f"contact {name}: normal force is the resultant", resultant, 1e-9, ""),
+        (f"contact {name}: pressure adds up to the force", max(c.normal_force - total, 0.0) / top, 0.05, ""),
+        (f"contact {name}: penetration", c.penetration, _depth(c), ""),
+    ]
+
+
+def _depth(c: ContactState) -> float:
+    """Limit of the penetration: a ten thousandth of what the contact moves by, m."""
+    return 1e-4 * max(abs(c.interference), _largest(c.gap), 1e-9)
 
 
 def _compliance_checks(g: ModalGroup) -> _Findings:

@@ -22,6 +22,7 @@ from ..data import (
     VOIGT,
     Array,
     Compliance,
+    ContactState,
     GyroscopicModes,
     Indices,
     Interface,
@@ -218,6 +219,8 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     for name, s in sorted(g.stresses.items()):
         _write_stress(group, name, s, mode)
     _write_state(group, g, axis)
+    if g.contacts:
+        _write_contacts(group, g)
     if g.run_up is not None:
         _write_run_up(group, g.run_up, mode, column)
     if g.gyroscopic is not None:
@@ -331,6 +334,46 @@ def _write_gyroscopic(group: h5py.Group, modes: GyroscopicModes, mode: h5py.Data
     put(where, "direction", np.array(modes.direction, dtype="U"), scales=[whirl])
     put(where, "error", modes.error, "1", scales=[whirl])
     put(where, "shapes", modes.shapes, "1", scales=[mode, whirl])
+
+
+_CONTACT_NUMBERS = {
+    "normal_force": "N", "closed_share": "1", "penetration": "m", "penalty": "Pa/m", "interference": "m",
+}  # fmt: skip
+_CONTACT_FIELDS = {"pressure": "Pa", "gap": "m", "areas": "m^2"}
+_CONTACT_TEXTS = ("face", "against", "interface", "modes")
+
+
+def _write_contacts(group: h5py.Group, g: ModalGroup) -> None:
+    """Closures of the static state."""
+    axis, where = group.file["axis"], group.create_group("contacts")
+    where.attrs["order"] = json.dumps(list(g.contacts))
+    for name, c in g.contacts.items():
+        item = where.create_group(_escaped(name))
+        for key in (*_CONTACT_TEXTS, "sector_shift"):
+            item.attrs[key] = getattr(c, key)
+        for key, unit in _CONTACT_NUMBERS.items():
+            put(item, key, getattr(c, key), unit)
+        put(item, "force", c.force, "N", scales=[axis])
+        put(item, "centre", c.centre, "m", scales=[axis])
+        point = put_scale(item, "point", np.arange(1, len(c.points) + 1))
+        put(item, "points", c.points, "m", scales=[point, axis])
+        for key, unit in _CONTACT_FIELDS.items():
+            put(item, key, getattr(c, key), unit, scales=[point])
+
+
+def _read_contacts(where: h5py.Group) -> dict[str, ContactState]:
+    out = {}
+    for name in _names(where):
+        item = where[_escaped(name)]
+        p = len(item["areas"])
+        values: dict[str, Any] = {key: str(item.attrs[key]) for key in _CONTACT_TEXTS}
+        values |= {key: float(_array(item, key)) for key in _CONTACT_NUMBERS}
+        values |= {key: _array(item, key, p) for key in _CONTACT_FIELDS}
+        values |= {key: _array(item, key, 3) for key in ("force", "centre")}
+        out[name] = ContactState(
+            sector_shift=int(item.attrs["sector_shift"]), points=_array(item, "points", p, 3), **values
+        )
+    return out
 
 
 def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset) -> None:
@@ -570,6 +613,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         run_up=_read_run_up(group["run_up"], m) if "run_up" in group else None,
         gyroscopic=_read_gyroscopic(group["gyroscopic"], m) if "gyroscopic" in group else None,
         invariants=_read_invariants(group["invariants"], m) if "invariants" in group else None,
+        contacts=_read_contacts(group["contacts"]) if "contacts" in group else {},
     )  # fmt: skip
 
 

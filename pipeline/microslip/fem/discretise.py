@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -207,17 +207,20 @@ class Discretisation:
         return float(sum(b.dx.sum() for b in self.blocks))
 
 
-def discretise(mesh: Mesh, degree: Mapping[str, int] | None = None) -> Discretisation:
+def discretise(
+    mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Sequence[Indices] = ()
+) -> Discretisation:
     """Shape-function gradients at every quadrature point and the sparsity pattern.
 
     Args:
         mesh: in metres. degree: cell type -> degree of the quadrature rule, to override the default.
+        coupled: (m, 2) further pairs of points that the pattern must hold (contacts).
 
     Raises:
         UserError: cells that are inside out at a quadrature point.
     """
     blocks = tuple(_block(mesh, t, (degree or {}).get(t)) for t in mesh.cells)
-    pattern, positions = _pattern(mesh.n_points, [b.cells for b in blocks])
+    pattern, positions = _pattern(mesh.n_points, [b.cells for b in blocks], coupled)
     return Discretisation(mesh, blocks, pattern, positions)
 
 
@@ -253,10 +256,13 @@ def _inverse3(J: Array, det: Array) -> Array:
     return r / det[..., None, None]
 
 
-def _pattern(n: int, connectivity: list[Indices]) -> tuple[Pattern, tuple[Indices, ...]]:
+def _pattern(
+    n: int, connectivity: list[Indices], coupled: Sequence[Indices] = ()
+) -> tuple[Pattern, tuple[Indices, ...]]:
     upper = [c[:, :, None] <= c[:, None, :] for c in connectivity]
     keys = [(c[:, :, None] * n + c[:, None, :])[u] for c, u in zip(connectivity, upper, strict=True)]
-    unique, inverse = np.unique(np.concatenate(keys), return_inverse=True)
+    further = [c.min(axis=1) * n + c.max(axis=1) for c in coupled]
+    unique, inverse = np.unique(np.concatenate([*keys, *further]), return_inverse=True)
     positions, start = [], 0
     for mask, key in zip(upper, keys, strict=True):
         where = np.full(mask.shape, len(unique), dtype=np.int32)

@@ -47,6 +47,9 @@ def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array
         raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")
     if settings.free and settings.rotation.range_rpm is not None:
         raise UserError("rotation.range_rpm: a free body has no equilibrium at speed; hold it or leave the range out")
+    if settings.free and (settings.closures or settings.bolts):
+        key = "closures" if settings.closures else "bolts"
+        raise UserError(f"{key}: a free body has no static equilibrium under contact; hold it or remove them")
     if settings.free and settings.loads:
         raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
 

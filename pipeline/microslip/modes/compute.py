@@ -20,6 +20,7 @@ from ..data import (
     SpeedRange,
     StressSet,
 )
+from ..fem.contact import coupled_points
 from ..fem.discretise import Discretisation, discretise, free_upper
 from ..gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
@@ -27,6 +28,7 @@ from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
 from .boundary import check_held, fixed_dofs, refuse_overlap, with_dead_loads
 from .characteristic import with_characteristic
+from .closures import bolt_forces, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
 from .run_up import run_up_terms
@@ -53,17 +55,20 @@ def modal_basis(
         NotConverged: the equilibrium or the spectrum could not be found.
     """
     report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
-    d = discretise(mesh)
+    material = settings.material.material()
+    pairs = contact_pairs(mesh, settings, material)
+    d = discretise(mesh, coupled=[coupled_points(p) for p in pairs])
     fixed = fixed_dofs(mesh, settings)
     axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
     sector = make_sector(d, settings, fixed, axis, point) if settings.cyclic else None
     free = free_upper(d.pattern, fixed) if sector is None else sector.static
     rows = body_rows(mesh, settings)
     model = make_model(
-        d, settings.material.material(), free, fixed, axis, point, temperature, settings.temperature.reference,
+        d, material, free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
     model = with_dead_loads(model, mesh, settings)
+    model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
     mass, centre, inertia = inertia_of(d, model.material.density)
     if sector is None:
         motions = rigid.free_motions(mesh.points, centre, fixed)
@@ -110,10 +115,12 @@ def modal_basis(
 
 
 def _guess(state: StaticState | None, before: float, speed: float) -> StaticState | None:
-    """Start of Newton at the next speed: displacements grow about as the square of the speed."""
+    """Start of Newton at the next speed: displacements and contact pressures grow about as the square of the speed."""
     if state is None or before == 0:
         return state
-    return replace(state, u=state.u * (speed / before) ** 2)
+    grown = (speed / before) ** 2
+    pressed = tuple(replace(g, multiplier=grown * g.multiplier) for g in state.contacts)
+    return replace(state, u=grown * state.u, contacts=pressed)
 
 
 def inertia_of(d: Discretisation, density: float) -> tuple[float, Array, Array]:
@@ -190,6 +197,7 @@ def assemble_group(
         prestress=state.prestress if (speed or model.loaded) else "none",
         harmonic=harmonic,
         spin_softening=model.spin_softening,
+        contacts=contact_states(model.d.mesh, settings, state.contacts),
     )
 
 

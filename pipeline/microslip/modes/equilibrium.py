@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
 from ..eigen import DirectSolver, Unstable
+from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import (
@@ -28,6 +29,7 @@ from ..fem.operators import (
     tangent,
     tangent_tensor,
 )
+from .closing import Closing
 
 Report = Callable[[str], None]
 
@@ -41,7 +43,7 @@ class BodyModel:
         thermal_strain: per block (e, q, 6), or None. M: (p,) scalar mass over the pattern, kg. M_full: (n, n).
         K0: (p, 3, 3) stiffness of the stress-free body, N/m. free: map to the free degrees of freedom.
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
-        spin_softening: whether -Omega^2 M P is part of K.
+        spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
     """
 
     d: Discretisation
@@ -57,11 +59,12 @@ class BodyModel:
     axis: Array
     point: Array
     spin_softening: bool = True
+    contacts: tuple[ContactPair, ...] = ()
 
     @property
     def loaded(self) -> bool:
         """True if something acts on the body at rest."""
-        return self.thermal_strain is not None or bool(np.any(self.dead_load))
+        return self.thermal_strain is not None or bool(np.any(self.dead_load)) or bool(self.contacts)
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,9 @@ class StaticState:
     Attributes:
         u: (n, 3) m. H: per block displacement gradients (e, q, 3, 3), None if the reference geometry is used.
         stress: per block (e, q, 6) second Piola-Kirchhoff stress, Pa. K: (p, 3, 3) stiffness about the state with
-        the centrifugal softening, N/m. prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton.
+        the centrifugal softening, N/m: without the stiffness of contacts, whose forces stay as dead loads, but for
+        those that stay closed. prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton. contacts: as
+        they press in the state.
     """
 
     u: Array
@@ -80,6 +85,7 @@ class StaticState:
     K: Array
     prestress: str
     iterations: int = 0
+    contacts: tuple[Grip, ...] = ()
 
 
 def make_model(
@@ -173,13 +179,13 @@ def _newton(
     model: BodyModel, speed: float, solver: DirectSolver, start: StaticState | None, report: Report
 ) -> StaticState:
     """Full Newton; where it fails the load is applied in halved steps from the last good state."""
-    rest = np.zeros((model.d.mesh.n_points, 3))
     if start is not None:
         try:
-            return _newton_at(model, speed, 1.0, solver, start.u)
+            return _newton_at(model, speed, 1.0, solver, start)
         except NotConverged:
             report("static state: starting again from rest")
-    good, level, step, total = rest, 0.0, 1.0, 0
+    good: StaticState | None = None
+    level, step, total = 0.0, 1.0, 0
     while level < 1.0:
         target = min(level + step, 1.0)
         try:
@@ -191,16 +197,17 @@ def _newton(
             continue
         total += state.iterations
         report(f"static state: {100 * target:.0f} % of the load after {total} Newton steps")
-        good, level = state.u, target
+        good, level = state, target
     return replace(state, iterations=total)
 
 
 def _newton_at(
-    model: BodyModel, speed: float, level: float, solver: DirectSolver, u: Array
+    model: BodyModel, speed: float, level: float, solver: DirectSolver, start: StaticState | None
 ) -> StaticState:
     """Newton at a share `level` of all loads. Ends when a step is below 1e-9 of u, or small and no longer falling.
 
-    A millionth of the body stands for u where less moves: heated between walls a body does not move at all.
+    A millionth of the body stands for u where less moves: heated between walls a body does not move at all. With
+    contacts the pressures must stand too.
     """
     n, free = model.d.mesh.n_points, model.free
     omega = speed * np.sqrt(level)
@@ -208,24 +215,35 @@ def _newton_at(
     if model.thermal_strain is not None and level < 1:
         model = replace(model, thermal_strain=[level * e for e in model.thermal_strain])
     steps: list[float] = []
-    size = float(np.ptp(model.d.mesh.points, axis=0).max())
-    for _ in range(25):
+    points = model.d.mesh.points
+    size = float(np.ptp(points, axis=0).max())
+    u = np.zeros((n, 3)) if start is None else start.u
+    closing = Closing(model.contacts, points + u, level, () if start is None else start.contacts)
+    for _ in range(60 if model.contacts else 25):
         H = [displacement_gradient(b, u) for b in model.d.blocks]
         stress = stress_of(model, [green_strain(h) for h in H])
         K = _tangent(model, H, stress)
-        if steps and (steps[-1] < 1e-9 or (len(steps) > 1 and steps[-1] < 1e-5 and steps[-1] > 0.3 * steps[-2])):
-            return StaticState(u, H, stress, K + soft if model.spin_softening else K, "nonlinear", len(steps))
-        outer = level * model.dead_load + centrifugal_force(model, omega, u)
+        closing.move(points + u, steps[-1] if steps else np.inf)
+        if _stands(steps) and closing.settled:
+            K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, kept=True)
+            return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)
+        outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))
-        solver.factorise(free.matrix(K + soft))
+        solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
         if (negative := solver.negative()) and len(steps) > 3:
             raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
-        change = free.expand(solver.solve(residual), n)
-        u = u + change.reshape(n, 3)
-        steps.append(float(np.abs(change).max() / max(np.abs(u).max(), 1e-6 * size)))
+        unknowns = solver.solve(residual)
+        change = free.expand(unknowns, n).reshape(n, 3)
+        steps.append(float(np.abs(change).max() / max(np.abs(u + change).max(), 1e-6 * size)))
+        u = u + closing.share(points + u, change, steps[-1], float(residual @ unknowns)) * change
         if not np.isfinite(steps[-1]) or np.abs(u).max() > 1e3 * size:
             break
     raise NotConverged(_no_equilibrium(speed))
+
+
+def _stands(steps: list[float]) -> bool:
+    falling = len(steps) < 2 or steps[-1] <= 0.3 * steps[-2]
+    return bool(steps) and (steps[-1] < 1e-9 or (steps[-1] < 1e-5 and not falling))
 
 
 def _unstable(speed: float, count: int) -> str:

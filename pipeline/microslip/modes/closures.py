@@ -1,0 +1,135 @@
+"""Closures and bolts of a body file: pairs of faces for Newton, preloads, and what the static state made of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..body import GROUND, BodySettings, Closure
+from ..data import Array, ContactState, Indices, Material, Mesh, UserError
+from ..fem.contact import ContactPair, Grip, Plane, corner_values, gap_at, make_pair
+from ..fem.discretise import face_blocks, quadrature
+from ..fem.loads import traction
+from .boundary import require_face
+
+
+def contact_pairs(mesh: Mesh, settings: BodySettings, material: Material) -> tuple[ContactPair, ...]:
+    """The faces that may touch.
+
+    Raises:
+        UserError: missing faces, faces that do not face each other, an unknown number of sectors.
+    """
+    modulus = float(material.elasticity.diagonal()[:3].max())
+    return tuple(_pair(mesh, settings, c, modulus) for c in settings.closures)
+
+
+def _pair(mesh: Mesh, settings: BodySettings, c: Closure, modulus: float) -> ContactPair:
+    require_face(mesh, c.face, f"closures.{c.name}.face")
+    if c.against == GROUND:
+        other: str | Plane = _ground(mesh, c)
+    else:
+        require_face(mesh, c.against, f"closures.{c.name}.against")
+        other = c.against
+    axis, about = np.array(settings.rotation.axis), np.array(settings.rotation.point)
+    angle = 2 * np.pi * c.sector_shift / sector_count(settings, c) if c.sector_shift else 0.0
+    return make_pair(
+        mesh, c.name, c.face, other, modulus, turned(axis, angle), about, c.interference, c.penalty, c.slide,
+        c.modes == "closed",
+    )  # fmt: skip
+
+
+def _ground(mesh: Mesh, c: Closure) -> Plane:
+    blocks = face_blocks(mesh, c.face)
+    vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
+    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
+    mean, areas = vectors.sum(axis=0), np.linalg.norm(vectors, axis=1)
+    if c.normal is None and np.linalg.norm(mean) < 1e-6 * areas.sum():
+        raise UserError(f"closures.{c.name}: face '{c.face}' closes on itself; give the ground's normal and point")
+    normal = np.array(c.normal) if c.normal is not None else -mean
+    point = np.array(c.point) if c.point is not None else areas @ points / areas.sum()
+    return Plane(point, normal / np.linalg.norm(normal))
+
+
+def sector_count(settings: BodySettings, c: Closure) -> float:
+    """N of ``[cyclic]``, or the build file's parameter ``blades``."""
+    if settings.cyclic is not None:
+        return settings.cyclic.sectors
+    blades = settings.geometry.parameters.get("blades")
+    if isinstance(blades, int | float) and blades >= 2:
+        return float(blades)
+    raise UserError(
+        f"closures.{c.name}.sector_shift: the number of sectors is not known; give [cyclic] sectors, or the geometry "
+        "parameter blades"
+    )
+
+
+def turned(axis: Array, angle: float) -> Array:
+    """(3, 3) rotation about an axis by an angle in rad."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+
+
+def bolt_forces(mesh: Mesh, settings: BodySettings) -> Array:
+    """(n, 3) forces of the bolts' preloads, N: uniform under head and nut, along the bolt, of fixed direction.
+
+    Raises:
+        UserError: missing faces; faces under head and nut that a bolt would not press together.
+    """
+    force = np.zeros((mesh.n_points, 3))
+    for bolt in settings.bolts:
+        key = f"bolts.{bolt.name}"
+        require_face(mesh, bolt.face, f"{key}.face")
+        head, normal, area = _seat(mesh, bolt.face, key)
+        along = -normal  # the way the head pushes
+        if bolt.against != GROUND:
+            require_face(mesh, bolt.against, f"{key}.against")
+            nut, nut_normal, nut_area = _seat(mesh, bolt.against, key)
+            along = (nut - head) / max(float(np.linalg.norm(nut - head)), 1e-300)
+            if normal @ nut_normal > -0.9 or along @ normal > -0.9:
+                raise UserError(
+                    f"{key}: face '{bolt.face}' under the head and face '{bolt.against}' under the nut are not pressed "
+                    "together by a bolt (their outward normals must point away from each other, along the bolt); "
+                    "correct the faces"
+                )
+            force += traction(face_blocks(mesh, bolt.against), mesh.n_points, -bolt.preload / nut_area * along)
+        force += traction(face_blocks(mesh, bolt.face), mesh.n_points, bolt.preload / area * along)
+    return force
+
+
+def _seat(mesh: Mesh, face: str, key: str) -> tuple[Array, Array, float]:
+    """Area centre (3,), mean outward normal (3,), area of a face."""
+    blocks = face_blocks(mesh, face)
+    vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
+    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
+    areas, mean = np.linalg.norm(vectors, axis=1), vectors.sum(axis=0)
+    if np.linalg.norm(mean) < 0.9 * areas.sum():
+        raise UserError(f"{key}: face '{face}' is not flat enough to seat a bolt; name the ring under the head")
+    return areas @ points / areas.sum(), mean / np.linalg.norm(mean), float(areas.sum())
+
+
+def contact_states(
+    mesh: Mesh, settings: BodySettings, grips: tuple[Grip, ...]
+) -> dict[str, ContactState]:
+    """What the modal file keeps of every closure, by name."""
+    by_name = {c.name: c for c in settings.closures}
+    of_face = {i.face: i.name for i in reversed(settings.interfaces) if i.role != "load"}
+    return {g.pair.name: _state(mesh, by_name[g.pair.name], of_face, g) for g in grips}
+
+
+def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactState:
+    blocks = face_blocks(mesh, c.face)
+    points = np.concatenate([b.points.reshape(-1, 3) for b in blocks])
+    areas = np.concatenate([np.linalg.norm(b.area, axis=2).ravel() for b in blocks])
+    places: list[tuple[str, Indices, Array]] = [(t, f, quadrature(t)[0]) for t, f in mesh.faces[c.face].items()]
+    force = g.slave_force.sum(axis=0)
+    weight = g.point_weight * g.point_pressure
+    total = float(weight.sum())
+    pressed = np.concatenate([np.einsum("pk,pki->pi", p.N, mesh.points[p.slave]) for p in g.cut.points])
+    centre = weight @ pressed / total if total > 0 else areas @ points / areas.sum()
+    return ContactState(
+        face=c.face, against=c.against, sector_shift=c.sector_shift, interface=of_face.get(c.face, ""),
+        normal_force=float(np.linalg.norm(force)), force=force, centre=centre, points=points, areas=areas,
+        pressure=corner_values(g.pair, g.pressure, places), gap=gap_at(g, places),
+        closed_share=float(g.area[g.pressure > 0].sum() / areas.sum()), penetration=g.penetration,
+        penalty=float(g.pair.penalty.max()), interference=c.interference, modes=c.modes,
+    )  # fmt: skip
