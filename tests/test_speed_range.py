@@ -10,6 +10,7 @@ from meshes import STEEL, body, brick, nearest, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.body import Rotation
+from microslip.campbell import track_basis
 from microslip.data import ModalBasis, UserError
 from microslip.modes import modal_basis
 from microslip.modes.common import Settled, Solved, common_coordinates, interpolated, lagrange, variable
@@ -284,6 +285,30 @@ def test_a_speed_outside_or_a_file_without_range_is_refused() -> None:
     group_at(ranged(), TOP)
     with pytest.raises(UserError, match="no speed range"):
         group_at(modal_basis(BLADE, body(supports=[{"face": "z0"}], modes={"count": 2})), 100.0)
+
+
+def test_the_command_line_reads_any_speed_of_the_range(tmp_path, capsys) -> None:
+    from microslip.cli import main
+
+    file = tmp_path / "basis.h5"
+    write_basis(file, ranged())
+    assert main(["info", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "one basis of" in said and "held out" in said and "modes solved for at 0, " in said
+    assert main(["info", str(file), "--rpm", "9000"]) == 0
+    assert f"{group_at(ranged(), 9000.0).frequency[0]:.6g} Hz" in capsys.readouterr().out
+    assert main(["info", str(file), "--rpm", "17000"]) == 2
+    assert "outside the speed range of 'test', 0 to 16000 rpm" in capsys.readouterr().err
+
+
+def test_campbell_diagram_of_the_range() -> None:
+    """Fifty speeds, dots at the samples, curves that follow the shapes."""
+    tracks = track_basis(ranged())
+    assert tracks is not None and tracks.solved is not None
+    assert len(tracks.speeds) == 50 and tracks.modes.shape == (6, 50) and np.nanmin(tracks.mac) > 0.8
+    np.testing.assert_array_equal(tracks.solved, ranged().ranges[0].speeds)
+    at = [group_at(ranged(), rpm).frequency[0] for rpm in (0.0, 0.5 * TOP, TOP)]
+    np.testing.assert_allclose(tracks.frequency(0, np.array([0.0, 0.5, 1.0]) * TOP * np.pi / 30), at, rtol=1e-4)
 
 
 def test_free_bodies_and_single_speeds_are_refused() -> None:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from .data import Array, Indices, ModalBasis, ModalGroup
+from .data import Array, Indices, ModalBasis, ModalGroup, SpeedRange
+from .speed_range import frequencies_over
 
 LINK = 0.3
 """Two shapes with a smaller MAC than this are never taken for the same mode."""
@@ -32,12 +33,14 @@ class Tracks:
         modes: (c, s) mode number (0-based) of each curve at each speed, -1 where the curve does not exist.
         omega: (c, s) rad/s, nan where it does not exist.
         mac: (c, s - 1) modal assurance criterion of each step, nan where there is none.
+        solved: rad/s, the speeds whose equilibrium was computed where the others follow from a range; None: all.
     """
 
     speeds: Array
     modes: Indices
     omega: Array
     mac: Array
+    solved: Array | None = None
 
     def frequency(self, curve: int, speeds: Array) -> Array:
         """Hz of one curve at any speeds (rad/s), nan outside its range."""
@@ -96,12 +99,17 @@ def follow(groups: Sequence[ModalGroup], weights: Array | None = None) -> tuple[
         `modes`, `omega` and `mac` as in `Tracks`.
     """
     links = [_link(a, b, weights) for a, b in zip(groups[:-1], groups[1:], strict=True)]
-    s = len(groups)
-    rows: list[list[int]] = [[j] + [-1] * (s - 1) for j in range(groups[0].n_modes)]
+    return _joined([g.omega for g in groups], links)
+
+
+def _joined(found: Sequence[Array], links: Sequence[tuple[Indices, Array]]) -> tuple[Indices, Array, Array]:
+    """`modes`, `omega` and `mac` of curves from the frequencies of every station and the links between them."""
+    s = len(found)
+    rows: list[list[int]] = [[j] + [-1] * (s - 1) for j in range(len(found[0]))]
     macs: list[list[float]] = [[np.nan] * (s - 1) for _ in rows]
     for step, (partner, values) in enumerate(links):
         at = {row[step]: number for number, row in enumerate(rows) if row[step] >= 0}
-        for mode in range(groups[step + 1].n_modes):
+        for mode in range(len(found[step + 1])):
             before = int(partner[mode])
             if before < 0:
                 rows.append([-1] * (step + 1) + [mode] + [-1] * (s - step - 2))
@@ -111,21 +119,25 @@ def follow(groups: Sequence[ModalGroup], weights: Array | None = None) -> tuple[
                 macs[at[before]][step] = float(values[mode])
     modes = np.array(rows, dtype=np.int64).reshape(len(rows), s)
     omega = np.full(modes.shape, np.nan)
-    for i, group in enumerate(groups):
+    for i, here_omega in enumerate(found):
         here = modes[:, i] >= 0
-        omega[here, i] = group.omega[modes[here, i]]
+        omega[here, i] = here_omega[modes[here, i]]
     return modes, omega, np.array(macs, dtype=float).reshape(len(rows), s - 1)
 
 
 def _link(a: ModalGroup, b: ModalGroup, weights: Array | None) -> tuple[Indices, Array]:
     """For each mode of b: the mode of a it continues (-1: none), and their MAC."""
-    partner = np.full(b.n_modes, -1, dtype=np.int64)
-    value = np.full(b.n_modes, np.nan)
     if not (len(a.phi) and len(b.phi)):
+        partner = np.full(b.n_modes, -1, dtype=np.int64)
         common = min(a.n_modes, b.n_modes)
         partner[:common] = np.arange(common)
-        return partner, value
-    table = mac(a.phi, b.phi, weights)
+        return partner, np.full(b.n_modes, np.nan)
+    return _assigned(mac(a.phi, b.phi, weights))
+
+
+def _assigned(table: Array) -> tuple[Indices, Array]:
+    """For each column of a table of MAC: its row (-1: none), and the MAC; the largest sum wins."""
+    partner, value = np.full(table.shape[1], -1, dtype=np.int64), np.full(table.shape[1], np.nan)
     rows, columns = linear_sum_assignment(-table)
     good = table[rows, columns] >= LINK
     partner[columns[good]] = rows[good]
@@ -133,12 +145,25 @@ def _link(a: ModalGroup, b: ModalGroup, weights: Array | None) -> tuple[Indices,
     return partner, value
 
 
+def track_range(r: SpeedRange) -> Tracks:
+    """Curves at the points of a speed range.
+
+    In its M-orthonormal coordinates the MAC with the mass as weight is the squared product of two modes, so nothing
+    of the mesh's size is touched.
+    """
+    omega, shapes = frequencies_over(r, r.points)
+    links = [_assigned(np.abs(a.conj().T @ b) ** 2) for a, b in zip(shapes[:-1], shapes[1:], strict=True)]
+    return Tracks(r.points, *_joined(list(omega), links), r.speeds)
+
+
 def track_basis(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
-    """Curves of one nodal diameter of a modal file, or None if it holds fewer than two speeds.
+    """Curves of one nodal diameter of a modal file over its speed range, else over its speeds (None: fewer than two).
 
     The shapes are weighted by the volume that belongs to each node where the file has nodal stresses (for one
     density that is the mass), else equally.
     """
+    if harmonic in basis.ranges:
+        return track_range(basis.ranges[harmonic])
     groups = [g for (_, h), g in sorted(basis.groups.items()) if h == harmonic]
     if len(groups) < 2:
         return None

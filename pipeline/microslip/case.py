@@ -34,6 +34,7 @@ from .harmonic_balance import (
     refined_peaks,
     stuck_frequencies,
 )
+from .speed_range import group_at
 
 
 class ContactSettings(Model):
@@ -77,6 +78,7 @@ class CaseSettings(Model):
     description: str = ""
     body: Name
     speed: Annotated[int, Field(ge=0)] = 0
+    speed_rpm: NotNegative | None = None
     excitation: Name
     amplitude: Number = 1.0
     monitor: Name
@@ -126,9 +128,7 @@ def run_case(
             f"{path}: body: '{basis.name}' is one of {basis.sectors} cyclic sectors, whose contacts join neighbours; a "
             "case follows one body alone: leave [cyclic] out of its body.toml to study a lone sector"
         )
-    if (settings.speed, 0) not in basis.groups:
-        raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
-    stored = basis.groups[settings.speed, 0]
+    stored = _at_speed(settings, basis, path)
     beside = statics_beside(stored, basis.reduction)
     group = in_modes(stored) if beside else stored
     force = settings.amplitude * _row(group.excitations, settings.excitation, path, "excitation").rows[0]
@@ -227,6 +227,18 @@ def _what_is_counted(
             f'includes = "{BULK_AND_SURFACE}"; if it is that of the surface alone, write includes = "{SURFACE}".'
         )
     return ""
+
+
+def _at_speed(settings: CaseSettings, basis: ModalBasis, path: Path | str) -> ModalGroup:
+    """The group of a stored speed (`speed`, a number), or of any speed inside the body's range (`speed_rpm`)."""
+    if settings.speed_rpm is not None:
+        try:
+            return group_at(basis, settings.speed_rpm)
+        except UserError as error:
+            raise UserError(f"{path}: speed_rpm: {error}") from error
+    if (settings.speed, 0) not in basis.groups:
+        raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
+    return basis.groups[settings.speed, 0]
 
 
 def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:

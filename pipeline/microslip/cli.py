@@ -9,13 +9,16 @@ import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
 from .errors import NotConverged, UserError
 from .progress import progress
+
+if TYPE_CHECKING:
+    from .data import ModalBasis
 
 app = App(
     name="microslip",
@@ -172,13 +175,16 @@ def check(file: Path, /, *, quiet: Quiet = False) -> None:
 
 
 @app.command
-def export(file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int = 0) -> None:
+def export(
+    file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int = 0, rpm: float | None = None
+) -> None:
     """Write a modal file in another program's format.
 
     Args:
         file: a basis.h5.
         to: mat (MATLAB, Octave), vtu (ParaView).
         speed: with --ring: which of the file's speeds, counted from 0.
+        rpm: of a modal file with a speed range: this speed alone.
     """
     from .basis import read_basis
     from .exchange import WRITERS, writer
@@ -193,7 +199,8 @@ def export(file: Path, /, *, to: str, output: Output = None, ring: Ring = False,
         print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed))
         return
     target = output or file.with_suffix(f".{to}")
-    writer(to)(read_basis(file), target)
+    basis = read_basis(file)
+    writer(to)(basis if rpm is None else _at_speed(basis, rpm), target)
     print(target)
 
 
@@ -221,12 +228,13 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
 
 
 @app.command
-def info(file: Path, /, *, unit: str = "mm") -> None:
+def info(file: Path, /, *, unit: str = "mm", rpm: float | None = None) -> None:
     """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), or a body.toml.
 
     Args:
         file: basis.h5, a mesh, a STEP or BREP file, or a body.toml.
         unit: unit of length of a mesh or CAD file.
+        rpm: of a modal file with a speed range: what it holds at this speed.
     """
     from .mesh import UNITS
 
@@ -239,7 +247,8 @@ def info(file: Path, /, *, unit: str = "mm") -> None:
         from .basis import read_basis
         from .workflow import basis_summary
 
-        print("\n".join(basis_summary(read_basis(file))))
+        basis = read_basis(file)
+        print("\n".join(basis_summary(basis if rpm is None else _at_speed(basis, rpm))))
     elif suffix in (".step", ".stp", ".brep", ".iges", ".igs"):
         _cad_info(file, unit)
     elif suffix == ".toml" or file.is_dir():
@@ -261,6 +270,12 @@ def info(file: Path, /, *, unit: str = "mm") -> None:
         _warn(warnings)
         if errors:
             raise UserError("\n".join(f"{file}: {e}" for e in errors))
+
+
+def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
+    from .speed_range import basis_at
+
+    return basis_at(basis, rpm)
 
 
 def _cad_info(file: Path, unit: str) -> None:

@@ -20,7 +20,7 @@ from .body import GROUND
 from .campbell import crossings, engine_orders, track_basis
 from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
-from .data import ContactState, Interface, ModalBasis, ModalGroup
+from .data import ContactState, Interface, ModalBasis, ModalGroup, SpeedRange
 from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
 from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
@@ -334,6 +334,7 @@ def _campbell(basis: ModalBasis, album: _Album) -> str:
         "The frequencies hold stress stiffening and spin softening as stated above, but no gyroscopic coupling.",
         kind="plain",
     )
+    out += _say(*(range_sentence(k, r) for k, r in sorted(basis.ranges.items())), kind="plain")
     out += album.take("campbell", "Campbell diagram.")
     rows = [
         [str(c.order), str(int(tracks.modes[c.curve][tracks.modes[c.curve] >= 0][0]) + 1)]
@@ -341,6 +342,18 @@ def _campbell(basis: ModalBasis, album: _Album) -> str:
         for c in crossings(tracks, engine_orders(basis))
     ]
     return out + _hidden("Where engine orders meet modes", _table(["engine order", "mode", "rpm", "Hz"], rows))
+
+
+def range_sentence(harmonic: int, r: SpeedRange) -> str:
+    """How a speed range was made and how good it is."""
+    low, high = r.speeds[[0, -1]] * 30 / np.pi
+    held = " and ".join(f"{v:.0f}" for v in r.held_out * 30 / np.pi)
+    which = f"Nodal diameter {harmonic}: between" if harmonic else "Between"
+    return (
+        f"{which} {low:.6g} and {high:.6g} rpm one basis of {r.samples[0].n_modes} coordinates serves at every speed: "
+        f"modes solved for at {int(r.solved.sum())} speeds, stiffness known at {len(r.samples)}; at {held} rpm, which "
+        f"were held out, its frequencies err by {r.total_error.max():.1e} at most."
+    )
 
 
 def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
@@ -360,6 +373,7 @@ def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
     out += album.take(
         "nodal_diameters_stuck", "The two limits of friction: neighbours apart, and stuck to each other without slip."
     )
+    out += _say(*(range_sentence(k, r) for k, r in sorted(basis.ranges.items())), kind="plain")
     for i, s in enumerate(speeds):
         shown = _ring_table([eigenmodes(basis.groups[s, k]) for k in held])
         out += shown if i == 0 else _hidden(f"Frequencies at {_at(basis.groups[s, held[0]])}", shown)

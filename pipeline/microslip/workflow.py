@@ -43,7 +43,9 @@ _MODES_CODE = (
     "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
     "coordinates.py", "fem", "reduction", "modes",
 )  # fmt: skip
-_CASE_CODE = ("harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py")
+_CASE_CODE = (
+    "speed_range.py", "harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py",
+)  # fmt: skip
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
     "compliance.py", "basis/checks.py",

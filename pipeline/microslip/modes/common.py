@@ -213,7 +213,9 @@ def better_frequencies(held: Settled, V: Array, K_r: Array, count: int) -> Array
     for _ in range(2):
         more = more - V @ (MV.conj().T @ more)
     size = np.sqrt(np.einsum("ij,ij->j", more.conj(), pencil.M(more)).real)
-    V = V if size.max() < 1e-13 else orthonormal_union(np.hstack([V, more[:, size > 1e-13]]), pencil.M)[0]
+    more = more[:, size > 1e-13]
+    if more.shape[1]:
+        V = np.hstack([V, orthonormal_union(more, pencil.M)[0]])
     values = np.linalg.eigvalsh(projected(pencil.K, V))
     if below != (values < sigma).sum():
         return None
@@ -249,6 +251,7 @@ class _Search:
     V: Array = field(default_factory=lambda: np.zeros((0, 0)))
     orthogonality: float = 0.0
     K_r: dict[float, Array] = field(default_factory=dict)
+    true: dict[float, Array | None] = field(default_factory=dict)
 
     def settled(self, speed: float) -> Settled:
         """Equilibrium at a speed, begun from those known."""
@@ -264,7 +267,7 @@ class _Search:
         self.held.pop(settled.speed, None)
         if solved:
             self.solved[settled.speed] = self.solve(settled)
-            self.V, self.K_r = np.zeros((0, 0)), {}
+            self.V, self.K_r, self.true = np.zeros((0, 0)), {}, {}
 
     def begin(self, low: float, high: float) -> None:
         """Both ends, and between them the middle of the variable that they suggest."""
@@ -307,7 +310,10 @@ class _Search:
         """Errors of the better form at every held-out speed."""
         held = [self.held[s] for s in sorted(self.held)]
         exact = [projected(h.pencil.K, self.V) for h in held]
-        true = [better_frequencies(h, self.V, K, self.count) for h, K in zip(held, exact, strict=True)]
+        for h, K in zip(held, exact, strict=True):
+            if h.speed not in self.true:
+                self.true[h.speed] = better_frequencies(h, self.V, K, self.count)
+        true = [self.true[h.speed] for h in held]
         found = {
             form: [self._errors(form, h.speed, K, f) for h, K, f in zip(held, exact, true, strict=True)]
             for form in FORMS

@@ -135,10 +135,10 @@ def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
         colour = COLOURS[c % len(COLOURS)]
         known = tracks.modes[c] >= 0
         axes.plot(rpm, f, color=colour, linewidth=1.8)
-        stations = tracks.omega[c, known] / (2 * np.pi)
+        at = tracks.speeds[known] if tracks.solved is None else tracks.solved
+        stations = tracks.frequency(c, at)
         shown = stations <= top
-        x = tracks.speeds[known][shown] * 30 / np.pi
-        axes.plot(x, stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
+        axes.plot(at[shown] * 30 / np.pi, stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
         for step in np.flatnonzero(tracks.mac[c] < SURE):
             part = (speeds >= tracks.speeds[step]) & (speeds <= tracks.speeds[step + 1])
             axes.plot(rpm[part], f[part], color="white", linewidth=2.4, linestyle=(0, (2, 3)))
@@ -194,6 +194,8 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
     second = axes.secondary_xaxis("top", functions=(_per_second, _per_minute))
     second.set_xlabel("rotation speed in rev/s")
     note = "dots: computed; curves joined by MAC; circles: engine order meets mode"
+    if tracks.solved is not None:
+        note = f"dots: computed; curves: {len(tracks.speeds)} speeds of the range, joined by MAC; circles: crossings"
     shown = np.nanmin(tracks.omega, axis=1) / (2 * np.pi) <= top
     if (tracks.mac[shown] < SURE).any():
         note += f"; dotted: MAC below {SURE:g}, add speeds"
