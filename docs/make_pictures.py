@@ -24,6 +24,7 @@ from microslip.case import CaseSettings, _contact, _sized, load_case, run_case
 from microslip.compliance import contact_share, without_bulk
 from microslip.data import ModalBasis, ModalGroup
 from microslip.harmonic_balance import peaks, stuck_frequencies
+from microslip.modes import modal_basis
 from microslip.modes.patches import patch_bounds
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.response import response_picture
@@ -397,6 +398,39 @@ def speed_picture(runs: dict[str, ModalBasis], speeds: dict[str, Sequence[int]])
     save(drawn(fig), "speed")
 
 
+# the rotation page --------------------------------------------------------------------------------------------------
+
+
+def rotation() -> None:
+    """A hollow drum that spins: its Campbell diagram; the spin-up of the beam of Simo and Vu-Quoc."""
+    sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "validation")]
+    import test_spin_up as beam
+    from meshes import body, pipe
+
+    turning = {"speeds_rpm": [0.0, 8000.0, 16000.0, 24000.0, 32000.0], "axis": [0.0, 0, 1]}
+    mesh = pipe("hexahedron20", (1, 12, 4), 0.018, 0.025, 0.25)
+    basis = modal_basis(mesh, body(supports=[{"face": "z0"}], rotation=turning, modes={"count": 6}))
+    tracks = track_basis(basis)
+    assert tracks is not None
+    plots.campbell_plot(replace(basis, name="drum"), tracks, [1, 2], BUILD / "drum.png")
+    save(from_file(BUILD / "drum.png"), "drum")
+    times = np.linspace(0, 20, 801)
+    runs = {"floating frame": beam.tip(times)[:, 1], "without stiffening": beam.tip(times, stiffened=False)[:, 1]}
+    fig = figure(8.6, 3.9)
+    axes = fig.subplots()
+    plain(axes)
+    axes.plot(times, runs["floating frame"], color="#0b4f9c", label="floating frame, 14 modes")
+    axes.plot(times[::20], beam.beam_equation(times)[::20], "o", mfc="none", color="#111111", label="beam equation")
+    away = np.abs(runs["without stiffening"]) < 0.8
+    last = int(np.argmin(away))
+    axes.plot(times[:last], runs["without stiffening"][:last], color="#c8382c", label="without stiffening")
+    axes.set_ylim(-0.75, 0.1)
+    axes.set_xlabel("time in s")
+    axes.set_ylabel("lag of the tip in m")
+    axes.legend(fontsize=9)
+    save(drawn(fig), "spin_up")
+
+
 def compliance() -> None:
     """How much static compliance the modes hold, for every body."""
     rows = []
@@ -623,8 +657,8 @@ def reference() -> None:
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, compliance, counted_once,
-        reduction, own,
+        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, rotation, compliance,
+        counted_once, reduction, own,
     )  # fmt: skip
 }
 

@@ -14,6 +14,7 @@ from meshes import STEEL, body, brick, nearest, pipe, twisted_blade
 
 from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
+from microslip.campbell import gyroscopic_change, track_gyroscopic
 from microslip.coordinates import in_modes
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
@@ -30,6 +31,7 @@ from microslip.modes.equilibrium import equilibrium, make_model
 from microslip.modes.run_up import run_up_terms
 from microslip.reference.rings import ring_at_rest, spinning_ring
 from microslip.reference.shafts import spinning_mass
+from microslip.report import report_html
 
 ROOT = {"supports": [{"face": "z0"}]}
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # n x u in the plane of the rotation
@@ -343,6 +345,26 @@ def test_the_centrifugal_load_moves_the_static_state_with_the_speed():
     change = b.u_static - a.u_static
     # what 60 modes leave out of a static deflection, and the second order of 0.2 %
     assert np.abs(a.phi @ q - change).max() < 0.01 * np.abs(change).max()
+
+
+# ---------------------------------------------------------------- over the speed
+
+
+def test_branches_of_the_campbell_diagram():
+    """The pair of a square beam parts into a rising backward and a falling forward branch, 2 Omega apart."""
+    mesh = brick("hexahedron20", (1, 1, 8), (0.02, 0.02, 1.0), (-0.01, -0.01, 0))
+    turning = {"speeds_rpm": [0.0, 150.0, 300.0], "axis": [0.0, 0, 1]}
+    basis = modal_basis(mesh, body(**ROOT, rotation=turning, modes={"count": 4}))
+    tracks = track_gyroscopic(basis)
+    assert tracks.modes.shape == (4, 3) and (tracks.modes >= 0).all()
+    first = tracks.omega[:2]
+    np.testing.assert_allclose(np.abs(np.diff(first, axis=0))[0], 2 * tracks.speeds, atol=1e-3 * first.max())
+    assert sorted(np.sign(np.diff(first, axis=1).sum(axis=1))) == [-1, 1]
+    x = tracks.speeds[-1] / first[0, 0]  # omega_0 + Omega over the uncoupled root of omega_0^2 - Omega^2
+    assert gyroscopic_change(basis) == pytest.approx(np.sqrt((1 + x) / (1 - x)) - 1, rel=1e-2)
+    assert track_gyroscopic(blade(4)) is None  # one speed only
+    page = report_html(basis, {})
+    assert "The rotating body is stable" in page and "backward" in page
 
 
 # ---------------------------------------------------------------- the file

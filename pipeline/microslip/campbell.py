@@ -2,14 +2,14 @@
 
 Between two speeds the squared frequency is taken as linear in the squared speed (Southwell: omega^2 =
 omega_0^2 + B Omega^2), which is exact at the stations and makes every crossing a root in closed form.
-Gyroscopic coupling is not in the frequencies of a modal file (its matrix G_r stands beside them).
+Gyroscopic coupling is not in the frequencies of a modal file; the modes with it stand beside (`track_gyroscopic`).
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -168,6 +168,40 @@ def track_basis(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
     if len(groups) < 2:
         return None
     return track(groups, point_weights(basis))
+
+
+def track_gyroscopic(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
+    """Curves of the modes with gyroscopic coupling of a real group, in the rotating frame; None without shapes.
+
+    They begin at rest with the modes that have none.
+    """
+    groups = [g for (_, h), g in sorted(basis.groups.items()) if h == harmonic]
+    held = [g.gyroscopic is not None or not g.speed for g in groups]
+    if len(groups) < 2 or not all(held) or not any(g.speed for g in groups) or not all(len(g.phi) for g in groups):
+        return None
+    return track([_whirling(g) for g in groups], point_weights(basis))
+
+
+def _whirling(g: ModalGroup) -> ModalGroup:
+    """The group with its gyroscopic modes in the place of its modes."""
+    if g.gyroscopic is None:
+        return g
+    y, w = g.gyroscopic, len(g.gyroscopic.omega)
+    zero = np.zeros((w, w))
+    return replace(
+        g, omega=np.abs(y.omega), kind=y.direction, phi=g.phi @ y.shapes, M_r=zero, K_r=zero, to_diagonal=None
+    )
+
+
+def gyroscopic_change(basis: ModalBasis) -> float:
+    """Largest relative change of a frequency, counted in order, that gyroscopic coupling makes in the file."""
+    change = 0.0
+    for g in basis.groups.values():
+        if g.gyroscopic is not None and len(g.gyroscopic.omega) >= len(g.omega):
+            elastic = g.omega > 0
+            new = np.abs(g.gyroscopic.omega[: len(g.omega)])
+            change = max(change, float(np.abs(new[elastic] / g.omega[elastic] - 1).max(initial=0.0)))
+    return change
 
 
 def point_weights(basis: ModalBasis) -> Array | None:

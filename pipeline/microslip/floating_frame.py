@@ -21,6 +21,7 @@ import scipy.integrate
 
 from .coordinates import in_modes
 from .data import Array, Invariants, ModalBasis, NotConverged, UserError
+from .frames import skew
 
 OfTime = Callable[[float], float]
 _LEVI_CIVITA = np.zeros((3, 3, 3))
@@ -113,11 +114,6 @@ def floating_body(basis: ModalBasis, speed: int = 0, stiffened: bool = True) -> 
         invariants, (g.K_r + soft)[some], g.C_r[some], g.speed**2 * g.run_up.centrifugal[keep], g.speed,
         basis.rotation_axis, g.phi[:, :, keep] if g.phi.shape[0] else g.phi, g.u_static, stiffened,
     )  # fmt: skip
-
-
-def skew(v: Array) -> Array:
-    """(3, 3) matrix of the cross product (Sextro Eq. (2.1-5))."""
-    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 # the integrals at a deflection ------------------------------------------------------------------------------------

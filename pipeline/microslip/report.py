@@ -21,6 +21,7 @@ from .campbell import crossings, engine_orders, track_basis
 from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
 from .data import ContactState, Interface, ModalBasis, ModalGroup, SpeedRange
+from .gyroscopic import stability_sentence
 from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
 from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
@@ -322,7 +323,24 @@ def _frequencies(basis: ModalBasis, album: _Album) -> str:
         rows.append([str(j + 1), *cells, f"{100 * first.damping_ratio[j]:.4g}", text(first.kind[j])])
     proofs = [(f"{_at(g)}: " if several else "") + certificate(g) for g in groups]
     out = _say(*proofs, kind="" if all(g.checks.get("certified") for g in groups) else "warn")
-    return out + _table(head, rows) + _campbell(basis, album)
+    return out + _table(head, rows) + _campbell(basis, album) + _gyroscopic(groups)
+
+
+def _gyroscopic(groups: Sequence[ModalGroup]) -> str:
+    """Frequencies with gyroscopic coupling at every speed, and whether the body is stable."""
+    out = ""
+    for g in groups:
+        if (y := g.gyroscopic) is None:
+            continue
+        bounds = [f"{100 * e:.2g} %" if np.isfinite(e) else "" for e in y.error]
+        rows = [
+            [str(i + 1), f"{f:#.6g}", text(way), f"{s:+.2f}", text(bound)]
+            for i, (f, way, s, bound) in enumerate(zip(y.frequency, y.direction, y.sense, bounds, strict=True))
+        ]
+        head = ["mode", "Hz", "direction", "sense of the orbits", "too high by at most"]
+        out += _say(f"{_at(g)}: {stability_sentence(y)}", kind="plain" if y.stable else "bad")
+        out += _hidden(f"Modes with gyroscopic coupling at {_at(g)}, in the rotating frame", _table(head, rows))
+    return out
 
 
 def _campbell(basis: ModalBasis, album: _Album) -> str:
@@ -331,7 +349,8 @@ def _campbell(basis: ModalBasis, album: _Album) -> str:
         return ""
     out = _say(
         "Modes are ordered by frequency at each speed; the Campbell diagram joins those that have the same shape. "
-        "The frequencies hold stress stiffening and spin softening as stated above, but no gyroscopic coupling.",
+        "The frequencies hold stress stiffening and spin softening as stated above, but no gyroscopic coupling, which "
+        "stands beside.",
         kind="plain",
     )
     out += _say(*(range_sentence(k, r) for k, r in sorted(basis.ranges.items())), kind="plain")

@@ -114,7 +114,25 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         },
         "stress_nodes": _stress(g),
         "checks": _struct(g.checks, float),
+        **_rotation(g),
     }
+
+
+def _rotation(g: ModalGroup) -> dict[str, Any]:
+    """What a change of the speed adds, and the modes with gyroscopic coupling, where the basis has them."""
+    out: dict[str, Any] = {}
+    if (r := g.run_up) is not None:
+        out["run_up"] = {"N": r.N, "P": r.P, "euler": _load(r.euler), "centrifugal": _load(r.centrifugal)}
+    if (y := g.gyroscopic) is not None:
+        out["gyroscopic"] = {
+            "omega": _column(y.omega), "shapes": y.shapes, "growth": _column(y.growth), "sense": _column(y.sense),
+            "direction": np.array(y.direction, dtype=object).reshape(-1, 1), "error": _column(y.error),
+        }  # fmt: skip
+    return out
+
+
+def _load(values: Array) -> Array:
+    return np.asarray(values).reshape(-1, 1)
 
 
 def _interface(item: Interface) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campbell import SURE, Crossing, Tracks, crossings
+from ..campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
 from ..data import Array, ModalBasis, ModalGroup
 from ..store import complete_or_absent
 from ..truncation import Coordinate, coordinates, percent
@@ -105,13 +105,43 @@ def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path
     orders = sorted({k for k in orders if k > 0})
     top = _ceiling(tracks, orders)
     rpm = np.linspace(tracks.speeds[0], tracks.speeds[-1], 201) * 30 / np.pi
+    split = track_gyroscopic(basis) if gyroscopic_change(basis) > VISIBLE else None
     _curves(axes, tracks, rpm, top)
+    if split is not None:
+        _split(axes, basis, split, rpm, top)
     for order in orders:
         axes.plot(rpm, order * rpm / 60, color="#5b6270", linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
         _order_label(axes, order, rpm[-1], top)
     _mark(axes, [c for c in crossings(tracks, orders) if c.frequency <= top])
     _campbell_frame(axes, basis, rpm, top, tracks)
     return _save(figure, path)
+
+
+VISIBLE = 0.005
+"""A smaller relative change of the frequencies by gyroscopic coupling is told but not drawn."""
+
+_WHIRL = {"forward": "^", "backward": "v", "mixed": "x"}
+
+
+def _split(axes: Axes, basis: ModalBasis, split: Tracks, rpm: Array, top: float) -> None:
+    """The branches with gyroscopic coupling, thin and dark, with the direction at every station."""
+    ink = "#30343c"
+    for omega in split.omega:  # the split grows with Omega, not with its square
+        known = np.isfinite(omega)
+        at = split.speeds[known] * 30 / np.pi
+        f = np.interp(rpm, at, omega[known], left=np.nan, right=np.nan) / (2 * np.pi)
+        axes.plot(rpm, np.where(f <= top, f, np.nan), color=ink, linewidth=0.9, linestyle=(0, (4, 1.5)), zorder=2.5)
+    for way, mark in _WHIRL.items():
+        at = [
+            (g.speed * 30 / np.pi, f)
+            for (_, h), g in sorted(basis.groups.items())
+            if g.gyroscopic is not None and h == 0
+            for f, direction in zip(g.gyroscopic.frequency, g.gyroscopic.direction, strict=True)
+            if direction == way and f <= top
+        ]
+        if at:
+            axes.plot(*zip(*at, strict=True), mark, color=ink, markersize=4.5, zorder=3.5, label=way, clip_on=False)
+    axes.legend(title="with gyroscopic coupling,\nrotating frame", loc="upper left", fontsize=8, title_fontsize=8)
 
 
 def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
@@ -199,6 +229,8 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
     shown = np.nanmin(tracks.omega, axis=1) / (2 * np.pi) <= top
     if (tracks.mac[shown] < SURE).any():
         note += f"; dotted: MAC below {SURE:g}, add speeds"
+    if (change := gyroscopic_change(basis)) and change <= VISIBLE:
+        note += f"; gyroscopic coupling changes them by {100 * change:.2g} % at most"
     if not shown.all():
         note += f"; {int((~shown).sum())} modes lie above"
     axes.set_title(f"{basis.name}: Campbell diagram\n", fontweight="bold")
