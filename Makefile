@@ -62,6 +62,7 @@ docs: $(READY) ## the studies and pictures of docs/ (minutes)
 
 bench: $(READY) ## timings against CalculiX and NGSolve (minutes)
 	@$(PYTHON) benchmarks/modal.py
+	@$(PYTHON) benchmarks/ring.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

@@ -31,3 +31,12 @@ def test_the_cyclic_benchmark_compares_the_two_ways(tmp_path):
     assert done.returncode == 0, done.stderr
     for text in ("| cyclic / real, CPU |", "| cyclic |", "| real |", "condensation"):
         assert text in done.stdout
+
+
+def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
+    command = [sys.executable, str(ROOT / "benchmarks" / "ring.py"), "--quick", "--work", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    dof, ring_dof, modes = (int(v) for v in done.stdout.splitlines()[-1].split("|")[1:4])
+    assert ring_dof == 24 * dof and modes == 288  # 12 modes at each k, counted twice but for k = 0 and 12: 12 * 24
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from itertools import product
@@ -97,16 +98,17 @@ def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
     Args:
         phi: (n, 3, m) shapes.
     """
-    total, volume = np.zeros((phi.shape[2], phi.shape[2]), dtype=phi.dtype), 0.0
+    m = phi.shape[2]
+    total, volume = np.zeros((m, m), dtype=phi.dtype), 0.0
+    columns = np.ascontiguousarray(phi).reshape(len(phi), -1).view(np.float64)  # complex ones as pairs
     for cell_type, cells in mesh.cells.items():
         N, dN, weights = tables(cell_type)
-        for chunk in np.array_split(cells, max(1, len(cells) // 20000)):
-            x = mesh.points[chunk]
-            for q, w in enumerate(weights):
-                dv = w * np.linalg.det(np.einsum("dk,eki->edi", dN[q], x))
-                u = np.tensordot(N[q], phi[chunk], axes=(0, 1)).reshape(-1, phi.shape[2])
-                total += u.conj().T @ (np.repeat(dv, 3)[:, None] * u)
-                volume += float(dv.sum())
+        size = max(1, int(2e6 / ((columns.shape[1] + 1) * len(weights))))  # cells at a time: what stays in the cache
+        for chunk in np.array_split(cells, max(1, math.ceil(len(cells) / size))):
+            dv = weights * np.linalg.det(np.einsum("qdk,eki->eqdi", dN, mesh.points[chunk], optimize=True))
+            u = np.matmul(N, columns[chunk]).view(phi.dtype).reshape(3 * dv.size, m)
+            total += u.conj().T @ (np.repeat(dv.ravel(), 3)[:, None] * u)
+            volume += float(dv.sum())
     return total, volume
 
 
