@@ -22,6 +22,7 @@ from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
 from .coordinates import basis_in_modes
 from .data import ContactState, Interface, ModalBasis, ModalGroup, SpeedRange
 from .gyroscopic import stability_sentence
+from .quality import sentences
 from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
 from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
@@ -323,7 +324,9 @@ def _frequencies(basis: ModalBasis, album: _Album) -> str:
         rows.append([str(j + 1), *cells, f"{100 * first.damping_ratio[j]:.4g}", text(first.kind[j])])
     proofs = [(f"{_at(g)}: " if several else "") + certificate(g) for g in groups]
     out = _say(*proofs, kind="" if all(g.checks.get("certified") for g in groups) else "warn")
-    return out + _table(head, rows) + _campbell(basis, album) + _gyroscopic(groups)
+    words = [f"{w[:1].upper()}{w[1:]}." for w in sentences(groups[0], basis.reduction)]
+    quality = _say(*words, kind="plain") if words else ""
+    return out + _table(head, rows) + quality + _campbell(basis, album) + _gyroscopic(groups)
 
 
 def _gyroscopic(groups: Sequence[ModalGroup]) -> str:

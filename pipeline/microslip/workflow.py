@@ -48,7 +48,7 @@ _CASE_CODE = (
 )  # fmt: skip
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
-    "compliance.py", "basis/checks.py",
+    "compliance.py", "quality.py", "basis/checks.py",
 )  # fmt: skip
 
 
