@@ -136,3 +136,45 @@ def shroud():
 def test_the_shrouded_blade_on_its_disc(tmp_path):
     """24 sectors, 13 nodal diameters about the untwisting equilibrium at 4500 rpm."""
     compared(tmp_path, shroud(), 24, 150 * np.pi, "nonlinear", 4)
+
+
+# ---------------------------------------------------------------- Coriolis
+
+MODES = 60
+
+
+def complex_frequencies(dat: str) -> np.ndarray:
+    """rad/s of the last table of eigenvalues."""
+    start = dat.rindex("E I G E N V A L U E   O U T P U T")
+    rows = re.findall(r"^ +\d+ +(-?[\d.]+E[+-]\d+) +\S+ +\S+ *$", dat[start:], re.MULTILINE)
+    return np.abs(np.array(rows, dtype=float))
+
+
+def test_coriolis_waves_of_the_full_ring(tmp_path):
+    """CalculiX refuses Coriolis forces with cyclic symmetry, so it gets the whole ring: *COMPLEX FREQUENCY, CORIOLIS.
+
+    It finds the waves among 60 modes of the ring and prints only some of them (one of most pairs). Every one is a wave
+    of ours: the first eight within 2e-6, the others as close as 60 modes allow, 1e-4.
+    """
+    sector = rings.bladed_sector()
+    load = centrifugal(600.0)
+    silent = static(load, ", NLGEOM").partition("*NODE PRINT")[0] + "*END STEP\n"
+    text = deck(rings.full_ring(sector, 6).mesh, held="bore") + silent
+    text += f"*STEP, PERTURBATION\n*FREQUENCY, STORAGE=YES\n{MODES}\n*END STEP\n"
+    text += f"*STEP, PERTURBATION\n*COMPLEX FREQUENCY, CORIOLIS\n{MODES}\n{load}*END STEP\n"
+    theirs = complex_frequencies(run(tmp_path, text))[:20]
+    described = body(
+        supports=[{"face": "bore"}], cyclic={"sectors": 6}, modes={"count": 60},
+        rotation={"speeds_rpm": [600.0 * 30 / np.pi]},
+    )  # fmt: skip
+    groups = modal_basis(sector, described).groups
+    ours = np.concatenate([np.abs(g.gyroscopic.omega) for g in groups.values()])
+    still = np.concatenate([g.omega for g in groups.values()])
+
+    def nearest(candidates):
+        return np.abs(theirs[:, None] / candidates - 1).min(axis=1)
+
+    assert len(theirs) == 20
+    assert nearest(ours)[:8].max() < 5e-6
+    assert nearest(ours).max() < 3e-4
+    assert nearest(still)[:8].max() > 5e-4  # without Coriolis forces they are no waves of ours
