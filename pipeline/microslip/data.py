@@ -446,6 +446,8 @@ class ModalBasis:
         cyclic_faces: names of its left and right face in the mesh; right is left turned by 2 pi / N.
         ranges: nodal diameter -> the body over a range of speeds.
         provenance: name -> text (settings, hashes, versions); nothing that changes between identical runs.
+        source: ``elements``: assembled on the mesh; ``matrices``: from foreign matrices (the mesh may have points
+            alone); ``measured``: from a test.
     """
 
     name: str
@@ -463,3 +465,4 @@ class ModalBasis:
     sectors: int = 1
     cyclic_faces: tuple[str, str] = ("cyclic_left", "cyclic_right")
     ranges: Mapping[int, SpeedRange] = field(default_factory=dict)
+    source: str = "elements"

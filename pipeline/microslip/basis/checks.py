@@ -77,7 +77,9 @@ _Findings = list[tuple[str, float, float, str]]
 
 def _mesh_checks(basis: ModalBasis) -> _Findings:
     mesh = basis.mesh
-    found: _Findings = [("mesh: cells", 0.0 if mesh.n_cells else 1.0, 0.0, f"{mesh.n_cells} cells")]
+    needed = basis.source == "elements"  # foreign matrices and measurements may know points alone
+    lacking = 1.0 if not mesh.n_points or (needed and not mesh.n_cells) else 0.0
+    found: _Findings = [("mesh: points and cells", lacking, 0.0, f"{mesh.n_points} points, {mesh.n_cells} cells")]
     tables = [*mesh.cells.values(), *(f for blocks in mesh.faces.values() for f in blocks.values())]
     highest = max((int(c.max()) for c in tables if c.size), default=-1)
     lowest = min((int(c.min()) for c in tables if c.size), default=0)
@@ -115,12 +117,12 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         g = in_modes(g)
     if g.invariants is not None:
         found += _invariant_checks(basis, g, g.invariants)
-    found += _matrix_checks(g)
+    found += _matrix_checks(g, coupled=basis.damping_source == "matrix")
     if g.run_up is not None:
         found += _run_up_checks(g, g.run_up)
     if g.gyroscopic is not None:
         found += _gyroscopic_checks(g, g.gyroscopic)
-    if mesh_is_sound and g.phi.shape[0]:
+    if mesh_is_sound and g.phi.shape[0] and basis.source == "elements":
         found += _shape_checks(basis, g)
     for name, item in g.interfaces.items():
         found += _interface_checks(basis, g, name, item, mesh_is_sound)
@@ -228,7 +230,8 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     ]
 
 
-def _matrix_checks(g: ModalGroup) -> _Findings:
+def _matrix_checks(g: ModalGroup, coupled: bool = False) -> _Findings:
+    """coupled: whether damping may couple the modes (a foreign damping matrix)."""
     scale = max(_largest(g.omega**2), 1.0)
     found: _Findings = [
         ("frequencies ascend", float(np.maximum(-np.diff(g.omega), 0).max(initial=0.0)), 1e-9 * _largest(g.omega), ""),
@@ -236,6 +239,8 @@ def _matrix_checks(g: ModalGroup) -> _Findings:
         ("rigid modes have omega = 0", _largest(g.omega[np.array(g.kind) == "rigid"]), 0.0, ""),
     ]
     C = np.diag(2 * g.damping_ratio * g.omega)
+    if coupled:
+        C = C + g.C_r - np.diag(np.diag(g.C_r))
     found.append(("M_r is the identity", _largest(g.M_r - np.eye(g.n_modes)), 1e-9, ""))
     found.append(("K_r is diag(omega^2)", _largest(g.K_r - np.diag(g.omega**2)) / scale, 1e-9, ""))
     found.append(("C_r is diag(2 D omega)", _largest(g.C_r - C) / np.sqrt(scale), 1e-9, ""))

@@ -109,6 +109,7 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> None:
     file.attrs["reduction"] = basis.reduction
     file.attrs["free"] = int(basis.free)
     file.attrs["damping_source"] = basis.damping_source
+    file.attrs["source"] = basis.source
     put_scale(file, "axis", np.array(["x", "y", "z"]))
     put_scale(file, "component", np.array(VOIGT))
     put_scale(file, "frame_axis", np.array(["n", "t1", "t2"]))
@@ -545,6 +546,7 @@ def _read(file: h5py.File) -> ModalBasis:
         damping_source=str(file.attrs["damping_source"]),
         free=bool(file.attrs["free"]), reduction=str(file.attrs["reduction"]),
         provenance={k: str(v) for k, v in file["provenance"].attrs.items()}, sectors=sectors, ranges=ranges,
+        source=str(file.attrs.get("source", "elements")),
         **_cyclic_faces(file, sectors),
     )  # fmt: skip
 
