@@ -6,8 +6,8 @@
 The file is made up: an annular sector of 20-node bricks, 12 shapes at each of 13 nodal diameters that obey the phase
 rule exactly and are mass-orthonormal, so every check has to pass. Each measurement is a process of its own with one
 thread: read the file, then certify the ring (orthonormality of all ring modes, phase rule on the cut faces, count),
-then displace all sectors in the modes of one nodal diameter. "Ring's shapes": all ring modes on all sectors would
-fill, "ring's M" one triangle of its mass matrix; neither is ever made.
+then displace all sectors in the modes of one nodal diameter. "Ring's shapes": what all ring modes on all sectors would
+fill; "ring's M": one triangle of its mass matrix. Neither is ever made.
 """
 
 from __future__ import annotations

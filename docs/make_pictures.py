@@ -654,11 +654,122 @@ def reference() -> None:
     fill("body_toml.md", "body_toml", body_reference())
 
 
+# the cyclic page ---------------------------------------------------------------------------------------------------
+
+SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
+
+
+def cyclic() -> None:
+    """Conventions of cyclic symmetry drawn, and the shrouded blade's diagrams with free and with sticking shrouds."""
+    from microslip import resonances, ring
+    from microslip.pictures import diagrams, ring_views
+
+    save(drawn(conventions_sketch()), "cyclic_conventions", smooth=True)
+    speeds = ("rotation.speeds_rpm=[0, 1500, 3000, 4500]", "modes.count=8", 'cyclic.nodal_diameters="all"')
+    basis = replace(made("shroud-cyclic", "shroud", *COARSE_SHROUD, *LIGHT, *speeds), name="shroud")
+    closed = replace(sticking(basis), name="shroud, contacts stuck")
+    with_studio(basis, lambda studio: save(ring_picture(ring_views, studio), "cyclic_ring", smooth=True))
+    for name, draw, body in (
+        ("cyclic_nodal_diameters", diagrams.nodal_diameter_plot, closed),
+        ("cyclic_safe", lambda b, path: diagrams.safe_plot(at_one_speed(b, 2), SHROUD_ORDERS, path), closed),
+        ("cyclic_campbell", lambda b, path: diagrams.cyclic_campbell_plot(b, SHROUD_ORDERS, path), basis),
+    ):
+        draw(body, BUILD / f"{name}.png")
+        save(from_file(BUILD / f"{name}.png"), name)
+    found = [r for r in resonances.resonances(basis, SHROUD_ORDERS) if r.family <= 3]
+    fill("cyclic.md", "resonances", table(list(resonances.HEAD), [list(row) for row in resonances.rows(found)]))
+    orders = (1, 6, 11, 12, 13, 18, 23, 24, 25, 30, 36)
+    fill("cyclic.md", "aliases", table(["e", "k", "wave"], [[e, *ring.aliased(e, 24)] for e in orders]))
+    rows = []
+    for k in (0, 1, 2, 4, 6, 8, 12):
+        free, held = basis.groups[0, k].frequency, closed.groups[0, k].frequency
+        rows.append([k, ring.multiplicity(k, 24), *(f"{f:.2f}" for f in free[:3]), *(f"{f:.1f}" for f in held[:3])])
+    head = ["k", "modes of the ring each", *(f"free {j}" for j in (1, 2, 3)), *(f"stuck {j}" for j in (1, 2, 3))]
+    fill("cyclic.md", "frequencies", table(head, rows))
+
+
+def sticking(basis: ModalBasis) -> ModalBasis:
+    """The ring whose contacts stick without any relative motion: its frequencies and shapes in the same groups."""
+    from microslip.neighbours import stuck
+
+    groups = {}
+    for key, g in basis.groups.items():
+        omega, x = stuck(basis, g, "right")
+        count = g.kind.count("normal")
+        groups[key] = replace(
+            g, omega=omega[:count], kind=("normal",) * count, phi=g.phi @ x[:, :count], gyroscopic=None,
+            damping_ratio=np.zeros(count),
+        )  # fmt: skip
+    return replace(basis, groups=groups)
+
+
+def at_one_speed(basis: ModalBasis, speed: int) -> ModalBasis:
+    return replace(basis, groups={(0, k): g for (s, k), g in basis.groups.items() if s == speed})
+
+
+def ring_picture(ring_views: Any, studio: views.Studio) -> Any:
+    """Three nodal diameters of the ring in its first two modes."""
+    ring = ring_views.open_ring(studio.basis, studio.stage)
+    groups = [studio.basis.groups[0, k] for k in (0, 1, 2, 12)]
+    return ring_views.ring_sheet(ring, groups, 2, ring_views.ring_camera(ring, 110_000), across=4)
+
+
+def conventions_sketch() -> Any:
+    """Twelve sectors seen against the axis: their numbers, left and right, and both waves of two nodal diameters."""
+    fig = figure(10.2, 4.9)
+    left, right = fig.subplots(1, 2)
+    N, k = 12, 2
+    angle = 2 * np.pi / N * np.arange(N)
+    for axes in (left, right):
+        axes.set_aspect("equal")
+        axes.axis("off")
+        axes.set_xlim(-1.75, 1.75)
+        axes.set_ylim(-1.6, 1.75)
+    for j, a in enumerate(angle):
+        for edge in (a - np.pi / N, a + np.pi / N):
+            left.plot(*(np.outer([0.45, 1.0], [np.sin(edge), np.cos(edge)]).T), color="#c2c7d0", linewidth=1)
+        left.text(0.78 * np.sin(a), 0.78 * np.cos(a), str(j), ha="center", va="center", fontsize=11)
+    turn = np.linspace(0, 2 * np.pi, 200)
+    for radius in (0.45, 1.0):
+        left.plot(radius * np.sin(turn), radius * np.cos(turn), color="#5b6270", linewidth=1)
+    for side, text, colour in ((-1, "left", "#d98410"), (1, "right", "#26863c")):
+        edge = side * np.pi / N
+        left.plot(*(np.outer([0.45, 1.0], [np.sin(edge), np.cos(edge)]).T), color=colour, linewidth=3)
+        left.text(0.62 * side, 1.13, f"{text} face\nof sector 0", color=colour, ha="center", fontsize=9)
+    left.plot(0, 0, "o", mfc="none", mec="#111111", markersize=11)
+    left.plot(0, 0, "x", color="#111111", markersize=6)
+    left.text(0, -0.22, "axis points\naway", ha="center", va="center", fontsize=8)
+    arc(left, 1.28, 2.35, 3.9, "#111111")
+    left.text(0, -1.5, "positive rotation Omega, and numbers of the sectors", ha="center", fontsize=9)
+    wave = 1 + 0.22 * np.cos(k * turn)
+    right.plot(np.sin(turn), np.cos(turn), color="#c2c7d0", linewidth=1)
+    right.plot(wave * np.sin(turn), wave * np.cos(turn), color="#0b4f9c", linewidth=1.2)
+    u = 1 + 0.22 * np.cos(k * angle)
+    right.plot(u * np.sin(angle), u * np.cos(angle), "o", color="#0b4f9c", markersize=6)
+    arc(right, 1.42, 2.2, 0.95, "#0b4f9c")
+    right.text(1.72, 1.12, "backward:\nexp(+i omega t)", color="#0b4f9c", ha="center", fontsize=9)
+    arc(right, 1.42, -2.2, -0.95, "#c8382c")
+    right.text(-1.72, 1.12, "forward:\nexp(-i omega t)", color="#c8382c", ha="center", fontsize=9)
+    arc(right, 0.5, 2.35, 3.9, "#111111")
+    right.text(0, -0.02, "rotation", ha="center", fontsize=9)
+    right.text(0, -1.5, "two nodal diameters: u(j) = R^j phi exp(i j k 2 pi / N)", ha="center", fontsize=9)
+    return fig
+
+
+def arc(axes: Any, radius: float, start: float, stop: float, colour: str) -> None:
+    """An arrow along a circle; angles from the top, clockwise."""
+    a = np.linspace(start, stop, 60)
+    x, y = radius * np.sin(a), radius * np.cos(a)
+    axes.plot(x[:-2], y[:-2], color=colour, linewidth=1.6)
+    tip = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "mutation_scale": 16}
+    axes.annotate("", (x[-1], y[-1]), (x[-3], y[-3]), arrowprops=tip)
+
+
 STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, rotation, compliance,
-        counted_once, reduction, own,
+        counted_once, reduction, own, cyclic,
     )  # fmt: skip
 }
 

@@ -183,6 +183,24 @@ def test_modes_page(tmp_path: Path) -> None:
         np.testing.assert_allclose(basis.groups[i, 0].frequency[:6], [float(r[column]) for r in told], rtol=1e-4)
 
 
+def test_cyclic_page(tmp_path: Path) -> None:
+    """Aliases as computed, resonances on their engine-order lines, frequencies of the free shroud at two k."""
+    from microslip.ring import aliased, multiplicity
+
+    for e, k, wave in rows("cyclic.md", "aliases"):
+        assert aliased(int(e), 24) == (int(k), wave)
+    for rpm, hertz, e, k, wave, *_ in rows("cyclic.md", "resonances"):
+        assert float(hertz) == pytest.approx(float(rpm) * int(e) / 60, rel=2e-4)  # rpm has one decimal
+        assert aliased(int(e), 24) == (int(k), wave)
+    told = {int(r[0]): r for r in rows("cyclic.md", "frequencies")}
+    coarse = "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"
+    change = ["mesh.size=12", coarse, "rotation.speeds_rpm=[0.0]", "modes.count=4", "modes.certify=false"]
+    basis = made(tmp_path, "shroud", *change, "cyclic.nodal_diameters=[0, 6]", "reduction=eigenmodes")
+    for k in (0, 6):
+        assert int(told[k][1]) == multiplicity(k, 24)
+        np.testing.assert_allclose(basis.groups[0, k].frequency[:3], [float(v) for v in told[k][2:5]], rtol=1e-4)
+
+
 def test_geometry_page(tmp_path: Path) -> None:
     """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
     basis = made(tmp_path, "pendulum", "modes.count=3")

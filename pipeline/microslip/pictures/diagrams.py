@@ -265,10 +265,11 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     found = [r for r in resonances(basis, orders) if r.frequency <= top]
     waves = {aliased(e, basis.sectors) for e in orders} or {(k, "") for k in curves}
     excited = {wave: t[wave[0]] for wave in sorted(waves) if wave[0] in (t := tracks(basis, wave[1]))}
-    hidden = _waves(axes, joined, curves, excited, rpm, top)
+    hidden, strong = _waves(axes, joined, curves, excited, rpm, top)
     for order in orders:
         axes.plot(rpm, order * rpm / 60, color=FAINT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
-        _order_label(axes, order, rpm[-1], top, f"EO {order}, k={aliased(order, basis.sectors)[0]}")
+        at = _free_place(order, rpm, top, strong, found)
+        _order_label(axes, order, at, top, f"EO {order}, k={aliased(order, basis.sectors)[0]}")
     _rings(axes, found)
     axes.set_xlim(rpm[0], rpm[-1])
     axes.set_ylim(0, top)
@@ -280,7 +281,8 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     if orders:
         note = "strong lines: nodal diameters k that an engine order excites; faint: all others; "
         note += "circles: true resonances (same frequency, same k)"
-    _note(axes, note + (f"; {hidden} families lie above" if hidden else ""), -0.13)
+    above = f"; {hidden} {'family lies' if hidden == 1 else 'families lie'} above" if hidden else ""
+    _note(axes, note + above, -0.13)
     return _save(figure, path)
 
 
@@ -297,9 +299,9 @@ def _campbell_ceiling(curves: dict[int, Tracks], orders: Sequence[int], fastest:
 def _waves(
     axes: Axes, joined: Families, curves: dict[int, Tracks], excited: dict[tuple[int, str], Tracks], rpm: Array,
     top: float,
-) -> int:  # fmt: skip
-    """Draw every curve, faint unless its wave is excited; returns how many families lie above."""
-    speeds, labels, hidden = rpm * np.pi / 30, [], 0
+) -> tuple[int, list[Array]]:  # fmt: skip
+    """Draw every curve, faint unless its wave is excited; how many families lie above, and the strong curves."""
+    speeds, labels, hidden, drawn = rpm * np.pi / 30, [], 0, []
     for c, row in enumerate(joined.modes):
         members = {int(k): int(j) for k, j in zip(joined.harmonics, row, strict=True) if j >= 0}
         lines = {k: f for k, j in members.items() if (f := _line(curves[k], j, speeds)) is not None}
@@ -308,6 +310,7 @@ def _waves(
         hidden += not any(np.nanmin(f) <= top for f in lines.values())
         for f in [f for k, f in lines.items() if k not in {k for k, _ in excited}]:
             axes.plot(rpm, np.where(f <= top, f, np.nan), color=_colour(c), linewidth=0.7, alpha=0.35)
+        drawn += strong
         for f in strong:
             axes.plot(rpm, np.where(f <= top, f, np.nan), color=_colour(c), linewidth=1.4)
         if strong:
@@ -315,7 +318,23 @@ def _waves(
             end = int(np.flatnonzero(np.isfinite(f) & (f <= top))[-1])
             labels.append((float(f[end]), float(rpm[end]), f"family {c + 1}", _colour(c)))
     _end_labels(axes, labels, float(rpm[-1]), top)
-    return hidden
+    return hidden, drawn
+
+
+def _free_place(order: int, rpm: Array, top: float, curves: Sequence[Array], rings: Sequence[Resonance]) -> float:
+    """rpm at which an engine order's name stands, far right but not on a curve or a ring if that can be had."""
+    last = min(float(rpm[-1]), 60 * top / order)
+    best = (-1.0, 0.93 * last)
+    for part in np.arange(0.93, 0.5, -0.02):
+        x = part * last
+        y = order * x / 60
+        here = [abs(float(np.interp(x, rpm, f)) - y) / top for f in curves]
+        marks = [max(abs(r.speed * 30 / np.pi - x) / rpm[-1] - 0.03, 0) + abs(r.frequency - y) / top for r in rings]
+        room = min([f for f in [*here, *marks] if np.isfinite(f)], default=1.0)
+        if room > 0.028:
+            return float(x)
+        best = max(best, (room, float(x)))
+    return best[1]
 
 
 def _line(t: Tracks, mode: int, speeds: Array) -> Array | None:

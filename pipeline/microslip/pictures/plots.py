@@ -190,10 +190,10 @@ def _end_labels(axes: Axes, labels: list[tuple[float, float, str, str]], last: f
 
 
 def _order_label(axes: Axes, order: int, last: float, top: float, text: str = "") -> None:
-    """On the line, near where it leaves the picture."""
+    """On the line, near where it leaves the picture; a text of one's own stands at the speed `last`, rpm."""
     from matplotlib.patheffects import withStroke
 
-    x = min(last, 60 * top / order) * (0.93 if text else 0.96)
+    x = last if text else min(last, 60 * top / order) * 0.96
     behind = [withStroke(linewidth=6, foreground="white")]
     axes.text(
         x, order * x / 60, text or f"EO {order}", ha="center", va="center", fontsize=8, color="#3c424e",

@@ -136,9 +136,13 @@ def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
 
 
 def ring_sheet(
-    ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera
+    ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera, across: int | None = None
 ) -> Picture:  # fmt: skip
-    """A row of pictures per nodal diameter: its first modes as standing shapes."""
+    """The first modes of nodal diameters as standing shapes.
+
+    Args:
+        across: how many pictures a row has; the modes of one nodal diameter if not given.
+    """
     data, triangles = _skin(ring, camera)
     still, tiles = ring.points(), []
     for group in groups:
@@ -148,7 +152,7 @@ def ring_sheet(
             image = ring.stage.shoot(camera)
             title = f"k = {group.harmonic}, mode {j + 1}: {hertz(group.frequency[j])}"
             tiles.append(captioned(image, title, f"{shown.direction} displacement", 17))
-    across = min(modes, min(eigenmodes(g).n_modes for g in groups))
+    across = across or min(modes, min(eigenmodes(g).n_modes for g in groups))
     shape = across * tiles[0].width / (max(len(tiles) // across, 1) * tiles[0].height)
     title = f"{ring.basis.name}: modes of the ring of {ring.basis.sectors} sectors{at_speed(groups[0])}"
     note = "Amplified. k: nodal diameter; of each pair (0 < k < N/2) one member is shown, the other is turned."
