@@ -664,11 +664,11 @@ def cyclic() -> None:
     from microslip import resonances, ring
     from microslip.pictures import diagrams, ring_views
 
-    save(drawn(conventions_sketch()), "cyclic_conventions", smooth=True)
+    save(drawn(conventions_sketch()), "cyclic_conventions")
     speeds = ("rotation.speeds_rpm=[0, 1500, 3000, 4500]", "modes.count=8", 'cyclic.nodal_diameters="all"')
     basis = replace(made("shroud-cyclic", "shroud", *COARSE_SHROUD, *LIGHT, *speeds), name="shroud")
     closed = replace(sticking(basis), name="shroud, contacts stuck")
-    with_studio(basis, lambda studio: save(ring_picture(ring_views, studio), "cyclic_ring", smooth=True))
+    with_studio(basis, lambda studio: save(ring_picture(ring_views, studio), "cyclic_ring"))
     for name, draw, body in (
         ("cyclic_nodal_diameters", diagrams.nodal_diameter_plot, closed),
         ("cyclic_safe", lambda b, path: diagrams.safe_plot(at_one_speed(b, 2), SHROUD_ORDERS, path), closed),
@@ -708,10 +708,10 @@ def at_one_speed(basis: ModalBasis, speed: int) -> ModalBasis:
 
 
 def ring_picture(ring_views: Any, studio: views.Studio) -> Any:
-    """Three nodal diameters of the ring in its first two modes."""
+    """Four nodal diameters of the ring in its first mode."""
     ring = ring_views.open_ring(studio.basis, studio.stage)
     groups = [studio.basis.groups[0, k] for k in (0, 1, 2, 12)]
-    return ring_views.ring_sheet(ring, groups, 2, ring_views.ring_camera(ring, 110_000), across=4)
+    return ring_views.ring_sheet(ring, groups, 1, ring_views.ring_camera(ring, 80_000), across=4)
 
 
 def conventions_sketch() -> Any:
