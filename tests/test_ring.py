@@ -505,6 +505,7 @@ def test_the_report_of_a_cyclic_sector() -> None:
     words = said(report_html(basis, {}))
     assert "one of 6 alike round the axis" in words and "nodal diameters 0 to 3" in words
     assert words.count("modes of the ring up to") >= 2
+    assert "Ring of 6 sectors, 4 nodal diameters with 5 modes each from 2360.3 Hz at each of 2 speeds" in words
     assert "k = 0 k = 1 k = 2 k = 3" in words
     assert f"{basis.groups[0, 2].frequency[1]:#.6g}" in words
     assert "5 1 forward" in words and "6 0 standing" in words  # engine order, nodal diameter, wave

@@ -215,7 +215,12 @@ def _lead(basis: ModalBasis) -> str:
     count = len(speeds_of(basis))
     speeds = f" at each of {count} speeds" if count > 1 else ""
     if basis.sectors > 1:
-        speeds = f" at nodal diameter {group.harmonic}, one of {len(harmonics_of(basis))} held{speeds}"
+        modes = eigenmodes(group)
+        return (
+            f'<p class="lead">Ring of {basis.sectors} sectors, {len(harmonics_of(basis))} nodal diameters with '
+            f"{modes.n_modes} modes each from {modes.frequency[0]:.5g} Hz{speeds}; mass of a sector "
+            f"{_number(basis.mass)} kg. Proved: {text(certificate_words(certify_ring(basis)))}.</p>\n"
+        )
     return (
         f'<p class="lead">{group.n_modes} modes{free}{band}{speeds}; mass {_number(basis.mass)} kg. '
         f"{text(certificate(group))}</p>\n"
