@@ -107,6 +107,19 @@ MEANING: dict[str, tuple[str, str]] = {
     "geometry.build": ("", "a Python file that draws the body with gmsh"),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
+    "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .op4, DMIG cards, .sti"),
+    "geometry.matrices.mass": ("", "M, likewise"),
+    "geometry.matrices.damping": ("", "C, likewise; instead of [damping]"),
+    "geometry.matrices.gyroscopic": ("", "G, likewise, skew-symmetric, at the speed of rotation.speeds_rpm"),
+    "geometry.matrices.dofs": (
+        "", "node and direction (1 to 6) of every row: lines `node.direction` or two columns; not needed where the "
+        "matrices name their rows, or where every node has three or six rows in the order of `nodes`",
+    ),
+    "geometry.matrices.nodes": ("", "number, x, y, z: .csv, .mat, .h5, GRID cards, or a mesh with its sets"),
+    "geometry.matrices.units": ("", "of the matrices; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"),
+    "geometry.matrices.grounded": ("", "the supports are in the matrices already"),
+    "geometry.matrices.superelement": ("", "rows without a node are the generalised coordinates of a superelement"),
+    "geometry.matrices.sets": ("", "table: name of a set = list of node numbers"),
     "geometry.parameters": ("", "table handed to the build file"),
     "geometry.faces.name": ("", "name of the face; several rules of one name add up"),
     "geometry.faces.label": ("", "the surface's label in the CAD file, or a part of it"),
@@ -125,12 +138,17 @@ MEANING: dict[str, tuple[str, str]] = {
     "material.expansion": ("1/K", "thermal expansion, one or along the three material axes"),
     "material.temperature": ("K", "rising temperatures of `modulus_factor`"),
     "material.modulus_factor": ("", "factor on the moduli at those temperatures; linear between, constant outside"),
+    "material.from": ("", "the mesh file's own material, or materials"),
+    "material.units": ("", "of the mesh file; m-kg-s, mm-t-s, in-lbf-s go without saying with m, mm, in"),
     "material.unusual": ("", "silences the warnings about implausible units"),
+    "temperature.from": ("", "both temperatures from the mesh file"),
+    "temperature.scale": ("", "of the mesh file's temperatures: °C or K"),
     "temperature.reference": ("K", "free of thermal stress"),
     "temperature.uniform": ("K", "one temperature everywhere"),
     "temperature.file": ("*, K", "CSV lines x, y, z, T; linear between, nearest outside"),
     "supports.face": ("", "face, or set of points, that is held"),
     "supports.directions": ("", "body directions in which it is held"),
+    "supports.rotations": ("", "hold the rotations of its nodes too (matrices only)"),
     "rotation.axis": ("", "direction of the rotor axis"),
     "rotation.point": ("*", "a point of the axis"),
     "cyclic.sectors": ("", "N, how many of this body make the ring"),
@@ -173,15 +191,18 @@ MEANING: dict[str, tuple[str, str]] = {
     "interfaces.partner": ("", "name of the interface it faces"),
     "interfaces.sector_shift": ("", "where the partner is: next blade 1, previous -1, else 0"),
     "interfaces.t2": ("", "direction whose projection on the patch becomes t2"),
+    "interfaces.normal": ("", "outward normal of a list of nodes that does not tell it itself (matrices only)"),
     "interfaces.coordinates": ("", "rigid: six; characteristic: six and the softest shapes of the patch"),
     "interfaces.count": ("", "how many characteristic shapes"),
     "excitations.name": ("", ""),
     "excitations.point": ("*", "where a unit force acts"),
+    "excitations.node": ("", "or the number of a node in the mesh file"),
     "excitations.face": ("", "or the face over which it is spread"),
     "excitations.direction": ("", "of the force; its length does not matter"),
     "excitations.pressure": ("", "a unit pressure (1 Pa) on the face instead"),
     "monitors.name": ("", ""),
     "monitors.point": ("*", "where displacements are read"),
+    "monitors.node": ("", "or the number of a node in the mesh file"),
     "monitors.directions": ("", "body directions"),
     "gauges.name": ("", ""),
     "gauges.point": ("*", "where the strain is read"),
@@ -217,34 +238,35 @@ def body_reference() -> str:
 
 def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, str, Any]]:
     yield prefix, title, "" if not prefix else " ".join((model.__doc__ or "").split("\n\n")[0].split()), model
-    for key, field in model.model_fields.items():
-        inner, many = _inner(field.annotation)
-        if inner is not None:
+    for key, field in _fields(model).items():
+        for number, (inner, many) in enumerate(_inner(field.annotation)):
             name = f"{prefix}{key}"
-            yield from _sections(inner, f"{name}.", f"[[{name}]]" if many else f"[{name}]")
+            head = f"[[{name}]]" if many else f"[{name}]"
+            yield from _sections(inner, f"{name}.", head + (", or instead" if number else ""))
 
 
-def _inner(annotation: Any, many: bool = False) -> tuple[Any, bool]:
-    """The settings model inside an annotation, and whether a list of them is meant."""
+def _fields(model: Any) -> dict[str, Any]:
+    """Keys as they are written -> fields."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
+def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:
+    """The settings models inside an annotation (several are alternatives), and whether a list of them is meant."""
     if isinstance(annotation, type) and hasattr(annotation, "model_fields"):
-        return annotation, many
-    is_list = getattr(annotation, "__origin__", None) is tuple
-    for argument in getattr(annotation, "__args__", ()):
-        found = _inner(argument, many or is_list)
-        if found[0] is not None:
-            return found
-    return None, many
+        return [(annotation, many)]
+    many = many or getattr(annotation, "__origin__", None) is tuple
+    return [found for argument in getattr(annotation, "__args__", ()) for found in _inner(argument, many)]
 
 
 def _plain_keys(model: Any) -> list[str]:
-    return [k for k, f in model.model_fields.items() if _inner(f.annotation)[0] is None]
+    return [k for k, f in _fields(model).items() if not _inner(f.annotation)]
 
 
 def _section(prefix: str, title: str, text: str, model: Any) -> str:
     schema = model.model_json_schema()["properties"]
     rows = []
     for key in _plain_keys(model):
-        field = model.model_fields[key]
+        field = _fields(model)[key]
         unit, meaning = MEANING[f"{prefix}{key}"]
         if _is_length(field) and not unit.startswith("*"):
             raise SystemExit(f"docs/pages.py: {prefix}{key} is a length; mark its unit with *")

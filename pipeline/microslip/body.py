@@ -12,9 +12,19 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from .data import Array, Material, UserError
+from .elasticity import isotropic, orthotropic, turned_strain
 from .mesh import UNITS
 from .mistakes import validate
 
@@ -68,6 +78,7 @@ FaceName = Annotated[str, Field(min_length=1, max_length=200)]  # as other progr
 
 
 Byte = Annotated[int, Field(ge=0, le=255)]
+NodeNumber = Annotated[int, Field(ge=1)]
 EngineOrder = Annotated[int, Field(ge=1, le=10000)]
 
 
@@ -101,21 +112,43 @@ class FaceRule(Model):
         return self
 
 
+UnitSystem = Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"]
+
+
+class MatrixFiles(Model):
+    """Stiffness and mass that another program has assembled, the node and direction of every row, and positions.
+
+    A file that holds several matrices is written FILE#NAME.
+    """
+
+    stiffness: str
+    mass: str
+    damping: str | None = None
+    gyroscopic: str | None = None
+    dofs: str | None = None
+    nodes: str
+    units: UnitSystem | None = None
+    grounded: bool = False
+    superelement: bool = False
+    sets: dict[FaceName, Annotated[tuple[NodeNumber, ...], BeforeValidator(_tuple)]] = Field(default_factory=dict)
+
+
 class Geometry(Model):
-    """Where the body comes from: exactly one of build (a script), cad (STEP, BREP, IGES) or mesh (a file)."""
+    """Where the body comes from: one of build (a script), cad (STEP, BREP, IGES), mesh (a file) or matrices."""
 
     build: str | None = None
     cad: str | None = None
     mesh: str | None = None
+    matrices: MatrixFiles | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
 
     @model_validator(mode="after")
     def _one_source(self) -> Geometry:
-        sources = [k for k in ("build", "cad", "mesh") if getattr(self, k)]
+        sources = [k for k in ("build", "cad", "mesh", "matrices") if getattr(self, k)]
         if len(sources) != 1:
             given = " and ".join(sources) or "none"
-            raise ValueError(f"needs exactly one of build, cad, mesh, and has {given}; keep one")
+            raise ValueError(f"needs exactly one of build, cad, mesh, matrices, and has {given}; keep one")
         return self
 
 
@@ -175,8 +208,6 @@ class MaterialSettings(Model):
 
     def material(self) -> Material:
         """The `Material` in body axes."""
-        from .fem.operators import isotropic, orthotropic
-
         axes = None if self.axes is None else np.array([np.array(a) / np.linalg.norm(a) for a in self.axes])
         if isinstance(self.young, tuple):
             try:
@@ -187,19 +218,42 @@ class MaterialSettings(Model):
             assert isinstance(self.poisson, float)
             C = isotropic(self.young, self.poisson)
         alpha = np.broadcast_to(np.asarray(self.expansion, dtype=float), 3)
-        R = np.eye(3) if axes is None else axes
-        strain = R.T @ np.diag(alpha) @ R
-        shear = 2 * strain[[0, 1, 0], [1, 2, 2]]
-        voigt = np.concatenate([np.diag(strain), shear])
+        voigt = turned_strain(alpha, axes)
         table = None
         if self.temperature is not None:
             table = np.column_stack([self.temperature, self.modulus_factor or ()])
         return Material(self.density, C, voigt, table, self.name)
 
 
-class Temperature(Model):
-    """Reference (stress free) and actual temperature, K: uniform, or a CSV file of x, y, z, T (length_unit, K)."""
+class ForeignMaterial(Model):
+    """The material stands elsewhere: in the mesh file itself, or in the matrices, which hold it already.
 
+    units: of the mesh file's numbers; those that go with length_unit if not given.
+    """
+
+    source: Annotated[Literal["mesh", "matrices"], Field(alias="from")]
+    units: UnitSystem | None = None
+    unusual: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"from the {self.source}"
+
+
+def _material_kind(value: Any) -> str:
+    return "foreign" if isinstance(value, ForeignMaterial) or (isinstance(value, dict) and "from" in value) else "own"
+
+
+AnyMaterial = Annotated[
+    Annotated[MaterialSettings, Tag("own")] | Annotated[ForeignMaterial, Tag("foreign")], Discriminator(_material_kind)
+]
+
+
+class Temperature(Model):
+    """Stress-free (reference) and actual temperature: uniform, a CSV file of x, y, z, T, or those of the mesh file."""
+
+    source: Annotated[Literal["mesh"] | None, Field(alias="from")] = None
+    scale: Literal["C", "K"] = "C"
     reference: Positive = 293.15
     uniform: Positive | None = None
     file: str | None = None
@@ -208,7 +262,14 @@ class Temperature(Model):
     def _one_source(self) -> Temperature:
         if self.uniform is not None and self.file is not None:
             raise ValueError("give uniform or file, not both")
+        if self.source and (self.uniform is not None or self.file is not None or "reference" in self.model_fields_set):
+            raise ValueError('from = "mesh" takes both temperatures from the mesh file; remove the others')
         return self
+
+    @property
+    def zero(self) -> float:
+        """K of the temperature 0 in the mesh file."""
+        return 273.15 if self.scale == "C" else 0.0
 
 
 class Support(Model):
@@ -216,6 +277,7 @@ class Support(Model):
 
     face: FaceName
     directions: Directions = "xyz"
+    rotations: bool = False
 
 
 class Cyclic(Model):
@@ -348,6 +410,7 @@ class InterfaceSettings(Model):
     partner: str = ""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
     t2: Direction = (0.0, 0.0, 1.0)
+    normal: Direction | None = None
     coordinates: Literal["rigid", "characteristic"] = "rigid"
     count: Annotated[int, Field(ge=0, le=500)] = 0
 
@@ -365,14 +428,15 @@ class Excitation(Model):
 
     name: Name
     point: Point | None = None
+    node: NodeNumber | None = None
     face: FaceName | None = None
     direction: Vector | None = None
     pressure: bool = False
 
     @model_validator(mode="after")
     def _one_kind(self) -> Excitation:
-        if (self.point is None) == (self.face is None):
-            raise ValueError("needs either point or face")
+        if [self.point, self.node, self.face].count(None) != 2:
+            raise ValueError("needs exactly one of point, node and face")
         if self.pressure and (self.face is None or self.direction is not None):
             raise ValueError("pressure = true needs a face and no direction")
         if not self.pressure and (self.direction is None or not any(self.direction)):
@@ -384,8 +448,15 @@ class Monitor(Model):
     """Displacement read-out along body directions at a point."""
 
     name: Name
-    point: Point
+    point: Point | None = None
+    node: NodeNumber | None = None
     directions: Directions = "xyz"
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Monitor:
+        if (self.point is None) == (self.node is None):
+            raise ValueError("needs either point or node (its number in the mesh file)")
+        return self
 
 
 class Gauge(Model):
@@ -475,7 +546,7 @@ class BodySettings(Model):
     free: bool = False
     geometry: Geometry
     mesh: Meshing = Field(default_factory=Meshing)
-    material: MaterialSettings
+    material: AnyMaterial
     temperature: Temperature = Field(default_factory=Temperature)
     supports: Annotated[tuple[Support, ...], BeforeValidator(_tuple)] = ()
     cyclic: Cyclic | None = None
@@ -492,6 +563,15 @@ class BodySettings(Model):
     output: Output = Field(default_factory=Output)
     note: str = ""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _matrices_hold_the_material(cls, raw: Any) -> Any:
+        """Matrices need no material; it may be left out."""
+        if isinstance(raw, dict) and isinstance(given := raw.get("geometry"), dict):
+            if given.get("matrices") is not None and "material" not in raw:
+                return {**raw, "material": {"from": "matrices"}}
+        return raw
+
     @model_validator(mode="after")
     def _names_once(self) -> BodySettings:
         for kind in ("closures", "bolts", "interfaces", "excitations", "monitors", "gauges"):
@@ -499,6 +579,11 @@ class BodySettings(Model):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{kind}: the name '{min(twice)}' is used twice; rename one")
+        if self.geometry.matrices is not None:
+            self._only_what_matrices_can()
+        elif isinstance(self.material, ForeignMaterial):
+            if self.material.source == "matrices" or self.geometry.mesh is None:
+                raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
         if self.closures and self.rotation.prestress != "nonlinear":
             raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
         if self.cyclic and any(c.modes == "closed" and c.sector_shift for c in self.closures):
@@ -509,6 +594,21 @@ class BodySettings(Model):
         if self.cyclic and self.free:
             raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self
+
+
+    def _only_what_matrices_can(self) -> None:
+        """Refuse what needs finite elements of ours."""
+        if not isinstance(self.material, ForeignMaterial) or self.material.source != "matrices":
+            raise ValueError("material: the matrices hold the material already; remove [material]")
+        needs = {
+            "cyclic": self.cyclic, "closures": self.closures, "bolts": self.bolts, "loads": self.loads,
+            "gauges": self.gauges,
+            "rotation.range_rpm": self.rotation.range_rpm, "temperature.file": self.temperature.file,
+            "temperature.uniform": self.temperature.uniform, "geometry.faces": self.geometry.faces,
+            "rotation.speeds_rpm": len(self.rotation.speeds_rpm) > 1,
+        }  # fmt: skip
+        if found := [key for key, value in needs.items() if value]:
+            raise ValueError(f"{found[0]}: matrices are of one state and bring no elements for this; remove it")
 
 
 def load_toml(path: Path | str) -> dict[str, Any]:
@@ -631,7 +731,7 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
     """
     found = []
     m = settings.material
-    if not m.unusual:
+    if isinstance(m, MaterialSettings) and not m.unusual:
         if not 300 <= m.density <= 25000:
             found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
         stiff = max(m.young) if isinstance(m.young, tuple) else m.young

@@ -336,6 +336,7 @@ def _missing(error: ModuleNotFoundError) -> str:
         "fem": ("skfem", "meshio", "gmsh", "qdldl"),
         "viz": ("matplotlib", "pyvista", "vtk", "vtkmodules", "imageio", "PIL"),
         "solve": ("jax",),
+        "exchange": ("pyyeti", "mapdl_archive", "pandas"),
     }
     package = (error.name or "").split(".")[0]
     extra = next((e for e, packages in extras.items() if package in packages), None)

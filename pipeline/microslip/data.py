@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from .errors import NotConverged as NotConverged
 from .errors import UserError as UserError
@@ -64,6 +65,9 @@ class Mesh:
             ordered so that their normal points out of the body.
         point_sets: set name -> point indices.
         node_id: (n,) numbers of the points in the file the mesh came from.
+        materials: those the file brings, empty if it brings none. regions: cell type -> (e,) number of each cell's
+            material, ascending; empty unless there are materials. temperature: (n, 2) of the stress-free and of the
+            actual state as the file has them, in its own unit, or None.
     """
 
     points: Array
@@ -71,6 +75,9 @@ class Mesh:
     faces: Mapping[str, Mapping[str, Indices]] = field(default_factory=dict)
     point_sets: Mapping[str, Indices] = field(default_factory=dict)
     node_id: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    materials: tuple[Material, ...] = ()
+    regions: Mapping[str, Indices] = field(default_factory=dict)
+    temperature: Array | None = None
 
     @property
     def n_points(self) -> int:
@@ -85,6 +92,34 @@ class Mesh:
         if name in self.faces:
             return np.unique(np.concatenate([f.ravel() for f in self.faces[name].values()]))
         return np.unique(self.point_sets[name])
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """A body that another program has assembled: M x'' + (C + G) x' + K x = f, in SI.
+
+    Attributes:
+        stiffness, mass: (m, m) symmetric. damping: (m, m), gyroscopic: (m, m) skew, or None.
+        mesh: the nodes, and cells and sets if they are known. node: (m,) point of each row, -1 for a generalised
+            coordinate of a superelement. component: (m,) 0 to 2: displacement along x, y, z; 3 to 5: rotation about
+            them; -1 for a generalised coordinate.
+        grounded: whether the supports are in the matrices already. remarks: what the reader had to assume.
+    """
+
+    stiffness: csr_matrix
+    mass: csr_matrix
+    damping: csr_matrix | None
+    gyroscopic: csr_matrix | None
+    mesh: Mesh
+    node: Indices
+    component: Indices
+    grounded: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.node)
 
 
 INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")

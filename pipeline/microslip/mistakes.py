@@ -213,7 +213,7 @@ def _known_keys(model: Any, place: tuple[Any, ...]) -> list[str]:
     for step in place:
         if isinstance(step, str) and step in getattr(model, "model_fields", {}):
             model = _model_in(model.model_fields[step].annotation) or model
-    return list(getattr(model, "model_fields", {}))
+    return [field.alias or name for name, field in getattr(model, "model_fields", {}).items()]
 
 
 def _model_in(annotation: Any) -> Any:

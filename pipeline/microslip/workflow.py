@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +21,18 @@ import numpy as np
 
 from . import __version__, store
 from .basis import read_basis, write_basis
-from .body import BodySettings, implausible, load_body, load_toml
+from .body import BodySettings, MaterialSettings, MatrixFiles, implausible, load_body, load_toml
 from .case import CaseResult, load_case, run_case
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, GyroscopicModes, Mesh, ModalBasis, SpeedRange, UserError
+from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
 from .report import contact_sentence
 from .resonances import eigenmodes, harmonics_of, resonance_csv, resonances, speeds_of
 from .ring import certificate_words, certify_ring
+from .units import SYSTEMS, usual_system
 
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
@@ -41,8 +42,9 @@ _READS_BY_GMSH = {".unv"}
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
     "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
-    "coordinates.py", "fem", "reduction", "modes",
+    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "units.py",
 )  # fmt: skip
+_FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
 _CASE_CODE = (
     "speed_range.py", "harmonic_balance.py", "compliance.py", "truncation.py", "case.py", "pictures/response.py",
 )  # fmt: skip
@@ -126,6 +128,8 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         UserError: what the mesher says, or a missing source.
     """
     geometry = job.settings.geometry
+    if geometry.matrices is not None:
+        raise UserError(f"{job.path}: geometry.matrices: there is nothing to mesh; type: microslip modes {job.folder}")
     if geometry.mesh is not None and job.mesh_file == job.folder / geometry.mesh:
         if not job.mesh_file.is_file():
             raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
@@ -209,21 +213,68 @@ def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: Non
         UserError: everything that would spoil a solution.
     """
     path = path or job.mesh_file
-    mesh = read_mesh(path, job.settings.length_unit)
+    mesh, told = _read_with_materials(job, path)
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
     errors, warnings = mesh_problems(mesh)
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
     size = float(np.ptp(mesh.points, axis=0).max())
-    warnings = [f"{path}: {w}" for w in warnings] + [f"{job.path}: {w}" for w in implausible(job.settings, size)]
+    warnings = [f"{path}: {w}" for w in (*warnings, *told)]
+    warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
     return mesh, warnings
+
+
+def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
+    """The mesh, with the file's own materials if they are asked for, and what to say of them."""
+    unit, material, zero = job.settings.length_unit, job.settings.material, job.settings.temperature.zero
+    if job.settings.geometry.mesh is None:
+        return read_mesh(path, unit), []
+    usual = usual_system(unit)
+    if isinstance(material, MaterialSettings):
+        try:
+            mesh = read_mesh(path, unit, usual, zero)
+        except UserError:  # perhaps only its materials cannot be read, which nobody asked for
+            return read_mesh(path, unit), []
+        told = differing_materials(material.material(), mesh.materials)
+        return replace(mesh, materials=(), regions={}), told
+    system = material.units or usual
+    if system is None:
+        raise UserError(
+            f'{job.path}: material.units: with length_unit = "{unit}" it must be said; choose '
+            + ", ".join(SYSTEMS)
+        )
+    mesh = read_mesh(path, unit, system, zero)
+    if not mesh.materials:
+        raise UserError(f"{path}: brings no material; write density, young and poisson in [material]")
+    return mesh, [] if material.unusual else [text for m in mesh.materials if (text := strange_material(m, system))]
+
+
+def differing_materials(own: Material, others: tuple[Material, ...]) -> list[str]:
+    """A warning where the mesh file says another material than the settings, which rule."""
+    for m in others:
+        rho, C = abs(m.density / own.density - 1), np.abs(m.elasticity - own.elasticity).max() / own.elasticity.max()
+        if max(rho, C) > 1e-3:
+            return [
+                f"its material '{m.name}' ({m.density:.5g} kg/m3, C_xxxx {m.elasticity[0, 0]:.4g} Pa) is not that of "
+                f"[material] ({own.density:.5g} kg/m3, {own.elasticity[0, 0]:.4g} Pa), which is used for every cell; "
+                'write [material] from = "mesh" to use the file\'s'
+            ]
+    return []
+
+
+def strange_material(m: Material, system: str) -> str:
+    """A warning about numbers that suggest other units."""
+    if 300 <= m.density <= 25000 and 1e8 <= m.elasticity[0, 0] <= 2e12:
+        return ""
+    return (
+        f"its material '{m.name}' has {m.density:.4g} kg/m3 and C_xxxx = {m.elasticity[0, 0]:.4g} Pa in the units "
+        f"{system}, which is no structural solid's; correct material.units (material.unusual = true silences this)"
+    )
 
 
 def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
     """Faces of a user's own mesh given by a box (named sets of the file are there already)."""
-    from dataclasses import replace
-
     from .mesh import boundary_facets, faces_from_points
 
     faces = dict(mesh.faces)
@@ -251,27 +302,64 @@ def modes_stage(
     Raises:
         UserError, NotConverged: see `modes.modal_basis`.
     """
-    mesh_file = mesh_stage(job, report=report)
+    matrices = job.settings.geometry.matrices
+    mesh_file = mesh_stage(job, report=report) if matrices is None else job.path
     product = output or job.basis_file
-    inputs = modes_inputs(job, mesh_file)
+    inputs = modes_inputs(job, mesh_file) if matrices is None else matrices_inputs(job, matrices)
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
         _touch(product)
         return product, []
+    if matrices is None:
+        basis, warnings = _assembled_here(job, mesh_file, report)
+    else:
+        basis, warnings = _from_matrices(job, matrices, report)
+    report(f"writing {product}")
+    write_basis(product, basis)
+    store.note_product(product, inputs, warnings=warnings)
+    return product, warnings
+
+
+def _assembled_here(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, list[str]]:
+    """The modal basis of a body that has a mesh, and warnings."""
     from .modes import modal_basis
 
     mesh, warnings = load_mesh(job, mesh_file)
     for warning in warnings:
         report(f"warning: {warning}")
-    temperature = nodal_temperature(job, mesh)
     try:
-        basis = modal_basis(mesh, job.settings, temperature, report, provenance(job, mesh_file))
+        settings, temperature = with_temperature(job, mesh)
+        return modal_basis(mesh, settings, temperature, report, provenance(job, mesh_file)), warnings
     except UserError as error:
         raise UserError(f"{job.path}: {error}") from error
-    report(f"writing {product}")
-    write_basis(product, basis)
-    store.note_product(product, inputs, warnings=warnings)
-    return product, warnings
+
+
+def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:
+    """The modal basis of a body that another program has assembled, and warnings."""
+    from .exchange.matrices import read_matrices
+    from .modes import foreign_basis
+
+    try:
+        body = read_matrices(given, job.folder, job.settings.length_unit)
+        basis, remarks = foreign_basis(body, job.settings, report, provenance(job, job.path))
+    except UserError as error:
+        text = str(error)
+        raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
+    warnings = [f"{job.path}: {remark}" for remark in remarks]
+    for warning in warnings:
+        report(f"warning: {warning}")
+    return basis, warnings
+
+
+def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
+    """What a modal file made of foreign matrices depends on: all settings but the prose, the files, the code."""
+    from .exchange.matrices import files_of
+
+    settings = {k: v for k, v in job.raw.items() if k not in ("description", "note")}
+    files = [job.folder / name for name in files_of(given)]
+    if missing := [f for f in files if not f.is_file()]:
+        raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
+    return {"settings": settings, "files": [store.hash_file(f) for f in files], "code": _code_hash(_FOREIGN_CODE)}
 
 
 def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
@@ -309,6 +397,30 @@ def _temperature_file(job: Job) -> Path:
     if not path.is_file():
         raise UserError(f"{job.path}: temperature.file: there is no file {path}; correct the path")
     return path
+
+
+def with_temperature(job: Job, mesh: Mesh) -> tuple[BodySettings, Array | None]:
+    """The settings with the stress-free temperature, and the nodal one, of the settings or of the mesh file.
+
+    Raises:
+        UserError: the mesh file brings none, or a stress-free one that is not the same everywhere.
+    """
+    setting = job.settings.temperature
+    if setting.source is None:
+        return job.settings, nodal_temperature(job, mesh)
+    if mesh.temperature is None:
+        raise UserError('temperature.from: the mesh file brings no temperatures; use uniform or file')
+    free, actual = mesh.temperature.T
+    if np.isnan(free).any() or np.ptp(free) > 1e-9 * max(np.abs(free).max(), 1.0):
+        raise UserError(
+            "temperature.from: the stress-free temperature (*INITIAL CONDITIONS, TYPE=TEMPERATURE) must be "
+            "given for every node and be the same everywhere"
+        )
+    hot = np.where(np.isnan(actual), free, actual) + setting.zero
+    if hot.min() <= 0 or free[0] + setting.zero <= 0:
+        raise UserError("temperature.scale: the mesh file's temperatures fall below absolute zero; choose C or K")
+    reference = setting.model_copy(update={"reference": float(free[0] + setting.zero)})
+    return job.settings.model_copy(update={"temperature": reference}), hot
 
 
 def nodal_temperature(job: Job, mesh: Mesh) -> Array | None:

@@ -23,7 +23,7 @@ from ..data import (
     SpeedRange,
 )
 from ..gyroscopic import stability_sentence
-from .integrals import face_mean, modal_mass
+from .integrals import cell_volumes, face_mean, modal_mass
 
 TOLERANCES = {
     "orthogonality": 1e-9,
@@ -84,7 +84,9 @@ def _mesh_checks(basis: ModalBasis) -> _Findings:
     highest = max((int(c.max()) for c in tables if c.size), default=-1)
     lowest = min((int(c.min()) for c in tables if c.size), default=0)
     found.append(("mesh: cells refer to points", float(highest if lowest >= 0 else np.inf), mesh.n_points - 1, ""))
-    numbers = (mesh.points, basis.mass, basis.centre, basis.inertia, basis.rotation_axis, basis.rotation_point)
+    numbers: tuple[Any, ...] = (mesh.points, basis.mass, basis.centre, basis.inertia)
+    numbers += (basis.rotation_axis, basis.rotation_point)
+    numbers += tuple(a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion))
     found.append(("body: every number is finite", _not_finite(numbers), 0.0, ""))
     found.append(("body: mass is positive", max(-basis.mass, 0.0) if basis.mass else 1.0, 0.0, f"{basis.mass:.6g} kg"))
     found.append(("rotation axis has unit length", abs(float(np.linalg.norm(basis.rotation_axis)) - 1), 1e-9, ""))
@@ -293,12 +295,15 @@ def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:
 
 
 def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
-    """The shapes against the mesh they are stored with; the density is the mass over the mesh's volume."""
-    inner, volume = modal_mass(basis.mesh, g.phi)
-    if not volume > 0:
+    """The shapes against the mesh they are stored with; one density is the mass over the mesh's volume."""
+    inner, weight = modal_mass(basis.mesh, g.phi)
+    if not weight > 0:
         return [("volume of the mesh is positive", np.inf, 0.0, "")]
-    error = _largest(inner * basis.mass / volume - np.eye(g.n_modes))
+    error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
     found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, "")]
+    if basis.mesh.materials:
+        found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
+    volume = cell_volumes(basis.mesh) if g.stresses else 0.0
     for name, s in g.stresses.items():
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found

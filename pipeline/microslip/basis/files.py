@@ -27,6 +27,7 @@ from ..data import (
     Indices,
     Interface,
     Invariants,
+    Material,
     Mesh,
     ModalBasis,
     ModalGroup,
@@ -140,6 +141,8 @@ def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
     cells.attrs["order"] = "VTK node order, 0-based positions in /mesh/node"
     for cell_type, connectivity in sorted(mesh.cells.items()):
         put(cells, cell_type, connectivity, dims=("cell", "corner"))
+    if mesh.materials:
+        _write_materials(group, mesh)
     groups = group.create_group("groups")
     groups.attrs["order"] = "nodes: ids as in /mesh/node; facets: VTK node order, 0-based positions in /mesh/node"
     for name in sorted({*mesh.faces, *mesh.point_sets}):
@@ -149,6 +152,34 @@ def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
         put(where, "nodes", ids[chosen], dims=("member",))
         for facet_type, facets in sorted(mesh.faces.get(name, {}).items()):
             put(where, facet_type, facets, dims=("facet", "corner"))
+
+
+def _write_materials(group: h5py.Group, mesh: Mesh) -> None:
+    """Those the mesh file brought; a body of one material of its settings has none here."""
+    where = group.create_group("materials")
+    m = mesh.materials
+    put(where, "name", np.array([x.name.replace("\0", "") or "-" for x in m], dtype="U"), dims=("material",))
+    put(where, "density", np.array([x.density for x in m]), "kg/m^3", dims=("material",))
+    put(where, "elasticity", np.array([x.elasticity for x in m]), "Pa", ("material", "component", "component_"))
+    put(where, "expansion", np.array([x.expansion for x in m]), "1/K", ("material", "component"))
+    regions = where.create_group("cells")
+    regions.attrs["order"] = "material of each cell, 0-based, cells as in /mesh/cells"
+    for cell_type, numbers in sorted(mesh.regions.items()):
+        put(regions, cell_type, numbers.astype(np.int64), dims=("cell",))
+
+
+def _read_materials(group: h5py.Group, cells: dict[str, Indices]) -> dict[str, Any]:
+    if "materials" not in group:
+        return {}
+    where = group["materials"]
+    names = _texts(where, "name")
+    k = len(names)
+    numbers = (_array(where, "density", k), _array(where, "elasticity", k, 6, 6), _array(where, "expansion", k, 6))
+    regions = {t: _indices(where["cells"], t, None, k) for t in where["cells"]}
+    if {t: len(r) for t, r in regions.items()} != {t: len(c) for t, c in cells.items()}:
+        raise ValueError("/mesh/materials/cells does not give every cell a material")
+    materials = tuple(Material(float(d), C, a, None, n) for d, C, a, n in zip(*numbers, names, strict=True))
+    return {"materials": materials, "regions": regions}
 
 
 def _escaped(name: str) -> str:
@@ -577,7 +608,7 @@ def _read_mesh(group: h5py.Group) -> Mesh:
             point_sets[name] = position[at]
         if blocks := {t: _indices(where, t, _FACET_NODES[t], n) for t in where if t in FACET_CORNERS}:
             faces[name] = blocks
-    return Mesh(points, cells, faces, point_sets, node_id)
+    return Mesh(points, cells, faces, point_sets, node_id, **_read_materials(group, cells))
 
 
 def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mesh) -> ModalGroup:

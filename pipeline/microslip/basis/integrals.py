@@ -93,23 +93,43 @@ def tables(cell_type: str) -> tuple[Array, Array, Array]:
 
 
 def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
-    """(m, m) integral of conj(phi_i) . phi_j over the volume (m3 times the unit of phi squared), and the volume, m3.
+    """(m, m) integral of rho conj(phi_i) . phi_j over the volume, and that of rho, kg; rho = 1 without materials.
 
     Args:
         phi: (n, 3, m) shapes.
     """
     m = phi.shape[2]
-    total, volume = np.zeros((m, m), dtype=phi.dtype), 0.0
+    total, mass = np.zeros((m, m), dtype=phi.dtype), 0.0
     columns = np.ascontiguousarray(phi).reshape(len(phi), -1).view(np.float64)  # complex ones as pairs
     for cell_type, cells in mesh.cells.items():
         N, dN, weights = tables(cell_type)
         size = max(1, int(2e6 / ((columns.shape[1] + 1) * len(weights))))  # cells at a time: what stays in the cache
-        for chunk in np.array_split(cells, max(1, math.ceil(len(cells) / size))):
-            dv = weights * np.linalg.det(np.einsum("qdk,eki->eqdi", dN, mesh.points[chunk], optimize=True))
-            u = np.matmul(N, columns[chunk]).view(phi.dtype).reshape(3 * dv.size, m)
-            total += u.conj().T @ (np.repeat(dv.ravel(), 3)[:, None] * u)
-            volume += float(dv.sum())
-    return total, volume
+        split = max(1, math.ceil(len(cells) / size))
+        parts = (np.array_split(whole, split) for whole in (cells, _density(mesh, cell_type)))
+        for chunk, rho in zip(*parts, strict=True):
+            jacobian = np.einsum("qdk,eki->eqdi", dN, mesh.points[chunk], optimize=True)
+            dm = rho[:, None] * weights * np.linalg.det(jacobian)
+            u = np.matmul(N, columns[chunk]).view(phi.dtype).reshape(3 * dm.size, m)
+            total += u.conj().T @ (np.repeat(dm.ravel(), 3)[:, None] * u)
+            mass += float(dm.sum())
+    return total, mass
+
+
+def cell_volumes(mesh: Mesh) -> float:
+    """Volume of the mesh, m3."""
+    total = 0.0
+    for cell_type, cells in mesh.cells.items():
+        _, dN, weights = tables(cell_type)
+        for q, w in enumerate(weights):
+            total += float(w * np.linalg.det(np.einsum("dk,eki->edi", dN[q], mesh.points[cells])).sum())
+    return total
+
+
+def _density(mesh: Mesh, cell_type: str) -> Array:
+    """(e,) kg/m3, or 1 where the mesh brings no material."""
+    if not mesh.materials:
+        return np.ones(len(mesh.cells[cell_type]))
+    return np.array([m.density for m in mesh.materials])[mesh.regions[cell_type]]
 
 
 def face_mean(points: Array, blocks: Mapping[str, Indices], values: Array) -> tuple[float, Array, Array]:

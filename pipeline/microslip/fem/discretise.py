@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -84,12 +84,13 @@ def quadrature(cell_type: str, degree: int | None = None) -> tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Block:
-    """All cells of one type.
+    """All cells of one type (and of one material, where the mesh brings several).
 
     Attributes:
         cell_type: meshio's name. cells: (e, k) point indices.
         at: (q, 3) reference coordinates of the quadrature points. N: (q, k) shape functions there.
         grad: (e, q, 3, k) gradients in space, 1/m. dx: (e, q) volume of each quadrature point, m3.
+        region: number of the material.
     """
 
     cell_type: str
@@ -98,6 +99,7 @@ class Block:
     N: Array
     grad: Array
     dx: Array
+    region: int = 0
 
     @property
     def points_shape(self) -> tuple[int, int]:
@@ -219,13 +221,25 @@ def discretise(
     Raises:
         UserError: cells that are inside out at a quadrature point.
     """
-    blocks = tuple(_block(mesh, t, (degree or {}).get(t)) for t in mesh.cells)
+    blocks = tuple(
+        _block(mesh, t, (degree or {}).get(t), region, cells)
+        for t, whole in mesh.cells.items()
+        for region, cells in _by_region(whole, mesh.regions.get(t))
+    )
     pattern, positions = _pattern(mesh.n_points, [b.cells for b in blocks], coupled)
     return Discretisation(mesh, blocks, pattern, positions)
 
 
-def _block(mesh: Mesh, cell_type: str, degree: int | None) -> Block:
-    cells = mesh.cells[cell_type]
+def _by_region(cells: Indices, region: Indices | None) -> Iterator[tuple[int, Indices]]:
+    """Runs of cells of one material; the numbers ascend."""
+    if region is None or not len(region):
+        yield 0, cells
+        return
+    for number in np.unique(region):
+        yield int(number), cells[region == number]
+
+
+def _block(mesh: Mesh, cell_type: str, degree: int | None, region: int, cells: Indices) -> Block:
     at, weights = quadrature(cell_type, degree)
     N, dN = shape_functions(cell_type, at)
     jacobian = np.einsum("eki,qjk->eqij", mesh.points[cells], dN, optimize=True)
@@ -237,7 +251,7 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None) -> Block:
             "or remesh"
         )
     grad = np.matmul(_inverse3(jacobian, det).transpose(0, 1, 3, 2), dN[None])
-    return Block(cell_type, cells, at, N, grad, det * weights)
+    return Block(cell_type, cells, at, N, grad, det * weights, region)
 
 
 def _det3(J: Array) -> Array:

@@ -6,66 +6,25 @@ A = C for the stress-free body, A = F C F^T + S (times identity) for the tangent
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices
+from ..elasticity import PAIR, to_tensor
+from ..elasticity import from_tensor as from_tensor
+from ..elasticity import isotropic as isotropic
+from ..elasticity import orthotropic as orthotropic
 from .discretise import Block, Discretisation
 
 _BATCH = 300_000  # node pairs assembled at a time: temporaries stay below the 32 MB that malloc hands back at once
-_PAIR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # tensor index pair -> Voigt index (xx yy zz xy yz xz)
-
-
-def isotropic(young: float, poisson: float) -> Array:
-    """(6, 6) Hooke matrix, Pa, of Sextro Eq. (2.2-18)."""
-    lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    mu = young / (2 * (1 + poisson))
-    C = np.diag([2 * mu] * 3 + [mu] * 3)
-    C[:3, :3] += lam
-    return C
-
-
-def orthotropic(young: Array, poisson: Array, shear: Array, axes: Array | None = None) -> Array:
-    """(6, 6) Hooke matrix of an orthotropic material in body axes.
-
-    Args:
-        young: (3,) E1, E2, E3, Pa. poisson: (3,) nu12, nu23, nu13 (strain in the second under stress along the
-            first). shear: (3,) G12, G23, G13, Pa. axes: (3, 3) rows = material axes in body axes.
-
-    Raises:
-        ValueError: constants that are not thermodynamically admissible (the matrix is not positive definite).
-    """
-    e1, e2, e3 = young
-    n12, n23, n13 = poisson
-    S = np.zeros((6, 6))
-    S[:3, :3] = [[1 / e1, -n12 / e1, -n13 / e1], [-n12 / e1, 1 / e2, -n23 / e2], [-n13 / e1, -n23 / e2, 1 / e3]]
-    S[3:, 3:] = np.diag(1 / np.asarray(shear, dtype=float))
-    if np.linalg.eigvalsh(S).min() <= 0:
-        raise ValueError("orthotropic constants are not positive definite")
-    C = np.linalg.inv(S)
-    if axes is None:
-        return C
-    R = np.asarray(axes, dtype=float)
-    return from_tensor(np.einsum("pi,qj,rk,sl,pqrs->ijkl", R, R, R, R, to_tensor(C), optimize=True))
-
-
-def to_tensor(C: Array) -> Array:
-    """(6, 6) Hooke matrix -> (3, 3, 3, 3) elasticity tensor."""
-    return C[_PAIR[:, :, None, None], _PAIR[None, None]]
-
-
-def from_tensor(C: Array) -> Array:
-    """(3, 3, 3, 3) elasticity tensor -> (6, 6) Hooke matrix."""
-    i = np.array([0, 1, 2, 0, 1, 0])
-    j = np.array([0, 1, 2, 1, 2, 2])
-    return C[i[:, None], j[:, None], i[None], j[None]]
 
 
 def to_symmetric(voigt: Array) -> Array:
     """(..., 6) stress -> (..., 3, 3) tensor."""
-    return voigt[..., _PAIR]
+    return voigt[..., PAIR]
 
 
 def _batches(block: Block) -> Iterator[slice]:
@@ -84,26 +43,50 @@ def _scatter(into: Array, positions: Indices, values: Array) -> None:
     into += select @ values.reshape(count, -1)
 
 
-def mass(d: Discretisation, density: float) -> Array:
+def per_block(d: Discretisation, value: Any) -> list[Any]:
+    """One value for each block: the given list, or the same for all."""
+    return list(value) if isinstance(value, list | tuple) else [value] * len(d.blocks)
+
+
+def mass(d: Discretisation, density: float | Sequence[float]) -> Array:
     """(p,) consistent mass over the pattern, kg; the full matrix is this times the 3 x 3 identity.
 
     M of Sextro Eq. (2.3-29), with the quadrature of the discretisation.
+
+    Args:
+        density: kg/m3, one or one per block.
     """
     out = np.zeros((d.pattern.size + 1, 1))
-    for block, positions in zip(d.blocks, d.positions, strict=True):
+    for block, positions, rho in zip(d.blocks, d.positions, per_block(d, density), strict=True):
         products = np.einsum("qa,qb->qab", block.N, block.N).reshape(len(block.N), -1)
-        _scatter(out, positions, density * (block.dx @ products))
+        _scatter(out, positions, rho * (block.dx @ products))
     return out[:-1, 0]
 
 
-def stiffness(d: Discretisation, elasticity: Array, factor: list[Array] | None = None) -> Array:
+def stiffness(
+    d: Discretisation, elasticity: Array | Sequence[Array], factor: list[Array] | None = None
+) -> Array:
     """(p, 3, 3) stiffness of the stress-free body, N/m: K_N of Sextro Eq. (2.3-17).
 
     Args:
-        elasticity: (6, 6) Hooke matrix, Pa. factor: per block (e, q) factor on it (temperature), or None.
+        elasticity: (6, 6) Hooke matrix, Pa, one or one per block. factor: per block (e, q) factor on it
+            (temperature), or None.
     """
+    own = per_block(d, elasticity)
+    alike: dict[bytes, list[int]] = {}
+    for i, C in enumerate(own):
+        alike.setdefault(np.asarray(C).tobytes(), []).append(i)
+    K, *more = (_stiffness_of(d, chosen, own[chosen[0]], factor) for chosen in alike.values())
+    for part in more:
+        K += part
+    return K
+
+
+def _stiffness_of(d: Discretisation, chosen: list[int], elasticity: Array, factor: list[Array] | None) -> Array:
+    """(p, 3, 3) stiffness of some blocks of one material."""
     out = np.zeros((d.pattern.size + 1, 9))
-    for i, (block, positions) in enumerate(zip(d.blocks, d.positions, strict=True)):
+    for i in chosen:
+        block, positions = d.blocks[i], d.positions[i]
         weight = block.dx if factor is None else block.dx * factor[i]
         k = block.cells.shape[1]
         for s in _batches(block):

@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Indices
-from .raw import Damaged, Numbering, RawMesh
+from ..elasticity import turned, turned_strain
+from .materials import isotropic_rows, orthotropic_row
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh
 
 _SOLIDS = {
     4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge", 15: "wedge15",
@@ -30,6 +32,9 @@ _REFUSED = {
     "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY", "SYSTEM": "uses a local *SYSTEM",
 }  # fmt: skip
 _KEYWORDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "INSTANCE", "ASSEMBLY", "END ASSEMBLY"} | set(_REFUSED)
+_KEYWORDS |= {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "SOLID SECTION", "ORIENTATION"}
+_KEYWORDS |= {"INITIAL CONDITIONS", "TEMPERATURE"}
+_ANYWHERE = {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "INITIAL CONDITIONS", "TEMPERATURE"}
 
 
 @dataclass
@@ -54,6 +59,24 @@ class _Deck:
     cell_sets: dict[str, list[Indices]] = field(default_factory=dict)
     surfaces: list[tuple[str, str, list[list[str]]]] = field(default_factory=list)
     instances: int = 0
+    materials: dict[str, _Material] = field(default_factory=dict)
+    current: str = ""
+    orientations: dict[str, Array | str] = field(default_factory=dict)
+    sections: list[tuple[str, str, str]] = field(default_factory=list)
+    temperatures: list[tuple[int, str, float]] = field(default_factory=list)
+
+
+@dataclass
+class _Material:
+    """Constants as written: name; (t, 3) E, nu, T or 9 engineering constants, or text why they are not read."""
+
+    name: str
+    isotropic: Array | None = None
+    orthotropic: Array | None = None
+    stiffness: Array | None = None
+    refused: str = ""
+    density: float | None = None
+    expansion: Array = field(default_factory=lambda: np.zeros(3))
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -73,7 +96,9 @@ def read_inp(path: Path) -> RawMesh:
             deck.instances += 1
             if deck.instances > 1 or any(_fields(line) for line in lines):
                 raise Damaged("the file holds several or moved *INSTANCEs; write it without parts and assemblies")
-        elif keyword in _READERS and (not assembly or "INSTANCE" in parameters or keyword == "SURFACE"):
+        elif keyword in _READERS and (
+            not assembly or "INSTANCE" in parameters or keyword == "SURFACE" or keyword in _ANYWHERE
+        ):
             if "INPUT" in parameters:
                 lines = [*lines, *(line for line in _lines(path.parent / parameters["INPUT"], 1))]
             _READERS[keyword](deck, parameters, lines)
@@ -229,7 +254,124 @@ def _read_surface(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
         deck.surfaces.append((name, kind, [words for line in lines if (words := _fields(line))]))
 
 
+def _table(lines: list[str], what: str) -> list[list[float]]:
+    """Numbers of the data lines; an empty place counts as 0."""
+    try:
+        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in _words(s)] for s in lines]
+    except ValueError as error:
+        raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None
+
+
+def _words(line: str) -> list[str]:
+    return line.rstrip().rstrip(",").split(",")
+
+
+def _read_material(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    name = parameters.get("NAME", "")
+    if not name:
+        raise Damaged("a *MATERIAL has no name")
+    deck.current = name.upper()
+    deck.materials[deck.current] = _Material(name)
+
+
+def _of(deck: _Deck, keyword: str) -> _Material:
+    if not deck.current:
+        raise Damaged(f"*{keyword} stands before any *MATERIAL")
+    return deck.materials[deck.current]
+
+
+def _read_elastic(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material, kind = _of(deck, "ELASTIC"), " ".join(parameters.get("TYPE", "ISO").upper().split())
+    rows, what = _table(lines, f"*ELASTIC of {material.name}"), f"*ELASTIC, TYPE={kind} of the material {material.name}"
+    if kind.startswith("ISO"):
+        if any(len(row) not in (2, 3) for row in rows) or not rows:
+            raise Damaged(f"{what} needs E, nu and perhaps a temperature a line")
+        material.isotropic = np.array([[*row, 0.0][:3] for row in rows])
+        return
+    values = np.array([v for row in rows for v in row])
+    if kind not in ("ENGINEERING CONSTANTS", "ORTHO", "ORTHOTROPIC"):
+        material.refused = f"*ELASTIC, TYPE={kind}"
+    elif len(values) not in (9, 10):
+        material.refused = f"{what} with {len(values)} numbers (nine, at one temperature, are read)"
+    elif kind == "ENGINEERING CONSTANTS":
+        material.orthotropic = values[:9]
+    else:
+        material.stiffness = values[:9]
+
+
+def _read_density(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material = _of(deck, "DENSITY")
+    rows = _table(lines, f"*DENSITY of {material.name}")
+    if not rows or not rows[0]:
+        raise Damaged(f"*DENSITY of the material {material.name} holds no number")
+    if len({row[0] for row in rows}) > 1:
+        material.refused = "a density that depends on temperature"
+    material.density = rows[0][0]
+
+
+def _read_expansion(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    material, kind = _of(deck, "EXPANSION"), parameters.get("TYPE", "ISO").upper()
+    rows = _table(lines, f"*EXPANSION of {material.name}")
+    count = 3 if kind.startswith("ORTHO") else 1
+    if not rows or any(len(row) not in (count, count + 1) for row in rows) or kind.startswith("ANISO"):
+        raise Damaged(f"*EXPANSION, TYPE={kind} of the material {material.name} is not read; use ISO or ORTHO")
+    values = np.array([row[:count] for row in rows])
+    if np.ptp(values, axis=0).any():
+        material.refused = "an expansion that depends on temperature"
+    material.expansion = np.broadcast_to(values[0], 3).copy()
+
+
+def _read_section(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    keys = ("ELSET", "MATERIAL", "ORIENTATION")
+    deck.sections.append((parameters.get(keys[0], ""), parameters.get(keys[1], ""), parameters.get(keys[2], "")))
+
+
+def _read_orientation(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    name, system = parameters.get("NAME", ""), parameters.get("SYSTEM", "RECTANGULAR").upper()
+    key = name.upper()
+    if not system.startswith("R") or parameters.get("DEFINITION", "COORDINATES").upper() != "COORDINATES":
+        deck.orientations[key] = f"*ORIENTATION, NAME={name} of the system {system}"
+        return
+    rows = _table(lines, f"*ORIENTATION, NAME={name}")
+    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
+        deck.orientations[key] = f"*ORIENTATION, NAME={name} with an additional rotation"
+        return
+    if not rows or len(rows[0]) not in (6, 9):
+        raise Damaged(f"*ORIENTATION, NAME={name} needs the six coordinates of two points")
+    origin = np.array(rows[0][6:9]) if len(rows[0]) == 9 else np.zeros(3)
+    a, b = np.array(rows[0][:3]) - origin, np.array(rows[0][3:6]) - origin
+    normal = np.cross(a, b)
+    if not np.linalg.norm(normal) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
+        raise Damaged(f"the points of *ORIENTATION, NAME={name} lie on a line")
+    x, z = a / np.linalg.norm(a), normal / np.linalg.norm(normal)
+    deck.orientations[key] = np.array([x, np.cross(z, x), z])
+
+
+def _read_temperature(deck: _Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
+    if "FILE" in parameters or "BSTEP" in parameters:
+        raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
+    for line in lines:
+        words = _fields(line)
+        try:
+            deck.temperatures.append((column, words[0], float(words[1])))
+        except (IndexError, ValueError):
+            raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
+
+
+def _read_initial(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    if parameters.get("TYPE", "").upper() == "TEMPERATURE":
+        _read_temperature(deck, parameters, lines, column=0)
+
+
 _READERS = {
+    "MATERIAL": _read_material,
+    "ELASTIC": _read_elastic,
+    "DENSITY": _read_density,
+    "EXPANSION": _read_expansion,
+    "SOLID SECTION": _read_section,
+    "ORIENTATION": _read_orientation,
+    "INITIAL CONDITIONS": _read_initial,
+    "TEMPERATURE": _read_temperature,
     "NODE": _read_nodes,
     "ELEMENT": _read_elements,
     "NSET": _read_node_set,
@@ -250,7 +392,10 @@ def _assembled(deck: _Deck) -> RawMesh:
     for cells in deck.solids:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
+    raw.cell_id = [cells.ids for cells in deck.solids]
     _check_cell_numbers(deck)
+    _assign_materials(deck, raw)
+    _assign_temperatures(deck, raw, numbering)
     for key, parts in deck.node_sets.items():
         members = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
         if len(members):
@@ -286,6 +431,76 @@ def _unique_nodes(node_id: Indices, points: Array) -> tuple[Indices, Array]:
         raise Damaged(f"node {node_id[differs][0]} is defined twice, at different places")
     keep = np.sort(first)
     return node_id[keep], points[keep]
+
+
+def _assign_materials(deck: _Deck, raw: RawMesh) -> None:
+    """A region for every pair of material and orientation that sections give to cells."""
+    if not deck.materials:
+        return
+    raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
+    known: dict[tuple[str, str], int] = {}
+    for name_of_set, material, orientation in deck.sections:
+        if material.upper() not in deck.materials:
+            raise Damaged(f"*SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined")
+        key = (material.upper(), orientation.upper())
+        if key not in known:
+            known[key] = len(raw.materials)
+            raw.materials.append(_deck_material(deck, key, name_of_set))
+        chosen = _members(deck, name_of_set.upper())
+        for cells, region in zip(deck.solids, raw.regions, strict=True):
+            region[np.isin(cells.ids, chosen)] = known[key]
+    bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]
+    if count := sum(map(len, bare)):
+        first = next(int(ids[0]) for ids in bare if len(ids))
+        raw.materials.append(DeckMaterial("", None, None, np.zeros(6), where=f"{count} cells from number {first} on"))
+        for region in raw.regions:
+            region[region < 0] = len(raw.materials) - 1
+
+
+def _deck_material(deck: _Deck, key: tuple[str, str], where: str) -> DeckMaterial:
+    found = deck.materials[key[0]]
+    if key[1] and key[1] not in deck.orientations:
+        raise Damaged(f"*SOLID SECTION, ELSET={where} names the orientation '{key[1]}', which is not defined")
+    turn = deck.orientations[key[1]] if key[1] else None
+    axes = None if isinstance(turn, str) else turn
+    if refused := found.refused or (turn if isinstance(turn, str) else ""):
+        name = f"{found.name} ({refused}, which is not read)"
+        return DeckMaterial(name, None, found.density, np.zeros(6), None, where)
+    C, table = None, None
+    if found.isotropic is not None:
+        C, table = isotropic_rows(found.name, found.isotropic)
+    elif found.orthotropic is not None:
+        C = orthotropic_row(found.name, found.orthotropic)
+    elif found.stiffness is not None:
+        C = _orthotropic_stiffness(found.name, found.stiffness)
+    if C is not None and axes is not None:
+        C = turned(C, axes)
+    return DeckMaterial(found.name, C, found.density, turned_strain(found.expansion, axes), table, where)
+
+
+def _orthotropic_stiffness(name: str, d: Array) -> Array:
+    """Hooke matrix from D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323."""
+    C = np.diag([d[0], d[2], d[5], d[6], d[8], d[7]])
+    C[0, 1] = C[1, 0] = d[1]
+    C[0, 2] = C[2, 0] = d[3]
+    C[1, 2] = C[2, 1] = d[4]
+    if not np.isfinite(C).all() or np.linalg.eigvalsh(C).min() <= 0:
+        raise Damaged(f"the stiffness of the material '{name}' is not positive definite")
+    return C
+
+
+def _assign_temperatures(deck: _Deck, raw: RawMesh, numbering: Numbering) -> None:
+    if not deck.temperatures:
+        return
+    raw.temperature = np.full((len(raw.points), 2), np.nan)
+    for column, word, value in deck.temperatures:
+        if word.isdecimal() and len(word) < 18:
+            members = np.array([int(word)])
+        elif word.strip('"').upper() in deck.node_sets:
+            members = np.concatenate([np.zeros(0, dtype=np.int64), *deck.node_sets[word.strip('"').upper()]])
+        else:
+            raise Damaged(f"*TEMPERATURE names the node set '{word}', which is not defined")
+        raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
 
 
 def _members(deck: _Deck, key: str) -> Indices:

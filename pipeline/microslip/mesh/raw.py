@@ -20,6 +20,24 @@ class Damaged(ValueError):
     """A mesh file that contradicts itself or ends too early. The text says how, without the file's name."""
 
 
+@dataclass(frozen=True)
+class DeckMaterial:
+    """A material as a file writes it, in the file's units.
+
+    Attributes:
+        name: as in the file. elasticity: (6, 6) Hooke matrix in the order `VOIGT`, in body axes; None: missing.
+        density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
+            the elasticity, or None. where: the set of cells that it was given to.
+    """
+
+    name: str
+    elasticity: Array | None
+    density: float | None
+    expansion: Array
+    temperature: Array | None = None
+    where: str = ""
+
+
 @dataclass
 class RawMesh:
     """A file's content.
@@ -29,6 +47,10 @@ class RawMesh:
         blocks: (type, (e, k) positions in `points` in VTK's node order), volumes only.
         facets: set name -> corner positions of its facets, (f, 3) or (f, 4) arrays.
         point_sets: set name -> positions.
+        regions: of each block, (e,) number of each cell's material, or nothing where the file brings none.
+        materials: those of the file, in its own units. temperature: (n, 2) stress-free and actual ones in the file's
+            unit, NaN where none is given, or None. notes: what a person should know of what was left out.
+        cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
     """
 
     points: Array
@@ -36,6 +58,11 @@ class RawMesh:
     blocks: list[tuple[str, Indices]] = field(default_factory=list)
     facets: dict[str, list[Indices]] = field(default_factory=dict)
     point_sets: dict[str, Indices] = field(default_factory=dict)
+    regions: list[Indices] = field(default_factory=list)
+    materials: list[DeckMaterial] = field(default_factory=list)
+    temperature: Array | None = None
+    notes: list[str] = field(default_factory=list)
+    cell_id: list[Indices] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

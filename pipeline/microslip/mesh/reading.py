@@ -10,6 +10,7 @@ import contextlib
 import io
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from ..data import Array, Indices, Mesh, UserError
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .inp import read_inp
+from .materials import in_si
 from .msh import is_msh41, read_msh41
 from .raw import Damaged, RawMesh
 from .surface import boundary_facets, faces_from_points, match_facets
@@ -29,13 +31,14 @@ _FARTHEST = 1e9  # m; beyond it a file is damaged, and geometry loses its digits
 _IGNORED = {"vertex", "line", "line3"}
 
 
-def read_mesh(path: Path | str, unit: str) -> Mesh:
+def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: float = 0.0) -> Mesh:
     """Read a volume mesh with its named sets.
 
     Args:
         path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, or any file meshio reads (``.med``, ``.vtu``,
             ``.bdf``, ...).
-        unit: of the file's coordinates, a key of `UNITS`.
+        unit: of the file's coordinates, a key of `UNITS`. system: of the units its materials are written in, a key of
+            `units.SYSTEMS`; None: its materials are left out. zero: K of the file's temperature 0.
 
     Returns:
         The mesh in metres. A named set of facets becomes a face; so does a named set of points in which whole
@@ -51,7 +54,9 @@ def read_mesh(path: Path | str, unit: str) -> Mesh:
         raise UserError(f"{path}: no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)
-        return _mesh_of(raw, UNITS[unit], path)
+        materials = tuple(in_si(m, system, zero) for m in raw.materials) if system else ()
+        mesh = _mesh_of(raw, UNITS[unit], path)
+        return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
         raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
     except OSError as error:
@@ -73,6 +78,7 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
             f"{path}: cells of type {', '.join(foreign)} cannot be assembled; "
             f"convert the mesh to one of {', '.join(CELL_TYPES)}"
         )
+    _sort_by_region(raw)
     cells: dict[str, list[Indices]] = {}
     for kind, connectivity in raw.blocks:
         if len(connectivity):
@@ -190,6 +196,8 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
     mesh = Mesh(
         points=points[used],
         cells={t: renumber[c] for t, c in cells.items()},
+        regions={} if not raw.regions else {t: r for (t, _), r in zip(raw.blocks, raw.regions, strict=True) if len(r)},
+        temperature=None if raw.temperature is None else raw.temperature[used],
         point_sets={n: kept for n, s in raw.point_sets.items() if len(kept := _kept(renumber[s]))},
         node_id=raw.node_id[used],
     )
@@ -209,7 +217,23 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
     for name, chosen in mesh.point_sets.items():
         if name not in faces and (face := faces_from_points(boundary, chosen, len(mesh.points))):
             faces[name] = face
-    return Mesh(mesh.points, mesh.cells, faces, mesh.point_sets, mesh.node_id)
+    return replace(mesh, faces=faces)
+
+
+def _sort_by_region(raw: RawMesh) -> None:
+    """Blocks of one type put together, their cells in the order of their materials."""
+    if not raw.regions:
+        return
+    blocks, regions, ids = [], [], []
+    for kind in dict.fromkeys(kind for kind, _ in raw.blocks):
+        own = [i for i, (k, _) in enumerate(raw.blocks) if k == kind]
+        cells = np.concatenate([raw.blocks[i][1] for i in own])
+        region = np.concatenate([raw.regions[i] for i in own])
+        order = np.argsort(region, kind="stable")
+        blocks.append((kind, cells[order]))
+        regions.append(region[order])
+        ids.append(np.concatenate([raw.cell_id[i] for i in own])[order])
+    raw.blocks, raw.regions, raw.cell_id = blocks, regions, ids
 
 
 def _kept(indices: Indices) -> Indices:

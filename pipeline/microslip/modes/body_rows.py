@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..body import BodySettings, Excitation
-from ..data import INTERFACE_ROWS, Array, Interface, Mesh, Rows
+from ..body import BodySettings, Excitation, InterfaceSettings, Monitor
+from ..data import INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
 from ..fem.discretise import face_blocks
 from ..fem.loads import pressure, traction
 from .boundary import AXES, require_face
 from .equilibrium import StaticState
-from .rows import Locator, Patch, patch, point_rows, slope_rows
+from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows
 
 INTERFACE_LABELS = INTERFACE_ROWS
 
@@ -62,19 +62,18 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
     """Rows of all interfaces, excitations, monitors and gauges of the settings on a mesh."""
     patches = {}
     for item in settings.interfaces:
-        require_face(mesh, item.face, f"interfaces.{item.name}.face")
-        patches[item.name] = patch(mesh, item.face, np.array(item.t2), item.name)
+        patches[item.name] = _interface_patch(mesh, item)
     for excitation in settings.excitations:
         if excitation.face is not None:
-            require_face(mesh, excitation.face, f"excitations.{excitation.name}.face")
-            if excitation.face not in patches:
+            require_face(mesh, excitation.face, f"excitations.{excitation.name}.face", not mesh.cells)
+            if excitation.face not in patches and excitation.face in mesh.faces:
                 patches[excitation.face] = _load_patch(mesh, excitation.face)
-    locator = Locator(mesh)
+    locator = Locator(mesh) if mesh.cells else NodeLocator(mesh)
     n = mesh.n_points
     excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations}
     monitors, gauges = {}, {}
     for m in settings.monitors:
-        place = locator.find(np.array(m.point), f"monitors.{m.name}.point")
+        place = _place(mesh, locator, m, f"monitors.{m.name}")
         directions = np.eye(3)[[AXES[c] for c in m.directions]]
         labels = tuple(f"u_{c}" for c in m.directions)
         monitors[m.name] = NamedRows(point_rows(n, place, directions), labels, "m", place.point, place.distance)
@@ -86,6 +85,25 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
     return BodyRows(patches, excitations, monitors, gauges)
 
 
+def _interface_patch(mesh: Mesh, item: InterfaceSettings) -> Patch:
+    """Of a face by its area; of a list of nodes, where the body has no elements, evenly."""
+    require_face(mesh, item.face, f"interfaces.{item.name}.face", points_suffice=not mesh.cells)
+    if item.face in mesh.faces:
+        return patch(mesh, item.face, np.array(item.t2), item.name)
+    normal = None if item.normal is None else np.array(item.normal)
+    return node_patch(mesh, item.face, np.array(item.t2), normal, item.name)
+
+
+def _place(mesh: Mesh, locator: Locator | NodeLocator, item: Excitation | Monitor, key: str) -> Location:
+    """Where a load or monitor acts: at a point of space, or at a node by its number."""
+    if item.node is None:
+        return locator.find(np.array(item.point), f"{key}.point")
+    found = np.flatnonzero(mesh.node_id == item.node)
+    if not len(found):
+        raise UserError(f"{key}.node: the body has no node {item.node}; correct the number")
+    return at_node(mesh, int(found[0]))
+
+
 def _load_patch(mesh: Mesh, face: str) -> Patch:
     """The points, areas and shapes of a load face; a face that closes on itself keeps the body's axes as frame."""
     blocks = face_blocks(mesh, face)
@@ -94,12 +112,14 @@ def _load_patch(mesh: Mesh, face: str) -> Patch:
     return patch(mesh, face, hint, face, needs_frame=False)
 
 
-def _excitation(mesh: Mesh, locator: Locator, e: Excitation) -> NamedRows:
+def _excitation(mesh: Mesh, locator: Locator | NodeLocator, e: Excitation) -> NamedRows:
     n = mesh.n_points
     if e.face is None:
-        place = locator.find(np.array(e.point), f"excitations.{e.name}.point")
+        place = _place(mesh, locator, e, f"excitations.{e.name}")
         direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
         return NamedRows(point_rows(n, place, direction[None]), ("force",), "N", place.point, place.distance)
+    if e.face not in mesh.faces:
+        return _spread(mesh, e)
     blocks = face_blocks(mesh, e.face)
     sizes = [np.linalg.norm(b.area, axis=2) for b in blocks]
     total = sum(s.sum() for s in sizes)
@@ -109,6 +129,16 @@ def _excitation(mesh: Mesh, locator: Locator, e: Excitation) -> NamedRows:
     direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
     force = traction(blocks, n, direction / total)
     return NamedRows(sp.csr_matrix(force.reshape(1, -1)), ("force",), "N", centre, 0.0)
+
+
+def _spread(mesh: Mesh, e: Excitation) -> NamedRows:
+    """A force in equal parts on a list of nodes."""
+    if e.pressure:
+        raise UserError(f"excitations.{e.name}.pressure: a list of nodes has no facets to press on; give a direction")
+    nodes = mesh.face_points(e.face or "")
+    place = Location(nodes, np.full(len(nodes), 1 / len(nodes)), np.zeros((3, 1)), mesh.points[nodes].mean(axis=0), 0.0)
+    direction = np.array(e.direction) / np.linalg.norm(np.array(e.direction))
+    return NamedRows(point_rows(mesh.n_points, place, direction[None]), ("force",), "N", place.point, 0.0)
 
 
 def reduced_interfaces(rows: BodyRows, settings: BodySettings, phi: Array, shapes: Array) -> dict[str, Interface]:

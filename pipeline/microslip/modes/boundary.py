@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..body import BodySettings
-from ..data import Array, Indices, Mesh, UserError
-from ..fem.discretise import face_blocks
+from ..body import BodySettings, MaterialSettings
+from ..data import Array, Indices, Material, Mesh, UserError
+from ..fem.discretise import Discretisation, face_blocks
 from ..fem.loads import body_force, pressure, traction
 from . import rigid
 from .equilibrium import BodyModel
@@ -31,6 +31,29 @@ def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
         nodes = mesh.face_points(support.face)
         fixed += [3 * nodes + AXES[c] for c in support.directions]
     return np.unique(np.concatenate(fixed))
+
+
+def materials_of(d: Discretisation, settings: BodySettings) -> list[Material]:
+    """The material of each block: that of the settings, or those the mesh file brings.
+
+    Raises:
+        UserError: the mesh file brings none.
+    """
+    known = known_materials(d.mesh, settings)
+    return [known[b.region if len(known) > 1 else 0] for b in d.blocks]
+
+
+def known_materials(mesh: Mesh, settings: BodySettings) -> tuple[Material, ...]:
+    """The one of the settings, or those the mesh file brings.
+
+    Raises:
+        UserError: the mesh file brings none.
+    """
+    if isinstance(settings.material, MaterialSettings):
+        return (settings.material.material(),)
+    if not mesh.materials:
+        raise UserError("material.from: the mesh file brings no material; write density, young and poisson")
+    return mesh.materials
 
 
 def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..body import GROUND, BodySettings, Closure
@@ -12,13 +14,13 @@ from ..fem.loads import traction
 from .boundary import require_face
 
 
-def contact_pairs(mesh: Mesh, settings: BodySettings, material: Material) -> tuple[ContactPair, ...]:
+def contact_pairs(mesh: Mesh, settings: BodySettings, materials: Sequence[Material]) -> tuple[ContactPair, ...]:
     """The faces that may touch.
 
     Raises:
         UserError: missing faces, faces that do not face each other, an unknown number of sectors.
     """
-    modulus = float(material.elasticity.diagonal()[:3].max())
+    modulus = max(float(m.elasticity.diagonal()[:3].max()) for m in materials)
     return tuple(_pair(mesh, settings, c, modulus) for c in settings.closures)
 
 

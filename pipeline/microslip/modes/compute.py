@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,11 +22,12 @@ from ..data import (
 )
 from ..fem.contact import coupled_points
 from ..fem.discretise import Discretisation, discretise, free_upper
+from ..fem.operators import per_block
 from ..gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
-from .boundary import check_held, fixed_dofs, refuse_overlap, with_dead_loads
+from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
 from .characteristic import with_characteristic
 from .closures import bolt_forces, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
@@ -55,8 +56,7 @@ def modal_basis(
         NotConverged: the equilibrium or the spectrum could not be found.
     """
     report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
-    material = settings.material.material()
-    pairs = contact_pairs(mesh, settings, material)
+    pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
     d = discretise(mesh, coupled=[coupled_points(p) for p in pairs])
     fixed = fixed_dofs(mesh, settings)
     axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
@@ -64,12 +64,12 @@ def modal_basis(
     free = free_upper(d.pattern, fixed) if sector is None else sector.static
     rows = body_rows(mesh, settings)
     model = make_model(
-        d, material, free, fixed, axis, point, temperature, settings.temperature.reference,
+        d, materials_of(d, settings), free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
-    mass, centre, inertia = inertia_of(d, model.material.density)
+    mass, centre, inertia = inertia_of(d, [m.density for m in model.materials])
     if sector is None:
         motions = rigid.free_motions(mesh.points, centre, fixed)
     else:  # six supports may hold a ring though each lets its sector turn
@@ -123,10 +123,14 @@ def _guess(state: StaticState | None, before: float, speed: float) -> StaticStat
     return replace(state, u=grown * state.u, contacts=pressed)
 
 
-def inertia_of(d: Discretisation, density: float) -> tuple[float, Array, Array]:
-    """Mass (kg), centre (3,) m, inertia (3, 3) about the centre, kg m2 (Sextro Eqs. (2.3-32) to (2.3-34))."""
+def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[float, Array, Array]:
+    """Mass (kg), centre (3,) m, inertia (3, 3) about the centre, kg m2 (Sextro Eqs. (2.3-32) to (2.3-34)).
+
+    Args:
+        density: kg/m3, one or one per block.
+    """
     points = np.concatenate([np.einsum("qk,eki->eqi", b.N, d.mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks])
-    dm = density * np.concatenate([b.dx.reshape(-1) for b in d.blocks])
+    dm = np.concatenate([rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)])
     m = dm.sum()
     centre = dm @ points / m
     r = points - centre
@@ -235,7 +239,7 @@ def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
 
 def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:
     total = float(model.M_full.sum())
-    volume = model.d.volume * model.material.density
+    volume = float(sum(m.density * b.dx.sum() for m, b in zip(model.materials, model.d.blocks, strict=True)))
     return {
         "certified": float(found.certified),
         "count_below_upper_shift": float(len(found.values)),

@@ -7,7 +7,7 @@ pressures) and the tangent is taken about it: A = F C F^T + S, minus Omega^2 M P
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from ..fem.operators import (
     green_strain,
     internal_force,
     mass,
+    per_block,
     spin_projector,
     stiffness,
     stress_stiffness,
@@ -39,15 +40,15 @@ class BodyModel:
     """A discretised body with everything that does not depend on speed.
 
     Attributes:
-        d: the discretisation. material. factor: per block (e, q) modulus over reference modulus, or None.
-        thermal_strain: per block (e, q, 6), or None. M: (p,) scalar mass over the pattern, kg. M_full: (n, n).
+        d: the discretisation. materials: one per block. factor: per block (e, q) modulus over the reference one, or
+        None. thermal_strain: per block (e, q, 6), or None. M: (p,) scalar mass over the pattern, kg. M_full: (n, n).
         K0: (p, 3, 3) stiffness of the stress-free body, N/m. free: map to the free degrees of freedom.
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
     """
 
     d: Discretisation
-    material: Material
+    materials: tuple[Material, ...]
     factor: list[Array] | None
     thermal_strain: list[Array] | None
     M: Array
@@ -89,20 +90,26 @@ class StaticState:
 
 
 def make_model(
-    d: Discretisation, material: Material, free: FreeUpper | CyclicUpper, fixed: Indices, axis: Array, point: Array,
-    temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
+    d: Discretisation, material: Material | Sequence[Material], free: FreeUpper | CyclicUpper, fixed: Indices,
+    axis: Array, point: Array, temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
 ) -> BodyModel:  # fmt: skip
-    """Assemble what does not depend on speed. temperature: (n,) K at the nodes, or None for the reference."""
+    """Assemble what does not depend on speed.
+
+    Args:
+        material: one for all, or one per block. temperature: (n,) K at the nodes, or None for the reference.
+    """
+    own: list[Material] = per_block(d, material)
     factor = strain = None
     if temperature is not None:
         at = [np.einsum("qk,ek->eq", b.N, temperature[b.cells]) for b in d.blocks]
-        if material.temperature_table is not None:
-            factor = [material.modulus_factor(t) for t in at]
-        if np.any(material.expansion):
-            strain = [(t - reference)[..., None] * material.expansion for t in at]
-    M = mass(d, material.density)
+        if any(m.temperature_table is not None for m in own):
+            factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
+        if any(np.any(m.expansion) for m in own):
+            strain = [(t - reference)[..., None] * m.expansion for m, t in zip(own, at, strict=True)]
+    M = mass(d, [m.density for m in own])
+    K = stiffness(d, [m.elasticity for m in own], factor)
     return BodyModel(
-        d, material, factor, strain, M, d.pattern.full(M), stiffness(d, material.elasticity, factor), free, fixed,
+        d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
         dead_load, axis / np.linalg.norm(axis), point, spin_softening,
     )  # fmt: skip
 
@@ -112,7 +119,7 @@ def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
     out = []
     for i, e in enumerate(strain):
         elastic = e if model.thermal_strain is None else e - model.thermal_strain[i]
-        s = elastic @ model.material.elasticity.T
+        s = elastic @ model.materials[i].elasticity.T
         out.append(s if model.factor is None else s * model.factor[i][..., None])
     return out
 
@@ -171,7 +178,8 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
 
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
     factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
-    A = [tangent_tensor(model.material.elasticity, f, h, s) for f, h, s in zip(factor, H, stress, strict=True)]
+    parts = zip(model.materials, factor, H, stress, strict=True)
+    A = [tangent_tensor(m.elasticity, f, h, s) for m, f, h, s in parts]
     return tangent(model.d, A)
 
 

@@ -19,7 +19,7 @@ from ..body import BodySettings
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import Discretisation, discretise, free_upper
 from .body_rows import INTERFACE_LABELS, BodyRows, body_rows
-from .boundary import fixed_dofs
+from .boundary import fixed_dofs, materials_of
 from .equilibrium import make_model
 from .spectrum import make_pencil
 
@@ -83,7 +83,7 @@ def _pencil(d: Discretisation, settings: BodySettings, fixed: Indices) -> tuple[
     free = free_upper(d.pattern, fixed)
     rotation, nothing = settings.rotation, np.zeros((d.mesh.n_points, 3))
     model = make_model(
-        d, settings.material.material(), free, fixed, np.array(rotation.axis), np.array(rotation.point), None,
+        d, materials_of(d, settings), free, fixed, np.array(rotation.axis), np.array(rotation.point), None,
         settings.temperature.reference, nothing, rotation.spin_softening,
     )  # fmt: skip
     return free.free, make_pencil(model, model.K0, eigen.new_solver(settings.modes.solver))

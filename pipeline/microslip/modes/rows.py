@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 from scipy.optimize import lsq_linear, nnls
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
@@ -73,11 +73,75 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True)
     vectors = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
     areas = np.linalg.norm(vectors, axis=1)
     N = _interpolation(mesh.n_points, [(b.facets, b.N) for b in blocks])
+    normal = vectors.sum(axis=0)
+    closed = bool(np.linalg.norm(normal) < 1e-6 * areas.sum())
+    rotation = np.eye(3) if closed and not needs_frame else _frame(normal, t2, areas, name)
+    nodes = mesh.points[mesh.face_points(face)]
+    return _fitted(nodes, points, vectors / areas[:, None], areas, N, rotation, closed, (name, face))
+
+
+def node_patch(mesh: Mesh, name_of_set: str, t2: Array, normal: Array | None, name: str) -> Patch:
+    """The evenly weighted rigid fit of a list of nodes, each with its share of the area that they span.
+
+    Args:
+        normal: outwards; None: that of the plane through the nodes, away from the middle of all nodes.
+            t2, name: as for `patch`.
+
+    Raises:
+        UserError: nodes on a line; nodes that are not flat and no normal given.
+    """
+    at = mesh.face_points(name_of_set)
+    points = mesh.points[at]
+    if len(points) == 1:
+        return _single(mesh, int(at[0]), t2, normal, name)
+    n = _plane_normal(points, mesh.points.mean(axis=0), name, name_of_set) if normal is None else normal
+    rotation = _frame(np.asarray(n, dtype=float), t2, np.zeros(1), name)
+    try:
+        area = ConvexHull((points - points[0]) @ rotation[1:].T).volume
+    except QhullError:
+        area = 0.0
+    if not area > 0:
+        raise UserError(
+            f"interface '{name}': the {len(points)} nodes of '{name_of_set}' lie on a line, so it has no rotation; "
+            "name nodes that span an area"
+        )
+    count = len(points)
+    N = sp.csr_matrix((np.ones(count), (np.arange(count), at)), shape=(count, mesh.n_points))
+    normals = np.broadcast_to(rotation[0], points.shape).copy()
+    return _fitted(points, points, normals, np.full(count, area / count), N, rotation, False, (name, name_of_set))
+
+
+def _single(mesh: Mesh, node: int, t2: Array, normal: Array | None, name: str) -> Patch:
+    """A patch of one node, of unit weight; its rows are those of the node itself and are put in by the caller."""
+    if normal is None:
+        raise UserError(f"interfaces.{name}.normal: a single node does not tell which way is outwards; give normal")
+    rotation = _frame(np.asarray(normal, dtype=float), t2, np.zeros(1), name)
+    n, point = mesh.n_points, mesh.points[[node]]
+    N = sp.csr_matrix(([1.0], ([0], [node])), shape=(1, n))
+    B = sp.csr_matrix((6, 3 * n))
+    return Patch(point[0], rotation, B, point, np.ones(1), rotation[:1], N, np.zeros(2), np.zeros((0, 3)))
+
+
+def _plane_normal(points: Array, middle: Array, name: str, name_of_set: str) -> Array:
+    """Normal of the plane nearest to some points, away from `middle`."""
+    centre = points.mean(axis=0)
+    size, axes = np.linalg.eigh((points - centre).T @ (points - centre))
+    n = axes[:, 0]
+    if size[0] > 0.02 * size[1] or abs(n @ (centre - middle)) < 1e-3 * np.linalg.norm(centre - middle):
+        raise UserError(
+            f"interfaces.{name}.normal: the nodes of '{name_of_set}' do not tell which way is outwards; give normal"
+        )
+    return n * np.sign(n @ (centre - middle))
+
+
+def _fitted(
+    nodes: Array, points: Array, normals: Array, areas: Array, N: sp.csr_matrix, rotation: Array, closed: bool,
+    names: tuple[str, str],
+) -> Patch:  # fmt: skip
+    """The rows of a patch from its weighted points (p, 3) and the interpolation (p, n) to them."""
+    name, face = names
     total = areas.sum()
     origin = areas @ points / total
-    normal = vectors.sum(axis=0)
-    closed = np.linalg.norm(normal) < 1e-6 * total
-    rotation = np.eye(3) if closed and not needs_frame else _frame(normal, t2, areas, name)
     r = points - origin
     second = np.einsum("p,pi,pj->ij", areas, r, r)
     J = np.trace(second) * np.eye(3) - second
@@ -92,10 +156,9 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True)
     cross = np.array([skew(v) for v in r])  # r x u = cross @ u
     W[3:] = np.einsum("ij,pjk->ipk", rotation @ np.linalg.inv(J), cross) * areas[None, :, None]
     B = sp.vstack([_expand(N, W[i]) for i in range(6)]).tocsr()
-    nodes = mesh.points[mesh.face_points(face)]
     extent = np.ptp(nodes @ rotation[1:].T, axis=0)
     polygon = np.zeros((0, 3)) if closed else _outline(nodes, rotation)
-    return Patch(origin, rotation, B, points, areas, vectors / areas[:, None], N, extent, polygon)
+    return Patch(origin, rotation, B, points, areas, normals, N, extent, polygon)
 
 
 def _outline(nodes: Array, rotation: Array) -> Array:
@@ -110,7 +173,7 @@ def _outline(nodes: Array, rotation: Array) -> Array:
 
 
 def _frame(normal: Array, t2: Array, areas: Array, name: str) -> Array:
-    if np.linalg.norm(normal) < 1e-6 * areas.sum():
+    if np.linalg.norm(normal) <= 1e-6 * areas.sum():
         raise UserError(f"interface '{name}': the face closes on itself and has no mean normal; split it")
     n = normal / np.linalg.norm(normal)
     t2 = np.asarray(t2, dtype=float)
@@ -243,6 +306,34 @@ def _into_cell(J: Array, xi: Array, corners: int) -> Array:
     heavy = 1e6 * np.abs(A).max()
     w = nnls(np.vstack([A, np.full(4, heavy)]), np.array([0.0, 0.0, 0.0, heavy]))[0]
     return w[1:] / w.sum()
+
+
+@dataclass
+class NodeLocator:
+    """Finds the nearest of a body's nodes, where its cells are not known."""
+
+    mesh: Mesh
+
+    def find(self, point: Array, what: str) -> Location:
+        """The node nearest to a point.
+
+        Raises:
+            UserError: further away than 2 % of the body's size.
+        """
+        away = np.linalg.norm(self.mesh.points - point, axis=1)
+        nearest = int(away.argmin())
+        size = np.ptp(self.mesh.points, axis=0).max()
+        if away[nearest] > 0.02 * size:
+            raise UserError(
+                f"{what}: the node nearest to {np.asarray(point).tolist()} m lies {away[nearest]:.4g} m away (node "
+                f"{self.mesh.node_id[nearest]}); give a node by its number, or check length_unit"
+            )
+        return at_node(self.mesh, nearest, float(away[nearest]))
+
+
+def at_node(mesh: Mesh, position: int, distance: float = 0.0) -> Location:
+    """The place of a node (without gradients)."""
+    return Location(np.array([position]), np.ones(1), np.zeros((3, 1)), mesh.points[position], distance)
 
 
 def point_rows(n: int, place: Location, directions: Array) -> sp.csr_matrix:

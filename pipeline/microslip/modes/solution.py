@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from .. import eigen
 from ..body import BodySettings
 from ..coordinates import held
-from ..data import Array, UserError
+from ..data import Array, Indices, UserError
 from ..mesh import longest_over_shortest
 from ..reduction import METHODS, Problem, Reduced, stuck
 from . import canonical, rigid
@@ -146,10 +146,17 @@ def reduced_solution(
     model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows, report: Report
 ) -> Solution:  # fmt: skip
     """The reduction of certified modes and static answers, in one definite form."""
-    n, zero = model.d.mesh.n_points, s.R.shape[1]
+    points = model.d.mesh.points
+    return reduced_on(canonical.by_place(points), len(points), settings, s, rows, report)
+
+
+def reduced_on(
+    place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows, report: Report
+) -> Solution:  # fmt: skip
+    """The same of a body of n points, whose degrees of freedom take precedence in the order `place`."""
+    zero = s.R.shape[1]
     static = np.asarray(s.B @ s.answers)
     static = 0.5 * (static + static.conj().T)
-    place = canonical.by_place(model.d.mesh.points)
     phi = s.unknowns.expand(s.found.vectors, n)
     lead = leading_rows(rows, settings, phi, place)
     vectors = canonical.turn_clusters(s.found.vectors, s.found.values, lead(phi), zero)

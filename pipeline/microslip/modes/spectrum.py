@@ -81,9 +81,9 @@ def _norm(upper: sp.csr_matrix) -> float:
 
 def rigid_shift(model: BodyModel) -> float:
     """Negative shift for bodies with rigid modes: minus the square of a twentieth of wave speed over length."""
-    stiffness = np.linalg.eigvalsh(model.material.elasticity).max()
+    square_of_speed = max(float(np.linalg.eigvalsh(m.elasticity).max()) / m.density for m in model.materials)
     length = np.ptp(model.d.mesh.points, axis=0).max()
-    return -float(0.05**2 * stiffness / model.material.density / length**2)
+    return -float(0.05**2 * square_of_speed / length**2)
 
 
 def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix, R: Array, shift: float) -> Array:

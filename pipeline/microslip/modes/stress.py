@@ -68,7 +68,8 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
 
 
 def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Array:
-    C = model.material.elasticity if F is None else spatial_elasticity(model.material.elasticity, F)
+    C = model.materials[block].elasticity
+    C = C if F is None else spatial_elasticity(C, F)
     stress = np.matmul(C, strain)
     return stress if model.factor is None else stress * model.factor[block][:, :, None, None]
 

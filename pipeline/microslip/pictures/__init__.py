@@ -92,7 +92,7 @@ def draw_all(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Path] = {}
-    if scenes:
+    if scenes and basis.mesh.n_cells:
         drawn |= _scenes(basis, folder, report)
     report("curves")
     first = basis.groups[min(basis.groups)]

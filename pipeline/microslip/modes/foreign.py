@@ -1,0 +1,409 @@
+"""The modal basis of a body that another program has assembled: the same modes, rows, reductions and certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from scipy.spatial import ConvexHull, QhullError
+
+from .. import eigen
+from ..body import BodySettings
+from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, UserError
+from ..frames import skew
+from ..reduction import Reduced, stuck
+from . import canonical, rigid
+from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
+from .boundary import AXES, check_held, require_face
+from .compute import modal_damping
+from .rows import Patch
+from .solution import Searched, Solution, certified, held_compliance, reduced_on
+from .spectrum import static_answers
+
+Report = Callable[[str], None]
+
+NOT_RIGID = 1e-6
+"""Force that a rigid motion may meet, over that of its parts, of a stiffness written with seven digits or more."""
+
+
+def foreign_basis(
+    body: Matrices, settings: BodySettings, report: Report = lambda _: None,
+    provenance: Mapping[str, str] | None = None,
+) -> tuple[ModalBasis, list[str]]:  # fmt: skip
+    """The modal basis of a body given by its matrices (Sextro section 2.4), and what a person should know of it.
+
+    Raises:
+        UserError: matrices that do not belong to the positions, missing sets, unheld bodies.
+        NotConverged: the spectrum could not be certified.
+    """
+    report(f"matrices of {body.count} rows, {body.mesh.n_points} nodes")
+    layout = _layout(body)
+    motions = _rigid_rows(body)
+    remarks = [*body.remarks, *_refuse_other_positions(body, motions)]
+    mass, centre, inertia, told = _inertia(body, motions)
+    remarks += told + _implausible(body.mesh, mass)
+    free = _free(body, settings)
+    unknowns = Unknowns(layout.column[free], layout.width)
+    _refuse_missing_nodes(body, settings)
+    rows = _padded(body_rows(body.mesh, settings), settings, body, layout)
+    solver = eigen.new_solver(settings.modes.solver)
+    try:
+        pencil = _pencil(body.stiffness[free][:, free], body.mass[free][:, free], solver)
+        R = _free_motions(body, motions, free)
+        spread = np.zeros((3 * body.mesh.n_points, R.shape[1]))
+        at = free[(body.component[free] >= 0) & (body.component[free] < 3)]
+        spread[layout.column[at]] = R[np.isin(free, at)]
+        check_held(body.mesh, settings, centre, spread)
+        shift = _shift(body, motions, free, pencil) if R.shape[1] else 0.0
+        s = _search(settings, pencil, unknowns, R, shift, rows, report)
+        place = np.concatenate(
+            [canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)]
+        )
+        solved = reduced_on(place, layout.width // 3, settings, s, rows, report)
+    finally:
+        solver.close()
+    group = _group(body, settings, solved, rows, layout, free, motions)
+    damping = "matrix" if body.damping is not None else settings.damping.source
+    axis = np.array(settings.rotation.axis)
+    basis = ModalBasis(
+        settings.name, body.mesh, {(0, 0): group}, mass, centre, inertia, axis / np.linalg.norm(axis),
+        np.array(settings.rotation.point), damping, bool(R.shape[1]), settings.reduction, dict(provenance or {}),
+        source="matrices",
+    )  # fmt: skip
+    return basis, remarks
+
+
+# what the rows mean ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Displacements of the nodes first, three each, then every other row, filled up to a multiple of three.
+
+    Attributes:
+        column: (m,) place of each row. width: of the whole.
+    """
+
+    column: Indices
+    width: int
+
+
+def _layout(body: Matrices) -> Layout:
+    n = body.mesh.n_points
+    moves = (body.component >= 0) & (body.component < 3)
+    others = np.cumsum(~moves) - 1
+    width = 3 * (n + -(-int((~moves).sum()) // 3))
+    return Layout(np.where(moves, 3 * body.node + body.component, 3 * n + others), width)
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """The free rows of foreign matrices in a `Layout`. column: (m,). width: of the whole."""
+
+    column: Indices
+    width: int
+
+    def expand(self, unknowns: Array, n: int) -> Array:
+        """(3n, r) displacements, and whatever else there is behind them."""
+        whole = np.zeros((self.width, *unknowns.shape[1:]), dtype=unknowns.dtype)
+        whole[self.column] = unknowns
+        return whole
+
+    def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
+        """(r, m) rows on the unknowns."""
+        return _wide(B, self.width)[:, self.column]
+
+
+def _wide(B: sp.csr_matrix, width: int) -> sp.csr_matrix:
+    B = sp.csr_matrix(B)
+    return sp.csr_matrix((B.data, B.indices, B.indptr), shape=(B.shape[0], width))
+
+
+def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout) -> BodyRows:
+    """Rows over the whole layout; an interface on a single node gets that node's own rotations."""
+
+    def wide(p: Patch) -> Patch:
+        return replace(p, B=_wide(p.B, layout.width), N=_wide(p.N, layout.width // 3))
+
+    def named(group):  # noqa: ANN001
+        return {k: replace(v, B=_wide(v.B, layout.width)) for k, v in group.items()}
+
+    patches = {k: wide(p) for k, p in rows.patches.items()}
+    for item in settings.interfaces:
+        nodes = body.mesh.face_points(item.face)
+        if len(nodes) == 1:
+            patches[item.name] = replace(
+                patches[item.name], B=_six(body, layout, int(nodes[0]), patches[item.name].rotation, item.name)
+            )
+    return BodyRows(patches, named(rows.excitations), named(rows.monitors), {})
+
+
+def _six(body: Matrices, layout: Layout, node: int, rotation: Array, name: str) -> sp.csr_matrix:
+    """(6, width) displacements and rotations of one node in the interface's frame."""
+    B = np.zeros((6, layout.width))
+    for c in range(6):
+        row = np.flatnonzero((body.node == node) & (body.component == c))
+        if not len(row):
+            raise UserError(
+                f"interfaces.{name}.face: node {body.mesh.node_id[node]} alone has no rotation of its own in the "
+                "matrices; name three or more nodes"
+            )
+        B[3 * (c // 3) : 3 * (c // 3) + 3, layout.column[row[0]]] = rotation[:, c % 3]
+    return sp.csr_matrix(B)
+
+
+def _refuse_missing_nodes(body: Matrices, settings: BodySettings) -> None:
+    """An interface needs every one of its nodes in the matrices: what a superelement has condensed is lost."""
+    moves = np.unique(body.node[(body.component >= 0) & (body.component < 3)])
+    for item in settings.interfaces:
+        require_face(body.mesh, item.face, f"interfaces.{item.name}.face", points_suffice=True)
+        missing = np.setdiff1d(body.mesh.face_points(item.face), moves)
+        if len(missing):
+            raise UserError(
+                f"interfaces.{item.name}.face: {len(missing)} nodes of '{item.face}' (first: node "
+                f"{body.mesh.node_id[missing[0]]}) have no rows in the matrices, so this interface is not the one that "
+                "they keep; name nodes that they keep, or condense again"
+            )
+    numbered = [("excitations", e.name, e.node) for e in settings.excitations]
+    for kind, name, node in [*numbered, *(("monitors", m.name, m.node) for m in settings.monitors)]:
+        if node is not None and node not in body.mesh.node_id[moves]:
+            raise UserError(f"{kind}.{name}.node: node {node} has no rows in the matrices; choose one that they keep")
+
+
+# rigid motions and mass --------------------------------------------------------------------------------------------
+
+
+def _rigid_rows(body: Matrices) -> Array:
+    """(m, 6) every row under translations along x, y, z and rotations about the middle of the nodes."""
+    points = body.mesh.points
+    fields = rigid.rigid_fields(points, points.mean(axis=0))
+    R = np.zeros((body.count, 6))
+    moves = (body.component >= 0) & (body.component < 3)
+    R[moves] = fields[body.node[moves], body.component[moves]]
+    turns = body.component >= 3
+    R[turns, body.component[turns]] = 1.0
+    return R
+
+
+def _refuse_other_positions(body: Matrices, R: Array) -> list[str]:
+    """A free body lets itself be moved rigidly without force: a stiffness that does not was given other positions.
+
+    Raises:
+        UserError: with the row that resists most.
+    """
+    if body.grounded:
+        return []
+    size = abs(body.stiffness)
+    ratio = np.zeros(body.count)
+    for r in R.T:
+        whole = size @ np.abs(r)
+        force = np.abs(body.stiffness @ r)
+        ratio = np.maximum(ratio, np.divide(force, whole.max(), out=np.zeros_like(force), where=whole.max() > 0))
+    worst = int(ratio.argmax())
+    if ratio[worst] <= NOT_RIGID:
+        return []
+    where = f"node {body.mesh.node_id[body.node[worst]]}" if body.node[worst] >= 0 else "a generalised coordinate"
+    raise UserError(
+        f"geometry.matrices: the stiffness resists rigid motions (worst in row {worst + 1}, {where}, by "
+        f"{ratio[worst]:.2g} of the largest force), so its rows are in another order, the positions are of another "
+        "body, or supports are in it already; correct geometry.matrices.dofs and nodes, or write grounded = true"
+    )
+
+
+def _inertia(body: Matrices, R: Array) -> tuple[float, Array, Array, list[str]]:
+    """Mass, centre, inertia about the centre as the mass matrix has them, and what is odd about it."""
+    gram = R.T @ (body.mass @ R)
+    each = np.diag(gram)[:3]
+    m = float(each.mean())
+    if not m > 0:
+        raise UserError("geometry.matrices.mass: a translation moves no mass; is it the mass matrix?")
+    told = []
+    if np.ptp(each) > 1e-6 * m and not body.grounded:
+        told.append(
+            f"the mass is {each[0]:.6g}, {each[1]:.6g}, {each[2]:.6g} kg along x, y, z; a body's own mass is the same "
+            "in every direction"
+        )
+    coupling = gram[:3, 3:] / m  # column i: e_i x d
+    d = 0.5 * np.array(
+        [coupling[1, 2] - coupling[2, 1], coupling[2, 0] - coupling[0, 2], coupling[0, 1] - coupling[1, 0]]
+    )
+    J = gram[3:, 3:] + m * skew(d) @ skew(d)
+    return m, body.mesh.points.mean(axis=0) + d, 0.5 * (J + J.T), told
+
+
+def _implausible(mesh: Mesh, mass: float) -> list[str]:
+    """Warnings of a mean density that no solid has: a mistake of units."""
+    try:
+        volume = ConvexHull(mesh.points).volume
+    except (QhullError, ValueError):  # nodes on a plane or a line
+        return []
+    density = mass / volume
+    if 1 <= density <= 25000:
+        return []
+    return [
+        f"{mass:.4g} kg within {volume:.4g} m3 are {density:.3g} kg/m3, which is no solid's; check length_unit and "
+        "geometry.matrices.units"
+    ]
+
+
+def _free(body: Matrices, settings: BodySettings) -> Indices:
+    """Rows that neither a support holds nor nothing is attached to."""
+    held = np.zeros(body.count, dtype=bool)
+    for support in settings.supports:
+        require_face(body.mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
+        on = np.isin(body.node, body.mesh.face_points(support.face)) & (body.node >= 0)
+        ways = [AXES[c] for c in support.directions] + ([3, 4, 5] if support.rotations else [])
+        chosen = on & np.isin(body.component, ways)
+        if not chosen.any():
+            raise UserError(
+                f"supports.{support.face}.face: no row of the matrices moves a node of '{support.face}' along "
+                f"{support.directions}; the support is in them already, or the nodes were condensed: remove it"
+            )
+        held |= chosen
+    weight = np.asarray(abs(body.stiffness).sum(axis=1)).ravel() + np.asarray(abs(body.mass).sum(axis=1)).ravel()
+    return np.flatnonzero(~held & (weight > 0))
+
+
+def _free_motions(body: Matrices, R: Array, free: Indices) -> Array:
+    """(f, r) rigid motions of the free rows that move no held row and meet no force."""
+    held = np.setdiff1d(np.arange(body.count), free)
+    R = R / np.maximum(np.abs(R).max(axis=0), 1e-300)
+    parts = [R[held]]
+    if body.grounded:
+        K = body.stiffness[free][:, free]
+        parts.append((K @ R[free]) / max(float(abs(K).sum(axis=1).max()), 1e-300) * 1e4)
+    s, vt = np.linalg.svd(np.vstack([*parts, np.zeros((6, 6))]), full_matrices=True)[1:]
+    vt = vt[int((s > 1e-8 * max(s.max(), 1.0)).sum()) :]
+    motions = R[free] @ vt.T
+    Q, T, _ = scipy.linalg.qr(motions, mode="economic", pivoting=True)  # a single line of nodes has fewer than six
+    return Q[:, : int((np.abs(np.diag(T)) > 1e-9 * max(abs(T[0, 0]), 1e-300)).sum())] if motions.shape[1] else motions
+
+
+# the eigenproblem ---------------------------------------------------------------------------------------------------
+
+
+def _pencil(K: sp.csr_matrix, M: sp.csr_matrix, solver: eigen.DirectSolver) -> eigen.Pencil:
+    """K x = lambda M x with one pattern for every shift."""
+    pattern = sp.triu(abs(K) + abs(M) + sp.identity(K.shape[0]), format="csr")
+    pattern.sort_indices()
+    k, m = (_on(sp.triu(A, format="csr"), pattern) for A in (K, M))
+
+    def shifted(s: float) -> sp.csr_matrix:
+        return sp.csr_matrix((k - s * m, pattern.indices, pattern.indptr), shape=pattern.shape)
+
+    k_norm, m_norm = (float(abs(A).sum(axis=1).max()) for A in (K, M))
+    return eigen.Pencil(shifted, lambda x: K @ x, lambda x: M @ x, K.shape[0], k_norm, m_norm, solver)
+
+
+def _on(A: sp.csr_matrix, pattern: sp.csr_matrix) -> Array:
+    """Entries of a matrix at the places of a larger pattern."""
+    n = pattern.shape[0]
+    places = np.repeat(np.arange(n, dtype=np.int64), np.diff(pattern.indptr)) * n + pattern.indices
+    entries = A.tocoo()
+    out = np.zeros(pattern.nnz)
+    out[np.searchsorted(places, entries.row.astype(np.int64) * n + entries.col)] = entries.data
+    return out
+
+
+def _shift(body: Matrices, R: Array, free: Indices, pencil: eigen.Pencil) -> float:
+    """Negative shift for a free body: a tenth of the lowest elastic Rayleigh quotient of quadratic displacements."""
+    x = body.mesh.points - body.mesh.points.mean(axis=0)
+    x = x / max(float(np.abs(x).max()), 1e-30)
+    shapes = [R[free]]
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)):
+        f = np.zeros((body.count, 3))
+        moves = (body.component >= 0) & (body.component < 3)
+        f[moves, body.component[moves]] = (x[:, i] * x[:, j])[body.node[moves]]
+        shapes.append(f[free])
+    F = np.hstack(shapes)
+    F = F / np.maximum(np.linalg.norm(F, axis=0), 1e-300)
+    gram = F.T @ pencil.M(F)
+    w, Q = np.linalg.eigh(0.5 * (gram + gram.T))
+    Q = Q[:, w > 1e-10 * w[-1]] / np.sqrt(w[w > 1e-10 * w[-1]])
+    ritz = np.linalg.eigvalsh(Q.T @ (F.T @ pencil.K(F)) @ Q)
+    elastic = ritz[ritz > 1e-7 * ritz[-1]]
+    return -0.1 * float(elastic[0]) if len(elastic) else -1e-6 * pencil.k_norm / pencil.m_norm
+
+
+def _search(
+    settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, R: Array, shift: float, rows: BodyRows,
+    report: Report,
+) -> Searched:  # fmt: skip
+    report(f"eigenmodes: {pencil.n} free rows, solver {pencil.solver.name}")
+    if not pencil.n:
+        raise UserError("supports: every row of the matrices is held; remove one")
+    R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
+    try:
+        found = eigen.search(pencil, min(settings.modes.count, pencil.n), shift, rigid=R if R.shape[1] else None)
+    except eigen.Unstable as error:
+        raise UserError(
+            f"geometry.matrices: the stiffness has {error.count} negative directions; is it K, of a stable state?"
+        ) from error
+    B, labels = rows.stacked(settings)
+    B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
+    answers = static_answers(pencil, found, B, R, shift)
+    at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
+    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(R.shape[1]))
+    s = Searched(pencil, unknowns, R, shift, found, B, labels, answers, held)
+    if not settings.modes.certify:
+        return s
+    report("certifying the spectrum by the inertia count")
+    return certified([s])[0]
+
+
+def _group(
+    body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices, motions: Array
+) -> ModalGroup:
+    reduced, n = s.reduced, body.mesh.n_points
+    whole = s.unknowns.expand(reduced.vectors, n)
+    shapes = whole.reshape(layout.width // 3, 3, -1)
+    m, speed = whole.shape[1], settings.rotation.speeds_rpm[0] * np.pi / 30
+    B, labels = rows.stacked(settings)
+    T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, m))
+    C, ratios = _damping(body, settings, reduced, free)
+    G = np.zeros((m, m))
+    if body.gyroscopic is not None:
+        G = reduced.vectors.T @ (body.gyroscopic[free][:, free] @ reduced.vectors)
+        G = 0.5 * (G - G.T)
+    interfaces = reduced_interfaces(rows, settings, whole, shapes)
+    return ModalGroup(
+        speed=speed, omega=reduced.omega, kind=reduced.kind, damping_ratio=ratios, M_r=reduced.M_r, K_r=reduced.K_r,
+        C_r=C, G_r=G, to_diagonal=reduced.to_diagonal,
+        phi=shapes[:n] if settings.output.shapes else np.zeros((0, 3, m)),
+        interfaces=interfaces,
+        excitations={k: reduced_rows(v, whole, None) for k, v in rows.excitations.items()},
+        monitors={k: reduced_rows(v, whole, None) for k, v in rows.monitors.items()},
+        gauges={},
+        compliance=Compliance(
+            labels, s.static, held_compliance(T, reduced, labels), bool((reduced.omega == 0).any()), s.eigenmodes
+        ),
+        stresses={}, u_static=np.zeros((n, 3)),
+        checks={
+            "certified": float(s.found.certified),
+            "count_below_upper_shift": float(len(s.found.values)),
+            "upper_shift_hz": float(np.sqrt(max(s.found.upper_shift, 0.0)) / 2 / np.pi),
+            "refound": float(s.found.refound),
+            "orthogonality": s.found.orthogonality,
+            "backward_error": float(s.found.backward_error[: s.kept].max()),
+            **s.indicators,
+        },
+        prestress="none" if not speed else "foreign",
+    )  # fmt: skip
+
+
+def _damping(body: Matrices, settings: BodySettings, reduced: Reduced, free: Indices) -> tuple[Array, Array]:
+    """C_r and the ratios: of the foreign matrix if there is one, whatever it couples, else as the settings say."""
+    if body.damping is None:
+        ratios = settings.damping.ratios(reduced.omega)
+        return modal_damping(reduced, 2 * ratios * reduced.omega), ratios
+    d = settings.damping
+    if d.ratio is not None or d.table is not None or d.alpha is not None or d.beta is not None:
+        raise UserError("damping: geometry.matrices.damping brings the damping already; remove one of the two")
+    C = reduced.vectors.T @ (body.damping[free][:, free] @ reduced.vectors)
+    C = 0.5 * (C + C.T)
+    V = np.eye(len(C)) if reduced.to_diagonal is None else reduced.to_diagonal
+    own = np.einsum("ij,ik,kj->j", V, C, V)
+    return C, np.divide(own, 2 * reduced.omega, out=np.zeros_like(own), where=reduced.omega > 0)

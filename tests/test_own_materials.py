@@ -1,0 +1,148 @@
+"""Materials, orientations and temperatures that a deck brings itself: used as they are, conflicts told."""
+
+from __future__ import annotations
+
+import decks
+import meshes
+import numpy as np
+import pytest
+
+from microslip.basis import check_basis, read_basis
+from microslip.cli import main
+from microslip.elasticity import isotropic, orthotropic
+from microslip.workflow import modes_stage, open_job
+
+BODY = """
+name = "part"
+length_unit = "mm"
+[geometry]
+mesh = "part.inp"
+[material]
+{material}
+[[supports]]
+face = "z0"
+[modes]
+count = 8
+solver = "superlu"
+"""
+ORTHO = [
+    "*MATERIAL, NAME=Wood", "*ELASTIC, TYPE=ENGINEERING CONSTANTS",
+    "12000., 900., 500., 0.37, 0.42, 0.47, 700., 650.,", "250.", "*DENSITY", "6e-10",
+    "*ORIENTATION, NAME=GRAIN, SYSTEM=RECTANGULAR", "0.8, 0.6, 0., -0.6, 0.8, 0.",
+]  # fmt: skip
+HELD = ["*BOUNDARY", "z0, 1, 3"]
+
+
+def beam():
+    return meshes.brick("hexahedron20", (1, 2, 4), (0.01, 0.015, 0.05), to=meshes.shaken(0.0005))
+
+
+def halves() -> list[str]:
+    return ["*ELSET, ELSET=LOW, GENERATE", "1, 4", "*ELSET, ELSET=HIGH, GENERATE", "5, 8"]
+
+
+def made(folder, lines, material='from = "mesh"', more=""):
+    (folder / "part.inp").write_text("\n".join(lines) + "\n")
+    (folder / "body.toml").write_text(BODY.format(material=material) + more)
+    path, warnings = modes_stage(open_job(folder, root=folder))
+    return read_basis(path), warnings
+
+
+def test_deck_and_settings_say_the_same_material(tmp_path):
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section()]
+    (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
+    own, none = made(tmp_path / "a", lines, "density = 7850.0\nyoung = 2.1e11\npoisson = 0.3")
+    deck, told = made(tmp_path / "b", lines)
+    assert not none and not told
+    np.testing.assert_allclose(deck.groups[0, 0].omega, own.groups[0, 0].omega, rtol=1e-10)
+    assert deck.mesh.materials[0].name == "Steel"
+    assert all(c.passed for c in check_basis(deck))
+
+
+def test_another_material_in_the_settings_is_told(tmp_path):
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section()]
+    _, told = made(tmp_path, lines, "density = 7850.0\nyoung = 7e10\npoisson = 0.3")
+    assert any("'Steel'" in t and "from" in t for t in told)
+
+
+@pytest.mark.skipif(decks.CCX is None, reason="needs CalculiX")
+def test_two_materials_one_turned_give_calculix_own_frequencies(tmp_path):
+    """1e-6: CalculiX prints seven digits. Element sets, engineering constants, orientation, mass checked too."""
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *halves(), *decks.MATERIAL, *ORTHO]
+    lines += [decks.section("LOW"), decks.section("HIGH", "Wood", "GRAIN")]
+    theirs = decks.run(tmp_path, "ccx", [*lines, *HELD, *decks.frequency_step()])
+    basis, told = made(tmp_path, lines)
+    assert not told and len(theirs) >= 8
+    np.testing.assert_allclose(basis.groups[0, 0].frequency[:8], theirs[:8], rtol=1e-6)
+    assert {m.name for m in basis.mesh.materials} == {"Steel", "Wood"}
+    failed = [c.name for c in check_basis(basis) if not c.passed]
+    assert not failed, failed
+
+
+@pytest.mark.skipif(decks.CCX is None, reason="needs CalculiX")
+def test_heated_deck_between_walls_gives_calculix_own_frequencies(tmp_path):
+    """Thermal stress of the deck's own temperatures, linear prestress as CalculiX' PERTURBATION step makes it."""
+    lines = decks.mesh_lines(beam(), sets=("z0", "z1"))
+    lines += [*decks.MATERIAL, "*EXPANSION", "1.2e-5", decks.section()]
+    lines += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 20."]
+    held = ["*BOUNDARY", "z0, 1, 3", "z1, 1, 3"]
+    hot = ["*STEP", "*STATIC", "*TEMPERATURE", "NALL, 120.", "*END STEP"]
+    step = ["*STEP, PERTURBATION", "*FREQUENCY", "6", "*END STEP"]
+    theirs = decks.run(tmp_path, "ccx", [*lines, *held, *hot, *step])
+    more = '[[supports]]\nface = "z1"\n[temperature]\nfrom = "mesh"\n[rotation]\nprestress = "linear"\n'
+    basis, _ = made(tmp_path, [*lines, *hot], more=more)
+    cold, _ = made(tmp_path, lines, more='[[supports]]\nface = "z1"\n')
+    np.testing.assert_allclose(basis.groups[0, 0].frequency[:6], theirs[:6], rtol=2e-6)
+    assert basis.groups[0, 0].frequency[0] < 0.999 * cold.groups[0, 0].frequency[0]  # it does soften
+
+
+def test_orthotropic_stiffness_and_engineering_constants_are_one_material(tmp_path):
+    """*ELASTIC, TYPE=ORTHO lists D1111 D1122 D2222 D1133 D2233 D3333 D1212 D1313 D2323."""
+    C = orthotropic(np.array([12e3, 900.0, 500.0]), np.array([0.37, 0.47, 0.42]), np.array([700.0, 250.0, 650.0]))
+    d = [C[0, 0], C[0, 1], C[1, 1], C[0, 2], C[1, 2], C[2, 2], C[3, 3], C[5, 5], C[4, 4]]
+    words = [f"{v:.15e}" for v in d]
+    stiff = ["*MATERIAL, NAME=Wood", "*ELASTIC, TYPE=ORTHO", ", ".join(words[:8]) + ",", words[8], "*DENSITY", "6e-10"]
+    lines = decks.mesh_lines(beam(), sets=("z0",))
+    (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
+    a, _ = made(tmp_path / "a", [*lines, *ORTHO, decks.section(material="Wood", orientation="GRAIN")])
+    b, _ = made(tmp_path / "b", [*lines, *stiff, *ORTHO[-2:], decks.section(material="Wood", orientation="GRAIN")])
+    np.testing.assert_allclose(b.mesh.materials[0].elasticity, a.mesh.materials[0].elasticity, atol=1e-2)
+    np.testing.assert_allclose(b.groups[0, 0].omega, a.groups[0, 0].omega, rtol=1e-9)
+
+
+def test_modulus_over_temperature_becomes_a_factor(tmp_path):
+    table = ["*MATERIAL, NAME=Hot", "*ELASTIC", "200000., 0.3, 20.", "150000., 0.3, 420.", "*DENSITY", "7.85e-9"]
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *table, decks.section(material="Hot")]
+    basis, _ = made(tmp_path, lines, more="[temperature]\nuniform = 493.15\n")  # half way between 20 and 420 degrees C
+    cold, _ = made(tmp_path, lines)
+    np.testing.assert_allclose(cold.mesh.materials[0].elasticity, isotropic(2e11, 0.3), rtol=1e-12)
+    ratio = basis.groups[0, 0].omega / cold.groups[0, 0].omega
+    np.testing.assert_allclose(ratio, np.sqrt(0.875), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (("*DENSITY\n7.85e-9\n", ""), "material 'Steel' of the cells 'EALL' has no density"),
+        (("210000., 0.3", "210000., 0.5"), "nu = 0.5"),
+        (("*ELASTIC\n210000., 0.3", "*ELASTIC, TYPE=ANISO\n1.,2.,3.,4.,5.,6.,7.,8.,"), "TYPE=ANISO, which is not read"),
+        (("ELSET=EALL, MATERIAL=Steel", "ELSET=EALL, MATERIAL=Brass"), "'Brass', which is not defined"),
+        (("*SOLID SECTION, ELSET=EALL", "*SOLID SECTION, ELSET=OTHER"), "8 cells from number 1 on"),
+        (("210000., 0.3", "210000., x"), "no number"),
+    ],
+)
+def test_incomplete_materials_are_refused_in_a_sentence(tmp_path, capsys, change, text):
+    lines = "\n".join([*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section()]) + "\n"
+    assert change[0] in lines
+    (tmp_path / "part.inp").write_text(lines.replace(*change))
+    (tmp_path / "body.toml").write_text(BODY.format(material='from = "mesh"'))
+    assert main(["modes", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert text in said and "part.inp" in said and "Traceback" not in said
+
+
+def test_wrong_units_are_told(tmp_path):
+    """Numbers in kg and m read as t and mm: the density is a million millions too large."""
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), "*MATERIAL, NAME=Steel", "*ELASTIC", "2.1e11, 0.3", "*DENSITY"]
+    _, told = made(tmp_path, [*lines, "7850.", decks.section()])
+    assert any("correct material.units" in t for t in told)
