@@ -58,12 +58,14 @@ def init(name: str, folder: Path | None = None, /) -> None:
     """Copy a runnable body (and its case) to start from.
 
     Args:
-        name: blade, shroud, pendulum or half-pipe; `own` for a commented body.toml around your own CAD file or mesh.
+        name: blade, shroud, pendulum or half-pipe; `own` for a commented body.toml around your own CAD file or mesh;
+            `three-masses` for a system by hand; `sample` for a modal file with a case.
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
-    if name not in [*known, "own"]:
-        raise UserError(f"init {name}: there is no such body; choose one of {', '.join(known)}, own")
+    more = [*_MADE, "own"]
+    if name not in [*known, *more]:
+        raise UserError(f"init {name}: there is no such body; choose one of {', '.join([*known, *more])}")
     target = folder or Path(name)
     if target.exists() and any(target.iterdir() if target.is_dir() else [target]):
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
@@ -71,17 +73,25 @@ def init(name: str, folder: Path | None = None, /) -> None:
         target.mkdir(parents=True, exist_ok=True)
         for source, copy in _to_copy(name):
             shutil.copyfile(source, target / copy)
-            if copy.endswith(".toml"):
+            if copy.endswith(".toml") and name != "sample":  # whose modal file bears its name
                 _rename(target / copy, target.resolve().name)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
-    print(f"{target}: ready. Look at {target / 'body.toml'}, then: microslip run {target}")
+    file, verb = _MADE.get(name, ("body.toml", "run"))
+    print(f"{target}: ready. Look at {target / file}, then: microslip {verb} {target}")
+
+
+_MADE = {"three-masses": ("system.toml", "run"), "sample": ("case.toml", "respond")}
+"""Folders to start from that hold no body.toml: the file to look at and the verb that takes it from there."""
 
 
 def _to_copy(name: str) -> list[tuple[Path, str]]:
     """Files of a body that travels with the package, and their names in the new folder."""
     if name == "own":
         return [(PACKAGE / "templates" / "own.toml", "body.toml")]
+    if name in _MADE:
+        folder = PACKAGE / "samples" if name == "sample" else PACKAGE / "templates" / name
+        return [(f, f.name) for f in sorted(folder.iterdir()) if f.is_file()]
     files = [(f, f.name) for f in sorted((_bodies() / name).iterdir()) if f.is_file()]
     case = _cases() / f"{name}.toml"
     return files + ([(case, "case.toml")] if case.is_file() else [])
@@ -119,11 +129,17 @@ def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force 
     """Mesh if needed, then compute the modal file of a body.
 
     Args:
-        body: a body.toml or the folder that holds it.
+        body: a body.toml or the folder that holds it; a system.toml of masses, rigid bodies or matrices.
     """
     from .basis import read_basis
-    from .workflow import basis_summary, modes_stage, open_job
+    from .workflow import basis_summary, modes_stage, open_job, system_file, system_stage
 
+    if (system := system_file(body)) is not None:
+        path = system_stage(system, list(set_), output, force)
+        if not quiet:
+            print("\n".join(basis_summary(read_basis(path))))
+        _say(path, quiet)
+        return
     job = open_job(body, list(set_))
     with progress(f"modes of {job.settings.name}", quiet) as report:
         path, _ = modes_stage(job, output, force, report)
@@ -137,11 +153,14 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
     """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
 
     Args:
-        path: a body.toml, the folder that holds it, or a case.toml.
+        path: a body.toml, a system.toml, the folder that holds it, or a case.toml.
     """
-    from .workflow import is_case, open_job, run_body, run_case_file
+    from .workflow import is_case, open_job, run_body, run_case_file, run_system, system_file
 
-    if is_case(path):
+    if (system := system_file(path)) is not None:
+        with progress(f"run {system}", quiet) as report:
+            page, converged = run_system(system, list(set_), force, report)
+    elif is_case(path):
         with progress(f"run {path}", quiet) as report:
             page, converged = run_case_file(path, list(set_), force, report)
     else:
@@ -149,6 +168,29 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
         with progress(f"run {job.settings.name}", quiet) as report:
             page, converged = run_body(job, force, report)
     _say(page, quiet)
+    if not converged:
+        raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+
+
+@app.command
+def respond(
+    case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:  # fmt: skip
+    """Friction response of a case on a modal file that is there already; needs neither gmsh nor VTK.
+
+    Args:
+        case: a case.toml, the folder that holds it, or the word sample: a blade that travels with the package.
+        basis: the modal file; basis.h5 beside the case if not given.
+    """
+    from .workflow import respond
+
+    if str(case) == "sample" and not case.exists():
+        case = PACKAGE / "samples"
+    case = case / "case.toml" if case.is_dir() else case
+    file = basis or case.with_name("basis.h5")
+    with progress(f"respond {case}", quiet) as report:
+        table, converged = respond(case, file, list(set_), force, report)
+    _say(table, quiet)
     if not converged:
         raise NotConverged("some points of the response did not converge; they are marked in response.csv")
 
@@ -334,8 +376,8 @@ def main(words: list[str] | None = None) -> int:
 def _missing(error: ModuleNotFoundError) -> str:
     extras = {
         "fem": ("skfem", "meshio", "gmsh", "qdldl"),
-        "viz": ("matplotlib", "pyvista", "vtk", "vtkmodules", "imageio", "PIL"),
-        "solve": ("jax",),
+        "solve": ("jax", "matplotlib"),
+        "viz": ("pyvista", "vtk", "vtkmodules", "imageio", "PIL"),
         "exchange": ("pyyeti", "mapdl_archive", "pandas"),
     }
     package = (error.name or "").split(".")[0]

@@ -158,6 +158,9 @@ def sentence(basis: ModalBasis, group: ModalGroup) -> str:
     found = [s for s in shares(group, basis.reduction, basis.sectors) if s.kind in ("translation", "squeeze")]
     if not found:
         return "The body has no contact, so there is no compliance to share with a law."
+    found = [s for s in found if s.static > 0]
+    if not found:
+        return "The contacts cannot move, so there is no compliance to share with a law."
     place = "at each contact" if basis.sectors == 1 else "in each gap"
     left = [s for s in found if s.left]
     if left:

@@ -231,6 +231,8 @@ def certificate(group: ModalGroup) -> str:
     """What the inertia count proves, in one sentence."""
     if not group.checks.get("certified"):
         return "Nothing proves that no mode is missing: the spectrum was not certified (modes.certify)."
+    if "upper_shift_hz" not in group.checks:
+        return f"These are all {group.n_modes} modes of the system."
     count, limit = (
         int(group.checks.get("count_below_upper_shift", group.n_modes)),
         group.checks.get("upper_shift_hz", 0),
@@ -245,7 +247,7 @@ def _remarks(remarks: Sequence[str]) -> str:
 
 def _body(basis: ModalBasis, album: _Album) -> str:
     size = np.ptp(basis.mesh.points, axis=0) * 1e3
-    cells = ", ".join(f"{len(c)} {kind}" for kind, c in basis.mesh.cells.items())
+    cells = ", ".join(f"{len(c)} {kind}" for kind, c in basis.mesh.cells.items()) or "no cells"
     centre = ", ".join(f"{v * 1e3:.4g}" for v in _clean(basis.centre, float(np.ptp(basis.mesh.points))))
     inertia = _clean(basis.inertia, float(np.abs(basis.inertia).max()))
     rows = [

@@ -109,7 +109,7 @@ def _coordinate(
     omega = np.where(group.omega > 0, group.omega, np.inf)
     parts = np.cumsum(np.abs(pick @ T / omega) ** 2)
     whole = float((pick @ static @ pick.conj()).real)
-    return Coordinate(label, kind, unit, whole, float(parts[-1]), parts / whole if whole > 0 else np.zeros_like(parts))
+    return Coordinate(label, kind, unit, whole, float(parts[-1]), parts / whole if whole > 0 else np.ones_like(parts))
 
 
 def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:

@@ -598,6 +598,79 @@ def run_case_file(
     return report_stage(job, response, force, report), converged
 
 
+# systems by hand --------------------------------------------------------------------------------------------------
+
+
+def system_file(path: Path) -> Path | None:
+    """The system.toml that a path names: a file of masses, rigid bodies or matrices, or the folder that holds it."""
+    if path.is_dir() and not (path / "body.toml").is_file():
+        path = path / "system.toml"
+    if path.is_file() and path.suffix == ".toml" and {"masses", "bodies", "matrices"} & set(load_toml(path)):
+        return path
+    return None
+
+
+def system_stage(
+    path: Path, assignments: list[str] | None = None, output: Path | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."),
+) -> Path:  # fmt: skip
+    """Compute, or check that it is up to date, the modal file of a system by hand. Returns its path.
+
+    Raises:
+        UserError: see `system.load_system` and `System.basis`.
+    """
+    from .system import load_system, system_basis
+
+    system = load_system(path, assignments)
+    product = output or root / "build" / system.name / "basis.h5"
+    inputs = {"settings": dict(system.settings), "code": _code_hash(("data.py", "system.py", "basis"))}
+    if not force and store.is_up_to_date(product, inputs):
+        report(f"{product} is up to date")
+        _touch(product)
+        return product
+    write_basis(product, system_basis(path, assignments))
+    store.note_product(product, inputs)
+    return product
+
+
+def run_system(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal file of a system, and the friction response of the case.toml beside it if there is one.
+
+    Returns:
+        The path of the last product, and whether every point of the response converged.
+    """
+    basis_file = system_stage(path, assignments, None, force, report)
+    case = path.parent / "case.toml"
+    return respond(case, basis_file, force=force, report=report) if case.is_file() else (basis_file, True)
+
+
+def respond(
+    case_path: Path, basis_file: Path, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."),
+) -> tuple[Path, bool]:  # fmt: skip
+    """Friction response of a case on a modal file that is there already: CSV, JSON, picture in build/<case>/.
+
+    Returns:
+        The path of the table, and whether every point converged.
+
+    Raises:
+        UserError: the case is about another body.
+    """
+    case, _ = load_case(case_path, assignments)
+    name = read_basis(basis_file).name
+    if case.body != name:
+        raise UserError(
+            f"{case_path}: body: it names '{case.body}', but {basis_file} holds '{name}'; make them agree"
+        )
+    folder = root / "build" / case.name
+    summary, converged = response_stage(case_path, basis_file, folder, assignments, force, report)
+    for peak in summary["resonances"]:
+        report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m")
+    return folder / "response.csv", converged
+
+
 def is_case(path: Path) -> bool:
     """True for a case file (it names a body), False for a body file."""
     return path.is_file() and path.suffix == ".toml" and "body" in load_toml(path)

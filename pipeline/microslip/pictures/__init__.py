@@ -92,7 +92,7 @@ def draw_all(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Path] = {}
-    if scenes and basis.mesh.n_cells:
+    if scenes and basis.mesh.n_cells:  # a system by hand or a test has points alone
         drawn |= _scenes(basis, folder, report)
     report("curves")
     first = basis.groups[min(basis.groups)]

@@ -1,0 +1,240 @@
+"""Small systems by hand against closed forms, against direct solutions of M x'' + C x' + K x = f, and their file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from microslip.basis import check_basis, read_basis, write_basis
+from microslip.cli import main
+from microslip.data import UserError
+from microslip.harmonic_balance import JenkinsContact, frequency_response, stuck_frequencies
+from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
+
+ROOT = Path(__file__).resolve().parents[1]
+THREE = (ROOT / "pipeline/microslip/templates/three-masses/system.toml").read_text(encoding="utf-8")
+
+
+def chain(ratio: float = 0.01, dampers: bool = True) -> System:
+    names = ["m1", "m2", "m3"]
+    return System(
+        "chain",
+        [Body(n, 2.0, (float(i), 0, 0), free="x") for i, n in enumerate(names)],
+        [Spring(a, b, 5e3) for a, b in zip(["ground", *names], names, strict=False)]
+        + ([Damper("m1", "m2", 0.7)] if dampers else []),
+        [Contact("rub", "m3", normal=(0, 0, 1))],
+        [Force("shaker", "m1", (1, 0, 0))],
+        [Monitor("end", "m3")],
+        ratio=ratio,
+    )
+
+
+def failed(system: System) -> list[str]:
+    return [c.name for c in check_basis(system.basis()) if not c.passed]
+
+
+def test_chain_of_masses() -> None:
+    """omega_j = 2 sqrt(k/m) sin((2j - 1) pi / (2 (2n + 1))) of a fixed-free chain."""
+    g = chain().basis().groups[0, 0]
+    expected = 2 * np.sqrt(5e3 / 2) * np.sin((2 * np.arange(1, 4) - 1) * np.pi / 14)
+    np.testing.assert_allclose(g.omega, expected, rtol=1e-12)
+    assert failed(chain()) == []
+
+
+def test_rigid_bar_on_two_springs() -> None:
+    """Heave 2k/m, pitch 2k (L/2)^2 / J: the springs act at the ends, off the centre of mass."""
+    k, m, J, half = 3e4, 4.0, 0.2, 0.3
+    bar = Body("bar", m, (0.1, 0.2, 0.3), inertia=(0.1, J, 0.1), free="z ry")
+    ends = [(0.1 + s * half, 0.2, 0.3) for s in (-1, 1)]
+    system = System("bar", [bar], [Spring("ground", "bar", k, axis=(0, 0, 1), at=e) for e in ends])
+    np.testing.assert_allclose(
+        np.sort(system.basis().groups[0, 0].omega ** 2), np.sort([2 * k / m, 2 * k * half**2 / J]), rtol=1e-12
+    )
+
+
+def test_two_free_bodies_keep_their_rigid_motions() -> None:
+    """Twelve coordinates, one line spring: omega^2 = k (1/m1 + 1/m2) and eleven motions without stiffness."""
+    J = (0.1, 0.2, 0.3)
+    system = System("pair", [Body("a", 2.0, (0, 0, 0), J), Body("b", 3.0, (0, 0, 1.0), J)], [Spring("a", "b", 1e5)])
+    basis = system.basis()
+    g = basis.groups[0, 0]
+    assert g.kind == ("rigid",) * 11 + ("normal",) and basis.free
+    assert g.omega[-1] ** 2 == pytest.approx(1e5 * (1 / 2 + 1 / 3), rel=1e-12)
+    assert basis.mass == 5.0
+    np.testing.assert_allclose(basis.centre, [0, 0, 0.6], rtol=1e-15)
+    reduced = 2 * 3 / 5
+    np.testing.assert_allclose(np.diag(basis.inertia), [0.2 + reduced, 0.4 + reduced, 0.6], rtol=1e-12)
+    assert failed(system) == []
+
+
+def test_rows_of_a_contact_off_the_centre() -> None:
+    """u(P) = u + phi x (P - c), in the contact's own frame."""
+    body = Body("a", 1.0, (1.0, 0, 0), inertia=(1, 1, 1))
+    system = System("one", [body], [Spring("ground", "a", (1, 1, 1, 1, 1, 1))], [Contact("c", "a", (1, 0, 0))])
+    rows, point = system.rows_at("a", (1.0, 2.0, 0.0), "")
+    np.testing.assert_allclose(rows[:3, 3:], [[0, 0, -2], [0, 0, 0], [2, 0, 0]])  # phi_z moves it along -x
+    R = system.contacts[0].rotation
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(R) == pytest.approx(1)
+    g = system.basis().groups[0, 0]
+    T = g.interfaces["c"].rows
+    np.testing.assert_allclose(T @ T.T, np.eye(6), atol=1e-12)  # M = 1: all six rows of a unit body
+
+
+def direct(system: System, frequency: np.ndarray, k: float = 0.0) -> np.ndarray:
+    """The last coordinate under a unit force on the first one, by (K + i w C - w^2 M)^-1; k: ground spring there."""
+    M, C, K = system.matrices()
+    X, omega = scipy.linalg.eigh(K, M)[1], np.sqrt(scipy.linalg.eigh(K, M)[0])
+    C = C + M @ X @ np.diag(2 * system.ratio * omega) @ X.T @ M
+    K = K.copy()
+    K[-1, -1] += k
+    w = 2 * np.pi * frequency
+    return np.array([np.linalg.solve(K + 1j * v * C - v**2 * M, np.eye(len(M))[:, 0])[-1] for v in w])
+
+
+def test_linear_response_is_that_of_the_matrices() -> None:
+    """Dampers couple the modes: C_r is full, and the response exact all the same."""
+    basis = chain().basis()
+    g, f = basis.groups[0, 0], np.linspace(1, 20, 37)
+    assert np.abs(g.C_r - np.diag(np.diag(g.C_r))).max() > 0.01
+    found = frequency_response(g, [], g.excitations["shaker"].rows[0], g.monitors["end"].rows[0], f)
+    np.testing.assert_allclose(found.monitor, direct(chain(), f), rtol=1e-10)
+
+
+def test_jenkins_element_between_free_and_stuck() -> None:
+    """Far below its limit a spring; with no limit nothing; between, the loop it draws loses 4 limit (a - limit/k)."""
+    g, f, k = chain().basis().groups[0, 0], np.linspace(2, 12, 41), 4e3
+    force, read = g.excitations["shaker"].rows[0], g.monitors["end"].rows[0]
+
+    def rub(limit: float) -> JenkinsContact:
+        return JenkinsContact("rub", np.zeros(6), 1, k, limit)
+
+    stuck = frequency_response(g, [rub(1e9)], force, read, f)
+    np.testing.assert_allclose(stuck.monitor, direct(chain(), f, k), rtol=1e-9)
+    loose = frequency_response(g, [rub(1e-12)], force, read, f)
+    np.testing.assert_allclose(loose.monitor, direct(chain(), f), rtol=1e-7)  # a limit of 1e-12 N against 1 N
+    M, _, K = chain().matrices()
+    K[-1, -1] += k
+    expected = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)) / (2 * np.pi)
+    np.testing.assert_allclose(stuck_frequencies(g, [rub(1.0)]), expected, rtol=1e-12)
+    slides = frequency_response(g, [rub(0.5)], force, read, f)
+    a = np.abs(slides.slip[:, 0])
+    assert slides.converged.all() and (a > 0.5 / k).any()
+    loop = np.where(a > 0.5 / k, 4 * 0.5 * (a - 0.5 / k), 0.0)
+    np.testing.assert_allclose(slides.dissipated, loop, rtol=1e-9, atol=1e-15)
+
+
+def test_matrices_and_members_give_the_same_modes() -> None:
+    M, C, K = chain().matrices()
+    more = {"contacts": [Contact("rub", "3", normal=(0, 0, 1))], "ratio": 0.01}
+    a, b = chain().basis(), System.of_matrices("chain", M, K, C, **more).basis()
+    g, h = a.groups[0, 0], b.groups[0, 0]
+    np.testing.assert_allclose(h.omega, g.omega, rtol=1e-13)
+    np.testing.assert_allclose(h.phi, g.phi, atol=1e-13)
+    np.testing.assert_allclose(h.C_r, g.C_r, atol=1e-13)
+    assert b.mass == pytest.approx(6.0, rel=1e-15)
+    np.testing.assert_allclose(b.inertia, a.inertia, rtol=1e-15)
+
+
+def test_signs_and_files_are_definite(tmp_path: Path) -> None:
+    """The contact's rows rule; a mode that does not move it is ruled by the displacements; same bytes again."""
+    g = chain().basis().groups[0, 0]
+    assert (g.interfaces["rub"].rows[1] > 0).all()
+    for name in ("a.h5", "b.h5"):
+        write_basis(tmp_path / name, chain().basis())
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    assert read_basis(tmp_path / "a.h5").source == "matrices"
+
+
+# ---------------------------------------------------------------- the file
+
+
+def test_the_template_is_the_same_system(tmp_path: Path) -> None:
+    (tmp_path / "system.toml").write_text(THREE)
+    masses = [Body(f"m{i}", 1.0, (float(i), 0, 0), free="x") for i in (1, 2, 3)]
+    springs = [Spring(a, b, 1e4) for a, b in (("ground", "m1"), ("m1", "m2"), ("m2", "m3"))]
+    rub = Contact("rub", "m3", (0, 0, -1), (0, 1, 0))
+    by_hand = System("three-masses", masses, [*springs, Damper("m1", "m2", 0.2)], [rub], ratio=0.005).basis()
+    g, h = by_hand.groups[0, 0], system_basis(tmp_path / "system.toml").groups[0, 0]
+    for key in ("omega", "C_r", "phi"):
+        np.testing.assert_array_equal(getattr(g, key), getattr(h, key))
+    np.testing.assert_array_equal(g.interfaces["rub"].rows, h.interfaces["rub"].rows)
+    np.testing.assert_allclose(g.interfaces["rub"].rotation[1], [-1, 0, 0], atol=1e-15)
+
+
+def test_matrices_in_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "system.toml"
+    path.write_text(
+        'name = "two"\n[matrices]\nmass = [[2, 0], [0, 2]]\nstiffness = [[3e3, -1e3], [-1e3, 3e3]]\n'
+        '[[monitors]]\nname = "end"\non = "2"\n'
+    )
+    np.testing.assert_allclose(system_basis(path).groups[0, 0].omega ** 2, [1e3, 2e3], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('free = "x"', 'free = "q"', "no list of directions"),
+        ('free = "x"', 'free = "rx"', "does not turn"),
+        ("mass = 1.0", "mass = 0.0", "no mass"),
+        ("stiffness = 1e4", "stiffness = -1e4", "not negative"),
+        ("stiffness = 1e4", "stiffness = [1.0, 2.0]", "one, three or six"),
+        ('"m2", "m3"', '"m2", "m7"', "no member 'm7'"),
+        ('on = "m3"', 'on = "m4"', "no member 'm4'"),
+        ("[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]", "parallel to the normal"),
+        ('name = "m2"', 'name = "m1"', "taken"),
+        ('name = "m2"', 'name = "m2"\nwheight = 2', "wheight"),
+        ("damping_ratio = 0.005", "damping_ratio = true", "damping_ratio"),
+        ("damping_ratio = 0.005", "[matrices]\nmass = [[1.0]]\nstiffness = [[1.0]]", "free to move in 3 directions"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = tmp_path / "system.toml"
+    path.write_text(THREE.replace(old, new, 1))
+    with pytest.raises(UserError, match=words) as found:
+        system_basis(path)
+    assert str(path) in str(found.value)
+
+
+def test_matrices_that_no_system_has() -> None:
+    for M, K, words in (
+        (np.eye(2), [[1.0, 2], [3, 4]], "not symmetric"),
+        (np.eye(2), [[1.0, 2], [2, 1]], "not positive"),
+        (np.diag([1.0, 0]), np.eye(2), "no mass"),
+        (np.eye(2), np.full((2, 2), np.nan), "not finite"),
+        (np.eye(2), "abc", "lists of 2 numbers"),
+    ):
+        with pytest.raises(UserError, match=words):
+            System.of_matrices("s", M, K).basis()
+    with pytest.raises(UserError, match="no spring holds"):
+        System("s", [Body("a", 1.0, free="x")], [Damper("ground", "a", 1.0)]).basis()
+    with pytest.raises(UserError, match="Give its axis"):
+        System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis()
+
+
+# ---------------------------------------------------------------- the command line
+
+
+def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "three-masses"]) == 0
+    case = tmp_path / "three-masses" / "case.toml"
+    case.write_text(case.read_text().replace("points = 600", "points = 60"))
+    assert main(["run", "three-masses", "-q"]) == 0
+    summary = json.loads((tmp_path / "build" / "three-masses" / "response.json").read_text())
+    assert summary["failed_points"] == 0
+    stuck = summary["stuck_frequencies_Hz"]
+    M, _, K = load_system("three-masses/system.toml").matrices()
+    K[-1, -1] += 5e3
+    np.testing.assert_allclose(stuck, np.sqrt(np.linalg.eigvalsh(K)) / (2 * np.pi), rtol=1e-10)
+    assert M.tolist() == np.eye(3).tolist()
+    assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 0
+    assert main(["check", "build/three-masses/basis.h5", "-q"]) == 0
+    assert main(["info", "build/three-masses/basis.h5"]) == 0
+    assert main(["modes", "three-masses", "--set", "masses.m1.mass=-1", "-q"]) == 2
+    case.write_text(case.read_text().replace('body = "three-masses"', 'body = "four"'))
+    assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 2
