@@ -25,11 +25,12 @@ class Condensed:
         self.boundary = boundary
         self.upper: sp.csr_matrix | None = None
         self.schur: Array = np.zeros((0, 0))
+        self.reduced: tuple[HarmonicSolver, _Dense] | None = None
 
     def factorise(self, upper: sp.csr_matrix) -> None:
         """Factorise, unless it is this matrix that was factorised last."""
         if upper is not self.upper:
-            self.upper = None
+            self.upper = self.reduced = None
             self._factorise(upper)
             self.upper = upper
 
@@ -154,41 +155,58 @@ class HarmonicSolver(DirectSolver):
         self.condensed, self.name = condensed, condensed.name
         self._P = sp.csr_matrix(sp.vstack([sp.csr_matrix(sp.identity(block.shape[0])), phase * block]))
         self._T, self._stay = transformation, stay
-        self._reduced: Array = np.zeros((0, 0))
-        self._factor: tuple[Array, bool] | None = None
-        self._lu: tuple[Array, Array] | None = None
 
     def factorise(self, upper: sp.csr_matrix) -> None:
         self.condensed.factorise(upper)
+        self._reduce()
+
+    def _reduce(self) -> _Dense:
         half = self._P.conj().T @ self.condensed.schur
-        reduced = (self._P.T @ half.T).T  # P^H S P
-        self._reduced = 0.5 * (reduced + reduced.conj().T)
-        self._factor = self._lu = None
-        try:
-            self._factor = scipy.linalg.cho_factor(self._reduced, check_finite=False)
-        except scipy.linalg.LinAlgError:
-            pass  # an indefinite one is asked for its inertia, hardly ever solved with
+        dense = _Dense((self._P.T @ half.T).T)  # P^H S P
+        self.condensed.reduced = (self, dense)
+        return dense
+
+    @property
+    def _dense(self) -> _Dense:
+        """The small factors; of all nodal diameters only those asked last are kept, each is as large as S."""
+        kept = self.condensed.reduced
+        return kept[1] if kept is not None and kept[0] is self else self._reduce()
 
     def solve(self, b: Array) -> Array:
         flat = b.reshape(len(b), -1)
         whole = np.zeros((self._T.shape[0], flat.shape[1]), dtype=flat.dtype)
         whole[self._stay] = flat
         y = as_complex(self.condensed.forward(as_real(whole)), flat.dtype)
-        x_left = self._solve_reduced(self._P.conj().T @ y[self.condensed.boundary])
+        x_left = self._dense.solve(self._P.conj().T @ y[self.condensed.boundary])
         x = self.condensed.backward(as_real(y), as_real(self._P @ x_left))
         return as_complex(x, flat.dtype)[self._stay].reshape(b.shape)
 
-    def _solve_reduced(self, g: Array) -> Array:
+    def negative(self) -> int:
+        return self.condensed.negative() + self._dense.negative()
+
+
+class _Dense:
+    """Factors of a dense Hermitian matrix: Cholesky's, or where it is indefinite L U."""
+
+    def __init__(self, A: Array) -> None:
+        self._A: Array | None = 0.5 * (A + A.conj().T)
+        self._factor: tuple[Array, bool] | None = None
+        try:
+            self._factor = scipy.linalg.cho_factor(self._A, check_finite=False)
+            self._A = None
+        except scipy.linalg.LinAlgError:
+            pass  # an indefinite one is asked for its inertia, hardly ever solved with
+
+    def solve(self, g: Array) -> Array:
         if self._factor is not None:
             return scipy.linalg.cho_solve(self._factor, g, check_finite=False)
-        if self._lu is None:
-            self._lu = scipy.linalg.lu_factor(self._reduced)
-        if not np.isfinite(self._lu[0]).all():
-            raise NotConverged("the condensed matrix of the cut faces is singular; the sector is not held")
-        return scipy.linalg.lu_solve(self._lu, g)
+        try:
+            return scipy.linalg.solve(self._A, g, assume_a="her")
+        except scipy.linalg.LinAlgError as error:
+            raise NotConverged("the condensed matrix of the cut faces is singular; the sector is not held") from error
 
     def negative(self) -> int:
-        return self.condensed.negative() + (0 if self._factor is not None else negative_eigenvalues(self._reduced))
+        return 0 if self._A is None else negative_eigenvalues(self._A)
 
 
 def as_real(x: Array) -> Array:

@@ -73,14 +73,13 @@ class Sector:
         for k, pencil in pencils.items():
             report(f"eigenmodes: nodal diameter {k}")
             unknowns = HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
-            found.append(search(model, settings, pencil, unknowns, speed, motions, rows))
+            found.append(search(model, settings, pencil, unknowns, speed, motions, rows, f"nodal diameter {k}"))
         if settings.modes.certify:
             report("certifying the spectra by the inertia count")
             found = certified(found)
-        return {
-            k: reduced_solution(model, settings, s, rows, report)
-            for k, s in zip(pencils, found, strict=True)
-        }  # fmt: skip
+        if settings.reduction != "eigenmodes":
+            report(f"reduction: {settings.reduction}")
+        return {k: reduced_solution(model, settings, s, rows) for k, s in zip(pencils, found, strict=True)}
 
     def close(self) -> None:
         """Release memory."""

@@ -77,9 +77,9 @@ class Solution:
 
 def search(
     model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, speed: float, motions: Array,
-    rows: BodyRows,
+    rows: BodyRows, where: str = "",
 ) -> Searched:  # fmt: skip
-    """Modes and static answers of the stiffness about one state.
+    """Modes and static answers of the stiffness about one state; where: ``nodal diameter 3``, for messages.
 
     Raises:
         UserError: instability, more modes than degrees of freedom.
@@ -96,7 +96,7 @@ def search(
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
-        raise UserError(_divergence(settings, speed, error.count, model)) from error
+        raise UserError(_divergence(settings, speed, error.count, model, where)) from error
     B, labels = rows.stacked(settings)
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
@@ -142,9 +142,7 @@ def shared_shifts(gaps: Sequence[tuple[float, float]], margin: float = 0.05) -> 
     return chosen
 
 
-def reduced_solution(
-    model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows, report: Report
-) -> Solution:  # fmt: skip
+def reduced_solution(model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
     """The reduction of certified modes and static answers, in one definite form."""
     points = model.d.mesh.points
     return reduced_on(canonical.by_place(points), len(points), settings, s, rows, report)
@@ -168,8 +166,6 @@ def reduced_on(
         s.pencil, s.found.values[:keep], vectors[:, :keep], zero, s.B[np.array(exact, dtype=int)],
         tuple(s.labels[i] for i in exact), s.answers[:, exact], settings.modes.certify, s.shift,
     )  # fmt: skip
-    if settings.reduction != "eigenmodes":
-        report(f"reduction: {settings.reduction}")
     reduced = METHODS[settings.reduction](problem)
     plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
     T = np.asarray(s.B @ reduced.vectors)
@@ -194,7 +190,9 @@ def solution(
     if settings.modes.certify:
         report("certifying the spectrum by the inertia count")
         found = certified([found])[0]
-    return reduced_solution(model, settings, found, rows, report)
+    if settings.reduction != "eigenmodes":
+        report(f"reduction: {settings.reduction}")
+    return reduced_solution(model, settings, found, rows)
 
 
 def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) -> Array:
@@ -206,7 +204,7 @@ def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) ->
     return held(T, labels, reduced.kind, reduced.K_r, reduced.omega, reduced.to_diagonal)
 
 
-def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel) -> str:
+def _divergence(settings: BodySettings, speed: float, count: int, model: BodyModel, where: str) -> str:
     if not speed and not model.loaded:
         return (
             f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
@@ -219,8 +217,8 @@ def _divergence(settings: BodySettings, speed: float, count: int, model: BodyMod
     elif not speed:
         remedy = "reduce the loads or the temperature change, or check the material"
     return (
-        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm {count} eigenvalue{'s are' if count > 1 else ' is'} "
-        f"negative: the body diverges; {remedy}"
+        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm{where and ', ' + where + ','} {count} "
+        f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}"
     )
 
 
