@@ -200,6 +200,7 @@ class _Dense:
     def solve(self, g: Array) -> Array:
         if self._factor is not None:
             return scipy.linalg.cho_solve(self._factor, g, check_finite=False)
+        assert self._A is not None
         try:
             return scipy.linalg.solve(self._A, g, assume_a="her")
         except scipy.linalg.LinAlgError as error:
