@@ -62,7 +62,7 @@ def foreign_basis(
         place = np.concatenate(
             [canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)]
         )
-        solved = reduced_on(place, layout.width // 3, settings, s, rows, report)
+        solved = reduced_on(place, layout.width // 3, settings, s, rows)
     finally:
         solver.close()
     group = _group(body, settings, solved, rows, layout, free, motions)

@@ -145,12 +145,10 @@ def shared_shifts(gaps: Sequence[tuple[float, float]], margin: float = 0.05) -> 
 def reduced_solution(model: BodyModel, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
     """The reduction of certified modes and static answers, in one definite form."""
     points = model.d.mesh.points
-    return reduced_on(canonical.by_place(points), len(points), settings, s, rows, report)
+    return reduced_on(canonical.by_place(points), len(points), settings, s, rows)
 
 
-def reduced_on(
-    place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows, report: Report
-) -> Solution:  # fmt: skip
+def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows: BodyRows) -> Solution:
     """The same of a body of n points, whose degrees of freedom take precedence in the order `place`."""
     zero = s.R.shape[1]
     static = np.asarray(s.B @ s.answers)
