@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from meshes import STEEL, body, brick, nearest, twisted_blade
 
+from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.body import Rotation
 from microslip.campbell import track_basis
 from microslip.data import ModalBasis, UserError
 from microslip.modes import modal_basis
-from microslip.modes.common import Settled, Solved, common_coordinates, interpolated, lagrange, variable
+from microslip.modes.common import Interpolant, Settled, Solved, common_coordinates, hermite, lagrange, variable
+from microslip.modes.equilibrium import equilibrium, stiffness_slope
 from microslip.speed_range import basis_at, dense_pencil, frequencies_over, group_at
 
 BLADE = twisted_blade(n=(1, 3, 7), thickness=0.003)
@@ -72,8 +74,35 @@ def test_the_root_keeps_definiteness_and_commuting_families_exact() -> None:
     """Diagonal K = B (Omega^2 + a): the roots are straight lines in sqrt(Omega^2 + a)."""
     speeds, a = np.array([0.0, 400.0]), 3e4
     K = np.array([np.diag([1.0, 7.0, 30.0]) * (s**2 + a) for s in speeds])
-    found = interpolated(K, lagrange(speeds, 123.0, a), "root")
+    found = Interpolant(speeds, K, np.zeros((0, 3, 3)), "root", a).stiffness(123.0)
     np.testing.assert_allclose(found, np.diag([1.0, 7.0, 30.0]) * (123.0**2 + a), rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize("shift", [None, 2.0e5])
+def test_hermite_reproduces_polynomials_of_twice_the_degree(shift: float | None) -> None:
+    samples = np.array([0.0, 400.0, 1000.0])
+    for speed in (0.0, 55.5, 400.0, 940.0):
+        w, v = hermite(samples, speed, shift)
+        for power in range(6):
+            t, along = variable(samples, shift), 1.0 if shift is None else 1 / (2 * variable(samples, shift))
+            values, slopes = t**power, power * t ** max(power - 1, 0) * along
+            assert w @ values + v @ slopes == pytest.approx(
+                float(variable(speed, shift)) ** power, abs=1e-12 * values.max()
+            )
+
+
+def test_slopes_of_the_root_are_its_derivative() -> None:
+    """Two samples with slopes against a cubic family's own root in between: fourth order in their distance."""
+    K0, K1, K2 = (random_hermitian(8, s, 1.0, 50.0) for s in (4, 5, 6))
+    errors = []
+    for width in (40.0, 20.0):
+        s = np.array([100.0 - width, 100.0 + width])
+        x = (s / 100) ** 2
+        K = K0 + x[:, None, None] * K1 + x[:, None, None] ** 3 * K2
+        slopes = (K1 + 3 * x[:, None, None] ** 2 * K2) / 1e4
+        found = Interpolant(s, K, slopes, "root", 3e3).stiffness(100.0)
+        errors.append(np.abs(found - (K0 + K1 + K2)).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.5)
 
 
 # the builder on small matrices, complex ones too -------------------------------------------------------------------
@@ -107,11 +136,10 @@ def test_complex_hermitian_family_meets_its_tolerance_at_every_speed() -> None:
 
     found = family(stiffness, 5)
     assert max(h.total for h in found.held_out) <= 1e-4 and len(found.held_out) >= 2
-    speeds = np.array([s.speed for s in found.samples])
-    assert not set(speeds) & {h.speed for h in found.held_out}
+    assert not set(found.interpolant().samples) & {h.speed for h in found.held_out}
     assert np.iscomplexobj(found.V) and found.orthogonality < 1e-12
     for speed in np.linspace(0, 100, 23):
-        K = interpolated(found.K_r, lagrange(speeds, speed, found.shift), found.form)
+        K = found.interpolant().stiffness(speed)
         true = np.linalg.eigvalsh(stiffness((speed / 100) ** 2))[:5]
         assert np.abs(np.sqrt(np.linalg.eigvalsh(K)[:5] / true) - 1).max() < 3e-4  # between the held-out speeds
 
@@ -125,12 +153,13 @@ def test_a_mode_that_the_samples_do_not_know_is_noticed() -> None:
     def stiffness(x: float) -> np.ndarray:
         return np.diag(np.concatenate([rest, [1.1 + 200 * (x - dive) ** 2]]))
 
-    known = [np.sort(np.diag(stiffness((s.speed / 100) ** 2)))[6] for s in start.samples]
-    assert all(1.1 + 200 * ((s.speed / 100) ** 2 - dive) ** 2 > k for s, k in zip(start.samples, known, strict=True))
+    for speed in start.solved:
+        diagonal = np.diag(stiffness((speed / 100) ** 2))
+        assert np.sort(diagonal)[6] < diagonal[-1]  # not among the seven modes solved for
     found = family(stiffness, 3)
     assert len(start.solved) == 3 and len(found.solved) > 3
-    speeds, at = np.array([s.speed for s in found.samples]), 100 * np.sqrt(dive)
-    K = interpolated(found.K_r, lagrange(speeds, at, found.shift), found.form)
+    at = 100 * np.sqrt(dive)
+    K = found.interpolant().stiffness(at)
     np.testing.assert_allclose(np.linalg.eigvalsh(K)[:3], np.linalg.eigvalsh(stiffness(dive))[:3], rtol=3e-4)
 
 
@@ -146,6 +175,25 @@ def test_without_and_with_linear_prestress_the_interpolation_is_exact(kind: str)
     assert r.interpolation_error.max() < 1e-7  # rounding: |K_r| is some 1e8 times the lowest eigenvalue
     for rpm in (0.31 * top, 0.87 * top):
         assert frequency_error(ranged(kind, top=top), rpm, kind) < r.tolerance
+
+
+@pytest.mark.parametrize("rpm", [0.0, 9000.0])
+def test_the_slope_of_the_stiffness_is_that_of_the_equilibria(rpm: float) -> None:
+    """dK/dOmega^2 and du/dOmega^2 against differences of equilibria at two neighbouring speeds."""
+    from test_rotation import model_of
+
+    model, solver = model_of(BLADE, body(supports=[{"face": "z0"}])), eigen.new_solver("superlu")
+    speed, h = rpm * np.pi / 30, 30.0**2
+    state = equilibrium(model, speed, "nonlinear", solver)
+    du, dK = stiffness_slope(model, state, solver)
+    offsets = (h, 2 * h) if rpm == 0 else (-h, h)  # one-sided at rest
+    ends = [equilibrium(model, np.sqrt(speed**2 + o), "nonlinear", solver) for o in offsets]
+    if rpm == 0:
+        u, K = ((4 * getattr(ends[0], k) - getattr(ends[1], k) - 3 * getattr(state, k)) / (2 * h) for k in "uK")
+    else:
+        u, K = ((getattr(ends[1], k) - getattr(ends[0], k)) / (2 * h) for k in "uK")
+    assert np.abs(u - du).max() < 1e-4 * np.abs(du).max()
+    assert np.abs(K - dK).max() < 1e-4 * np.abs(dK).max()
 
 
 def test_estimate_at_held_out_speeds_is_the_true_error() -> None:
@@ -193,7 +241,7 @@ def test_at_a_solved_speed_the_range_gives_what_was_solved_for() -> None:
     """Frequencies, rows with their signs, static state, gauges, compliance, Coriolis: to rounding of the root."""
     basis = ranged()
     r = basis.ranges[0]
-    rpm = float(r.speeds[r.solved][1] * 30 / np.pi)
+    rpm = float(r.speeds[r.solved][1] * 30 / np.pi)  # between the ends
     got, true = group_at(basis, rpm), solved(rpm)
     np.testing.assert_allclose(got.omega, true.omega[:6], rtol=1e-7)
     np.testing.assert_allclose(got.u_static, true.u_static, atol=1e-8 * np.abs(true.u_static).max())

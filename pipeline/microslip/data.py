@@ -435,24 +435,27 @@ class SpeedRange:
         samples: s groups at rising speeds in the SAME c coordinates: M_r = 1, K_r the projected stiffness about the
             equilibrium there, to_diagonal the modes; phi and patch shapes are one array for all.
         solved: (s,) True where the modes were solved for (certified), False where only the equilibrium was.
+        held: (s,) True for the h speeds held out: their K_r is compared, not used. All else of them is used.
+        slopes: (s - h, c, c) dK_r/dOmega^2 at the samples not held out, or (0, c, c) where they are not needed.
         form: what of the stiffness is interpolated: ``stiffness`` K_r, or its ``root`` K_r^(1/2).
         shift: a of the variable sqrt(Omega^2 + a) of all polynomials, (rad/s)^2; None: the variable is Omega^2.
         count: modes kept in a group made from the range.
         lead: (k, c) read-outs that decide the basis of pairs; the first `signs` of them decide signs (0: phi does).
-        held_out: (h,) rad/s, speeds at which the true stiffness was compared: largest relative frequency error of the
-            kept modes by interpolation, by projection, and in total, (h,) each.
+        interpolation_error, projection_error, total_error: (h,) largest relative frequency error of the kept modes at
+            the held-out speeds.
         tolerance: that the total was held to. points: (p,) rad/s, speeds of the Campbell diagram.
         gyroscopic: whether groups made from the range have their gyroscopic modes.
     """
 
     samples: tuple[ModalGroup, ...]
     solved: Array
+    held: Array
+    slopes: Array
     form: str
     shift: float | None
     count: int
     lead: Array
     signs: int
-    held_out: Array
     interpolation_error: Array
     projection_error: Array
     total_error: Array
@@ -464,6 +467,11 @@ class SpeedRange:
     def speeds(self) -> Array:
         """(s,) rad/s."""
         return np.array([g.speed for g in self.samples])
+
+    @property
+    def held_out(self) -> Array:
+        """(h,) rad/s."""
+        return self.speeds[self.held]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from .data import (
 )
 from .gyroscopic import gyroscopic_modes
 from .modes import canonical
-from .modes.common import interpolated, lagrange, root
+from .modes.common import Interpolant, lagrange
 from .modes.compute import modal_damping, without_massless
 from .modes.solution import held_compliance
 from .reduction import METHODS, Problem, Reduced
@@ -83,7 +83,7 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
     Much cheaper than `group_at`: nothing of the mesh's size is touched. The modes are orthonormal.
     """
     count = count or r.count
-    parts = _StiffnessParts(r)
+    parts = interpolant(r)
     omega, modes = np.empty((len(speeds), count)), []
     for i, speed in enumerate(speeds):
         values, Y = parts.modes(float(speed))
@@ -92,22 +92,10 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
     return omega, modes
 
 
-class _StiffnessParts:
-    """What is interpolated of the samples' stiffness, taken apart once for many speeds."""
-
-    def __init__(self, r: SpeedRange) -> None:
-        self.range = r
-        K = np.array([g.K_r for g in r.samples])
-        self.parts = K if r.form == "stiffness" else np.array([root(k) for k in K])
-
-    def modes(self, speed: float) -> tuple[Array, Array]:
-        """(c,) frequencies, rad/s, and (c, c) orthonormal modes."""
-        part = np.tensordot(lagrange(self.range.speeds, speed, self.range.shift), self.parts, 1)
-        values, Y = np.linalg.eigh(part)
-        if self.range.form == "stiffness":
-            return np.sqrt(np.maximum(values, 0.0)), Y
-        order = np.argsort(np.abs(values), kind="stable")
-        return np.abs(values[order]), Y[:, order]
+def interpolant(r: SpeedRange) -> Interpolant:
+    """The stiffness of a range at any of its speeds."""
+    K = np.array([g.K_r for g, held in zip(r.samples, r.held, strict=True) if not held])
+    return Interpolant(r.speeds[~r.held], K, r.slopes, r.form, r.shift)
 
 
 class _Evaluated:
@@ -116,7 +104,8 @@ class _Evaluated:
     def __init__(self, basis: ModalBasis, r: SpeedRange, speed: float) -> None:
         self.basis, self.range, self.speed = basis, r, speed
         self.weights = lagrange(r.speeds, speed, r.shift)
-        self.K = interpolated(np.array([g.K_r for g in r.samples]), self.weights, r.form)
+        found = interpolant(r)
+        self.K, self.modes = found.stiffness(speed), found.modes(speed)
         self.T = compliance_rows(r.samples[0])
 
     def between(self, values: Iterable[Array]) -> Array:
@@ -173,6 +162,7 @@ class _Evaluated:
             u_static=self.between(g.u_static for g in r.samples),
             compliance=self._compliance(),
             run_up=self._run_up(),
+            contacts={},
             invariants=None,  # they follow the displaced body and are asked for at speeds of their own
             prestress=last.prestress if self.speed else r.samples[0].prestress,
         )
@@ -221,7 +211,7 @@ class _Evaluated:
         labels = self.range.samples[0].compliance.labels
         exact = [i for i, label in enumerate(labels) if not label.startswith("monitor:")]
         T = self.T[exact]
-        values, Y = _StiffnessParts(self.range).modes(self.speed)
+        values, Y = self.modes
         values, Y = values[: self.range.count] ** 2, self._definite(Y[:, : self.range.count], values)
         self.problem = Problem(
             dense_pencil(self.K), values, Y, 0, sp.csr_matrix(T), tuple(labels[i] for i in exact),

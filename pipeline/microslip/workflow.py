@@ -729,12 +729,14 @@ def basis_summary(basis: ModalBasis) -> list[str]:
 
 def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
     """Samples and held-out errors of a speed range, in lines for the terminal."""
-    rpm = [f"{v:.6g}" for v in r.speeds * 30 / np.pi]
-    solved = [v for v, s in zip(rpm, r.solved, strict=True) if s]
+    solved, known, rpm = (
+        ", ".join(f"{v:.6g}" for v in speeds * 30 / np.pi)
+        for speeds in (r.speeds[r.solved], r.speeds[~r.held], r.speeds[[0, -1]])
+    )
     lines = [
-        f"{rpm[0]} to {rpm[-1]} rpm, nodal diameter {harmonic}: one basis of {r.samples[0].n_modes} coordinates for "
-        f"{r.count} modes",
-        f"  modes solved for at {', '.join(solved)} rpm; stiffness known at {', '.join(rpm)} rpm",
+        f"{rpm.replace(', ', ' to ')} rpm, nodal diameter {harmonic}: one basis of {r.samples[0].n_modes} coordinates "
+        f"for {r.count} modes",
+        f"  modes solved for at {solved} rpm; stiffness taken from {known} rpm",
     ]
     held = zip(r.held_out * 30 / np.pi, r.interpolation_error, r.projection_error, r.total_error, strict=True)
     lines += [

@@ -23,6 +23,7 @@ from ..data import (
     SpeedRange,
 )
 from ..gyroscopic import stability_sentence
+from ..modes.common import Interpolant, frequencies, largest_difference
 from .integrals import cell_volumes, face_mean, modal_mass
 
 TOLERANCES = {
@@ -139,24 +140,39 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
 
 def _range_checks(basis: ModalBasis, r: SpeedRange, mesh_is_sound: bool) -> _Findings:
     """The samples like groups (shapes and patches, which they share, once), and what the range claims of itself."""
-    s, c, h = len(r.samples), r.samples[0].n_modes, len(r.held_out)
+    s, c, h = len(r.samples), r.samples[0].n_modes, len(r.total_error)
     errors = (r.interpolation_error, r.projection_error, r.total_error)
-    fits = r.solved.shape == (s,) and r.lead.shape[1] == c and 0 < r.count <= c and 0 <= r.signs <= len(r.lead)
+    fits = r.solved.shape == r.held.shape == (s,) and int(r.held.sum()) == h
+    fits = fits and r.slopes.shape in ((s - h, c, c), (0, c, c)) and not (r.held & r.solved).any() and s - h > 1
+    fits = fits and r.lead.shape[1] == c and 0 < r.count <= c and 0 <= r.signs <= len(r.lead)
     fits = fits and all(e.shape == (h,) for e in errors) and all(g.n_modes == c for g in r.samples)
     fits = fits and r.form in ("stiffness", "root")
     found: _Findings = [("shapes of the arrays agree", 0.0 if fits else 1.0, 0.0, "")]
-    numbers = [r.lead, r.held_out, *errors, r.points, 0.0 if r.shift is None else r.shift, r.tolerance]
+    numbers = [r.lead, r.slopes, *errors, r.points, 0.0 if r.shift is None else r.shift, r.tolerance]
     found.append(("every number is finite", _not_finite(numbers), 0.0, ""))
     if not fits or found[-1][1]:
         return found
     found.append(("speeds of the samples rise", float((np.diff(r.speeds) <= 0).sum()), 0.0, ""))
     shift = r.speeds[0] ** 2 + (1.0 if r.shift is None else r.shift)
     found.append(("variable of the polynomials is real", 0.0 if shift > 0 else 1.0, 0.0, ""))
+    found.append(("interpolation error at held-out speeds is the one stated", _misstated(r), 0.0, ""))
     found.append(("frequency error at held-out speeds", _largest(r.total_error), r.tolerance, f"{h} speeds"))
     for i, g in enumerate(r.samples):
         for name, value, bound, remark in _group_checks(basis, g, mesh_is_sound and i == 0):
             found.append((f"sample_{i}: {name}", value, bound, remark))
     return found
+
+
+def _misstated(r: SpeedRange) -> float:
+    """How many held-out speeds have another interpolation error than the file says (to a tenth, and rounding)."""
+    K = np.array([g.K_r for g in r.samples])
+    f = Interpolant(r.speeds[~r.held], K[~r.held], r.slopes, r.form, r.shift)
+    wrong = 0
+    for speed, exact, stated in zip(r.held_out, K[r.held], r.interpolation_error, strict=True):
+        true = frequencies(exact, r.count)
+        error = largest_difference(f.modes(speed)[0][: r.count], true)
+        wrong += not abs(error - stated) <= 0.1 * stated + 1e-7
+    return float(wrong)
 
 
 def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:

@@ -264,7 +264,7 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
         put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
 
 
-_RANGE_FIELDS = ("held_out", "interpolation_error", "projection_error", "total_error", "points")
+_RANGE_ERRORS = ("interpolation_error", "projection_error", "total_error")
 
 
 def _write_range(group: h5py.Group, r: SpeedRange, axis: Array) -> None:
@@ -272,11 +272,13 @@ def _write_range(group: h5py.Group, r: SpeedRange, axis: Array) -> None:
     group.attrs["form"], group.attrs["count"], group.attrs["signs"] = r.form, r.count, r.signs
     group.attrs["shift"] = np.nan if r.shift is None else r.shift
     group.attrs["tolerance"], group.attrs["gyroscopic"] = r.tolerance, int(r.gyroscopic)
-    put(group, "solved", r.solved.astype(np.int64), dims=("sample",))
+    for name in ("solved", "held"):
+        put(group, name, getattr(r, name).astype(np.int64), dims=("sample",))
+    put(group, "slopes", r.slopes, "1", dims=("used", "mode", "mode_column"))
     put(group, "lead", r.lead, dims=("lead", "mode"))
-    for name in _RANGE_FIELDS:
-        unit = "rad/s" if name in ("held_out", "points") else "1"
-        put(group, name, getattr(r, name), unit, dims=("point" if name == "points" else "held_out",))
+    put(group, "points", r.points, "rad/s", dims=("point",))
+    for name in _RANGE_ERRORS:
+        put(group, name, getattr(r, name), "1", dims=("held_out",))
     for i, g in enumerate(r.samples):
         if i:
             faces = {k: replace(f, shapes=f.shapes[:0]) for k, f in g.interfaces.items()}
@@ -686,13 +688,14 @@ def _read_range(file: h5py.File, group: h5py.Group, mesh: Mesh) -> SpeedRange:
         samples.append(g)
     if len(samples) < 2:
         raise ValueError(f"{group.name} holds fewer than two samples")
-    h, shift = len(group["held_out"]), float(group.attrs["shift"])
+    c, h, shift = samples[0].n_modes, len(group["total_error"]), float(group.attrs["shift"])
     return SpeedRange(
-        samples=tuple(samples), solved=np.asarray(group["solved"][()]).astype(bool), form=str(group.attrs["form"]),
+        samples=tuple(samples), form=str(group.attrs["form"]), slopes=_array(group, "slopes", None, c, c),
+        **{name: np.asarray(group[name][()]).astype(bool) for name in ("solved", "held")},
         shift=None if np.isnan(shift) else shift, count=int(group.attrs["count"]),
-        lead=_array(group, "lead", None, samples[0].n_modes), signs=int(group.attrs["signs"]),
+        lead=_array(group, "lead", None, c), signs=int(group.attrs["signs"]),
         tolerance=float(group.attrs["tolerance"]), gyroscopic=bool(group.attrs["gyroscopic"]),
-        **{name: _array(group, name, None if name == "points" else h) for name in _RANGE_FIELDS},
+        points=_array(group, "points", None), **{name: _array(group, name, h) for name in _RANGE_ERRORS},
     )  # fmt: skip
 
 

@@ -13,9 +13,9 @@ from ..data import Array, ModalGroup, SpeedRange, UserError
 from ..reduction import Reduced
 from . import canonical
 from .body_rows import BodyRows
-from .common import SPARE, Common, Settled, Solved, common_coordinates, lagrange
+from .common import SPARE, Common, Guess, Settled, Solved, common_coordinates, lagrange
 from .compute import assemble_group
-from .equilibrium import BodyModel, StaticState, equilibrium
+from .equilibrium import BodyModel, StaticState, equilibrium, stiffness_slope
 from .sector import HarmonicUnknowns, Sector, sector_pencils
 from .solution import Solution, Unknowns, solution
 from .spectrum import leading_rows, make_pencil
@@ -34,6 +34,11 @@ def body_ranges(
     """
     r = settings.rotation
     assert r.range_rpm is not None
+    if model.contacts:
+        raise UserError(
+            "rotation.range_rpm: faces that close at speed make the stiffness jump, which no range can follow; leave "
+            "the range out and use rotation.speeds_rpm"
+        )
     low, high = (v * np.pi / 30 for v in r.range_rpm)
     report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
     body = _Body(model, settings, motions, rows, solver, sector, report)
@@ -63,7 +68,9 @@ class _Body:
     sector: Sector | None
     report: Report
     states: dict[float, StaticState] = field(default_factory=dict)
+    slopes: dict[float, Array] = field(default_factory=dict)  # of the displacements
     pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
+    slope_pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
     solutions: dict[float, Mapping[int, Solution]] = field(default_factory=dict)
 
     def unknowns(self, k: int) -> Unknowns:
@@ -71,30 +78,35 @@ class _Body:
             return self.model.free
         return HarmonicUnknowns(self.sector.unknowns, self.sector.unknowns.transformation(k))
 
-    def settled(self, k: int) -> Callable[[float, Mapping[float, float]], Settled]:
-        """Equilibrium at a speed; Newton starts from the weighted displacements of the speeds known."""
+    def settled(self, k: int) -> Callable[[float, Guess], Settled]:
+        """Equilibrium at a speed; Newton starts from the weighted displacements and slopes of the speeds known."""
 
-        def settle(speed: float, weights: Mapping[float, float]) -> Settled:
+        def settle(speed: float, weights: Guess) -> Settled:
             if speed not in self.states:
                 self._settle(speed, weights)
-            return Settled(speed, self.pencils[speed][k], self.states[speed])
+            slope = self.slope_pencils[speed][k].K if speed in self.slope_pencils else None
+            return Settled(speed, self.pencils[speed][k], self.states[speed], slope)
 
         return settle
 
-    def _settle(self, speed: float, weights: Mapping[float, float]) -> None:
+    def _settle(self, speed: float, weights: Guess) -> None:
         start, prestress = None, self.settings.rotation.prestress
         if weights:
-            u = np.sum([w * self.states[s].u for s, w in weights.items()], axis=0)
+            u = np.sum([w * self.states[s].u for s, (w, _) in weights.items()], axis=0)
+            u += np.sum([v * self.slopes[s] for s, (_, v) in weights.items() if v], axis=0)
             start = StaticState(u, None, [], np.zeros(0), prestress)
         self.report(f"equilibrium at {speed * 30 / np.pi:.6g} rpm")
         state = equilibrium(self.model, speed, prestress, self.solver, start, self.report)
+        if prestress == "nonlinear":
+            self.slopes[speed], dK = stiffness_slope(self.model, state, self.solver)
+            self.slope_pencils[speed] = self._pencils(dK)
+        self.pencils[speed], self.states[speed] = self._pencils(state.K), state
+
+    def _pencils(self, K: Array) -> Mapping[int, eigen.Pencil]:
         s = self.sector
-        self.pencils[speed] = (
-            {0: make_pencil(self.model, state.K, self.solver)}
-            if s is None
-            else sector_pencils(self.model, state.K, s.unknowns, s.condensed, s.harmonics)
-        )
-        self.states[speed] = state
+        if s is None:
+            return {0: make_pencil(self.model, K, self.solver)}
+        return sector_pencils(self.model, K, s.unknowns, s.condensed, s.harmonics)
 
     def solve(self, k: int) -> Callable[[Settled], Solved]:
         """Certified modes, and with the methods that use them the static answers and fixed-interface modes."""
@@ -132,7 +144,8 @@ def _range(body: _Body, k: int, common: Common) -> SpeedRange:
         count=_kept(settings, common),
         lead=leading_rows(body.rows, settings, phi, canonical.by_place(model.d.mesh.points))(phi),
         signs=6 if settings.interfaces else 0,
-        held_out=np.array([h.speed for h in held]),
+        held=np.array([s.speed in {h.speed for h in held} for s in common.samples]),
+        slopes=common.slopes,
         interpolation_error=np.array([h.interpolation for h in held]),
         projection_error=np.array([h.projection for h in held]),
         total_error=np.array([h.total for h in held]),
@@ -171,7 +184,7 @@ def _samples(body: _Body, k: int, common: Common, phi: Array) -> list[ModalGroup
         if solved:
             checks["certified"] = float(s.found.certified)
         compliance = replace(group.compliance, eigenmodes=None)
-        group = replace(group, checks=checks, compliance=compliance)
+        group = replace(group, checks=checks, compliance=compliance, invariants=None)
         out.append(_shared(group, out[0]) if out else group)
     return out
 

@@ -11,6 +11,9 @@ do not matter. Two forms are tried and the better one is kept:
 - ``root``: K_r^(1/2), whose eigenvalues are the frequencies and whose entries cancel far less, as a polynomial in
   sqrt(Omega^2 + a): by Southwell's law omega^2 = B (Omega^2 + a) the first frequency is a straight line in it.
 
+Where the derivative dK/dOmega^2 of the whole operator is given as well, the polynomials are Hermite's: they agree with
+it at the samples, and a sample counts twice.
+
 Two errors are told apart at held-out speeds, where the true equilibrium and the true K are at hand:
 interpolation (frequencies from the interpolated against those from the projected K) and projection (from the
 projected K against those with the residuals of all modes added to V, each solved for once). The factorisation that
@@ -48,15 +51,21 @@ FAR = 30.0
 FORMS = ("stiffness", "root")
 
 Report = Callable[[str], None]
+Guess = Mapping[float, tuple[float, float]]
+"""Speed -> weights of the displacements there and of their slopes over Omega^2."""
 
 
 @dataclass(frozen=True)
 class Settled:
-    """The body in equilibrium at one speed, rad/s: its operators there, and whatever the caller keeps of the state."""
+    """The body in equilibrium at one speed, rad/s: its operators there, and whatever the caller keeps of the state.
+
+    slope: products with dK/dOmega^2 along the equilibria, or None.
+    """
 
     speed: float
     pencil: eigen.Pencil
     state: Any
+    slope: eigen.MatVec | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +93,8 @@ class Common:
     """Common coordinates of a range.
 
     Attributes:
-        V: (n, c) M-orthonormal shapes. samples: the settled body at rising speeds. K_r: (s, c, c) at the samples.
+        V: (n, c) M-orthonormal shapes. samples: the settled body at rising speeds, held-out ones among them.
+        K_r: (s, c, c) at the samples. slopes: (s - h, c, c) dK_r/dOmega^2 at those not held out, or none, (0, c, c).
         solved: speed -> its solution. held_out: the errors found. orthogonality: largest entry of |V^H M V - 1|.
         form: ``stiffness`` or ``root``. shift: a of the variable sqrt(Omega^2 + a), (rad/s)^2; None for Omega^2.
     """
@@ -92,11 +102,19 @@ class Common:
     V: Array
     samples: list[Settled]
     K_r: Array
+    slopes: Array
     solved: dict[float, Solved]
     held_out: list[HeldOut]
     orthogonality: float
     form: str
     shift: float | None
+
+    def interpolant(self) -> Interpolant:
+        """The stiffness at any speed, from the samples that are not held out."""
+        held = {h.speed for h in self.held_out}
+        used = [i for i, s in enumerate(self.samples) if s.speed not in held]
+        speeds = np.array([self.samples[i].speed for i in used])
+        return Interpolant(speeds, self.K_r[used], self.slopes, self.form, self.shift)
 
 
 # interpolation -----------------------------------------------------------------------------------------------------
@@ -118,42 +136,100 @@ def lagrange(samples: Array, speed: float, shift: float | None = None) -> Array:
     return weights / weights.sum()
 
 
-def root(K: Array) -> Array:
-    """Hermitian square root of a positive definite matrix."""
-    values, Q = np.linalg.eigh(K)
-    return (Q * np.sqrt(np.maximum(values, 0.0))) @ Q.conj().T
+def hermite(samples: Array, speed: float, shift: float | None) -> tuple[Array, Array]:
+    """(s,) weights of the values f and (s,) weights of the slopes df/dOmega^2 at the samples."""
+    t, at = variable(samples, shift), float(variable(speed, shift))
+    square = lagrange(samples, speed, shift) ** 2
+    own = _log_slopes(t)
+    along = np.ones_like(t) if shift is None else 2 * t  # dOmega^2 / dt
+    return (1 - 2 * own * (at - t)) * square, along * (at - t) * square
 
 
-def interpolated(K: Array, weights: Array, form: str) -> Array:
-    """(c, c) stiffness from those of the samples (s, c, c)."""
-    if form == "stiffness":
-        return np.tensordot(weights, K, 1)
-    S = np.tensordot(weights, np.array([root(k) for k in K]), 1)
-    return S @ S.conj().T
+def _log_slopes(t: Array) -> Array:
+    """(s,) derivative of each Lagrange polynomial at its own point."""
+    away = t[:, None] - t + np.diag(np.full(len(t), np.inf))
+    return (1 / away).sum(axis=1)
 
 
-def probes(samples: Array, K: Array, form: str, shift: float | None, kept: Sequence[float], count: int) -> list[float]:
+class Interpolant:
+    """K_r at any speed from those of samples, and from the slopes dK_r/dOmega^2 where they are known.
+
+    Args:
+        samples: (s,) rad/s, rising. K: (s, c, c). slopes: (s, c, c), or (0, c, c). form, shift: see `Common`.
+    """
+
+    def __init__(self, samples: Array, K: Array, slopes: Array, form: str, shift: float | None) -> None:
+        self.samples, self.form, self.shift = samples, form, shift
+        self.values, self.slopes = K, slopes
+        if form == "root":
+            parts = [np.linalg.eigh(k) for k in K]
+            roots = [np.sqrt(np.maximum(w, 0.0)) for w, _ in parts]
+            self.values = np.array([(Q * r) @ Q.conj().T for (_, Q), r in zip(parts, roots, strict=True)])
+            self.slopes = np.array(
+                [_root_slope(Q, r, dK) for (_, Q), r, dK in zip(parts, roots, slopes, strict=False)]
+            ).reshape(slopes.shape)
+
+    def part(self, speed: float) -> Array:
+        """(c, c) of what is interpolated: the stiffness or its root."""
+        if not len(self.slopes):
+            return np.tensordot(lagrange(self.samples, speed, self.shift), self.values, 1)
+        of_values, of_slopes = hermite(self.samples, speed, self.shift)
+        return np.tensordot(of_values, self.values, 1) + np.tensordot(of_slopes, self.slopes, 1)
+
+    def stiffness(self, speed: float) -> Array:
+        """(c, c) Hermitian."""
+        part = self.part(speed)
+        return part if self.form == "stiffness" else part @ part.conj().T
+
+    def modes(self, speed: float) -> tuple[Array, Array]:
+        """(c,) frequencies, rad/s, ascending, and (c, c) orthonormal modes."""
+        return self.modes_of(self.part(speed))
+
+    def modes_of(self, part: Array) -> tuple[Array, Array]:
+        values, Y = np.linalg.eigh(part)
+        if self.form == "stiffness":
+            return np.sqrt(np.maximum(values, 0.0)), Y
+        order = np.argsort(np.abs(values), kind="stable")
+        return np.abs(values[order]), Y[:, order]
+
+    def last(self) -> tuple[Array, int]:
+        """(c, c) leading coefficient times the range of the variable to its power; how often each sample counts."""
+        t = variable(self.samples, self.shift)
+        reach = t[-1] - t[0]
+        once = 1 / ((t[:, None] - t) / reach + np.eye(len(t))).prod(axis=1)
+        if not len(self.slopes):
+            return np.tensordot(once, self.values, 1), 1
+        along = np.ones_like(t) if self.shift is None else 2 * t
+        of_values, of_slopes = -2 * _log_slopes(t) * reach * once**2, along * reach * once**2
+        return np.tensordot(of_values, self.values, 1) + np.tensordot(of_slopes, self.slopes, 1), 2
+
+
+def _root_slope(Q: Array, roots: Array, slope: Array) -> Array:
+    """Derivative of K^(1/2) from that of K = Q roots^2 Q^H: S' S + S S' = K'."""
+    inner = Q.conj().T @ slope @ Q
+    return Q @ (inner / np.maximum(roots[:, None] + roots, 1e-300)) @ Q.conj().T
+
+
+def probes(f: Interpolant, kept: Sequence[float], count: int) -> list[float]:
     """Two held-out speeds: those kept, and more where the frequencies are likely to err most.
 
-    The error of a polynomial f through the samples t_i is about its last coefficient f[t_0 .. t_s] times the product
-    of all t - t_i; what that does to the first `count` frequencies is looked at on a grid.
+    The error of a polynomial f through the samples t_i is about its last coefficient times the product of all t - t_i
+    (squared where slopes are known); what that does to the first `count` frequencies is looked at on a grid.
     """
-    F = K if form == "stiffness" else np.array([root(k) for k in K])
-    t = variable(samples, shift)
+    t = variable(f.samples, f.shift)
     reach = t[-1] - t[0]
-    last = np.tensordot(1 / ((t[:, None] - t) / reach + np.eye(len(t))).prod(axis=1), F, 1)
+    last, times = f.last()
     at = t[0] + 0.5 * reach * (1 - np.cos(np.pi * np.arange(1, 80) / 80))
-    grid = np.sqrt(at if shift is None else at**2 - shift)
-    size = np.abs((at[:, None] - t) / reach).prod(axis=1)
-    power = 1 if form == "stiffness" else 2
+    grid = np.sqrt(at if f.shift is None else at**2 - f.shift)
+    size = np.abs((at[:, None] - t) / reach).prod(axis=1) ** times
     effect = []
     for speed, share in zip(grid, size, strict=True):
-        here = np.tensordot(lagrange(samples, float(speed), shift), F, 1)
-        values, changed = (np.abs(np.linalg.eigvalsh(A)[:count]) ** power for A in (here, here + share * last))
-        effect.append(np.abs(np.sqrt(changed / np.maximum(values, 1e-300)) - 1).max() + 1e-9 * share / size.max())
+        here = f.part(float(speed))
+        omega, changed = (f.modes_of(A)[0][:count] for A in (here, here + share * last))
+        effect.append(largest_difference(changed, omega) + 1e-9 * share / size.max())
     found = list(kept)
     while len(found) < 2:
-        away = np.abs((at[:, None] - variable(np.array(found), shift)) / reach).prod(axis=1) if found else 1.0
+        away = np.abs((at[:, None] - variable(np.array(found), f.shift)) / reach).prod(axis=1) if found else 1.0
         found.append(float(grid[(np.array(effect) * away).argmax()]))
     return sorted(found)
 
@@ -240,7 +316,7 @@ def _end_of_band(theta: Array, count: int) -> tuple[int, float]:
 class _Search:
     """State of `common_coordinates`: what is known so far."""
 
-    settle: Callable[[float, Mapping[float, float]], Settled]
+    settle: Callable[[float, Guess], Settled]
     solve: Callable[[Settled], Solved]
     count: int
     samples: dict[float, Settled] = field(default_factory=dict)
@@ -251,6 +327,7 @@ class _Search:
     V: Array = field(default_factory=lambda: np.zeros((0, 0)))
     orthogonality: float = 0.0
     K_r: dict[float, Array] = field(default_factory=dict)
+    slopes: dict[float, Array] = field(default_factory=dict)
     true: dict[float, Array | None] = field(default_factory=dict)
 
     def settled(self, speed: float) -> Settled:
@@ -258,7 +335,9 @@ class _Search:
         known = sorted({*self.samples, *self.held})
         start = {}
         if len(known) > 1:
-            start = dict(zip(known, lagrange(np.array(known), speed, self.shift), strict=True))
+            start = dict(zip(known, zip(*hermite(np.array(known), speed, self.shift), strict=True), strict=True))
+            if any(s.slope is None for s in (*self.samples.values(), *self.held.values())):
+                start = {s: (w, 0.0) for s, w in zip(known, lagrange(np.array(known), speed, self.shift), strict=True)}
         return self.settle(speed, start)
 
     def add(self, settled: Settled, solved: bool) -> None:
@@ -267,7 +346,7 @@ class _Search:
         self.held.pop(settled.speed, None)
         if solved:
             self.solved[settled.speed] = self.solve(settled)
-            self.V, self.K_r, self.true = np.zeros((0, 0)), {}, {}
+            self.V, self.K_r, self.slopes, self.true = np.zeros((0, 0)), {}, {}, {}
 
     def begin(self, low: float, high: float) -> None:
         """Both ends, and between them the middle of the variable that they suggest."""
@@ -282,16 +361,22 @@ class _Search:
 
     def begin_like(self, other: Common) -> None:
         self.form, self.shift = other.form, other.shift
+        held = {h.speed for h in other.held_out}
         for sample in other.samples:
-            self.add(self.settled(sample.speed), sample.speed in other.solved)
-        for h in other.held_out:
-            self.held[h.speed] = self.settled(h.speed)
+            settled = self.settled(sample.speed)
+            if sample.speed in held:
+                self.held[sample.speed] = settled
+            else:
+                self.add(settled, sample.speed in other.solved)
 
-    def hold_out(self) -> None:
+    def interpolant(self, form: str) -> Interpolant:
         speeds = sorted(self.samples)
         K = np.array([self.K_r[s] for s in speeds])
-        shift = self.shift if self.form == "root" else None
-        for speed in probes(np.array(speeds), K, self.form, shift, list(self.held), self.count):
+        slopes = np.array([self.slopes[s] for s in speeds if s in self.slopes]).reshape(-1, *K.shape[1:])
+        return Interpolant(np.array(speeds), K, slopes, form, self.shift if form == "root" else None)
+
+    def hold_out(self) -> None:
+        for speed in probes(self.interpolant(self.form), list(self.held), self.count):
             if speed not in self.held:
                 self.held[speed] = self.settled(speed)
 
@@ -305,27 +390,25 @@ class _Search:
         for speed, settled in self.samples.items():
             if speed not in self.K_r:
                 self.K_r[speed] = projected(settled.pencil.K, self.V)
+            if speed not in self.slopes and settled.slope is not None:
+                self.slopes[speed] = projected(settled.slope, self.V)
 
     def examine(self) -> list[HeldOut]:
         """Errors of the better form at every held-out speed."""
         held = [self.held[s] for s in sorted(self.held)]
-        exact = [projected(h.pencil.K, self.V) for h in held]
-        for h, K in zip(held, exact, strict=True):
+        for h in held:
             if h.speed not in self.true:
-                self.true[h.speed] = better_frequencies(h, self.V, K, self.count)
-        true = [self.true[h.speed] for h in held]
-        found = {
-            form: [self._errors(form, h.speed, K, f) for h, K, f in zip(held, exact, true, strict=True)]
-            for form in FORMS
-        }
+                self.K_r[h.speed] = projected(h.pencil.K, self.V)
+                self.true[h.speed] = better_frequencies(h, self.V, self.K_r[h.speed], self.count)
+        found = {form: self._errors(self.interpolant(form)) for form in FORMS}
         self.form = min(FORMS, key=lambda form: max(h.interpolation for h in found[form]))
         return found[self.form]
 
-    def _errors(self, form: str, speed: float, exact: Array, true: Array | None) -> HeldOut:
-        speeds = sorted(self.samples)
-        weights = lagrange(np.array(speeds), speed, self.shift if form == "root" else None)
-        between = interpolated(np.array([self.K_r[s] for s in speeds]), weights, form)
-        here, guess = frequencies(exact, self.count), frequencies(between, self.count)
+    def _errors(self, f: Interpolant) -> list[HeldOut]:
+        return [self._error(f, speed, self.K_r[speed], self.true[speed]) for speed in sorted(self.held)]
+
+    def _error(self, f: Interpolant, speed: float, exact: Array, true: Array | None) -> HeldOut:
+        here, guess = frequencies(exact, self.count), f.modes(speed)[0][: self.count]
         interpolation = largest_difference(guess, here)
         if true is None:
             return HeldOut(speed, interpolation, np.inf, np.inf)
@@ -346,8 +429,8 @@ class _Search:
 
 
 def common_coordinates(
-    settle: Callable[[float, Mapping[float, float]], Settled], solve: Callable[[Settled], Solved], low: float,
-    high: float, count: int, tolerance: float, report: Report = lambda _: None, before: Common | None = None,
+    settle: Callable[[float, Guess], Settled], solve: Callable[[Settled], Solved], low: float, high: float, count: int,
+    tolerance: float, report: Report = lambda _: None, before: Common | None = None,
 ) -> Common:  # fmt: skip
     """Common coordinates for all speeds between `low` and `high`, rad/s.
 
@@ -356,10 +439,10 @@ def common_coordinates(
     held out in its place.
 
     Args:
-        settle: (speed, weights) -> equilibrium; the displacements at the speeds settled before, times the weights,
-            are a first guess (none: from rest). solve: equilibrium -> its shapes. count: modes whose frequencies
-            must be right. tolerance: relative error of a frequency allowed at held-out speeds. before: of another
-            nodal diameter, whose samples are taken over.
+        settle: (speed, weights) -> equilibrium; the weighted displacements and slopes of the speeds settled before are
+            a first guess (none: from rest). solve: equilibrium -> its shapes. count: modes whose frequencies must be
+            right. tolerance: relative error of a frequency allowed at held-out speeds. before: of another nodal
+            diameter, whose samples are taken over.
 
     Raises:
         NotConverged: `MOST` samples do not suffice.
@@ -389,11 +472,14 @@ def common_coordinates(
 
 
 def _result(search: _Search, found: list[HeldOut]) -> Common:
-    speeds = sorted(search.samples)
-    K_r = np.array([search.K_r[s] for s in speeds])
-    shift = search.shift if search.form == "root" else None
-    samples = [search.samples[s] for s in speeds]
-    return Common(search.V, samples, K_r, search.solved, found, search.orthogonality, search.form, shift)
+    every = {**search.samples, **search.held}
+    f = search.interpolant(search.form)
+    K_r = np.array([search.K_r[s] for s in sorted(every)])
+    slopes = np.array([search.slopes[s] for s in f.samples if s in search.slopes]).reshape(-1, *K_r.shape[1:])
+    samples = [every[s] for s in sorted(every)]
+    return Common(
+        search.V, samples, K_r, slopes, search.solved, found, search.orthogonality, search.form, f.shift
+    )  # fmt: skip
 
 
 def _rpm(speed: float) -> str:
