@@ -22,7 +22,7 @@ from microslip.basis import read_basis
 from microslip.campbell import track_basis
 from microslip.case import CaseSettings, _contact, _sized, load_case, run_case
 from microslip.compliance import contact_share, without_bulk
-from microslip.data import ModalBasis, ModalGroup
+from microslip.data import ModalBasis, ModalGroup, SpeedRange
 from microslip.harmonic_balance import peaks, stuck_frequencies
 from microslip.modes import modal_basis
 from microslip.modes.patches import patch_bounds
@@ -30,6 +30,7 @@ from microslip.pictures import lettering, plots, views
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
 from microslip.reduction import METHODS
+from microslip.speed_range import frequencies_over
 from microslip.workflow import load_mesh, mesh_stage, modes_stage, open_job
 
 ROOT = HERE.parent
@@ -431,6 +432,52 @@ def rotation() -> None:
     save(drawn(fig), "spin_up")
 
 
+def speeds() -> None:
+    """One basis of the shrouded blade from rest to 12000 rpm, and its error against bodies solved for."""
+    plain_modes = (*COARSE_SHROUD, *LIGHT, 'reduction="eigenmodes"', "output.shapes=false", "rotation.gyroscopic=false")
+    at = [250.0 + 500 * i for i in range(24)]
+    true = made("shroud-solved", "shroud", *plain_modes, f"rotation.speeds_rpm={at}")
+    ranged = made("shroud-range", "shroud", *plain_modes, "rotation.speeds_rpm=[0]", "rotation.range_rpm=[0, 12000]")
+    r = ranged.ranges[0]
+    omega, _ = frequencies_over(r, np.array(at) * np.pi / 30)
+    errors = [np.abs(w / true.groups[i, 0].omega[: r.count] - 1).max() for i, w in enumerate(omega)]
+    fig = figure(9.4, 4.6)
+    left, right = fig.subplots(1, 2)
+    range_curves(left, r)
+    plain(right)
+    right.semilogy(at, errors, "o-", color="#0b4f9c", markersize=4, linewidth=1, label="against bodies solved for")
+    right.semilogy(r.held_out * 30 / np.pi, r.total_error, "D", color="#d98410", label="stated, at held-out speeds")
+    right.axhline(r.tolerance, color="#c8382c", linestyle="--", linewidth=1, label="tolerance")
+    right.set_title("largest relative frequency error", fontsize=11)
+    right.set_xlabel("rotation speed in rpm")
+    right.set_ylim(1e-9, 1e-3)
+    right.legend(fontsize=9, loc="lower center")
+    save(drawn(fig), "speeds")
+    known, solved, held = (
+        ", ".join(f"{v:.0f}" for v in r.speeds[chosen] * 30 / np.pi) for chosen in (~r.held, r.solved, r.held)
+    )
+    rows = [
+        [solved, known, held, f"{r.total_error.max():.0e}", f"{max(errors):.0e}", r.samples[0].n_modes],
+    ]
+    head = ["modes solved for at rpm", "stiffness from", "held out", "error stated", "largest of 24", "coordinates"]
+    fill("speeds.md", "range", table(head, rows))
+
+
+def range_curves(axes: Any, r: SpeedRange) -> None:
+    """Frequencies over the speed; dots where equilibria were computed, rings where they were held out."""
+    plain(axes)
+    omega, _ = frequencies_over(r, r.points)
+    for j in range(r.count):
+        axes.plot(r.points * 30 / np.pi, omega[:, j] / 2 / np.pi, color="#0b4f9c", linewidth=1.3)
+    for chosen, style in ((~r.held, {"color": "#111111"}), (r.held, {"mfc": "white", "mec": "#d98410"})):
+        there, _ = frequencies_over(r, r.speeds[chosen])
+        x = np.repeat(r.speeds[chosen][:, None] * 30 / np.pi, r.count, axis=1)
+        axes.plot(x.ravel(), there.ravel() / 2 / np.pi, "o", markersize=4, **style)
+    axes.set_title("frequency in Hz", fontsize=11)
+    axes.set_xlabel("rotation speed in rpm")
+    axes.set_ylim(0, 3000)
+
+
 def compliance() -> None:
     """How much static compliance the modes hold, for every body."""
     rows = []
@@ -768,8 +815,8 @@ def arc(axes: Any, radius: float, start: float, stop: float, colour: str) -> Non
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, rotation, compliance,
-        counted_once, reduction, own, cyclic,
+        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, speeds, rotation,
+        compliance, counted_once, reduction, own, cyclic,
     )  # fmt: skip
 }
 

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import rings
 from meshes import STEEL, body, brick, nearest, twisted_blade
 
 from microslip import eigen
@@ -185,7 +186,9 @@ def test_the_slope_of_the_stiffness_is_that_of_the_equilibria(rpm: float) -> Non
     model, solver = model_of(BLADE, body(supports=[{"face": "z0"}])), eigen.new_solver("superlu")
     speed, h = rpm * np.pi / 30, 30.0**2
     state = equilibrium(model, speed, "nonlinear", solver)
-    du, dK = stiffness_slope(model, state, solver)
+    du, dK = stiffness_slope(model, speed, state, solver, fresh=True)
+    anew = stiffness_slope(model, speed, state, solver)
+    np.testing.assert_allclose(anew[1], dK, atol=1e-6 * np.abs(dK).max())
     offsets = (h, 2 * h) if rpm == 0 else (-h, h)  # one-sided at rest
     ends = [equilibrium(model, np.sqrt(speed**2 + o), "nonlinear", solver) for o in offsets]
     if rpm == 0:
@@ -373,3 +376,34 @@ def test_divergence_inside_the_range_names_its_key() -> None:
     """Without prestress the first frequency falls to zero: no basis for such speeds, and the key that asks for it."""
     with pytest.raises(UserError, match=r"rotation\.range_rpm: at .* rpm .* negative"):
         modal_basis(BLADE, settings("none", top=60000.0))
+
+
+# cyclic sectors ----------------------------------------------------------------------------------------------------
+
+
+def test_every_nodal_diameter_of_a_sector_has_its_range(tmp_path) -> None:
+    """Complex coordinates between 0 and N/2: frequencies, rows, Coriolis matrix at a speed that is no sample."""
+    mesh = rings.bladed_sector("tetra10", 6)
+
+    def of(**rotation: object):
+        return body(
+            supports=[{"face": "bore"}], cyclic={"sectors": 6, "nodal_diameters": [0, 1, 3]}, modes={"count": 4},
+            interfaces=[{"name": "right", "face": "contact_right"}], rotation=rotation,
+        )  # fmt: skip
+
+    basis = modal_basis(mesh, of(speeds_rpm=[0.0], range_rpm=[0.0, 30000.0]))
+    rpm = 17000.0
+    true = modal_basis(mesh, of(speeds_rpm=[rpm]))
+    assert sorted(basis.ranges) == [0, 1, 3]
+    write_basis(tmp_path / "basis.h5", basis)
+    again = read_basis(tmp_path / "basis.h5")
+    assert [c for c in check_basis(again) if not c.passed] == []
+    for k in (0, 1, 3):
+        assert basis.ranges[k].total_error.max() <= 1e-4
+        got, at = group_at(again, rpm, k), true.groups[0, k]
+        assert np.iscomplexobj(got.phi) == (k == 1)
+        np.testing.assert_allclose(got.omega, at.omega[:4], rtol=2e-4)
+        rows, exact = got.interfaces["right"].rows, at.interfaces["right"].rows[:, :4]
+        np.testing.assert_allclose(rows, exact, atol=2e-3 * np.abs(exact).max())
+        np.testing.assert_allclose(got.G_r, at.G_r[:4, :4], atol=2e-3 * np.abs(at.G_r).max())
+        np.testing.assert_allclose(got.u_static, at.u_static, atol=1e-3 * np.abs(at.u_static).max())

@@ -84,10 +84,18 @@ class _Body:
         def settle(speed: float, weights: Guess) -> Settled:
             if speed not in self.states:
                 self._settle(speed, weights)
-            slope = self.slope_pencils[speed][k].K if speed in self.slope_pencils else None
+            nonlinear = self.settings.rotation.prestress == "nonlinear"
+            slope = (lambda fresh: self._slope(speed, fresh)[k].K) if nonlinear else None
             return Settled(speed, self.pencils[speed][k], self.states[speed], slope)
 
         return settle
+
+    def _slope(self, speed: float, fresh: bool) -> Mapping[int, eigen.Pencil]:
+        if speed not in self.slope_pencils:
+            state = self.states[speed]
+            self.slopes[speed], dK = stiffness_slope(self.model, speed, state, self.solver, fresh)
+            self.slope_pencils[speed] = self._pencils(dK)
+        return self.slope_pencils[speed]
 
     def _settle(self, speed: float, weights: Guess) -> None:
         start, prestress = None, self.settings.rotation.prestress
@@ -97,9 +105,6 @@ class _Body:
             start = StaticState(u, None, [], np.zeros(0), prestress)
         self.report(f"equilibrium at {speed * 30 / np.pi:.6g} rpm")
         state = equilibrium(self.model, speed, prestress, self.solver, start, self.report)
-        if prestress == "nonlinear":
-            self.slopes[speed], dK = stiffness_slope(self.model, state, self.solver)
-            self.slope_pencils[speed] = self._pencils(dK)
         self.pencils[speed], self.states[speed] = self._pencils(state.K), state
 
     def _pencils(self, K: Array) -> Mapping[int, eigen.Pencil]:

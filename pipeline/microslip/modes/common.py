@@ -59,13 +59,14 @@ Guess = Mapping[float, tuple[float, float]]
 class Settled:
     """The body in equilibrium at one speed, rad/s: its operators there, and whatever the caller keeps of the state.
 
-    slope: products with dK/dOmega^2 along the equilibria, or None.
+    slope: makes products with dK/dOmega^2 along the equilibria, when they are wanted (its argument: whether the solver
+    still is as the equilibrium left it); None where they are not.
     """
 
     speed: float
     pencil: eigen.Pencil
     state: Any
-    slope: eigen.MatVec | None = None
+    slope: Callable[[bool], eigen.MatVec] | None = None
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,8 @@ def variable(speeds: Array | float, shift: float | None) -> Array:
 def lagrange(samples: Array, speed: float, shift: float | None = None) -> Array:
     """(s,) weights of the samples at a speed: f(speed) = sum of weight times f(sample)."""
     t, at = variable(samples, shift), float(variable(speed, shift))
+    if len(t) == 1:
+        return np.ones(1)
     gap = (at - t) / t[-1]
     if (hit := np.abs(gap) < 1e-14).any():
         return np.where(np.arange(len(t)) == int(hit.argmax()), 1.0, 0.0)
@@ -328,36 +331,43 @@ class _Search:
     orthogonality: float = 0.0
     K_r: dict[float, Array] = field(default_factory=dict)
     slopes: dict[float, Array] = field(default_factory=dict)
+    slope_of: dict[float, eigen.MatVec] = field(default_factory=dict)
     true: dict[float, Array | None] = field(default_factory=dict)
 
     def settled(self, speed: float) -> Settled:
-        """Equilibrium at a speed, begun from those known."""
-        known = sorted({*self.samples, *self.held})
-        start = {}
-        if len(known) > 1:
-            start = dict(zip(known, zip(*hermite(np.array(known), speed, self.shift), strict=True), strict=True))
-            if any(s.slope is None for s in (*self.samples.values(), *self.held.values())):
-                start = {s: (w, 0.0) for s, w in zip(known, lagrange(np.array(known), speed, self.shift), strict=True)}
-        return self.settle(speed, start)
+        """Equilibrium at a speed, begun from those known: from the samples with their slopes where they have some."""
+        known = sorted(self.slope_of or {*self.samples, *self.held})
+        if self.slope_of:
+            weights = hermite(np.array(known), speed, self.shift)
+            return self.settle(speed, dict(zip(known, zip(*weights, strict=True), strict=True)))
+        start = lagrange(np.array(known), speed, self.shift) if len(known) > 1 else np.zeros(0)
+        return self.settle(speed, {s: (w, 0.0) for s, w in zip(known, start, strict=False)})
 
     def add(self, settled: Settled, solved: bool) -> None:
         """Make a speed a sample; a solved one widens the coordinates."""
         self.samples[settled.speed] = settled
-        self.held.pop(settled.speed, None)
+        before = self.held.pop(settled.speed, None)
+        if settled.slope is not None:
+            self.slope_of[settled.speed] = settled.slope(before is None)
         if solved:
             self.solved[settled.speed] = self.solve(settled)
             self.V, self.K_r, self.slopes, self.true = np.zeros((0, 0)), {}, {}, {}
 
     def begin(self, low: float, high: float) -> None:
         """Both ends, and between them the middle of the variable that they suggest."""
-        for speed in (low, high):
-            self.add(self.settled(speed), solved=True)
-        rise = (self.solved[high].lowest - self.solved[low].lowest) / (high**2 - low**2)
-        if rise > 0:
-            self.shift = self.solved[low].lowest / rise - low**2
+        self.add(self.settled(low), solved=True)
+        self.project()
+        if low in self.slopes:
+            self._vary(low, float(self.slopes[low][0, 0].real))  # of the lowest mode, a first guess
+        self.add(self.settled(high), solved=True)
+        self._vary(low, (self.solved[high].lowest - self.solved[low].lowest) / (high**2 - low**2))
         middle = 0.5 * float(variable(low, self.shift) + variable(high, self.shift))
         square = middle if self.shift is None else middle**2 - self.shift
         self.add(self.settled(float(np.sqrt(square))), solved=True)
+
+    def _vary(self, low: float, rise: float) -> None:
+        """The variable in which the lowest frequency, whose square rises by so much over Omega^2, is straight."""
+        self.shift = self.solved[low].lowest / rise - low**2 if rise > 0 else None
 
     def begin_like(self, other: Common) -> None:
         self.form, self.shift = other.form, other.shift
@@ -390,8 +400,8 @@ class _Search:
         for speed, settled in self.samples.items():
             if speed not in self.K_r:
                 self.K_r[speed] = projected(settled.pencil.K, self.V)
-            if speed not in self.slopes and settled.slope is not None:
-                self.slopes[speed] = projected(settled.slope, self.V)
+            if speed not in self.slopes and speed in self.slope_of:
+                self.slopes[speed] = projected(self.slope_of[speed], self.V)
 
     def examine(self) -> list[HeldOut]:
         """Errors of the better form at every held-out speed."""

@@ -176,18 +176,21 @@ def _linear(model: BodyModel, speed: float, solver: DirectSolver, soft: Array | 
     return StaticState(u, H, stress, K, "linear")
 
 
-def stiffness_slope(model: BodyModel, state: StaticState, solver: DirectSolver) -> tuple[Array, Array]:
+def stiffness_slope(
+    model: BodyModel, speed: float, state: StaticState, solver: DirectSolver, fresh: bool = False
+) -> tuple[Array, Array]:
     """(n, 3) du/dOmega^2 and (p, 3, 3) dK/dOmega^2 along the equilibria through a nonlinear state without contacts.
 
     K du = M P (x + u), from the balance of forces. The tangent of a St Venant-Kirchhoff body is quadratic in u, so its
     central difference along du is its derivative, whatever the step.
 
     Args:
-        solver: as Newton left it, factorised within its last step of K; at rest it is factorised here.
+        fresh: the solver is as Newton left it, factorised within its last step of K; else it is factorised here.
     """
     free, n = model.free, model.d.mesh.n_points
-    if not state.iterations:
-        solver.factorise(free.matrix(state.K))
+    if not (fresh and state.iterations):
+        K = state.K if model.spin_softening else state.K + softening(model, speed)
+        solver.factorise(free.matrix(K))
     force = centrifugal_force(model, 1.0, state.u).reshape(-1)
     du = free.expand(solver.solve(free.restrict(force)), n).reshape(n, 3)
     step = 0.01 * float(np.ptp(model.d.mesh.points, axis=0).max()) / max(float(np.abs(du).max()), 1e-300)
