@@ -218,18 +218,21 @@ def check(file: Path, /, *, quiet: Quiet = False) -> None:
 
 @app.command
 def export(
-    file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int = 0, rpm: float | None = None
-) -> None:
+    file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int | None = None,
+    nodal_diameter: int | None = None, rpm: float | None = None,
+) -> None:  # fmt: skip
     """Write a modal file in another program's format.
 
     Args:
         file: a basis.h5.
-        to: mat (MATLAB, Octave), vtu (ParaView).
-        speed: with --ring: which of the file's speeds, counted from 0.
+        to: exudyn, mat (MATLAB, Octave, NLvib), mbdyn, mtx (Matrix Market), pvd and vtu (ParaView), pyharm, sid, uff.
+        speed: this one of the file's speeds only, counted from 0.
+        nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: this speed alone.
     """
     from .basis import read_basis
     from .exchange import WRITERS, writer
+    from .exchange.choice import select
 
     if to not in WRITERS:
         raise UserError(f"export --to {to}: unknown format; choose one of {', '.join(sorted(WRITERS))}")
@@ -238,11 +241,11 @@ def export(
             raise UserError("export --ring: only vtu can hold the ring; leave --ring out for one sector")
         from .exchange.vtu import write_ring
 
-        print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed))
+        print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed or 0))
         return
-    target = output or file.with_suffix(f".{to}")
+    target = output or file.with_name(file.stem + WRITERS[to].ending)
     basis = read_basis(file)
-    writer(to)(basis if rpm is None else _at_speed(basis, rpm), target)
+    writer(to)(select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter), target)
     print(target)
 
 

@@ -48,14 +48,14 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
         temporary = None
         _sync(path.parent)
     except OSError as error:
-        raise UserError(_refused(path, error)) from error
+        raise UserError(refused(path, error)) from error
     finally:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 
-def _refused(path: Path, error: OSError) -> str:
+def refused(path: Path, error: OSError) -> str:
     """Why a file could not be written, and what to do, in one sentence."""
     reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())[:120] or "unknown reason"
     remedies = {

@@ -2,9 +2,9 @@
 
 One struct per speed, ``speed_0`` ..., holds the reduced model under the names such programs use: with ``b = speed_0``
 the system is ``b.M q'' + b.D q' + b.K q = b.Fex1 f``, and ``b.interfaces.<name>.T`` reads, its transpose loads, a
-contact. Numbers are those of the modal file, bit for bit; columns stay columns. A cyclic sector has one struct per
-nodal diameter, ``speed_0_nd_3``; its arrays are complex where the file's are, and the conjugate transpose (``T'`` in
-MATLAB) loads.
+contact; the columns of ``b.W`` are all these force directions side by side, named in ``b.W_row``. Numbers are those of
+the modal file, bit for bit; columns stay columns. A cyclic sector has one struct per nodal diameter, ``speed_0_nd_3``;
+its arrays are complex where the file's are, and the conjugate transpose (``T'`` in MATLAB) loads.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
-from ..data import Array, Interface, ModalBasis, ModalGroup, Rows, UserError
+from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows, UserError
 from ..store import complete_or_absent
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"
@@ -41,8 +41,13 @@ def write_mat(basis: ModalBasis, path: Path | str) -> None:
             savemat(temporary, mat_tables(basis), appendmat=False, long_field_names=True, oned_as="column")
         except (MatWriteError, OverflowError) as error:
             raise UserError(f"{path}: the MATLAB 5 format cannot hold this basis ({error}); use fewer modes") from error
-        with open(temporary, "r+b") as file:
-            file.write(_HEADER.ljust(116))  # scipy's text holds the time
+        clean_header(temporary)
+
+
+def clean_header(path: Path) -> None:
+    """Replace the text at the head of a MATLAB 5 file, which holds the time."""
+    with open(path, "r+b") as file:
+        file.write(_HEADER.ljust(116))
 
 
 def mat_tables(basis: ModalBasis) -> dict[str, Any]:
@@ -84,6 +89,7 @@ def _mesh(basis: ModalBasis) -> dict[str, Any]:
 
 def _group(g: ModalGroup) -> dict[str, Any]:
     loads = [rows.rows for rows in g.excitations.values()]
+    contacts = [i.rows for i in g.interfaces.values()]
     return {
         "Omega": g.speed,
         "harmonic": float(g.harmonic),
@@ -94,6 +100,8 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         "K": g.K_r,
         "G": g.G_r,
         "Fex1": np.concatenate(loads).conj().T if loads else np.zeros((g.n_modes, 0)),
+        "W": np.concatenate(contacts).conj().T if contacts else np.zeros((g.n_modes, 0)),
+        "W_row": np.array([f"{n}:{r}" for n in g.interfaces for r in INTERFACE_ROWS], dtype=object).reshape(-1, 1),
         "omega": _column(g.omega),
         "frequency": _column(g.frequency),
         "damping_ratio": _column(g.damping_ratio),

@@ -13,12 +13,13 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..coordinates import basis_in_modes
+from ..coordinates import basis_in_modes, in_modes
 from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
 from ..mesh import boundary_facets
 from ..resonances import eigenmodes, speeds_of
 from ..ring import expand, multiplicity, replicate, ring_scale, sector_rotation
 from ..store import complete_or_absent, write_text
+from .choice import with_shapes
 
 
 def write_vtu(basis: ModalBasis, path: Path | str) -> None:
@@ -48,6 +49,31 @@ def write_vtu(basis: ModalBasis, path: Path | str) -> None:
     mesh = meshio.Mesh(basis.mesh.points, dict(basis.mesh.cells), point_data=data)
     with complete_or_absent(path) as temporary:
         meshio.write(temporary, mesh, file_format="vtu")
+
+
+def write_pvd(basis: ModalBasis, path: Path | str) -> None:
+    """Write a VTU file a mode, bound together by a PVD file: ParaView shows the number of the mode as its time.
+
+    Point data: ``shape`` (n, 3) kg^-1/2, of complex modes ``shape_real`` and ``shape_imag``; ``Hz``, ``rpm``,
+    ``nodal_diameter``, the same at every point. Modes of several groups follow each other.
+
+    Raises:
+        UserError: shapes are not stored, no permission, no space.
+    """
+    import meshio
+
+    path, files = Path(path), dict[int, Path]()
+    groups = [with_shapes(basis, in_modes(g), "pvd") for _, g in sorted(basis.groups.items())]
+    for g in groups:
+        for j in range(g.n_modes):
+            number = len(files) + 1
+            files[number] = path.with_name(f"{path.stem}_mode{number:03d}.vtu")
+            state = (("Hz", g.frequency[j]), ("rpm", g.speed * 30 / np.pi), ("nodal_diameter", g.harmonic))
+            data = _parts("shape", g.phi[:, :, j]) | {n: np.full(basis.mesh.n_points, v) for n, v in state}
+            mesh = meshio.Mesh(basis.mesh.points, dict(basis.mesh.cells), point_data=data)
+            with complete_or_absent(files[number]) as temporary:
+                meshio.write(temporary, mesh, file_format="vtu")
+    write_text(path, _collection(files))
 
 
 def mode_label(group: ModalGroup, mode: int) -> str:
@@ -164,7 +190,7 @@ def _write_ring_group(basis: ModalBasis, ring: Mesh, group: ModalGroup, path: Pa
 
 
 def _collection(files: Mapping[int, Path]) -> str:
-    """A PVD file: the nodal diameter stands as the time."""
+    """A PVD file: the nodal diameter, or the number of the mode, stands as the time."""
     sets = "".join(f'    <DataSet timestep="{k}" part="0" file="{escape(f.name)}"/>\n' for k, f in files.items())
     return (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'

@@ -1,0 +1,136 @@
+"""What a format can hold of a modal file: which group, in which coordinates, and what is said if it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..coordinates import in_modes
+from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
+from ..resonances import speeds_of
+
+STATEMENT = "SI units (m, kg, s, N, rad, Pa), frequencies in Hz where so called; right-handed frame of the mesh"
+"""What every text file says of its units and frame."""
+
+
+def select(basis: ModalBasis, speed: int | None, nodal_diameter: int | None) -> ModalBasis:
+    """The same body with the groups of one speed (counted from 0) and one nodal diameter; None keeps all.
+
+    Raises:
+        UserError: the file holds no such group.
+    """
+    speeds, harmonics = len(speeds_of(basis)), sorted({k for _, k in basis.groups})
+    if speed is not None and not 0 <= speed < speeds:
+        raise UserError(f"{basis.name}: export --speed {speed}: the file has {speeds}; count from 0")
+    if nodal_diameter is not None and nodal_diameter not in harmonics:
+        known = ", ".join(map(str, harmonics))
+        raise UserError(f"{basis.name}: export --nodal-diameter {nodal_diameter}: the file has {known}")
+    wanted = (speed, nodal_diameter)
+    return replace(
+        basis,
+        groups={
+            key: g
+            for key, g in basis.groups.items()
+            if all(w is None or w == k for w, k in zip(wanted, key, strict=True))
+        },
+    )
+
+
+def only_group(basis: ModalBasis, form: str) -> ModalGroup:
+    """The group of a file that holds one, for a format that holds one.
+
+    Raises:
+        UserError: there are several.
+    """
+    if len(basis.groups) > 1:
+        speeds, harmonics = len(speeds_of(basis)), sorted({k for _, k in basis.groups})
+        several = [f"--speed 0 to {speeds - 1}"] * (speeds > 1)
+        several += [f"--nodal-diameter {harmonics[0]} to {harmonics[-1]}"] * (len(harmonics) > 1)
+        raise UserError(f"{basis.name}: export --to {form}: the format holds one state; choose {' and '.join(several)}")
+    return next(iter(basis.groups.values()))
+
+
+def real(group: ModalGroup, form: str) -> ModalGroup:
+    """The group, if its shapes are real.
+
+    Raises:
+        UserError: a sector at a nodal diameter between 0 and N/2.
+    """
+    if np.iscomplexobj(group.M_r) or np.iscomplexobj(group.phi) or np.iscomplexobj(group.K_r) or _complex_rows(group):
+        raise UserError(
+            f"export --to {form}: nodal diameter {group.harmonic} has complex shapes, which the format cannot hold; "
+            "choose --nodal-diameter 0 or N/2, or --to mat, mtx or uff"
+        )
+    return group
+
+
+def _complex_rows(group: ModalGroup) -> bool:
+    return any(np.iscomplexobj(i.rows) for i in group.interfaces.values())
+
+
+def with_shapes(basis: ModalBasis, group: ModalGroup, form: str) -> ModalGroup:
+    """The group, if its shapes at the nodes are in the file.
+
+    Raises:
+        UserError: they were left out.
+    """
+    if len(group.phi) != basis.mesh.n_points or not basis.mesh.n_points:
+        raise UserError(
+            f"{basis.name}: export --to {form}: the modal file holds no shapes at the nodes; "
+            "set shapes = true in [output] and compute it again"
+        )
+    return group
+
+
+def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
+    """The one real group at rest in its elastic modes, with inertia integrals: what multibody programs take.
+
+    Raises:
+        UserError: a cyclic sector, a group at speed, several groups, no inertia integrals in the file, no elastic mode.
+    """
+    group = only_group(basis, form)
+    if basis.sectors > 1:
+        raise UserError(f"{basis.name}: export --to {form}: a cyclic sector is no whole body; mesh the whole body")
+    if group.speed:
+        raise UserError(
+            f"{basis.name}: export --to {form}: the modes at {group.speed * 30 / np.pi:.6g} rpm hold the stiffness "
+            "of that speed, which a multibody program adds itself; export a group at rest (speeds_rpm = [0])"
+        )
+    if group.invariants is None:
+        raise UserError(f"{basis.name}: export --to {form}: the file holds no inertia integrals; compute it again")
+    return elastic(in_modes(real(group, form)), form)
+
+
+def elastic(g: ModalGroup, form: str) -> ModalGroup:
+    """A group in its modes without the rigid ones, whose motion the moving frame has. Only what multibody needs is cut.
+
+    Raises:
+        UserError: nothing elastic remains.
+    """
+    keep = np.flatnonzero(g.omega > 0)
+    if not len(keep):
+        raise UserError(f"export --to {form}: the modal file holds rigid motions only; ask for more modes")
+    some, v = np.ix_(keep, keep), g.invariants
+    assert v is not None
+    cut = replace(
+        v, shape=v.shape[:, keep], position_shape=v.position_shape[:, :, keep],
+        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep], stiffening=v.stiffening[:, keep][:, :, keep],
+    )  # fmt: skip
+    return replace(
+        g, omega=g.omega[keep], kind=tuple(g.kind[j] for j in keep), damping_ratio=g.damping_ratio[keep],
+        M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some], phi=_columns(g.phi, keep),
+        interfaces={n: replace(i, rows=i.rows[:, keep]) for n, i in g.interfaces.items()},
+        monitors={n: replace(r, rows=r.rows[:, keep]) for n, r in g.monitors.items()},
+        invariants=cut,
+    )  # fmt: skip
+
+
+def _columns(phi: Array, keep: Indices) -> Array:
+    return phi[:, :, keep] if len(phi) else phi
+
+
+def node_numbers(basis: ModalBasis) -> Indices:
+    """(n,) numbers of the nodes: those of the mesh file, or counted from 1."""
+    ids = basis.mesh.node_id
+    return ids if len(ids) else np.arange(1, basis.mesh.n_points + 1)

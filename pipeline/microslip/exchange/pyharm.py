@@ -1,0 +1,84 @@
+"""The .mat that pyHarm's generic reader takes: M, K, C, G with the physical coordinates first, a node an interface.
+
+pyHarm counts ``ndofs`` physical coordinates a node, node by node, then modal ones: its dictionary is
+``{"filename": ..., "ndofs": 6, "nmodes": nmodes}``, and all these numbers stand in the file. Node i is the i-th name in ``nodes``; its
+coordinates 0 to 5 are u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 in the frame of the interface. Characteristic coordinates
+stand among the modal ones. So the body must be reduced to interface displacements, by Craig-Bampton or with a massless
+boundary; a place where a force is to act or a displacement to be read must be an interface (role ``load``).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup, UserError
+from ..store import complete_or_absent
+from .choice import STATEMENT, only_group, real
+from .mat import clean_header
+from .mtx import interface_coordinates
+
+
+def write_pyharm(basis: ModalBasis, path: Path | str) -> None:
+    """Write one group, complete or absent. Same basis, same bytes.
+
+    Raises:
+        UserError: several groups, complex shapes, interface displacements are not coordinates, no permission.
+    """
+    tables = pyharm_tables(basis, real(only_group(basis, "pyharm"), "pyharm"))
+    from scipy.io import savemat
+
+    with complete_or_absent(path) as temporary:
+        savemat(temporary, tables, appendmat=False, oned_as="column")
+        clean_header(temporary)
+
+
+def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
+    """What the file holds.
+
+    Raises:
+        UserError: interface displacements are not coordinates.
+    """
+    order = physical_first(basis, g)
+    some, physical = np.ix_(order, order), 6 * len(g.interfaces)
+    loads = [rows.rows for rows in g.excitations.values()]
+    names = [f"{name}:{label}" for name, rows in g.excitations.items() for label in rows.labels]
+    return {
+        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]), "C": g.C_r[some], "G": g.G_r[some],
+        "ndofs": 6.0, "nnodes": float(len(g.interfaces)), "nmodes": float(g.n_modes - physical),
+        "nodes": np.array(list(g.interfaces), dtype=object).reshape(-1, 1),
+        "dofs": np.array(INTERFACE_ROWS, dtype=object).reshape(-1, 1),
+        "kind": np.array([g.kind[j] for j in order], dtype=object).reshape(-1, 1),
+        "origin": np.array([i.origin for i in g.interfaces.values()]),
+        "rotation": np.array([i.rotation for i in g.interfaces.values()]),
+        "Fex": np.concatenate(loads)[:, order].T if loads else np.zeros((g.n_modes, 0)),
+        "Fex_name": np.array(names, dtype=object).reshape(-1, 1),
+        "omega": g.omega, "Omega": g.speed,
+        "readme": f"{basis.name}: {STATEMENT}. Physical coordinates first: for each of nodes the six dofs in its frame "
+        "(rotation has n, t1, t2 as rows, n outwards), then nmodes modal ones. Positive forces act along the dofs. "
+        "Check: eigenvalues of (K, M) are omega^2 (without the massless coordinates).",
+    }  # fmt: skip
+
+
+def _symmetric(A: Array) -> Array:
+    return (A + A.T) / 2
+
+
+def physical_first(basis: ModalBasis, g: ModalGroup) -> Indices:
+    """(m,) the coordinates in pyHarm's order: six an interface, then all others as they stand.
+
+    Raises:
+        UserError: interface displacements are not coordinates.
+    """
+    column = {text: j for j, text in interface_coordinates(g).items()}
+    wanted = [f"{name}:{row}" for name in g.interfaces for row in INTERFACE_ROWS]
+    if not wanted or any(text not in column for text in wanted):
+        raise UserError(
+            f"{basis.name}: export --to pyharm: pyHarm wants the displacements of the interfaces as coordinates; give "
+            f'the body [[interfaces]] and compute it with reduction = "craig-bampton" or "massless-boundary" '
+            f'(the file has "{basis.reduction}")'
+        )
+    first = [column[text] for text in wanted]
+    return np.array(first + [j for j in range(g.n_modes) if j not in set(first)])

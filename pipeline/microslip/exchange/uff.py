@@ -1,0 +1,121 @@
+"""Universal File Format (.uff, .unv): nodes and shapes as test programs (pyuff, pyEMA, SDTools, Testlab) read them.
+
+Written to the published descriptions of the data sets: 151 header, 164 units (SI), 2411 nodes (double precision), 2412
+elements (of the types in `ELEMENTS`), one 55 an eigenmode. A data set 55 prints six digits, for frequency, damping and
+shape alike. Real shapes are normal modes (analysis type 2: frequency in Hz, modal mass 1, viscous damping ratio); the
+complex ones of a sector are complex eigenvalues (type 3) with eigenvalue -D omega + i omega sqrt(1 - D^2), 1/s, and
+modal A = phi^H (2 lambda M + C) phi = 2 i omega sqrt(1 - D^2). Components are displacements along x, y, z of the mesh's
+frame, kg^-1/2.
+
+The speed's number counted from 1 stands as the load case; ID line 4 tells speed and nodal diameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..resonances import eigenmodes
+from ..store import write_text
+from .choice import node_numbers, with_shapes
+
+ELEMENTS = {
+    "tetra": (111, (0, 1, 2, 3)),
+    "wedge": (112, (0, 1, 2, 3, 4, 5)),
+    "hexahedron": (115, (0, 1, 2, 3, 4, 5, 6, 7)),
+    "tetra10": (118, (0, 4, 1, 5, 2, 6, 7, 8, 9, 3)),
+    "wedge15": (113, (0, 6, 1, 7, 2, 8, 12, 13, 14, 3, 9, 4, 10, 5, 11)),
+    "hexahedron20": (116, (0, 8, 1, 9, 2, 10, 3, 11, 16, 17, 18, 19, 4, 12, 5, 13, 6, 14, 7, 15)),
+}
+"""Cell type -> FE descriptor of data set 2412 and the order of our nodes in it (edge nodes between their corners)."""
+
+
+def write_uff(basis: ModalBasis, path: Path | str) -> None:
+    """Write nodes and the eigenmodes of all groups, complete or absent. Same basis, same bytes.
+
+    Raises:
+        UserError: shapes are not stored, no permission, no space.
+    """
+    nodes = node_numbers(basis)
+    parts = [_header(basis), _units(), _nodes(nodes, basis.mesh.points), _elements(basis, nodes)]
+    for (speed, _), group in sorted(basis.groups.items()):
+        parts += _modes(basis, with_shapes(basis, eigenmodes(group), "uff"), speed, nodes)
+    write_text(path, "".join(parts))
+
+
+def _set(number: int, lines: list[str]) -> str:
+    return f"{-1:6d}\n{number:6d}\n" + "".join(f"{line}\n" for line in lines) + f"{-1:6d}\n"
+
+
+def _header(basis: ModalBasis) -> str:
+    """Data set 151. Its dates are left blank: the same basis gives the same bytes."""
+    program = f"microslip {__version__}"
+    date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
+    return _set(151, [basis.name[:80], "modal basis; SI; frame of the mesh; phi^H M phi = 1", program,
+                      date + f"{0:10d}{0:10d}{0:10d}", date, program, date])  # fmt: skip
+
+
+def _units() -> str:
+    """Data set 164: SI, absolute temperatures (type 2 would be relative)."""
+    return _set(164, [f"{1:10d}{'SI: Meter (newton)':<20}{1:10d}", _wide([1.0, 1.0, 1.0], 17), _wide([0.0], 17)])
+
+
+def _wide(values: list[float], digits: int = 16) -> str:
+    return "".join(f"{v:25.{digits}E}".replace("E", "D") for v in values)
+
+
+def _nodes(nodes: Indices, points: Array) -> str:
+    """Data set 2411: double precision, all in the global rectangular system."""
+    lines = []
+    for number, (x, y, z) in zip(nodes.tolist(), points.tolist(), strict=True):
+        lines += [f"{number:10d}{1:10d}{1:10d}{11:10d}", _wide([x, y, z])]
+    return _set(2411, lines)
+
+
+def _elements(basis: ModalBasis, nodes: Indices) -> str:
+    """Data set 2412; types it has no descriptor for are left out, their nodes and shapes stay."""
+    lines, number = [], 0
+    for kind, cells in basis.mesh.cells.items():
+        if kind not in ELEMENTS:
+            continue
+        descriptor, order = ELEMENTS[kind]
+        for cell in nodes[cells[:, order]].tolist():
+            number += 1
+            lines.append("".join(f"{v:10d}" for v in (number, descriptor, 1, 1, 7, len(cell))))
+            lines += ["".join(f"{v:10d}" for v in cell[i : i + 8]) for i in range(0, len(cell), 8)]
+    return _set(2412, lines) if lines else ""
+
+
+def _modes(basis: ModalBasis, g: ModalGroup, speed: int, nodes: Indices) -> Iterator[str]:
+    where = f"{g.speed * 30 / np.pi:.6g} rpm, nodal diameter {g.harmonic}, {basis.sectors} sectors"
+    complex_shapes = np.iscomplexobj(g.phi)
+    for j in range(g.n_modes):
+        lines = [basis.name[:80], "mode shape, kg^-1/2, phi^H M phi = 1", "NONE", where[:80]]
+        lines.append(f"{'Mode Same':<10}{j + 1:10d}{' Frequency':<10}{g.frequency[j]:13.5e}"[:80])
+        lines.append("".join(f"{v:10d}" for v in (1, 3 if complex_shapes else 2, 2, 8, 5 if complex_shapes else 2, 3)))
+        lines += _parameters(g, j, speed, complex_shapes)
+        values = _interleaved(g.phi[:, :, j]) if complex_shapes else g.phi[:, :, j]
+        for number, row in zip(nodes.tolist(), values.tolist(), strict=True):
+            lines += [f"{number:10d}", "".join(f"{v:13.5e}" for v in row)]
+        yield _set(55, lines)
+
+
+def _parameters(g: ModalGroup, j: int, speed: int, complex_shapes: bool) -> list[str]:
+    """Records 7 and 8 of data set 55."""
+    omega, D = float(g.omega[j]), float(g.damping_ratio[j])
+    if not complex_shapes:
+        numbers = [omega / (2 * np.pi), 1.0, D, 0.0]
+    else:
+        damped = omega * np.sqrt(max(1 - D**2, 0.0))
+        numbers = [-D * omega, damped, 0.0, 2 * damped, 0.0, 0.0]
+    head = f"{2:10d}{len(numbers):10d}{speed + 1:10d}{j + 1:10d}"
+    return [head, "".join(f"{v:13.5e}" for v in numbers)]
+
+
+def _interleaved(shape: Array) -> Array:
+    """(n, 6) real and imaginary part of each component in turn."""
+    return np.stack([shape.real, shape.imag], axis=2).reshape(len(shape), 6)
