@@ -1,9 +1,9 @@
 """Exudyn: the .npz that its `ObjectFFRFreducedOrderInterface.LoadFromFile` reads (file version 1 of its FEM module).
 
 The body enters a multibody system as an `ObjectFFRFreducedOrder`: elastic modes in a floating frame whose axes are
-those of the mesh and whose origin is the reference point of the inertia integrals. The integrals are those of the finite
-elements' mass matrix, so Exudyn needs neither mesh nor mass matrix. Damping is not in its file; the modal ratios stand
-beside under ``microslip_damping_ratio``. Nothing in the file is pickled.
+those of the mesh and whose origin is the reference point of the inertia integrals. The integrals are those of the
+finite elements' mass matrix, so Exudyn needs neither mesh nor mass matrix. Damping is not in its file; the modal
+ratios stand beside under ``microslip_damping_ratio``. Nothing in the file is pickled.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """The .mat that pyHarm's generic reader takes: M, K, C, G with the physical coordinates first, a node an interface.
 
-pyHarm counts ``ndofs`` physical coordinates a node, node by node, then modal ones: its dictionary is
-``{"filename": ..., "ndofs": 6, "nmodes": nmodes}``, and all these numbers stand in the file. Node i is the i-th name in ``nodes``; its
-coordinates 0 to 5 are u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 in the frame of the interface. Characteristic coordinates
-stand among the modal ones. So the body must be reduced to interface displacements, by Craig-Bampton or with a massless
-boundary; a place where a force is to act or a displacement to be read must be an interface (role ``load``).
+pyHarm counts ``ndofs`` physical coordinates a node, node by node, then modal ones: its dictionary is ``{"filename":
+..., "ndofs": 6, "nmodes": nmodes}``, and all these numbers stand in the file. Node i is the i-th name in ``nodes``;
+its coordinates 0 to 5 are u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 in the frame of the interface. Characteristic
+coordinates stand among the modal ones. So the body must be reduced to interface displacements, by Craig-Bampton or
+with a massless boundary; a place where a force is to act or a displacement to be read must be an interface (role
+``load``).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """SID, the standard input data of an elastic body for multibody programs (.SID_FEM, text).
 
 Wallrapp, Standardization of Flexible Body Modeling in Multibody System Codes, Part I: Definition of Standard Input
-Data, Mech. Struct. Mach. 22 (1994); Schwertassek and Wallrapp, Dynamik flexibler Mehrkoerpersysteme (1999), table 6.9. Every
-quantity is a Taylor series in the modal coordinates, m0 + sum over q of m1_q, written as ``m1( row, q, column)``. With
-x = r + phi q from the origin of the body frame, ~ the cross-product matrix and all integrals over the mass,
+Data, Mech. Struct. Mach. 22 (1994); Schwertassek and Wallrapp, Dynamik flexibler Mehrkoerpersysteme (1999), table
+6.9. Every quantity is a Taylor series in the modal coordinates, m0 + sum over q of m1_q, written as ``m1( row, q,
+column)``. With x = r + phi q from the origin of the body frame, ~ the cross-product matrix and all integrals over the
+mass,
 
     mdCM = int x,  J = -int x~ x~,  Ct = int phi^T,  Cr = int (x~ phi)^T = int phi^T x~^T,  Me = int phi^T phi,
     Gr_l = -2 int x~ phi~_l,  Ge_l = -2 int phi^T phi~_l,  Oe omega_q = int phi^T w~ w~ x,
@@ -15,8 +16,8 @@ and the equations of motion in body axes (a: acceleration of the origin less gra
     [ mdCM~  J      Cr^T ] [ w'    ] + [ sum Gr_l q'_l w + w~ J w       ] + [ 0                    ] = outer forces
     [ Ct     Cr     Me   ] [ q''   ]   [ sum Ge_l q'_l w + Oe omega_q   ]   [ ksigma + Ke q + De q' ]
 
-Where the modal file holds how inertia forces stiffen the body, their geometric stiffness stands in the m1 of Ct, Cr and
-Oe (rows of the elastic equations only, so Ct^T and Cr^T above take m0 of Ct, and Cr without it).
+Where the modal file holds how inertia forces stiffen the body, their geometric stiffness stands in the m1 of Ct, Cr
+and Oe (rows of the elastic equations only, so Ct^T and Cr^T above take m0 of Ct, and Cr without it).
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def _first(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> str
     names = ", ".join(f"{i + 1} = {a.name}" for i, a in enumerate(nodes))
     origin = " ".join(f"{x:.9g}" for x in g.invariants.point)  # type: ignore[union-attr]
     text = (
-        f"{len(nodes)} nodes, {g.n_modes} modes, {basis.name} by microslip; SI; axes of the mesh, origin at ({origin}) m "
-        f"of it; m1(row, q, column); omega products xx yy zz xy yz xz; nodes {names}"
+        f"{len(nodes)} nodes, {g.n_modes} modes, {basis.name} by microslip; SI; axes of the mesh, origin ({origin}); "
+        f"m1(row, q, column); omega products xx yy zz xy yz xz; nodes {names}"
     )
     return text.encode("ascii", "replace").decode("ascii")
 
