@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, Array, ModalBasis, ModalGroup, UserError
+from ..coordinates import compliance_row
+from ..data import Array, ModalBasis, ModalGroup, UserError
 from ..store import refused
 from .choice import STATEMENT
 from .mat import field_names
@@ -106,18 +107,18 @@ def _coordinates(g: ModalGroup) -> str:
 
 
 def interface_coordinates(g: ModalGroup) -> dict[int, str]:
-    """Coordinate (counted from 0) -> ``interface:row``, for coordinates that are an interface row itself."""
-    found = {}
-    for name, item in g.interfaces.items():
-        labels = [*INTERFACE_ROWS, *(f"c{c + 1}" for c in range(len(item.characteristic)))]
-        for label in labels:
-            row = item.row(label)
-            column = int(np.argmax(np.abs(row)))
-            alone = np.zeros_like(row)
-            alone[column] = 1.0
-            if g.kind[column] in ("interface", "massless-interface") and np.array_equal(row, alone):
-                found[column] = f"{name}:{label}"
-    return found
+    """Coordinate (counted from 0) -> ``interface:row``, for coordinates that are the displacement of an interface.
+
+    They stand in the order of the compliance's labels; a file whose rows say otherwise has none.
+    """
+    columns = [j for j, kind in enumerate(g.kind) if kind in ("interface", "massless-interface")]
+    labels = [text.removeprefix("interface:") for text in g.compliance.labels if text.startswith("interface:")]
+    if len(columns) != len(labels):
+        return {}
+    rows = np.array([compliance_row(g, f"interface:{text}") for text in labels]).reshape(-1, g.n_modes)
+    wanted = np.eye(g.n_modes)[columns]
+    unlike = np.abs(rows - wanted).max(initial=0.0)  # rounding of the constraint, in units of the row
+    return dict(zip(columns, labels, strict=True)) if unlike < 1e-6 else {}
 
 
 def _readme(basis: ModalBasis) -> str:

@@ -42,18 +42,18 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
     Raises:
         UserError: interface displacements are not coordinates.
     """
-    order = physical_first(basis, g)
-    some, physical = np.ix_(order, order), 6 * len(g.interfaces)
+    nodes, order = physical_first(basis, g)
+    some, faces = np.ix_(order, order), [g.interfaces[name] for name in nodes]
     loads = [rows.rows for rows in g.excitations.values()]
     names = [f"{name}:{label}" for name, rows in g.excitations.items() for label in rows.labels]
     return {
         "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]), "C": g.C_r[some], "G": g.G_r[some],
-        "ndofs": 6.0, "nnodes": float(len(g.interfaces)), "nmodes": float(g.n_modes - physical),
-        "nodes": np.array(list(g.interfaces), dtype=object).reshape(-1, 1),
+        "ndofs": 6.0, "nnodes": float(len(nodes)), "nmodes": float(g.n_modes - 6 * len(nodes)),
+        "nodes": np.array(nodes, dtype=object).reshape(-1, 1),
         "dofs": np.array(INTERFACE_ROWS, dtype=object).reshape(-1, 1),
         "kind": np.array([g.kind[j] for j in order], dtype=object).reshape(-1, 1),
-        "origin": np.array([i.origin for i in g.interfaces.values()]),
-        "rotation": np.array([i.rotation for i in g.interfaces.values()]),
+        "origin": np.array([i.origin for i in faces]),
+        "rotation": np.array([i.rotation for i in faces]),
         "Fex": np.concatenate(loads)[:, order].T if loads else np.zeros((g.n_modes, 0)),
         "Fex_name": np.array(names, dtype=object).reshape(-1, 1),
         "omega": g.omega, "Omega": g.speed,
@@ -67,19 +67,19 @@ def _symmetric(A: Array) -> Array:
     return (A + A.T) / 2
 
 
-def physical_first(basis: ModalBasis, g: ModalGroup) -> Indices:
-    """(m,) the coordinates in pyHarm's order: six an interface, then all others as they stand.
+def physical_first(basis: ModalBasis, g: ModalGroup) -> tuple[list[str], Indices]:
+    """Names of the interfaces that are nodes, and (m,) the coordinates in pyHarm's order: six a node, then the others.
 
     Raises:
         UserError: interface displacements are not coordinates.
     """
     column = {text: j for j, text in interface_coordinates(g).items()}
-    wanted = [f"{name}:{row}" for name in g.interfaces for row in INTERFACE_ROWS]
-    if not wanted or any(text not in column for text in wanted):
+    nodes = [name for name in g.interfaces if all(f"{name}:{row}" in column for row in INTERFACE_ROWS)]
+    if not nodes:
         raise UserError(
             f"{basis.name}: export --to pyharm: pyHarm wants the displacements of the interfaces as coordinates; give "
             f'the body [[interfaces]] and compute it with reduction = "craig-bampton" or "massless-boundary" '
             f'(the file has "{basis.reduction}")'
         )
-    first = [column[text] for text in wanted]
-    return np.array(first + [j for j in range(g.n_modes) if j not in set(first)])
+    first = [column[f"{name}:{row}"] for name in nodes for row in INTERFACE_ROWS]
+    return nodes, np.array(first + [j for j in range(g.n_modes) if j not in set(first)])

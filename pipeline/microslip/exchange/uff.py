@@ -1,11 +1,11 @@
 """Universal File Format (.uff, .unv): nodes and shapes as test programs (pyuff, pyEMA, SDTools, Testlab) read them.
 
 Written to the published descriptions of the data sets: 151 header, 164 units (SI), 2411 nodes (double precision), 2412
-elements (of the types in `ELEMENTS`), one 55 an eigenmode. A data set 55 prints six digits, for frequency, damping and
-shape alike. Real shapes are normal modes (analysis type 2: frequency in Hz, modal mass 1, viscous damping ratio); the
-complex ones of a sector are complex eigenvalues (type 3) with eigenvalue -D omega + i omega sqrt(1 - D^2), 1/s, and
-modal A = phi^H (2 lambda M + C) phi = 2 i omega sqrt(1 - D^2). Components are displacements along x, y, z of the mesh's
-frame, kg^-1/2.
+the surface as triangles and quadrilaterals to draw, one 55 a mode. A data set 55 prints six digits, for frequency,
+damping and shape alike. Real shapes are normal modes (analysis type 2: frequency in Hz, modal mass 1, viscous damping
+ratio); the complex ones of a sector are complex eigenvalues (type 3) with eigenvalue -D omega + i omega sqrt(1 - D^2),
+1/s, and modal A = phi^H (2 lambda M + C) phi = 2 i omega sqrt(1 - D^2). Components are displacements along x, y, z of
+the mesh's frame, kg^-1/2.
 
 The speed's number counted from 1 stands as the load case; ID line 4 tells speed and nodal diameter.
 """
@@ -19,19 +19,13 @@ import numpy as np
 
 from .. import __version__
 from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..mesh import boundary_facets
 from ..resonances import eigenmodes
 from ..store import write_text
 from .choice import node_numbers, with_shapes
 
-ELEMENTS = {
-    "tetra": (111, (0, 1, 2, 3)),
-    "wedge": (112, (0, 1, 2, 3, 4, 5)),
-    "hexahedron": (115, (0, 1, 2, 3, 4, 5, 6, 7)),
-    "tetra10": (118, (0, 4, 1, 5, 2, 6, 7, 8, 9, 3)),
-    "wedge15": (113, (0, 6, 1, 7, 2, 8, 12, 13, 14, 3, 9, 4, 10, 5, 11)),
-    "hexahedron20": (116, (0, 8, 1, 9, 2, 10, 3, 11, 16, 17, 18, 19, 4, 12, 5, 13, 6, 14, 7, 15)),
-}
-"""Cell type -> FE descriptor of data set 2412 and the order of our nodes in it (edge nodes between their corners)."""
+TRIANGLE, QUAD = 41, 44
+"""FE descriptors of data set 2412 (linear plane-stress elements, which stand for a skin to draw)."""
 
 
 def write_uff(basis: ModalBasis, path: Path | str) -> None:
@@ -41,7 +35,7 @@ def write_uff(basis: ModalBasis, path: Path | str) -> None:
         UserError: shapes are not stored, no permission, no space.
     """
     nodes = node_numbers(basis)
-    parts = [_header(basis), _units(), _nodes(nodes, basis.mesh.points), _elements(basis, nodes)]
+    parts = [_header(basis), _units(), _nodes(nodes, basis.mesh.points), _skin(basis, nodes)]
     for (speed, _), group in sorted(basis.groups.items()):
         parts += _modes(basis, with_shapes(basis, eigenmodes(group), "uff"), speed, nodes)
     write_text(path, "".join(parts))
@@ -76,17 +70,15 @@ def _nodes(nodes: Indices, points: Array) -> str:
     return _set(2411, lines)
 
 
-def _elements(basis: ModalBasis, nodes: Indices) -> str:
-    """Data set 2412; types it has no descriptor for are left out, their nodes and shapes stay."""
+def _skin(basis: ModalBasis, nodes: Indices) -> str:
+    """Data set 2412: the surface by the corners of its facets, outwards."""
     lines, number = [], 0
-    for kind, cells in basis.mesh.cells.items():
-        if kind not in ELEMENTS:
-            continue
-        descriptor, order = ELEMENTS[kind]
-        for cell in nodes[cells[:, order]].tolist():
+    for kind, facets in boundary_facets(basis.mesh).items():
+        descriptor, corners = (QUAD, 4) if kind.startswith("quad") else (TRIANGLE, 3)
+        for facet in nodes[facets[:, :corners]].tolist():
             number += 1
-            lines.append("".join(f"{v:10d}" for v in (number, descriptor, 1, 1, 7, len(cell))))
-            lines += ["".join(f"{v:10d}" for v in cell[i : i + 8]) for i in range(0, len(cell), 8)]
+            lines.append("".join(f"{v:10d}" for v in (number, descriptor, 1, 1, 7, corners)))
+            lines.append("".join(f"{v:10d}" for v in facet))
     return _set(2412, lines) if lines else ""
 
 

@@ -1,0 +1,530 @@
+"""Exports read back by readers written from the formats' descriptions, and by the packages that own the formats."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import sector
+import small
+from scipy.io import loadmat, mmread
+
+from microslip.basis import write_basis
+from microslip.body import BodySettings
+from microslip.cli import main
+from microslip.data import INTERFACE_ROWS, ModalBasis, UserError
+from microslip.exchange import WRITERS, to_xarray, writer
+from microslip.exchange.choice import elastic, select
+from microslip.floating_frame import floating_body, inertia, mass_matrix, right_side
+from microslip.frames import skew
+from microslip.mesh import boundary_facets
+from microslip.modes import modal_basis
+
+SOURCE = {"settings": "small", "mesh_sha256": "0" * 64}
+ROUNDING = 1e-12
+"""Sums of a few hundred products in double precision, relative to the largest entry."""
+
+
+@cache
+def body(**changes: Any) -> ModalBasis:
+    """The beam with other settings, as one-level keyword arguments."""
+    table = small.table(rotation={"speeds_rpm": [0.0], "point": [0.0, 0.01, -0.2]}, **changes)
+    return modal_basis(small.beam(), BodySettings.model_validate(table), provenance=SOURCE)
+
+
+@cache
+def stiffened() -> ModalBasis:
+    table = small.table(rotation={"speeds_rpm": [0.0], "point": [0.0, 0.01, -0.2]}, output={"stiffening": True})
+    return modal_basis(small.beam(), BodySettings.model_validate(table), provenance=SOURCE)
+
+
+def close(a: Any, b: Any, relative: float = ROUNDING) -> None:
+    np.testing.assert_allclose(a, b, rtol=0, atol=relative * max(np.abs(b).max(initial=0), 1e-300))
+
+
+# --- Matrix Market ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reduction", ["eigenmodes", "craig-bampton", "massless-boundary", "dual-craig-bampton"])
+def test_matrix_market_gives_every_bit_back_and_the_frequencies(reduction: str, tmp_path: Path) -> None:
+    basis = body(reduction=reduction)
+    g = basis.groups[0, 0]
+    writer("mtx")(basis, tmp_path / "m")
+    read = {p.stem: np.asarray(mmread(p)) for p in (tmp_path / "m" / "speed_0").glob("*.mtx")}
+    for name in ("M_r", "K_r", "C_r", "G_r"):
+        np.testing.assert_array_equal(read[name], getattr(g, name))
+    np.testing.assert_array_equal(read["interface_right"], g.interfaces["right"].rows)
+    np.testing.assert_array_equal(read["monitor_tip_probe"], g.monitors["tip-probe"].rows)
+    V = read.get("to_diagonal", np.eye(g.n_modes))
+    np.testing.assert_allclose(np.diag(V.T @ read["K_r"] @ V), read["omega"].ravel() ** 2, rtol=1e-8)
+    assert "u_n u_t1 u_t2" in (tmp_path / "m" / "README.txt").read_text()
+
+
+def test_coordinates_of_matrix_market_name_the_interface_displacements(tmp_path: Path) -> None:
+    basis = body(reduction="craig-bampton")
+    writer("mtx")(basis, tmp_path / "m")
+    with open(tmp_path / "m" / "speed_0" / "coordinates.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    named = [r["meaning"] for r in rows if r["kind"] == "interface"]
+    assert named == [f"{name}:{row}" for name in ("right", "left") for row in INTERFACE_ROWS]
+    assert not any(r["meaning"] for r in rows if r["kind"] != "interface")
+
+
+def test_a_complex_group_is_written_complex(tmp_path: Path) -> None:
+    basis = sector.basis()
+    writer("mtx")(basis, tmp_path / "m")
+    for (_, k), g in basis.groups.items():
+        inside = tmp_path / "m" / f"speed_0_nd_{k}"
+        np.testing.assert_array_equal(np.asarray(mmread(inside / "G_r.mtx")), g.G_r)
+        for name, item in g.interfaces.items():
+            np.testing.assert_array_equal(np.asarray(mmread(inside / f"interface_{name}.mtx")), item.rows)
+
+
+def test_a_folder_of_ours_is_replaced_and_another_one_is_not(tmp_path: Path) -> None:
+    writer("mtx")(small.basis(), tmp_path / "m")
+    (tmp_path / "m" / "speed_0" / "old.mtx").write_text("old")
+    writer("mtx")(small.basis(), tmp_path / "m")
+    assert not (tmp_path / "m" / "speed_0" / "old.mtx").exists()
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter1").write_text("years of work")
+    with pytest.raises(UserError, match="choose another name"):
+        writer("mtx")(small.basis(), tmp_path / "thesis")
+    assert (tmp_path / "thesis" / "chapter1").read_text() == "years of work"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m", "thesis"]
+
+
+# --- universal file format -------------------------------------------------------------------------------------------
+
+
+def uff_sets(path: Path) -> list[dict[str, Any]]:
+    pyuff = pytest.importorskip("pyuff")
+    found = pyuff.UFF(str(path)).read_sets()
+    return found if isinstance(found, list) else [found]
+
+
+def test_uff_is_read_by_pyuff_to_its_printed_digits(tmp_path: Path) -> None:
+    basis, g = small.basis(), small.basis().groups[0, 0]
+    writer("uff")(basis, tmp_path / "b.uff")
+    sets = uff_sets(tmp_path / "b.uff")
+    assert [s["type"] for s in sets] == [151, 164, 2411, 2412] + [55] * g.n_modes
+    header, units, nodes = sets[:3]
+    assert header["model_name"].strip() == "small"
+    assert (units["units_code"], units["length"], units["force"]) == (1, 1.0, 1.0)
+    np.testing.assert_array_equal(np.stack([nodes["x"], nodes["y"], nodes["z"]], axis=1), basis.mesh.points)
+    np.testing.assert_array_equal(nodes["node_nums"], basis.mesh.node_id)
+    skin = {frozenset(f[:3]) for f in boundary_facets(basis.mesh)["triangle6"].tolist()}
+    drawn = {frozenset(np.searchsorted(basis.mesh.node_id, f)) for f in sets[3]["triangle"]["nodes_nums"]}
+    assert drawn == skin
+    for j, mode in enumerate(s for s in sets if s["type"] == 55):
+        assert (mode["analysis_type"], mode["data_ch"], mode["spec_data_type"], mode["mode_n"]) == (2, 2, 8, j + 1)
+        shape = np.stack([mode["r1"], mode["r2"], mode["r3"]], axis=1)
+        printed = np.vectorize(lambda v: float(f"{v:.5e}"))
+        np.testing.assert_array_equal(shape, printed(g.phi[:, :, j]))
+        assert mode["freq"] == printed(g.frequency[j]) and mode["modal_damp_vis"] == printed(g.damping_ratio[j])
+        assert mode["modal_m"] == 1.0
+
+
+def test_complex_modes_in_uff_keep_phase_and_eigenvalue(tmp_path: Path) -> None:
+    basis = select(sector.basis(), None, 2)
+    g = basis.groups[0, 2]
+    assert np.iscomplexobj(g.phi)
+    writer("uff")(basis, tmp_path / "b.uff")
+    modes = [s for s in uff_sets(tmp_path / "b.uff") if s["type"] == 55]
+    for j, mode in enumerate(modes):
+        shape = np.stack([mode["r1"], mode["r2"], mode["r3"]], axis=1)
+        np.testing.assert_allclose(shape, g.phi[:, :, j], rtol=0, atol=6e-6 * np.abs(g.phi).max())
+        D, w = g.damping_ratio[j], g.omega[j]
+        np.testing.assert_allclose(mode["eig"], w * (-D + 1j * np.sqrt(1 - D**2)), rtol=2e-5)
+
+
+# --- SID: a reader from the description of the format -----------------------------------------------------------------
+
+
+@dataclass
+class Block:
+    """What stands between a keyword and its ``end``."""
+
+    name: str
+    values: dict[str, str] = field(default_factory=dict)
+    inside: list[Block] = field(default_factory=list)
+    entries: list[tuple[str, tuple[int, ...], float]] = field(default_factory=list)
+
+    def __getitem__(self, name: str) -> Block:
+        (one,) = [b for b in self.inside if b.name == name]
+        return one
+
+    def taylor(self) -> tuple[np.ndarray, np.ndarray]:
+        """m0 (rows, columns) and m1 (q, rows, columns)."""
+        rows, columns, modes = (int(self.values[n]) for n in ("nrow", "ncol", "nq"))
+        m0, m1 = np.zeros((rows, columns)), np.zeros((modes, rows, columns))
+        for which, at, value in self.entries:
+            if which == "m0":
+                m0[at[0] - 1, at[1] - 1] = value
+            else:
+                m1[at[1] - 1, at[0] - 1, at[2] - 1] = value
+        return m0, m1
+
+
+def read_sid(path: Path) -> tuple[str, Block]:
+    """First line and the part of a SID file."""
+    first, *lines = path.read_text(encoding="ascii").splitlines()
+    stack = [Block("file")]
+    for line in map(str.strip, lines):
+        if entry := re.fullmatch(r"(m[01])\(([\d, ]+)\) = (\S+)", line):
+            stack[-1].entries.append((entry[1], tuple(map(int, entry[2].split(","))), float(entry[3])))
+        elif line.startswith("end "):
+            closed = stack.pop()
+            assert line.removeprefix("end ") == closed.name, line
+            stack[-1].inside.append(closed)
+        elif line.startswith("new node"):
+            stack.append(Block("node", {"number": line.split("=")[1].strip()}))
+        elif "=" in line:
+            key, _, value = line.partition("=")
+            stack[-1].values[key.strip()] = value.strip()
+        else:
+            stack.append(Block(line.removeprefix("new ")))
+    assert len(stack) == 1
+    return first, stack[0]["part"]["modal"]
+
+
+@pytest.fixture(scope="module")
+def sid(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Block]:
+    path = tmp_path_factory.mktemp("sid") / "b.SID_FEM"
+    writer("sid")(stiffened(), path)
+    return read_sid(path)
+
+
+def test_sid_says_what_it_holds(sid: tuple[str, Block]) -> None:
+    first, modal = sid
+    g = stiffened().groups[0, 0]
+    assert first.startswith(f"4 nodes, {g.n_modes} modes") and "SI" in first and "m1(row, q, column)" in first
+    assert float(modal["refmod"].values["mass"]) == stiffened().groups[0, 0].invariants.mass
+    assert int(modal["refmod"].values["nelastq"]) == g.n_modes
+    names = [b.name for b in modal.inside]
+    assert names == "refmod frame mdCM J Ct Cr Me Gr Ge Oe ksigma Ke De".split()
+    assert [n.values["number"] for n in modal["frame"].inside] == ["1", "2", "3", "4"]
+
+
+def test_equations_of_motion_from_sid_are_those_of_the_floating_frame(sid: tuple[str, Block]) -> None:
+    """The SID's terms, put together as its description says, against Sextro (2.3-23) at a random state."""
+    modal, b = sid[1], floating_body(stiffened())
+    T = {name: modal[name].taylor() for name in "mdCM J Ct Cr Me Gr Ge Oe Ke De".split()}
+    rng = np.random.default_rng(7)
+    m = b.n_modes
+    q, velocity = 1e-4 * rng.normal(size=m), rng.normal(size=m)
+    w, alpha, a = rng.normal(size=3) * 100, rng.normal(size=3) * 1e3, rng.normal(size=3) * 10
+
+    def at(name: str, x: np.ndarray) -> np.ndarray:
+        m0, m1 = T[name]
+        return m0 + np.tensordot(x, m1, axes=1) if len(m1) else m0
+
+    # first-order inertia: the even part beyond q = 0 is what the format leaves out
+    J = inertia(b, 0 * q) + (inertia(b, q) - inertia(b, -q)) / 2
+    close(at("J", q), J)
+    M = mass_matrix(b, q)
+    M[3:6, 3:6] = J
+    c, geometric = at("mdCM", q)[:, 0], b.invariants.stiffening
+    Cr_plain = at("Cr", q) - np.einsum("kij,j->ik", geometric[9:], q)
+    close(float(modal["refmod"].values["mass"]) * np.eye(3), M[:3, :3])
+    close(skew(c), M[3:6, :3])
+    close(T["Ct"][0], M[6:, :3])
+    close(Cr_plain, M[6:, 3:6])
+    close(T["Me"][0], M[6:, 6:])
+    # elastic rows with all stiffening, from acceleration, angular acceleration and centrifugal force
+    products = np.array([w[0] ** 2, w[1] ** 2, w[2] ** 2, w[0] * w[1], w[1] * w[2], w[0] * w[2]])
+    Ge = T["Ge"][0].reshape(m, m, 3)
+    elastic_rows = (
+        at("Ct", q) @ a + at("Cr", q) @ alpha + np.einsum("klc,l,c->k", Ge, velocity, w) + at("Oe", q) @ products
+        + T["Ke"][0] @ q + T["De"][0] @ velocity
+    )  # fmt: skip
+    rest = -right_side(b, w, q, velocity)
+    stiff = np.tensordot(np.concatenate([a, alpha]), geometric[6:], axes=1) @ q
+    expected = M[6:, :3] @ a + M[6:, 3:6] @ alpha + rest[6:] + stiff
+    assert np.linalg.norm(stiff) > 1e-6 * np.linalg.norm(expected), "the stiffening must show"
+    close(elastic_rows, expected)
+    # the frame's rows
+    close(2 * skew(w) @ T["Ct"][0].T @ velocity + skew(w) @ skew(w) @ c, rest[:3])
+    Gr = at("Gr", q).reshape(3, m, 3)
+    turning = np.einsum("alc,l,c->a", Gr, velocity, w) + skew(w) @ J @ w
+    exact = rest[3:6] - skew(w) @ inertia(b, q) @ w + skew(w) @ J @ w
+    close(turning, exact)
+
+
+def test_nodes_of_sid_are_the_interfaces_in_body_axes(sid: tuple[str, Block]) -> None:
+    g = stiffened().groups[0, 0]
+    nodes = sid[1]["frame"].inside
+    for node, (_, face) in zip(nodes, g.interfaces.items(), strict=False):
+        origin, moved = node["origin"].taylor()
+        close(origin[:, 0], face.origin - g.invariants.point)
+        close(moved[:, :, 0].T, node["phi"].taylor()[0])
+        close(face.rotation @ node["phi"].taylor()[0], face.rows[:3])
+        close(face.rotation @ node["psi"].taylor()[0], face.rows[3:])
+        turn, turned = node["AP"].taylor()
+        np.testing.assert_array_equal(turn, np.eye(3))
+        close(turned[0], skew(node["psi"].taylor()[0][:, 0]))
+
+
+# --- MBDyn: a reader from the layout of its record groups -------------------------------------------------------------
+
+
+def read_fem(path: Path) -> dict[int, np.ndarray]:
+    """Record group -> its numbers; the shapes (8) as (modes, nodes, 6)."""
+    groups: dict[int, list[str]] = {}
+    here = 0
+    for line in path.read_text(encoding="ascii").splitlines():
+        if found := re.match(r"\*\* RECORD GROUP (\d+),", line):
+            here = int(found[1])
+            groups[here] = []
+        elif here and not line.startswith("**"):
+            groups[here] += line.replace("REV0", "").split()
+    read = {k: np.array(v, dtype=float) for k, v in groups.items()}
+    nodes, modes = int(read[1][0]), int(read[1][1])
+    read[8] = read[8].reshape(modes, nodes, 6)
+    for k in (9, 10, 13):
+        read[k] = read[k].reshape(modes, modes)
+    return read
+
+
+def test_mbdyn_fem_holds_the_body(tmp_path: Path) -> None:
+    basis = body()
+    g, v = basis.groups[0, 0], basis.groups[0, 0].invariants
+    writer("mbdyn")(basis, tmp_path / "b.fem")
+    read = read_fem(tmp_path / "b.fem")
+    m = g.n_modes
+    np.testing.assert_array_equal(read[1], [4, m, 0, 0, 0])
+    np.testing.assert_array_equal(read[2], [1, 2, 3, 4])
+    where = np.stack([read[5], read[6], read[7]], axis=1)
+    face = g.interfaces["right"]
+    close(where[0], face.origin - v.point)
+    close(face.rotation @ read[8][:, 0, :3].T, face.rows[:3])
+    close(face.rotation @ read[8][:, 0, 3:].T, face.rows[3:])
+    np.testing.assert_allclose(np.sqrt(scipy.linalg.eigvalsh(read[10], read[9])), g.omega, rtol=1e-12)
+    close(read[13], g.C_r)
+    mass, centre, about = read[12][0], read[12][1:4], read[12][4:].reshape(3, 3)
+    assert mass == pytest.approx(basis.mass, rel=1e-12)
+    close(centre + v.point, basis.centre)
+    close(about, basis.inertia, 1e-10)  # differences of moments about a point 0.26 m away
+    close(read[14].reshape(3, m), v.shape)
+
+
+def test_mbdyn_invariants_are_the_derivatives_of_the_inertia(tmp_path: Path) -> None:
+    """Inv8 + Inv8^T is dJ/dq; Inv5 is antisymmetric; Inv4 is the coupling of rotation and deflection."""
+    basis = body()
+    writer("mbdyn")(basis, tmp_path / "b.fem")
+    read, b = read_fem(tmp_path / "b.fem"), floating_body(basis, stiffened=False)
+    m = b.n_modes
+    Inv8 = read[16].reshape(3, m, 3)
+    Inv5 = read[17].reshape(3, m, m)
+    for j, e in enumerate(np.eye(m)):
+        slope = (inertia(b, e) - inertia(b, -e)) / 2
+        close(Inv8[:, j] + Inv8[:, j].T, slope)
+        close(read[15].reshape(3, m) + Inv5[:, j], mass_matrix(b, e)[3:6, 6:])
+    close(Inv5, -Inv5.transpose(0, 2, 1))
+
+
+# --- pyHarm -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reduction", ["craig-bampton", "massless-boundary"])
+def test_pyharm_gets_physical_coordinates_first(reduction: str, tmp_path: Path) -> None:
+    basis = body(reduction=reduction)
+    g = basis.groups[0, 0]
+    writer("pyharm")(basis, tmp_path / "b.mat")
+    read = loadmat(tmp_path / "b.mat", squeeze_me=True)
+    nodes, count = list(read["nodes"]), int(read["nnodes"])
+    assert nodes == ["right", "left"] and count * 6 + int(read["nmodes"]) == g.n_modes
+    w2 = scipy.linalg.eigvals(read["K"], read["M"])
+    w = np.sqrt(np.sort(w2[np.isfinite(w2) & (np.abs(w2) < 1e15)].real)[: len(g.omega)])
+    np.testing.assert_allclose(w[: len(g.omega) // 2], g.omega[: len(w) // 2], rtol=1e-6)
+    # a unit force on u_n of the second node: static displacement there is the stored compliance
+    dof = 6 + INTERFACE_ROWS.index("u_n")
+    answer = np.linalg.solve(read["K"], np.eye(g.n_modes)[dof])[dof]
+    i = g.compliance.labels.index(f"interface:{nodes[1]}:u_n")
+    assert answer == pytest.approx(g.compliance.static[i, i], rel=1e-8)
+
+
+def test_pyharm_puts_characteristic_coordinates_among_the_modal_ones(tmp_path: Path) -> None:
+    faces = [dict(i) for i in small.table()["interfaces"]]
+    faces[0] |= {"coordinates": "characteristic", "count": 3}
+    table = small.table(interfaces=faces, reduction="craig-bampton")
+    basis = modal_basis(small.beam(), BodySettings.model_validate(table), provenance=SOURCE)
+    g = basis.groups[0, 0]
+    writer("pyharm")(basis, tmp_path / "b.mat")
+    read = loadmat(tmp_path / "b.mat", squeeze_me=True)
+    dof = 6 + INTERFACE_ROWS.index("u_t1")
+    answer = np.linalg.solve(read["K"], np.eye(g.n_modes)[dof])[dof]
+    i = g.compliance.labels.index(f"interface:{read['nodes'][1]}:u_t1")
+    assert answer == pytest.approx(g.compliance.static[i, i], rel=1e-8)
+
+
+# --- xarray -----------------------------------------------------------------------------------------------------------
+
+
+def test_xarray_names_axes_and_shares_the_numbers() -> None:
+    pytest.importorskip("xarray")
+    basis, g = body(reduction="craig-bampton"), body(reduction="craig-bampton").groups[0, 0]
+    tree = to_xarray(basis)
+    phi = tree["speed_0"]["phi"]
+    assert phi.dims == ("node", "axis", "mode") and phi.attrs["units"] == "kg^-1/2"
+    np.testing.assert_array_equal(tree["xyz"].values, basis.mesh.points)
+    np.testing.assert_array_equal(tree["speed_0"]["to_diagonal"].values, g.to_diagonal)
+    right = tree["speed_0"]["interface_right"].sel(interface_row="u_t2").values
+    np.testing.assert_array_equal(right, g.interfaces["right"].rows[2])
+    tip = tree["speed_0"]["phi"].sel(axis="z", mode=1).values
+    np.testing.assert_array_equal(tip, g.phi[:, 2, 0])
+    where = tree["speed_0"]["stress_nodes"].sel(component="xy").values
+    np.testing.assert_array_equal(where, g.stresses["nodes"].stress[:, 3])
+
+
+def test_xarray_of_a_sector_has_a_group_per_nodal_diameter() -> None:
+    pytest.importorskip("xarray")
+    basis = sector.basis()
+    tree = to_xarray(basis)
+    for (_, k), g in basis.groups.items():
+        np.testing.assert_array_equal(tree[f"speed_0/nd_{k}"]["phi"].values, g.phi)
+
+
+# --- ParaView ---------------------------------------------------------------------------------------------------------
+
+
+def test_pvd_of_modes_is_read_by_vtk(tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    basis, g = small.basis(), small.basis().groups[0, 0]
+    writer("pvd")(basis, tmp_path / "b.pvd")
+    reader = pyvista.get_reader(str(tmp_path / "b.pvd"))
+    assert reader.time_values == [float(j + 1) for j in range(g.n_modes)]
+    for j in range(g.n_modes):
+        reader.set_active_time_point(j)
+        block = reader.read()[0]
+        np.testing.assert_allclose(block.point_data["shape"], g.phi[:, :, j], rtol=1e-6, atol=1e-6)
+        assert block.point_data["Hz"][0] == g.frequency[j]
+
+
+def test_pvd_of_the_ring_is_read_by_vtk(tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    from microslip.exchange.vtu import write_ring
+
+    basis = sector.basis()
+    reader = pyvista.get_reader(str(write_ring(basis, tmp_path / "ring.pvd")))
+    assert reader.time_values == [float(k) for _, k in sorted(basis.groups)]
+    reader.set_active_time_point(1)
+    block = reader.read()[0]
+    assert {"mode_01_real", "mode_01_imag"} <= set(block.point_data.keys())
+    assert set(np.unique(block.cell_data["sector"])) == set(range(basis.sectors))
+
+
+# --- what is refused --------------------------------------------------------------------------------------------------
+
+MOTION = ("exudyn", "mbdyn", "sid")
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_a_folder_that_cannot_be_written(form: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    basis = body(reduction="craig-bampton") if form == "pyharm" else small.basis()
+    with pytest.raises(UserError, match="cannot be written"):
+        writer(form)(basis, tmp_path / "file" / "export")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_same_basis_same_bytes(form: str, tmp_path: Path) -> None:
+    basis = body(reduction="craig-bampton")
+    for name in ("a", "b"):
+        writer(form)(basis, tmp_path / name / f"x{WRITERS[form].ending}")
+    files = [p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file()]
+    assert files
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+
+
+@pytest.mark.parametrize("form", ["exudyn", "uff", "pvd"])
+def test_missing_shapes_are_named(form: str, tmp_path: Path) -> None:
+    basis = small.basis()
+    group = replace(basis.groups[0, 0], phi=np.zeros((0, 3, 6)))
+    with pytest.raises(UserError, match="shapes = true"):
+        writer(form)(replace(basis, groups={(0, 0): group}), tmp_path / "x")
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("form", [*MOTION, "pyharm"])
+def test_one_state_must_be_chosen(form: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--speed 0 to 1"):
+        writer(form)(small.basis((0.0, 3000.0)), tmp_path / "x")
+    with pytest.raises(UserError, match="--nodal-diameter 0 to"):
+        writer(form)(sector.basis(), tmp_path / "x")
+    assert not any(tmp_path.iterdir())
+
+
+def test_complex_groups_are_refused_by_pyharm(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="complex shapes"):
+        writer("pyharm")(select(sector.basis(), None, 1), tmp_path / "x")
+
+
+@pytest.mark.parametrize("form", MOTION)
+def test_multibody_formats_want_a_whole_body_at_rest(form: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="at rest"):
+        writer(form)(select(small.basis((0.0, 3000.0)), 1, None), tmp_path / "x")
+    with pytest.raises(UserError, match="mesh the whole body"):
+        writer(form)(select(sector.basis(), None, 0), tmp_path / "x")
+    group = small.basis().groups[0, 0]
+    with pytest.raises(UserError, match="no inertia integrals"):
+        writer(form)(replace(small.basis(), groups={(0, 0): replace(group, invariants=None)}), tmp_path / "x")
+
+
+@pytest.mark.parametrize("form", ["mbdyn", "sid"])
+def test_a_body_without_points_to_attach(form: str, tmp_path: Path) -> None:
+    group = replace(small.basis().groups[0, 0], interfaces={}, monitors={})
+    with pytest.raises(UserError, match="attach"):
+        writer(form)(replace(small.basis(), groups={(0, 0): group}), tmp_path / "x")
+
+
+def test_free_bodies_leave_their_rigid_modes_to_the_frame(tmp_path: Path) -> None:
+    basis = small.basis(free=True)
+    g = basis.groups[0, 0]
+    assert list(g.kind).count("rigid") == 6 == g.n_modes
+    with pytest.raises(UserError, match="rigid motions only"):
+        elastic(g, "sid")
+
+
+def test_pyharm_wants_interface_coordinates(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match='"craig-bampton" or "massless-boundary"'):
+        writer("pyharm")(small.basis(), tmp_path / "x")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("cli") / "basis.h5"
+    write_basis(path, body(reduction="craig-bampton"))
+    return path
+
+
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_the_command_line_writes_each_format(form: str, file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(file), "--to", form]) == 0
+    said = Path(capsys.readouterr().out.strip())
+    assert said.exists() and said.name == f"basis{WRITERS[form].ending}"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--to", "nastran"], "unknown format; choose one of exudyn, mat"),
+        (["--to", "sid", "--speed", "3"], "count from 0"),
+        (["--to", "uff", "--nodal-diameter", "2"], "the file has 0"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_exit_code_2(
+    words: list[str], says: str, file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", str(file), *words, "-o", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert not out and says in err and "Traceback" not in err
+    assert not any(tmp_path.iterdir())
