@@ -161,6 +161,43 @@ def turned_about_y(angle: float) -> np.ndarray:
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
+# static contact ----------------------------------------------------------------------------------------------------
+
+
+def closure() -> None:
+    """Normal force of the shroud over speed and interference, and the pressure on its face."""
+    rpm = [0.0, 1500.0, 3000.0, 4500.0, 6000.0]
+    few = ("modes.count=2", "cyclic.nodal_diameters=[0]", f"rotation.speeds_rpm={rpm}")
+    rows, curves, shown = [], {}, None
+    for interference in (-0.2, 0.0, 0.2, 0.5):
+        closed = 'name="shroud", face="contact_right", against="contact_left", sector_shift=1'
+        name = f"shroud-closed-{interference:g}".replace(".", "-").replace("--", "-gap-")
+        settings = f"closures=[{{{closed}, interference={interference}}}]"
+        basis = made(name, "shroud", *COARSE_SHROUD, *LIGHT, *few, settings)
+        states = [basis.groups[i, 0].contacts["shroud"] for i in range(len(rpm))]
+        curves[interference] = [c.normal_force for c in states]
+        forces = [f"{c.normal_force:.1f}" for c in states]
+        rows.append([f"{interference:g}", *forces, percent_of(states[-1].closed_share)])
+        shown = basis if interference == 0.2 else shown
+    head = ["interference in mm", *(f"{r:g} rpm" for r in rpm), f"area in contact at {rpm[-1]:g} rpm"]
+    fill("contact_statics.md", "closure", table(head, rows))
+    fig = figure(7.2, 4.0)
+    axes = fig.subplots()
+    plain(axes)
+    for (interference, forces), colour in zip(curves.items(), plots.COLOURS, strict=False):
+        axes.plot(rpm, forces, "o-", color=colour, label=f"{interference:g} mm")
+    axes.set(xlabel="rpm", ylabel="normal force of one contact in N", ylim=(0, None))
+    axes.legend(title="interference (negative: gap)", fontsize=9)
+    save(drawn(fig), "closure_force")
+    assert shown is not None
+    plots.closure_plot(shown, BUILD / "closure.png")
+    save(from_file(BUILD / "closure.png"), "closure_pressure")
+
+
+def percent_of(share: float) -> str:
+    return f"{100 * share:.1f} %"
+
+
 # the blade of section 5.3 ------------------------------------------------------------------------------------------
 
 
@@ -815,8 +852,8 @@ def arc(axes: Any, radius: float, start: float, stop: float, colour: str) -> Non
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, contact, convergence, sensitivity, arrangement2, first, speed, speeds, rotation,
-        compliance, counted_once, reduction, own, cyclic,
+        reference, geometry, closure, contact, convergence, sensitivity, arrangement2, first, speed, speeds,
+        rotation, compliance, counted_once, reduction, own, cyclic,
     )  # fmt: skip
 }
 

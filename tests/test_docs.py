@@ -201,6 +201,17 @@ def test_cyclic_page(tmp_path: Path) -> None:
         np.testing.assert_allclose(basis.groups[0, k].frequency[:3], [float(v) for v in told[k][2:5]], rtol=1e-4)
 
 
+@pytest.mark.slow
+def test_contact_statics_page(tmp_path: Path) -> None:
+    """Normal force of the coarse shroud at 1500 rpm without interference."""
+    coarse = "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"
+    closed = 'closures=[{name="shroud", face="contact_right", against="contact_left", sector_shift=1}]'
+    few = ["rotation.speeds_rpm=[1500.0]", "modes.count=2", "cyclic.nodal_diameters=[0]"]
+    basis = made(tmp_path, "shroud", "mesh.size=12", coarse, closed, *few)
+    told = next(r for r in rows("contact_statics.md", "closure") if r[0] == "0")
+    assert basis.groups[0, 0].contacts["shroud"].normal_force == pytest.approx(float(told[2]), rel=2e-3)
+
+
 def test_geometry_page(tmp_path: Path) -> None:
     """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
     basis = made(tmp_path, "pendulum", "modes.count=3")

@@ -55,19 +55,19 @@ class ContactSettings(Model):
 
 
 class Sweep(Model):
-    """Frequencies (Hz), linearly spaced, and the normal forces (N) to compare."""
+    """Frequencies (Hz), linearly spaced, and the normal forces (N) to compare, or ``static``: the modal file's own."""
 
     start: Positive
     stop: Positive
     points: Annotated[int, Field(ge=2, le=200000)] = 600
-    normal_forces: Numbers
+    normal_forces: Literal["static"] | Numbers
 
     @model_validator(mode="after")
     def _rising(self) -> Sweep:
         if self.stop <= self.start:
             raise ValueError("stop must be above start")
-        if not self.normal_forces or min(self.normal_forces) < 0:
-            raise ValueError("normal_forces must be one or more numbers, none negative")
+        if self.normal_forces != "static" and (not self.normal_forces or min(self.normal_forces) < 0):
+            raise ValueError('normal_forces must be one or more numbers, none negative, or "static"')
         return self
 
 
@@ -144,13 +144,14 @@ def run_case(
                 f"{path}: contacts: the modal file of '{basis.name}' has no interface '{c.interface}'; it has "
                 f"{', '.join(group.interfaces) or 'none'}"
             )
+    forces = _normal_forces(settings, group, path)
     contacts = [_sized(c, group, path) for c in settings.contacts]
     springs, counted = _counted_once(contacts, stored, basis.reduction, path)
     residual = _residual(group, settings, label, basis.reduction, beside)
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     responses, resonances = {}, {}
-    for normal in sweep.normal_forces:
+    for normal in forces:
         report(f"friction response at a normal force of {normal:g} N")
         pressed = [_contact(c, normal, s) for c, s in zip(contacts, springs, strict=True)]
 
@@ -160,7 +161,7 @@ def run_case(
         responses[normal] = respond(frequency)
         resonances[normal] = refined_peaks(responses[normal], respond)
     free = frequency_response(group, [], force, watch, frequency)
-    closed = [_contact(c, max(sweep.normal_forces), s) for c, s in zip(contacts, springs, strict=True)]
+    closed = [_contact(c, max(forces), s) for c, s in zip(contacts, springs, strict=True)]
     stuck = stuck_frequencies(group, closed, residual)
     remarks = tuple(counted + _lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
     return CaseResult(settings, responses, free, stuck, resonances, group.speed, remarks)
@@ -239,6 +240,33 @@ def _at_speed(settings: CaseSettings, basis: ModalBasis, path: Path | str) -> Mo
     if (settings.speed, 0) not in basis.groups:
         raise UserError(f"{path}: speed: the modal file of '{basis.name}' has {len(basis.groups)} speeds; count from 0")
     return basis.groups[settings.speed, 0]
+
+
+def _normal_forces(settings: CaseSettings, group: ModalGroup, path: Path | str) -> tuple[float, ...]:
+    """The forces asked for, or the one that the static state at speed has in every contact of the case."""
+    asked = settings.sweep.normal_forces
+    if not isinstance(asked, str):
+        return asked
+    found = [_static_force(c.interface, group) for c in settings.contacts]
+    missing = [c.interface for c, force in zip(settings.contacts, found, strict=True) if force is None]
+    if missing:
+        raise UserError(
+            f'{path}: sweep.normal_forces: "static", but the modal file has no closure on interface '
+            f"'{missing[0]}' or its partner; add [[closures]] to the body or give numbers"
+        )
+    forces = [force for force in found if force is not None]
+    if not forces or max(forces) - min(forces) > 0.01 * max(forces):
+        raise UserError(
+            f'{path}: sweep.normal_forces: "static" needs contacts that are pressed alike; they have '
+            f"{', '.join(f'{force:.4g}' for force in forces) or 'none'} N; give numbers"
+        )
+    return (forces[0],)
+
+
+def _static_force(interface: str, group: ModalGroup) -> float | None:
+    """Normal force of the closure on an interface, or on the one it faces, N."""
+    partner = group.interfaces[interface].partner
+    return next((c.normal_force for c in group.contacts.values() if c.interface in {interface, partner} - {""}), None)
 
 
 def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:

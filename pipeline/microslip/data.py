@@ -333,8 +333,9 @@ class ContactState:
         face, against, sector_shift: what may touch what. interface: name of the interface on `face`, or empty.
         normal_force: N, size of the resultant. force: (3,) N, on `face`, body axes. centre: (3,) m, of the pressure,
             in the reference geometry. points: (p, 3) m, areas: (p,) m2, quadrature points of the face, in the order of
-            the interface's. pressure: (p,) Pa. gap: (p,) m, the interference counted, negative where points overlap.
-        closed_share: area in contact over the area of the face. penetration: m, largest mean one of a corner.
+            the interface's. pressure: (p,) Pa, areas @ pressure its integral. gap: (p,) m, the
+            interference counted, negative where points overlap.
+        closed_share: area in contact over the area of the face. penetration: m, largest mean one of a node.
         penalty: Pa/m, the largest used. interference: m. modes: ``open`` (the modes do not know the contact, its force
             is a dead load) or ``closed`` (they keep its stiffness along the normal).
     """

@@ -353,7 +353,7 @@ def _contact_checks(name: str, c: ContactState) -> _Findings:
     return [
         (f"contact {name}: no pressure is negative", max(-float(c.pressure.min(initial=0.0)), 0.0), 0.0, ""),
         (f"contact {name}: normal force is the resultant", resultant, 1e-9, ""),
-        (f"contact {name}: pressure adds up to the force", max(c.normal_force - total, 0.0) / top, 0.05, ""),
+        (f"contact {name}: pressure adds up to the force", max(c.normal_force - total, 0.0) / top, 1e-9, ""),
         (f"contact {name}: penetration", c.penetration, _depth(c), ""),
     ]
 

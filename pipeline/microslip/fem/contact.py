@@ -1,14 +1,14 @@
 """Frictionless contact of two faces, or of a face and a rigid plane: gaps, forces and their derivative.
 
 The gap of a point of the slave face is its distance from the nearest point of the master face along the master's
-normal, less the interference. What must not be negative is the gap averaged with the hat function of every corner
-node of the slave face (a mortar method with second-order displacements and first-order pressures, which is stable:
-S. Hueeber, B. I. Wohlmuth, Computer Methods in Applied Mechanics and Engineering 194 (2005) 3147). The pressure of a
-corner is <lambda - penalty gap>, <.> the positive part, linear between the corners; lambda is raised to that pressure
-until the gaps vanish (augmented Lagrangian after Uzawa: J. C. Simo, T. A. Laursen, Computers & Structures 42 (1992)
+normal, less the interference. What must not be negative is the gap averaged with the hat function of every node of
+the slave face (a mortar method with second-order displacements and pressures that are linear between nodes, mid-side
+ones included: M. A. Puso, T. A. Laursen, J. Solberg, Computer Methods in Applied Mechanics and Engineering 197 (2008)
+555). The pressure of a node is <lambda - penalty gap>, <.> the positive part; lambda is raised to that pressure until
+the gaps vanish (augmented Lagrangian after Uzawa: J. C. Simo, T. A. Laursen, Computers & Structures 42 (1992)
 97), so that the result does not depend on the penalty. All forces derive from one potential,
 
-    Pi = sum over corners of A / (2 penalty) <lambda - penalty gap>^2,
+    Pi = sum over nodes of A / (2 penalty) <lambda - penalty gap>^2,
 
 so the stiffness is symmetric, and with the second derivative of the gap it is exact.
 """
@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from ..data import Array, Indices, Mesh, NotConverged, UserError
 from ..topology import FACET_CORNERS
 from .discretise import Pattern, face_blocks
-from .segments import Facets, Points, corner_type, cut, facet_functions, flat, near_pairs, whole
+from .segments import Facets, Points, cut, facet_functions, flat, near_pairs, node_hats, whole
 
 Places = Sequence[tuple[str, Indices, Array]]
 """Places of a face: (facet type, facets (f, k), reference coordinates (q, 2)), the coordinates alike in all facets."""
@@ -52,10 +52,10 @@ class ContactPair:
 
     Attributes:
         name: for messages. points: (n, 3) reference positions of the mesh, m.
-        slave, master: facets; master is a `Plane` for a rigid one. corners: (v,) points that are corners of the
-            slave face. turn, about: the master stands where R (x - about) + about of its own points is (R (3, 3): a
+        slave, master: facets; master is a `Plane` for a rigid one. nodes: (v,) points of the slave face.
+        turn, about: the master stands where R (x - about) + about of its own points is (R (3, 3): a
             neighbouring sector; the unit matrix: the same body).
-        interference: m, positive presses. penalty: (v,) Pa/m, of each corner.
+        interference: m, positive presses. penalty: (v,) Pa/m, of each node.
         slide: m, how far the faces may slide on each other.
         far: m, facets further apart than this do not belong together. size: m, of the slave's facets.
         stays_closed: whether the modes keep the contact's stiffness (closed along the normal, sliding freely).
@@ -65,7 +65,7 @@ class ContactPair:
     points: Array
     slave: Facets
     master: Facets | Plane
-    corners: Indices
+    nodes: Indices
     turn: Array
     about: Array
     interference: float
@@ -94,16 +94,15 @@ def make_pair(
         UserError: faces that do not face each other, or that overlap deeply at rest.
     """
     slave = tuple(mesh.faces[face].items())
-    corners = np.unique(np.concatenate([f[:, : FACET_CORNERS[t]].ravel() for t, f in slave]))
+    nodes = mesh.face_points(face)
     areas = [np.linalg.norm(b.area, axis=2).sum(axis=1) for b in face_blocks(mesh, face)]
     size = float(np.sqrt(np.concatenate(areas).mean()))
-    local = _local_sizes(mesh.n_points, slave, areas)[corners]
-    nodes = mesh.points[mesh.face_points(face)]
-    extent = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    local = _local_sizes(mesh.n_points, slave, areas)[nodes]
+    extent = float(np.linalg.norm(np.ptp(mesh.points[nodes], axis=0)))
     pair = ContactPair(
         name, mesh.points, slave, against if isinstance(against, Plane) else tuple(mesh.faces[against].items()),
-        corners, np.eye(3) if turn is None else turn, np.zeros(3) if about is None else about, interference,
-        STIFF * modulus / local if penalty is None else np.full(len(corners), penalty),
+        nodes, np.eye(3) if turn is None else turn, np.zeros(3) if about is None else about, interference,
+        STIFF * modulus / local if penalty is None else np.full(len(nodes), penalty),
         SLIDE * size if slide is None else slide, 0.5 * extent, size, stays_closed,
     )  # fmt: skip
     _refuse_misplaced(pair, face, against)
@@ -111,12 +110,11 @@ def make_pair(
 
 
 def _local_sizes(n: int, faces: Facets, areas: list[Array]) -> Array:
-    """(n,) mean edge of the facets around each corner, m."""
+    """(n,) mean edge of the facets around each point, m."""
     total, count = np.zeros(n), np.zeros(n)
-    for (facet_type, facets), area in zip(faces, areas, strict=True):
-        corners = facets[:, : FACET_CORNERS[facet_type]]
-        np.add.at(total, corners, np.sqrt(area)[:, None])
-        np.add.at(count, corners, 1.0)
+    for (_, facets), area in zip(faces, areas, strict=True):
+        np.add.at(total, facets, np.sqrt(area)[:, None])
+        np.add.at(count, facets, 1.0)
     return total / np.maximum(count, 1.0)
 
 
@@ -147,13 +145,13 @@ def coupled_points(pair: ContactPair) -> Indices:
 
     All points of the slave facets around a corner and of the master facets within reach of these.
     """
-    around: dict[int, set[int]] = {int(c): set() for c in pair.corners}
+    around: dict[int, set[int]] = {}  # mid-side nodes couple less than the corners beside them
     for slave_type, facets in pair.slave:
         reach = _reach(pair, slave_type, facets)
         for number, facet in enumerate(facets):
             together = {*facet.tolist(), *reach[number]}
             for corner in facet[: FACET_CORNERS[slave_type]].tolist():
-                around[corner] |= together
+                around.setdefault(corner, set()).update(together)
     keys = [np.zeros(0, dtype=np.int64)]
     n = len(pair.points)
     for members in around.values():
@@ -189,17 +187,16 @@ class Cut:
 def cut_pair(pair: ContactPair, x: Array) -> Cut:
     """Cut the slave face along the edges of the master facets it meets at positions x (n, 3)."""
     number = np.zeros(len(x), dtype=np.int64)
-    number[pair.corners] = np.arange(len(pair.corners))
+    number[pair.nodes] = np.arange(len(pair.nodes))
     found = []
     for slave_type, facets in pair.slave:
-        corners = number[facets[:, : FACET_CORNERS[slave_type]]]
         if isinstance(pair.master, Plane):
-            found.append(whole(pair.points, slave_type, facets, corners))
+            found.append(whole(pair.points, slave_type, facets, number[facets]))
             continue
         for master_type, others in pair.master:
             turned = pair.neighbour(x)
             found.append(
-                cut(x, pair.points, slave_type, facets, corners, master_type, others, turned, pair.far)[0]
+                cut(x, pair.points, slave_type, facets, number[facets], master_type, others, turned, pair.far)[0]
             )
     return Cut(tuple(p for p in found if len(p.weight)), x)
 
@@ -210,7 +207,7 @@ def has_slid(pair: ContactPair, made: Cut, x: Array) -> bool:
         return False
     before, now = (_offsets(pair, made, at) for at in (made.made_at, x))
     return any(
-        np.linalg.norm(np.cross(n, b - a), axis=1).max() > 1e-4 * pair.size
+        np.linalg.norm(np.cross(n, b - a), axis=1).max() > 1e-6 * pair.size
         for (a, n), (b, _) in zip(before, now, strict=True)
     )
 
@@ -295,8 +292,8 @@ class Grip:
 
     Attributes:
         pair, cut: see there. at: (n, 3) positions. multiplier: (v,) Pa, lambda. gap: (v,) m, mean gaps of the
-            corners, interference counted (infinite where a corner meets nothing). area: (v,) m2. pressure: (v,) Pa,
-            >= 0. touching: (v,) whether a corner is closed. point_gap, point_pressure, point_weight: (p,) at the
+            nodes, interference counted (infinite where a node meets nothing). area: (v,) m2. pressure: (v,) Pa,
+            >= 0. touching: (v,) whether a node is closed. point_gap, point_pressure, point_weight: (p,) at the
             quadrature points.
         on_slave, on_master: (p, 3n) derivative of the gaps with respect to the displacements, by body.
         hats: (v, p). projections: per block of the cut.
@@ -342,7 +339,7 @@ class Grip:
 
     @property
     def penetration(self) -> float:
-        """Largest mean penetration of a corner that is pressed, m."""
+        """Largest mean penetration of a node that is pressed, m."""
         pressed = self.pressure > 0
         return float(np.abs(self.gap[pressed]).max(initial=0.0))
 
@@ -352,7 +349,7 @@ def grip(
 ) -> Grip:
     """Gaps, pressures and forces at positions x (n, 3), with a share `level` of a positive interference.
 
-    held: (v,) corners that are closed whatever their gap (they may pull), for one step of Newton.
+    held: (v,) nodes that are closed whatever their gap (they may pull), for one step of Newton.
     """
     n = len(x)
     found = tuple(project(pair, p, x) for p in made.points)
@@ -363,7 +360,7 @@ def grip(
         _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
         for p, f in zip(made.points, found, strict=True)
     ]).tocsr()  # fmt: skip
-    hats = _hats(made, len(pair.corners))
+    hats = _hats(made, len(pair.nodes))
     weight = np.concatenate([p.weight for p in made.points])
     inside = level * pair.interference if pair.interference > 0 else pair.interference
     point_gap = np.concatenate([f.gap for f in found]) - inside
@@ -382,17 +379,17 @@ def grip(
     )  # fmt: skip
 
 
-def _hats(made: Cut, corners: int) -> sp.csr_matrix:
-    """(v, p) hat functions of the corners at the quadrature points."""
+def _hats(made: Cut, nodes: int) -> sp.csr_matrix:
+    """(v, p) hat functions of the nodes at the quadrature points."""
     start, rows, cols, values = 0, [], [], []
     for p in made.points:
-        count, c = p.corners.shape
-        rows.append(p.corners.ravel())
+        count, c = p.numbers.shape
+        rows.append(p.numbers.ravel())
         cols.append(np.repeat(start + np.arange(count), c))
         values.append(p.hats.ravel())
         start += count
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
-    return sp.csr_matrix(entries, shape=(corners, start))
+    return sp.csr_matrix(entries, shape=(nodes, start))
 
 
 def contact_stiffness(g: Grip, pattern: Pattern, bent: bool = True, phase: complex = 1.0) -> Array:
@@ -495,15 +492,11 @@ def _slid(pair: ContactPair) -> str:
 # results -----------------------------------------------------------------------------------------------------------
 
 
-def corner_values(pair: ContactPair, values: Array, places: Places) -> Array:
-    """(p,) values (v,) of the corners, linear between them, at places of the slave face, facet by facet."""
+def node_values(pair: ContactPair, values: Array, places: Places) -> Array:
+    """(p,) values (v,) of the nodes, linear between them, at places of the slave face, facet by facet."""
     number = np.zeros(len(pair.points), dtype=np.int64)
-    number[pair.corners] = np.arange(len(pair.corners))
-    out = []
-    for facet_type, facets, at in places:
-        hats = facet_functions(corner_type(facet_type), at)[0]
-        out.append((values[number[facets[:, : FACET_CORNERS[facet_type]]]] @ hats.T).ravel())
-    return np.concatenate(out)
+    number[pair.nodes] = np.arange(len(pair.nodes))
+    return np.concatenate([(values[number[f]] @ node_hats(t, at).T).ravel() for t, f, at in places])
 
 
 def gap_at(g: Grip, places: Places) -> Array:

@@ -30,16 +30,16 @@ class Points:
 
     Attributes:
         slave_type, master_type: of facet (master ``""``: a plane). slave: (p, ks), master: (p, km) point indices.
-        corners: (p, c) number of each corner of the slave facet. N: (p, ks) shape functions, hats: (p, c) those of
-            the corners alone. weight: (p,) area in the reference geometry, m2. start: (p, 2) where on the master
-            facet the projection begins. piece: (p,) number of the slave facet, of its type.
+        numbers: (p, ks) number of each node among those of the slave face. N: (p, ks) shape functions, hats: (p, ks)
+            positive ones (`node_hats`). weight: (p,) area in the reference geometry, m2. start: (p, 2) where on the
+            master facet the projection begins. piece: (p,) number of the slave facet, of its type.
     """
 
     slave_type: str
     master_type: str
     slave: Indices
     master: Indices
-    corners: Indices
+    numbers: Indices
     N: Array
     hats: Array
     weight: Array
@@ -72,6 +72,41 @@ def facet_functions(facet_type: str, at: Array) -> tuple[Array, Array, Array]:
     mixed = _monomials(at, 1, 1) @ C
     second = np.stack([_monomials(at, 2, 0) @ C, mixed, mixed, _monomials(at, 0, 2) @ C], axis=1)
     return _monomials(at, 0, 0) @ C, first, second.reshape(len(at), 2, 2, C.shape[1])
+
+
+def node_hats(facet_type: str, at: Array) -> Array:
+    """(q, k) positive functions of the nodes that add up to 1: linear between nodes, mid-side ones included.
+
+    On a triangle of six nodes linear on its four parts, on a square bilinear on its four parts; without a node in the
+    middle, as in ``quad8``, its share goes to the four mid-side nodes.
+    """
+    if facet_type in ("triangle", "quad"):
+        return facet_functions(facet_type, at)[0]
+    x, y = at.T
+    if facet_type == "triangle6":
+        a = np.stack([1 - x - y, x, y])
+        corners = np.maximum(2 * a - 1, 0)
+        edges = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        middle = [np.clip(np.minimum(np.minimum(2 * a[i], 2 * a[j]), 1 - 2 * a[k]), 0, 1) for i, j, k in edges]
+        return np.stack([*corners, *middle], axis=1)
+
+    def hats(t: Array) -> dict[float, Array]:
+        return {0.0: np.maximum(1 - 2 * t, 0), 0.5: 1 - np.abs(2 * t - 1), 1.0: np.maximum(2 * t - 1, 0)}
+
+    X, Y = hats(x), hats(y)
+    found = np.stack([X[float(i)] * Y[float(j)] for i, j in reference_nodes("quad9")], axis=1)
+    if facet_type == "quad8":
+        found = np.hstack([found[:, :4], found[:, 4:8] + 0.25 * found[:, 8:]])
+    return found
+
+
+def _fine_rule(kind: str) -> tuple[Array, Array]:
+    """Points (q, 2) and weights (q,) of the second-order rule on each of the four parts of a triangle or square."""
+    at, w = quadrature("triangle6" if kind == "triangle" else "quad9")
+    shifts = ((0, 0), (0.5, 0), (0, 0.5))
+    parts = [0.5 * at + np.array(s) for s in shifts]
+    parts.append(0.5 - 0.5 * at if kind == "triangle" else 0.5 * at + 0.5)
+    return np.concatenate(parts), np.tile(0.25 * w, 4)
 
 
 def corner_type(facet_type: str) -> str:
@@ -179,14 +214,14 @@ def _to_reference(flat_corners: Array, places: Array) -> Array:
 
 
 def cut(
-    x: Array, reference: Array, slave_type: str, slave_facets: Indices, corners: Indices, master_type: str,
+    x: Array, reference: Array, slave_type: str, slave_facets: Indices, numbers: Indices, master_type: str,
     master_facets: Indices, turned: Array, far: float,
 ) -> tuple[Points, Indices, Indices]:  # fmt: skip
     """Quadrature points on the common parts of two sets of facets.
 
     Args:
-        x: (n, 3) positions now. reference: (n, 3) positions that areas are counted in. corners: (f, c) numbers of
-            the slave's corners. turned: (n, 3) positions of the master now. far: m, see `near_pairs`.
+        x: (n, 3) positions now. reference: (n, 3) positions that areas are counted in. numbers: (f, ks)
+            of the slave's nodes. turned: (n, 3) positions of the master now. far: m, see `near_pairs`.
 
     Returns:
         The points, and the numbers (t,), (t,) of slave and master facet of every piece.
@@ -195,7 +230,7 @@ def cut(
     tri, i, j = _pieces(slave, master, *near_pairs(slave, master, 0.0, far))
     mine = np.einsum("fab,fcb->fca", _frames(slave), slave.corners - slave.centre[:, None])
     ends = _to_reference(mine[i], tri) if len(tri) else tri
-    at, w = quadrature("triangle6")
+    at, w = _fine_rule("triangle")
     L = np.column_stack([1 - at.sum(axis=1), at])
     xi = np.einsum("qk,tkd->tqd", L, ends)
     edges = ends[:, 1:] - ends[:, :1]
@@ -207,21 +242,21 @@ def cut(
     weight = np.linalg.norm(np.cross(t[:, 0], t[:, 1]), axis=1) * (size[:, None] * w).ravel()
     start = np.broadcast_to(reference_nodes(corner_type(master_type)).mean(axis=0), flat_xi.shape)
     points = Points(
-        slave_type, master_type, slave_facets[own], master_facets[other], corners[own], N,
-        facet_functions(corner_type(slave_type), flat_xi)[0], weight, start, own,
+        slave_type, master_type, slave_facets[own], master_facets[other], numbers[own], N,
+        node_hats(slave_type, flat_xi), weight, start, own,
     )  # fmt: skip
     return points, i, j
 
 
-def whole(reference: Array, slave_type: str, facets: Indices, corners: Indices) -> Points:
+def whole(reference: Array, slave_type: str, facets: Indices, numbers: Indices) -> Points:
     """Quadrature points of uncut facets, against a plane."""
-    at, w = quadrature(slave_type)
+    at, w = _fine_rule(corner_type(slave_type))
     N, dN, _ = facet_functions(slave_type, at)
     t = np.einsum("qak,fki->fqai", dN, reference[facets])
     weight = np.linalg.norm(np.cross(t[:, :, 0], t[:, :, 1]), axis=2) * w
     f, q = weight.shape
     own = np.repeat(np.arange(f), q)
     return Points(
-        slave_type, "", facets[own], np.zeros((f * q, 0), dtype=np.int64), corners[own], np.tile(N, (f, 1)),
-        np.tile(facet_functions(corner_type(slave_type), at)[0], (f, 1)), weight.ravel(), np.zeros((f * q, 2)), own,
+        slave_type, "", facets[own], np.zeros((f * q, 0), dtype=np.int64), numbers[own], np.tile(N, (f, 1)),
+        np.tile(node_hats(slave_type, at), (f, 1)), weight.ravel(), np.zeros((f * q, 2)), own,
     )  # fmt: skip

@@ -52,7 +52,7 @@ class Closing:
     def __init__(self, pairs: tuple[ContactPair, ...], x: Array, level: float, start: tuple[Grip, ...] = ()) -> None:
         self.pairs, self.level = pairs, level
         given = {g.pair.name: g.multiplier for g in start}
-        self.multipliers = [given.get(p.name, np.zeros(len(p.corners))) for p in pairs]
+        self.multipliers = [given.get(p.name, np.zeros(len(p.nodes))) for p in pairs]
         self.cuts: list[Cut] = [_cut(p, x) for p in pairs]
         self.grips: tuple[Grip, ...] = ()
         self.bent = self.held = False
@@ -67,7 +67,7 @@ class Closing:
         self.multipliers = [g.pressure for g in self.grips]
         slid = [has_slid(p, c, x) for p, c in zip(self.pairs, self.cuts, strict=True)]
         self.cuts = [_cut(p, x) if s else c for p, c, s in zip(self.pairs, self.cuts, slid, strict=True)]
-        # a new cut moves the mean gaps a little: a step with the same corners closed takes that up
+        # a new cut moves the mean gaps a little: a step with the same nodes closed takes that up
         self.held = any(slid)
         self.bent = not self.held
         self._evaluate(x, [g.touching if s else None for g, s in zip(self.grips, slid, strict=True)])
@@ -91,7 +91,7 @@ class Closing:
     def share(self, x: Array, change: Array, step: float, work: float) -> float:
         """Share of a Newton step `change` (n, 3) after which the potential energy has about stopped falling.
 
-        Closing faces stiffen so suddenly that whole steps may run to and fro between two sets of closed corners for
+        Closing faces stiffen so suddenly that whole steps may run to and fro between two sets of closed nodes for
         ever. work: J, of the forces out of balance on the step; that of the body falls linearly to zero over it, that
         of the contacts is evaluated.
         """

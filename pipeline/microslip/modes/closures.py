@@ -8,7 +8,7 @@ import numpy as np
 
 from ..body import GROUND, BodySettings, Closure
 from ..data import Array, ContactState, Indices, Material, Mesh, UserError
-from ..fem.contact import ContactPair, Grip, Plane, corner_values, gap_at, make_pair
+from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
 from .boundary import require_face
@@ -128,10 +128,12 @@ def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactS
     total = float(weight.sum())
     pressed = np.concatenate([np.einsum("pk,pki->pi", p.N, mesh.points[p.slave]) for p in g.cut.points])
     centre = weight @ pressed / total if total > 0 else areas @ points / areas.sum()
+    pressure = node_values(g.pair, g.pressure, places)
+    pressure *= total / (areas @ pressure) if total > 0 else 0.0  # the points' rule misses kinks inside a facet
     return ContactState(
         face=c.face, against=c.against, sector_shift=c.sector_shift, interface=of_face.get(c.face, ""),
         normal_force=float(np.linalg.norm(force)), force=force, centre=centre, points=points, areas=areas,
-        pressure=corner_values(g.pair, g.pressure, places), gap=gap_at(g, places),
+        pressure=pressure, gap=gap_at(g, places),
         closed_share=float(g.area[g.pressure > 0].sum() / areas.sum()), penetration=g.penetration,
         penalty=float(g.pair.penalty.max()), interference=c.interference, modes=c.modes,
     )  # fmt: skip

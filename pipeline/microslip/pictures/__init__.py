@@ -84,9 +84,9 @@ def draw_all(
     Returns:
         Picture name -> file, in the order of the report: ``mesh``, ``interfaces``, ``modes_<rpm>rpm`` (sheets),
         ``mode_<number>_<rpm>rpm``, ``animation_<number>``, ``stress_modes``, ``static``, ``compliance``,
-        ``campbell``; of a cyclic sector also ``ring_modes_<rpm>rpm``, ``ring_wave_nd<k>``, ``nodal_diameters`` and
-        ``safe``, while the pictures of the sector itself are those of its lowest nodal diameter (real parts of the
-        shapes). What does not apply to the body is not there.
+        ``closure``, ``campbell``; of a cyclic sector also ``ring_modes_<rpm>rpm``, ``ring_wave_nd<k>``,
+        ``nodal_diameters`` and ``safe``, while the pictures of the sector itself are those of its lowest nodal
+        diameter (real parts of the shapes). What does not apply to the body is not there.
     """
     basis = basis_in_modes(basis)
     folder = Path(folder)
@@ -98,6 +98,8 @@ def draw_all(
     first = basis.groups[min(basis.groups)]
     if (path := plots.compliance_plot(basis, first, folder / "compliance.png")) is not None:
         drawn["compliance"] = path
+    if (path := plots.closure_plot(basis, folder / "closure.png")) is not None:
+        drawn["closure"] = path
     if basis.sectors > 1:
         drawn |= _diagrams(basis, folder, engine_orders)
     elif (tracks := track_basis(basis)) is not None:

@@ -1,4 +1,4 @@
-"""Curves by matplotlib: compliance over the number of modes, Campbell diagram."""
+"""Curves by matplotlib: compliance over the number of modes, Campbell diagram, pressure of closed faces."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
-from ..data import Array, ModalBasis, ModalGroup
+from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..store import complete_or_absent
 from ..truncation import Coordinate, coordinates, percent
 
@@ -235,3 +235,44 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
         note += f"; {int((~shown).sum())} modes lie above"
     axes.set_title(f"{basis.name}: Campbell diagram\n", fontweight="bold")
     axes.text(0.5, -0.13, note, transform=axes.transAxes, ha="center", va="top", fontsize=8, color="#5b6270")
+
+
+# --- static contact ------------------------------------------------------------------------------------------------
+
+
+def closure_plot(basis: ModalBasis, path: Path) -> Path | None:
+    """Pressure on every face that touches at the highest speed, and its normal force over the speeds (or None)."""
+    states = {g.speed: g.contacts for g in basis.groups.values() if g.contacts}
+    last = states[max(states)] if states else {}
+    if not any(c.normal_force for c in last.values()):
+        return None
+    several = len(states) > 1
+    figure = _figure(9.6, 3.2 * len(last))
+    panels = figure.subplots(len(last), 2 if several else 1, squeeze=False, width_ratios=[3, 2] if several else [1])
+    for row, (name, c) in zip(panels, last.items(), strict=True):
+        _pressure_map(row[0], name, c)
+        if several:
+            rpm = [w * 30 / np.pi for w in sorted(states)]
+            _plain(row[1])
+            row[1].plot(rpm, [states[w][name].normal_force for w in sorted(states)], "o-", color=COLOURS[0])
+            row[1].set(xlabel="rpm", ylabel="normal force in N", ylim=(0, None))
+    return _save(figure, path)
+
+
+def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
+    """The face seen along its normal: points sized by their area, coloured by the pressure."""
+    middle = c.points - c.points.mean(axis=0)
+    across = np.linalg.svd(middle, full_matrices=False)[2][:2]  # the two long directions of the face
+    x, y = 1e3 * (middle @ across.T).T
+    order = np.argsort(c.pressure, kind="stable")
+    box = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
+    size = np.clip(c.areas * 1e6 / box**2 * 4e4, 6, 200)
+    shown = axes.scatter(
+        x[order], y[order], s=size[order], c=1e-6 * c.pressure[order], cmap="YlOrRd", vmin=0, edgecolors="#8a929c",
+        linewidths=0.4,
+    )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.margins(0.06)
+    axes.set(xlabel="mm along the face", ylabel="mm")
+    axes.set_title(f"{name}: {c.normal_force:.4g} N on {percent(c.closed_share)} of the face", fontsize=10)
+    axes.figure.colorbar(shown, ax=axes, label="pressure in MPa", location="bottom", shrink=0.6)
