@@ -19,6 +19,9 @@ from microslip.mesh import boundary_facets
 QUADRATIC = ("tetra10", "hexahedron20", "hexahedron27")
 LINEAR = ("tetra", "hexahedron")
 CELLS = QUADRATIC + LINEAR
+WEDGES = ("wedge15", "pyramid13", "wedge", "pyramid")
+WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
 
 # Nodes of one box on its 3 x 3 x 3 half-box lattice, in VTK's order.
 _CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
@@ -44,9 +47,36 @@ def _kuhn() -> list[list[tuple[int, int, int]]]:
     return cells
 
 
+def _wedges() -> list[list[Array]]:
+    """Two wedges of a box, cut along the diagonal of its floor, each of fifteen lattice nodes."""
+    floor = [np.array(c) for c in ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0))]
+    up = np.array([0, 0, 2])
+    cells = []
+    for a, b, c in ((0, 1, 2), (0, 2, 3)):
+        low = [floor[a], floor[b], floor[c]]
+        corners = low + [p + up for p in low]
+        cells.append(corners + [(corners[i] + corners[j]) // 2 for i, j in WEDGE_EDGES])
+    return cells
+
+
+def _pyramids() -> list[list[Array]]:
+    """Six pyramids of a box that meet in its middle, each of thirteen nodes, in quarters of a box."""
+    corner = [2 * np.array(c) for c in _CORNERS]
+    faces = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+    cells = []
+    for face in faces:
+        corners = [*(corner[i] for i in face), np.array([2, 2, 2])]
+        cells.append(corners + [(corners[i] + corners[j]) // 2 for i, j in PYRAMID_EDGES])
+    return cells
+
+
 def _stencils(cell_type: str) -> Array:
-    """(cells per box, k, 3) lattice offsets."""
+    """(cells per box, k, 3) offsets in half boxes, of pyramids in quarters of a box."""
     whole = {
+        "wedge": [c[:6] for c in _wedges()],
+        "wedge15": _wedges(),
+        "pyramid": [c[:5] for c in _pyramids()],
+        "pyramid13": _pyramids(),
         "hexahedron": [_CORNERS],
         "hexahedron20": [_CORNERS + _EDGES],
         "hexahedron27": [_CORNERS + _EDGES + _CENTRES],
@@ -69,18 +99,19 @@ def brick(
         closed: True joins y = 0 and y = size (for full pipes, whose map must be periodic).
         keep: (b, 3) numbers of the boxes along x, y, z -> which of them to build; all if None.
     """
-    wrap = np.array([10**9, 2 * n[1] if closed else 10**9, 10**9])
+    parts = 4 if cell_type.startswith("pyramid") else 2  # of a box's edge on the lattice
+    wrap = np.array([10**9, parts * n[1] if closed else 10**9, 10**9])
     boxes = np.stack(np.meshgrid(*[np.arange(k) for k in n], indexing="ij"), axis=-1).reshape(-1, 3)
-    boxes = 2 * (boxes if keep is None else boxes[keep(boxes)]).reshape(-1, 1, 1, 3)
+    boxes = parts * (boxes if keep is None else boxes[keep(boxes)]).reshape(-1, 1, 1, 3)
     lattice = (boxes + _stencils(cell_type)[None]).reshape(-1, _stencils(cell_type).shape[1], 3)
     keys, inverse = np.unique((lattice % wrap).reshape(-1, 3), axis=0, return_inverse=True)
     cells = inverse.reshape(lattice.shape[:2]).astype(np.int64)
-    points = np.array(origin) + keys / (2 * np.array(n)) * np.array(size)
+    points = np.array(origin) + keys / (parts * np.array(n)) * np.array(size)
     points = points if to is None else to(points)
     if straight:
         points = _straighten(points, keys, cells, lattice)
     mesh = Mesh(points, {cell_type: cells}, node_id=np.arange(1, len(points) + 1))
-    return Mesh(points, mesh.cells, _faces(mesh, keys, n, closed), {}, mesh.node_id)
+    return Mesh(points, mesh.cells, _faces(mesh, keys, n, closed, parts), {}, mesh.node_id)
 
 
 def _straighten(points: Array, keys: Indices, cells: Indices, lattice: Indices) -> Array:
@@ -99,11 +130,13 @@ def _ends(nodes: Indices, local: int) -> Indices:
     return np.array(pairs[local - 4])
 
 
-def _faces(mesh: Mesh, keys: Indices, n: tuple[int, int, int], closed: bool) -> dict[str, dict[str, Indices]]:
+def _faces(
+    mesh: Mesh, keys: Indices, n: tuple[int, int, int], closed: bool, parts: int
+) -> dict[str, dict[str, Indices]]:
     boundary = boundary_facets(mesh)
     faces: dict[str, dict[str, Indices]] = {}
     for axis, letter in enumerate("xyz"):
-        for end, at in ((0, 0), (1, 2 * n[axis])):
+        for end, at in ((0, 0), (1, parts * n[axis])):
             if closed and axis == 1:
                 continue
             on = keys[:, axis] == at

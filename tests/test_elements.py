@@ -96,9 +96,9 @@ def test_facets_point_outwards_and_close(cell_type):
     mesh = brick(cell_type, (2, 1, 2), (1.0, 0.7, 0.5), to=shaken(0.03))
     facets = CELL_TYPES[cell_type].facets
     x = mesh.points[mesh.cells[cell_type]]
-    for f in facets:
+    for f, facet_type in zip(facets, CELL_TYPES[cell_type].facet_types, strict=True):
         a = x[:, list(f)]
-        corners = FACET_CORNERS[CELL_TYPES[cell_type].facet_type]
+        corners = FACET_CORNERS[facet_type]
         normal = np.cross(a[:, 1] - a[:, 0], a[:, corners - 1] - a[:, 0])
         outwards = a[:, :corners].mean(axis=1) - x[:, : CELL_TYPES[cell_type].corners].mean(axis=1)
         assert (np.einsum("ei,ei->e", normal, outwards) > 0).all()

@@ -278,11 +278,12 @@ def test_sets_and_surfaces_of_abaqus(tmp_path: Path) -> None:
     assert "Upper" not in mesh.faces and "Eall" not in mesh.faces  # sets of solid cells are no faces
 
 
-@pytest.mark.parametrize("cell_type", ["tetra", "tetra10", "hexahedron", "hexahedron20"])
+@pytest.mark.parametrize("cell_type", ["tetra", "tetra10", "hexahedron", "hexahedron20", "wedge", "wedge15"])
 def test_faces_of_cells_by_number_are_those_of_the_manual(tmp_path: Path, cell_type: str) -> None:
     """Each face S1 ... of one cell lies on the surface and all of them cover it."""
     kind = CELL_TYPES[cell_type]
-    name = {"tetra": "C3D4", "tetra10": "C3D10", "hexahedron": "C3D8", "hexahedron20": "C3D20R"}[cell_type]
+    name = {"tetra": "C3D4", "tetra10": "C3D10", "hexahedron": "C3D8", "hexahedron20": "C3D20R"}.get(cell_type)
+    name = name or {"wedge": "C3D6", "wedge15": "C3D15"}[cell_type]
     nodes = "\n".join(f"{i + 1}, {x[0]}, {x[1]}, {x[2]}" for i, x in enumerate(kind.reference))
     cell = ", ".join(str(i + 1) for i in range(len(kind.reference)))
     text = f"*NODE\n{nodes}\n*ELEMENT, TYPE={name}\n1, {cell}\n"
@@ -292,6 +293,7 @@ def test_faces_of_cells_by_number_are_those_of_the_manual(tmp_path: Path, cell_t
     normals = np.concatenate([outward(mesh, f"F{i + 1}") for i in range(len(kind.facets))])
     expected = {
         4: [[0, 0, -1], [0, -1, 0], [3**-0.5] * 3, [-1, 0, 0]],
+        6: [[0, 0, -1], [0, 0, 1], [0, -1, 0], [2**-0.5, 2**-0.5, 0], [-1, 0, 0]],
         8: [[0, 0, -1], [0, 0, 1], [0, -1, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]],
     }[kind.corners]
     assert np.allclose(normals, expected, rtol=0, atol=1e-12)
@@ -340,8 +342,8 @@ DAMAGED_INP = {
     "not a number": ("12, 1., 0., 0.", "12, 1., nan, 0.", "three finite numbers"),
     "cylindrical": ("*NODE, NSET=NALL", "*NODE, SYSTEM=C", "cylindrical"),
     "generated nodes": ("*ELEMENT, TYPE=C3D8R", "*NGEN\n11, 12, 1\n*ELEMENT, TYPE=C3D8", "*NGEN"),
-    "wedges": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D6\n9, 11, 12, 13, 21, 22, 23\n*ELEMENT, TYPE=S4", "type wedge"),
-    "an odd solid": ("TYPE=C3D8R", "TYPE=C3D9", "C3D9 cannot be assembled"),
+    "odd cells": ("*ELEMENT, TYPE=S4", "*ELEMENT, TYPE=C3D5\n9, 11, 12, 13, 14, 21\n*ELEMENT, TYPE=S4", "element 9 is"),
+    "an odd solid": ("TYPE=C3D8R", "TYPE=C3D9", "element 1 is of type C3D9"),
     "no nodes": ("*NODE", "*NOTHING", "there is no *NODE"),
     "no solids": ("*ELEMENT, TYPE=C3D8R,", "*ELEMENT, TYPE=T3D2,", "holds no volume cells"),
     "a set without name": ("*NSET, NSET=Both", "*NSET", "a *NSET has no name"),
@@ -389,9 +391,9 @@ def test_vtu_with_mixed_cells(tmp_path: Path) -> None:
     beam = small.beam()
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(beam.points, [("tetra10", beam.cells["tetra10"])]))
     assert middles_are_right(read_mesh(tmp_path / "a.vtu", "m"))
-    wedge = np.array([[0, 1, 3, 9, 10, 12]])
-    meshio.write(tmp_path / "b.vtu", meshio.Mesh(beam.points, [("tetra10", beam.cells["tetra10"]), ("wedge", wedge)]))
-    assert "cells of type wedge cannot be assembled" in refusal(tmp_path / "b.vtu", "m")
+    wedge = np.arange(18)[None]
+    meshio.write(tmp_path / "b.vtu", meshio.Mesh(beam.points, [("tetra10", beam.cells["tetra10"]), ("wedge18", wedge)]))
+    assert "cells of type wedge18 cannot be assembled" in refusal(tmp_path / "b.vtu", "m")
 
 
 def test_flat_meshes_are_refused(tmp_path: Path) -> None:

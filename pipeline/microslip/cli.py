@@ -381,7 +381,7 @@ def _missing(error: ModuleNotFoundError) -> str:
         "fem": ("skfem", "meshio", "gmsh", "qdldl"),
         "solve": ("jax", "matplotlib"),
         "viz": ("pyvista", "vtk", "vtkmodules", "imageio", "PIL"),
-        "exchange": ("pyyeti", "mapdl_archive", "pandas", "pyuff", "xarray"),
+        "exchange": ("pyyeti", "pandas", "pyuff", "xarray"),
     }
     package = (error.name or "").split(".")[0]
     extra = next((e for e, packages in extras.items() if package in packages), None)

@@ -1,6 +1,7 @@
 """Cell types microslip assembles: their corner nodes, facets and node orders (all in VTK's order).
 
-VTK's order equals meshio's, CalculiX's (C3D4, C3D8, C3D10, C3D20) and, after a permutation found from the
+VTK's order equals meshio's, CalculiX's (C3D4, C3D6, C3D8, C3D10, C3D15, C3D20; the first triangle of a wedge looks
+towards the second, as CalculiX has it) and, after a permutation found from the
 reference coordinates, scikit-fem's.
 """
 
@@ -20,20 +21,33 @@ _HEX_CORNERS = np.array(
 )
 # Corners of each facet, ordered so that the normal points out of the cell.
 _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+_WEDGE_EDGES = ((0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5))
+_WEDGE_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], dtype=float)
+_WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
+_PYRAMID_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1]])
+_PYRAMID_FACETS = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
 _HEX_FACETS = ((3, 0, 4, 7), (1, 2, 6, 5), (0, 1, 5, 4), (2, 3, 7, 6), (0, 3, 2, 1), (4, 5, 6, 7))
 
 
 @dataclass(frozen=True)
 class CellType:
-    """One cell type. `reference` is (k, 3) in the unit tetrahedron or unit cube; `facets` are local node tuples."""
+    """One cell type. `reference` is (k, 3) in the unit tetrahedron, cube, wedge or pyramid; `facets`: local nodes."""
 
     name: str
     corners: int
     reference: Array
     edges: tuple[tuple[int, int], ...]
-    facet_type: str
     facets: tuple[tuple[int, ...], ...]
     order: int
+
+    @property
+    def facet_types(self) -> tuple[str, ...]:
+        """Type of each facet."""
+        return tuple(_FACET_OF[len(f)] for f in self.facets)
+
+
+_FACET_OF = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"}
 
 
 def _edge_number(edges: tuple[tuple[int, int], ...], a: int, b: int) -> int:
@@ -63,12 +77,20 @@ def _cell_types() -> dict[str, CellType]:
     tet_quad = _quadratic_facets(_TET_FACETS, _TET_EDGES, 4, False)
     hex_quad8 = _quadratic_facets(_HEX_FACETS, _HEX_EDGES, 8, False)
     hex_quad9 = _quadratic_facets(_HEX_FACETS, _HEX_EDGES, 8, True)
+    wedge_mid = np.vstack([_WEDGE_CORNERS, _midpoints(_WEDGE_CORNERS, _WEDGE_EDGES)])
+    wedge_quad = _quadratic_facets(_WEDGE_FACETS, _WEDGE_EDGES, 6, False)
+    pyramid_mid = np.vstack([_PYRAMID_CORNERS, _midpoints(_PYRAMID_CORNERS, _PYRAMID_EDGES)])
+    pyramid_quad = _quadratic_facets(_PYRAMID_FACETS, _PYRAMID_EDGES, 5, False)
     types = (
-        CellType("tetra", 4, _TET_CORNERS, _TET_EDGES, "triangle", _TET_FACETS, 1),
-        CellType("tetra10", 4, tet_mid, _TET_EDGES, "triangle6", tet_quad, 2),
-        CellType("hexahedron", 8, _HEX_CORNERS, _HEX_EDGES, "quad", _HEX_FACETS, 1),
-        CellType("hexahedron20", 8, hex_mid, _HEX_EDGES, "quad8", hex_quad8, 2),
-        CellType("hexahedron27", 8, hex_full, _HEX_EDGES, "quad9", hex_quad9, 2),
+        CellType("tetra", 4, _TET_CORNERS, _TET_EDGES, _TET_FACETS, 1),
+        CellType("tetra10", 4, tet_mid, _TET_EDGES, tet_quad, 2),
+        CellType("hexahedron", 8, _HEX_CORNERS, _HEX_EDGES, _HEX_FACETS, 1),
+        CellType("hexahedron20", 8, hex_mid, _HEX_EDGES, hex_quad8, 2),
+        CellType("hexahedron27", 8, hex_full, _HEX_EDGES, hex_quad9, 2),
+        CellType("wedge", 6, _WEDGE_CORNERS, _WEDGE_EDGES, _WEDGE_FACETS, 1),
+        CellType("wedge15", 6, wedge_mid, _WEDGE_EDGES, wedge_quad, 2),
+        CellType("pyramid", 5, _PYRAMID_CORNERS, _PYRAMID_EDGES, _PYRAMID_FACETS, 1),
+        CellType("pyramid13", 5, pyramid_mid, _PYRAMID_EDGES, pyramid_quad, 2),
     )
     return {t.name: t for t in types}
 

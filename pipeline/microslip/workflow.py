@@ -42,7 +42,7 @@ _READS_BY_GMSH = {".unv"}
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
     "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
-    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "units.py",
+    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "elements.py", "units.py",
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
 _CASE_CODE = (

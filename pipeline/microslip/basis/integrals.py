@@ -9,6 +9,7 @@ from itertools import product
 
 import numpy as np
 
+from .. import elements
 from ..data import Array, Indices, Mesh
 from ..topology import CELL_TYPES, FACET_CORNERS
 
@@ -86,6 +87,9 @@ def _triangle_rule() -> tuple[Array, Array]:
 @cache
 def tables(cell_type: str) -> tuple[Array, Array, Array]:
     """Shape functions (q, k), reference gradients (q, d, k) and weights (q,) at a cell's or facet's own rule."""
+    if cell_type in elements.TYPES:
+        points, weights = elements.rule(cell_type)
+        return *elements.shape_functions(cell_type, points), weights
     exponents = _EXPONENTS[cell_type]
     at, weights = _rule(cell_type)
     coefficients = np.linalg.inv(_monomials(exponents, _nodes(cell_type)))

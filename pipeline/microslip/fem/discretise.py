@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from .. import elements
 from ..data import Array, Indices, Mesh, UserError
 from ..topology import CELL_TYPES
 
@@ -65,6 +66,8 @@ def shape_functions(cell_type: str, at: Array) -> tuple[Array, Array]:
     Returns:
         N (q, k), dN (q, d, k), nodes in VTK's order.
     """
+    if cell_type in elements.TYPES:
+        return elements.shape_functions(cell_type, at)
     element, order = _element(cell_type)
     x = np.ascontiguousarray(at.T)
     values = [element.lbasis(x, int(i)) for i in order]
@@ -74,7 +77,12 @@ def shape_functions(cell_type: str, at: Array) -> tuple[Array, Array]:
 
 
 def quadrature(cell_type: str, degree: int | None = None) -> tuple[Array, Array]:
-    """Points (q, d) and weights (q,) of the rule for a cell type; default degree as in the table above."""
+    """Points (q, d) and weights (q,) of the rule for a cell type; default degree as in the table above.
+
+    Wedges and pyramids have one rule each.
+    """
+    if cell_type in elements.TYPES:
+        return elements.rule(cell_type)
     from skfem.quadrature import get_quadrature
 
     element, _ = _element(cell_type)

@@ -11,7 +11,13 @@ from scipy.spatial import cKDTree
 from ..data import Array, Indices, Mesh
 from ..topology import CELL_TYPES, FACET_CORNERS
 
-_FIRST_ORDER = {"tetra", "hexahedron"}
+_FIRST_ORDER = {"tetra", "hexahedron", "wedge", "pyramid"}
+# corner -> its three neighbours, right-handed; of the cells with more corners than a tetrahedron
+_NEIGHBOURS = {
+    8: ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7), (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
+    6: ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
+    5: ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
+}
 
 
 def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
@@ -70,8 +76,8 @@ def _overlapping(mesh: Mesh) -> int:
         sides = [
             np.sort(cells[:, list(f[:corners])], axis=1)
             for cell_type, cells in mesh.cells.items()
-            for f in CELL_TYPES[cell_type].facets
-            if FACET_CORNERS[CELL_TYPES[cell_type].facet_type] == corners
+            for f, kind in zip(CELL_TYPES[cell_type].facets, CELL_TYPES[cell_type].facet_types, strict=True)
+            if FACET_CORNERS[kind] == corners
         ]
         if sides:
             found += int((np.unique(np.concatenate(sides), axis=0, return_counts=True)[1] > 2).sum())
@@ -83,13 +89,12 @@ def _first(mask: NDArray[np.bool_]) -> int:
 
 
 def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
-    """(e,) six times the signed volume between a tetrahedron's corners, or the least such at a brick's corners."""
+    """(e,) six times the signed volume between a tetrahedron's corners, or the least such at a cell's corners."""
     p = mesh.points[mesh.cells[cell_type]]
     if CELL_TYPES[cell_type].corners == 4:
         return np.linalg.det(p[:, 1:4] - p[:, :1])
-    bottom = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
-    top = ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
-    edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in (*bottom, *top))
+    corners = _NEIGHBOURS[CELL_TYPES[cell_type].corners]
+    edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in corners)
     return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
 
 

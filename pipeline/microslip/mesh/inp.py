@@ -25,6 +25,7 @@ _SOLIDS = {
 _CORNERS = {3: 3, 6: 3, 4: 4, 8: 4, 9: 4}  # nodes of a facet -> its corners
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
 }
 _REFUSED = {
@@ -190,7 +191,8 @@ def _read_elements(deck: _Deck, parameters: dict[str, str], lines: list[str]) ->
     solid = match[1] in ("C3D", "DC3D", "AC3D")
     count = 6 if match[0] == "STRI65" else int(match[2])
     if solid and count not in _SOLIDS:
-        raise Damaged(f"cells of type {kind} cannot be assembled")
+        first = _numbers(lines[0].partition(",")[0], "*ELEMENT") if lines else np.zeros(1, dtype=np.int64)
+        raise Damaged(f"element {first[0]} is of type {kind}, which cannot be assembled")
     if not solid and count not in _CORNERS:
         return
     table = _numbers(",".join(lines), f"*ELEMENT, TYPE={kind}")
@@ -530,8 +532,9 @@ def _element_surface(deck: _Deck, raw: RawMesh, name: str, rows: list[list[str]]
             if re.fullmatch(r"S[1-6]", face) and int(face[1]) <= len(sides):
                 raw.facets.setdefault(name, []).append(nodes[:, list(sides[int(face[1]) - 1])])
             elif not face:
-                every = np.concatenate([nodes[:, list(side)] for side in sides])
-                raw.facets.setdefault(name, []).append(_free(every, raw, len(sides[0])))
+                for corners in sorted({len(side) for side in sides}):
+                    every = np.concatenate([nodes[:, list(side)] for side in sides if len(side) == corners])
+                    raw.facets.setdefault(name, []).append(_free(every, raw, corners))
         for cells in deck.facets:
             if (inside := np.isin(cells.ids, chosen)).any() and face in ("", "SPOS", "SNEG"):
                 raw.facets.setdefault(name, []).append(cells.nodes[inside])

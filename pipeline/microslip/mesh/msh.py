@@ -21,8 +21,12 @@ _TYPES = {
     9: "triangle6", 10: "quad9", 11: "tetra10", 12: "hexahedron27", 13: "wedge18", 14: "pyramid14", 15: "vertex",
     16: "quad8", 17: "hexahedron20", 18: "wedge15", 19: "pyramid13",
 }  # fmt: skip
-_TET_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]
-_HEX_EDGES = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]
+_EDGES = {  # by the number of corners
+    4: [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)],
+    5: [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)],
+    6: [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
+    8: [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)],
+}
 _HEX_FACES = [(0, 1, 2, 3), (0, 1, 4, 5), (0, 3, 4, 7), (1, 2, 5, 6), (2, 3, 6, 7), (4, 5, 6, 7)]
 
 
@@ -31,7 +35,7 @@ def to_vtk(cell_type: str) -> list[int]:
     kind = CELL_TYPES[cell_type]
     groups: list[tuple[int, ...]] = [(i,) for i in range(kind.corners)]
     if kind.order == 2:
-        groups.extend(_TET_EDGES if kind.corners == 4 else _HEX_EDGES)
+        groups.extend(_EDGES[kind.corners])
     if cell_type == "hexahedron27":
         groups += [*_HEX_FACES, tuple(range(8))]
     corners = kind.reference[: kind.corners]

@@ -1,7 +1,7 @@
 """Any mesh file -> `Mesh`: named faces, unit of length, quality gates.
 
-gmsh's MSH 4.1 and Abaqus files have readers of their own (`msh`, `inp`), which keep node numbers and notice
-damage; every other format goes through meshio, which is called here only. Node orders are VTK's from here on.
+gmsh's MSH 4.1, Abaqus and Ansys files have readers of their own (`msh`, `inp`, `cdb`), which keep node numbers and
+notice damage; every other format goes through meshio, which is called here only. Node orders are VTK's from here on.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
 from ..topology import CELL_TYPES, FACET_CORNERS
+from .cdb import read_cdb
 from .inp import read_inp
 from .materials import in_si
 from .msh import is_msh41, read_msh41
@@ -35,8 +36,8 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
     """Read a volume mesh with its named sets.
 
     Args:
-        path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, or any file meshio reads (``.med``, ``.vtu``,
-            ``.bdf``, ...).
+        path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, an Ansys ``.cdb``, or any file meshio reads (``.med``,
+            ``.vtu``, ``.bdf``, ...).
         unit: of the file's coordinates, a key of `UNITS`. system: of the units its materials are written in, a key of
             `units.SYSTEMS`; None: its materials are left out. zero: K of the file's temperature 0.
 
@@ -68,6 +69,8 @@ def _read_raw(path: Path) -> RawMesh:
         return read_msh41(path)
     if path.suffix.lower() == ".inp":
         return read_inp(path)
+    if path.suffix.lower() in (".cdb", ".anf"):
+        return read_cdb(path)
     return _read_by_meshio(path)
 
 
@@ -161,7 +164,7 @@ def _valid(indices: Any, count: int) -> Indices:
 def _mirrored(cell_type: str) -> Indices:
     """Permutation between VTK's order and the mirrored one of MED, which meshio leaves as it is."""
     kind = CELL_TYPES[cell_type]
-    corners = [0, 2, 1, 3] if kind.corners == 4 else [0, 3, 2, 1, 4, 7, 6, 5]
+    corners = {4: [0, 2, 1, 3], 5: [0, 3, 2, 1, 4], 6: [0, 2, 1, 3, 5, 4], 8: [0, 3, 2, 1, 4, 7, 6, 5]}[kind.corners]
     image = kind.reference[: kind.corners][corners]
     # the affine map that takes each corner to its mirrored partner takes every other node to its own
     ones = np.ones((kind.corners, 1))

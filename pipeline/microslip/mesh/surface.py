@@ -15,8 +15,8 @@ def boundary_facets(mesh: Mesh) -> dict[str, Indices]:
     by_type: dict[str, list[Indices]] = {}
     for cell_type, cells in mesh.cells.items():
         kind = CELL_TYPES[cell_type]
-        every = np.concatenate([cells[:, list(f)] for f in kind.facets])
-        by_type.setdefault(kind.facet_type, []).append(every)
+        for facet, facet_type in zip(kind.facets, kind.facet_types, strict=True):
+            by_type.setdefault(facet_type, []).append(cells[:, list(facet)])
     stacked = {t: np.concatenate(f) for t, f in by_type.items()}
     result = {}
     for corners in (3, 4):

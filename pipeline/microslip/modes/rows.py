@@ -17,7 +17,7 @@ from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
 from ..fem.operators import engineering
 from ..frames import skew
-from ..topology import CELL_TYPES
+from ..topology import CELL_TYPES, CellType
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ class Locator:
             N, dN = shape_functions(cell_type, xi[None])
             J = (dN[0] @ x).T
             before = xi
-            xi = _into_cell(J, xi + np.linalg.lstsq(J, point - N[0] @ x, rcond=None)[0], kind.corners)
+            xi = _into_cell(J, xi + np.linalg.lstsq(J, point - N[0] @ x, rcond=None)[0], kind)
             if np.abs(xi - before).max() < 1e-13:
                 break
         N, dN = shape_functions(cell_type, xi[None])
@@ -294,18 +294,31 @@ class Locator:
         return Location(nodes, N[0], np.linalg.solve(dN[0] @ x, dN[0]), place, distance)
 
 
-def _into_cell(J: Array, xi: Array, corners: int) -> Array:
+def _into_cell(J: Array, xi: Array, kind: CellType) -> Array:
     """Reference coordinates inside the cell whose image under J is nearest to that of xi (distance in space)."""
-    if corners == 8:
-        inside = (xi >= 0).all() and (xi <= 1).all()
-        return xi if inside else lsq_linear(J, J @ xi, bounds=(0.0, 1.0), method="bvls").x
-    if (xi >= 0).all() and xi.sum() <= 1:
+    if _inside(xi, kind.corners):
         return xi
-    # barycentric coordinates w >= 0 of the simplex; the heavy last row makes their sum 1
-    A = J @ (np.column_stack([np.zeros(3), np.eye(3)]) - xi[:, None])
+    if kind.corners == 8:
+        return lsq_linear(J, J @ xi, bounds=(0.0, 1.0), method="bvls").x
+    # the mean of the corners with weights w >= 0; the heavy last row makes their sum 1
+    corners = kind.reference[: kind.corners]
+    A = J @ (corners - xi).T
     heavy = 1e6 * np.abs(A).max()
-    w = nnls(np.vstack([A, np.full(4, heavy)]), np.array([0.0, 0.0, 0.0, heavy]))[0]
-    return w[1:] / w.sum()
+    w = nnls(np.vstack([A, np.full(len(corners), heavy)]), np.array([0.0, 0.0, 0.0, heavy]))[0]
+    return w @ corners / w.sum()
+
+
+def _inside(xi: Array, corners: int) -> bool:
+    x, y, z = xi
+    if (xi < 0).any():
+        return False
+    if corners == 8:
+        return bool((xi <= 1).all())
+    if corners == 6:
+        return bool(x + y <= 1 and z <= 1)
+    if corners == 5:
+        return bool(max(abs(2 * x - 1), abs(2 * y - 1)) <= 1 - z)
+    return bool(x + y + z <= 1)
 
 
 @dataclass

@@ -77,8 +77,9 @@ def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Arra
 def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
     """Extrapolation from integration points to nodes: (n, e q) matrix of volume-weighted sums, and (n,) volumes.
 
-    In each cell a linear (tetrahedron) or trilinear (brick) field is fitted by least squares to the values at
-    the integration points and evaluated at the nodes; nodes average their cells by volume.
+    In each cell a linear (tetrahedron, pyramid), bilinear (wedge) or trilinear (brick) field is fitted
+    by least squares to the values at the integration points and evaluated at the nodes; nodes average their cells by
+    volume.
     """
     kind = CELL_TYPES[block.cell_type]
     at, nodes = _polynomials(block.at, kind.corners), _polynomials(kind.reference, kind.corners)
@@ -96,10 +97,12 @@ def smoother(block: Block, n_points: int) -> tuple[sp.csr_matrix, Array]:
 
 def _polynomials(x: Array, corners: int) -> Array:
     ones = np.ones(len(x))
-    if corners == 4:
+    if corners in (4, 5):
         columns = [ones, x[:, 0], x[:, 1], x[:, 2]]
         return np.column_stack(columns if len(x) > 1 else columns[:1])
     a, b, c = x.T
+    if corners == 6:
+        return np.column_stack([ones, a, b, c, a * c, b * c])
     return np.column_stack([ones, a, b, c, a * b, b * c, a * c, a * b * c])
 
 

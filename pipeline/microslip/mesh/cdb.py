@@ -1,0 +1,375 @@
+"""Reader of Ansys archives (CDWRITE, blocked): nodes, solid elements, degenerate ones too, components, materials.
+
+Written against the description of the coded database file in the Ansys Programmer's Reference (NBLOCK, EBLOCK, CMBLOCK,
+MPDATA) and the node orders of SOLID185, 186, 187 and 285 in the Element Reference. A brick whose corners coincide is a
+wedge (K = L, O = P), a pyramid (M = N = O = P) or a tetrahedron (both).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Array, Indices
+from ..elasticity import turned_strain
+from .materials import isotropic_rows, orthotropic_row
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+
+_SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
+"""Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
+_OTHERS = {
+    14, 21, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 177, 178, 179, 180, 181, 184, 188, 189, 200,
+    208, 209, 214, 281, 290,
+}  # fmt: skip
+# corners I J K L M N O P are 0-7; mid-sides Q R S T U V W X Y Z A B are 8-19
+_FORMS: dict[int, dict[str, Sequence[int]]] = {
+    8: {"hexahedron": range(8), "wedge": (0, 1, 2, 4, 5, 6), "pyramid": range(5), "tetra": (0, 1, 2, 4)},
+    20: {
+        "hexahedron20": range(20), "wedge15": (0, 1, 2, 4, 5, 6, 8, 9, 11, 12, 13, 15, 16, 17, 18),
+        "pyramid13": (0, 1, 2, 3, 4, 8, 9, 10, 11, 16, 17, 18, 19), "tetra10": (0, 1, 2, 4, 8, 9, 11, 16, 17, 18),
+    },
+    10: {"tetra10": range(10)},
+    4: {"tetra": range(4)},
+}  # fmt: skip
+
+
+@dataclass
+class _Archive:
+    """What the commands have said. elements: (number, material, type, system, nodes)."""
+
+    node_id: list[int] = field(default_factory=list)
+    points: list[list[float]] = field(default_factory=list)
+    kinds: dict[int, int] = field(default_factory=dict)
+    elements: list[tuple[int, int, int, int, list[int]]] = field(default_factory=list)
+    components: dict[str, list[int]] = field(default_factory=dict)
+    temperatures: dict[int, float] = field(default_factory=dict)
+    constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
+    tables: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
+    reference: float | None = None
+    uniform: float | None = None
+    nodal: dict[int, float] = field(default_factory=dict)
+
+
+def read_cdb(path: Path) -> RawMesh:
+    """Read an archive.
+
+    Raises:
+        Damaged: content that is inconsistent, or elements whose meaning would be lost, by their number.
+    """
+    lines = path.read_text(encoding="latin-1").splitlines()
+    archive, at = _Archive(), 0
+    while at < len(lines):
+        words = [word.strip() for word in lines[at].split("!")[0].split(",")]
+        command = words[0].upper()
+        if command in ("NBLOCK", "EBLOCK", "CMBLOCK"):
+            at = _BLOCKS[command](archive, words, lines, at + 1)
+            continue
+        if command in _COMMANDS:
+            _COMMANDS[command](archive, words)
+        at += 1
+    return _assembled(archive)
+
+
+# blocks --------------------------------------------------------------------------------------------------------------
+
+
+def _widths(lines: list[str], at: int, what: str) -> list[tuple[int, int, str]]:
+    """(first, last, kind) of the fields of a format line such as ``(3i9,6e21.13e3)``."""
+    line = lines[at].strip().lower() if at < len(lines) else ""
+    if not line.startswith("("):
+        raise Damaged(f"{what} has no line with its format")
+    fields, place = [], 0
+    for count, kind, width in re.findall(r"(\d*)([ie])(\d+)", re.sub(r"\.\d+(e\d+)?", "", line)):
+        if not 0 < int(width) < 100 or int(count or 1) > 1000:
+            raise Damaged(f"{what} has the format {line}, which cannot be")
+        for _ in range(int(count or 1)):
+            fields.append((place, place + int(width), kind))
+            place += int(width)
+    if not fields:
+        raise Damaged(f"{what} has the format {line}, which is not read")
+    return fields
+
+
+def _whole(text: str, what: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        raise Damaged(f"{what} holds '{text.strip()[:30]}' where a whole number belongs") from None
+    if abs(value) > 10**12:
+        raise Damaged(f"{what} holds the number {value}")
+    return value
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        return float(text.replace("D", "E").replace("d", "e"))
+    except ValueError:
+        raise Damaged(f"{what} holds '{text.strip()[:30]}' where a number belongs") from None
+
+
+def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+    fields = _widths(lines, at, "NBLOCK")
+    whole = [f for f in fields if f[2] == "i"]
+    real = [f for f in fields if f[2] == "e"][:3]
+    for number, line in enumerate(lines[at + 1 :], at + 1):
+        if line.strip().upper().startswith("N,") or line.strip() == "-1":
+            return number + 1
+        archive.node_id.append(_whole(line[: whole[0][1]], "NBLOCK"))
+        given = [line[a:b] for a, b, _ in real]
+        archive.points.append([_number(t, "NBLOCK") if t.strip() else 0.0 for t in given])
+    raise Damaged("NBLOCK has no end, the file is truncated")
+
+
+def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+    fields = _widths(lines, at, "EBLOCK")
+    solid = len(words) > 2 and words[2].upper() == "SOLID"
+    at += 1
+    while at < len(lines):
+        first = _row(lines[at], fields)
+        if first[:1] == [-1] or not lines[at].strip():
+            return at + 1
+        at += 1
+        if not solid:
+            continue
+        if len(first) < 12:
+            raise Damaged(f"EBLOCK holds the line '{lines[at - 1].strip()[:60]}', which is too short")
+        count, nodes = first[8], first[11:]
+        while len(nodes) < count and at < len(lines):
+            more = _row(lines[at], fields)
+            at += 1
+            if not more or more[0] == -1:
+                raise Damaged(f"element {first[10]} has {len(nodes)} nodes instead of {count}")
+            nodes += more
+        archive.elements.append((first[10], first[0], first[1], first[4], nodes[:count]))
+    raise Damaged("EBLOCK has no end, the file is truncated")
+
+
+def _row(line: str, fields: list[tuple[int, int, str]]) -> list[int]:
+    return [_whole(line[a:b], "EBLOCK") for a, b, _ in fields if line[a:b].strip()]
+
+
+def _read_component(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
+    """Numbers; a negative one ends a range that began with the number before it."""
+    if len(words) < 4:
+        raise Damaged("a CMBLOCK has no name or number of members")
+    fields, count = _widths(lines, at, "CMBLOCK"), _whole(words[3], "CMBLOCK")
+    listed: list[int] = []
+    at += 1
+    while len(listed) < count:
+        if at >= len(lines) or not (row := _row(lines[at], fields)):
+            raise Damaged(f"the component {words[1]} has {len(listed)} numbers instead of {count}")
+        listed += row
+        at += 1
+    if words[2].upper().startswith("NODE"):
+        archive.components.setdefault(words[1], []).extend(_ranges(listed, words[1]))
+    return at
+
+
+def _ranges(listed: list[int], name: str) -> list[int]:
+    members: list[int] = []
+    for number in listed:
+        if number < 0 and (not members or -number - members[-1] > 10**8):
+            raise Damaged(f"the component {name} holds a range without a beginning, or beyond all bounds")
+        members += [number] if number > 0 else range(members[-1] + 1, -number + 1)
+    return members
+
+
+_BLOCKS = {"NBLOCK": _read_nodes, "EBLOCK": _read_elements, "CMBLOCK": _read_component}
+
+
+# commands ------------------------------------------------------------------------------------------------------------
+
+
+def _read_type(archive: _Archive, words: list[str]) -> None:
+    if len(words) > 2 and words[1].isdecimal():
+        number = re.search(r"\d+$", words[2])
+        archive.kinds[_whole(words[1], "ET")] = int(number[0]) if number else 0
+
+
+def _read_temperatures(archive: _Archive, words: list[str]) -> None:
+    """MPTEMP[, R5.0, count], first place, values; alone it clears the table."""
+    rest = words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+    if not any(rest):
+        archive.temperatures = {}
+        return
+    start = _whole(rest[0], "MPTEMP")
+    for i, text in enumerate(t for t in rest[1:] if t):
+        archive.temperatures[start + i] = _number(text, "MPTEMP")
+
+
+def _read_data(archive: _Archive, words: list[str]) -> None:
+    """MPDATA[, R5.0, count], label, material, first place, values."""
+    rest = words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
+    if len(rest) < 4:
+        return
+    material, label = _whole(rest[1], "MPDATA"), rest[0].upper()
+    start = _whole(rest[2] or "1", "MPDATA")
+    values = archive.constants.setdefault(material, {}).setdefault(label, {})
+    table = archive.tables.setdefault(material, {}).setdefault(label, {})
+    for place, text in enumerate((t for t in rest[3:] if t), start):
+        values[place], table[place] = _number(text, "MPDATA"), archive.temperatures.get(place, 0.0)
+
+
+def _read_constant(archive: _Archive, words: list[str]) -> None:
+    """MP, label, material, value[, slopes over temperature]."""
+    if len(words) > 3 and words[3]:
+        if any(_number(w, "MP") for w in words[4:] if w):
+            raise Damaged(f"MP,{words[1]},{words[2]} is a polynomial of temperature; write a table (MPTEMP, MPDATA)")
+        material = _whole(words[2] or "1", "MP")
+        archive.constants.setdefault(material, {})[words[1].upper()] = {1: _number(words[3], "MP")}
+        archive.tables.setdefault(material, {})[words[1].upper()] = {1: 0.0}
+
+
+def _read_reference(archive: _Archive, words: list[str]) -> None:
+    if len(words) > 1 and words[1]:
+        archive.reference = _number(words[1], "TREF")
+
+
+def _read_uniform(archive: _Archive, words: list[str]) -> None:
+    if words[0].upper() == "TUNIF" and len(words) > 1 and words[1]:
+        archive.uniform = _number(words[1], "TUNIF")
+    elif len(words) > 2 and words[1].upper() == "TEMP" and words[2] not in ("", "_TINY"):  # how Ansys says none
+        archive.uniform = _number(words[2], "BFUNIF")
+
+
+def _read_body_force(archive: _Archive, words: list[str]) -> None:
+    if len(words) > 3 and words[2].upper() == "TEMP" and words[1].lstrip("-").isdecimal():
+        archive.nodal[_whole(words[1], "BF")] = _number(words[3], "BF")
+
+
+def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
+    if len(words) > 2 and words[2].upper().startswith("TEMP"):
+        raise Damaged("BFBLOCK with temperatures is not read; write them as BF commands (CDWRITE, UNBLOCKED)")
+
+
+_COMMANDS = {
+    "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
+    "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
+}  # fmt: skip
+
+
+# assembly ------------------------------------------------------------------------------------------------------------
+
+
+def _assembled(archive: _Archive) -> RawMesh:
+    if not archive.node_id:
+        raise Damaged("there is no NBLOCK")
+    node_id = np.array(archive.node_id, dtype=np.int64)
+    numbering = Numbering(node_id)
+    raw = RawMesh(np.array(archive.points), node_id)
+    regions: dict[tuple[int, int], int] = {}
+    blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
+    for number, material, kind, system, nodes in archive.elements:
+        named = _form(archive, number, kind, nodes)
+        if named is not None:
+            region = regions.setdefault((material, system), len(regions))
+            blocks.setdefault(named[0], []).append((number, region, named[1]))
+    for form, found in blocks.items():
+        ids = np.array([n for n, _, _ in found], dtype=np.int64)
+        cells = np.array([nodes for _, _, nodes in found], dtype=np.int64)
+        raw.blocks.append((form, numbering.positions(cells, "EBLOCK names")))
+        raw.cell_id.append(ids)
+        raw.regions.append(np.array([r for _, r, _ in found]))
+    _refuse_twice(raw.cell_id)
+    for name, members in archive.components.items():
+        if members:
+            chosen = np.array(members, dtype=np.int64)
+            raw.add_points(name, numbering.positions(chosen, f"the component '{name}' names"))
+    raw.materials = [_material(archive, *key) for key in regions]
+    _assign_temperatures(archive, raw, numbering)
+    return raw
+
+
+def _refuse_twice(cell_id: list[Indices]) -> None:
+    ids, count = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *cell_id]), return_counts=True)
+    if (count > 1).any():
+        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
+
+
+def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:
+    """Cell type and its nodes of an element; None if it is no solid."""
+    if kind not in archive.kinds:
+        raise Damaged(f"element {number} is of type {kind}, which no ET command defines")
+    count = _SOLIDS.get(archive.kinds[kind])
+    if count is None:
+        if archive.kinds[kind] in _OTHERS:
+            return None
+        raise Damaged(
+            f"element {number} is of the Ansys type {archive.kinds[kind]}, which cannot be assembled (SOLID185, 186, "
+            "187, 285 can)"
+        )
+    if (count, len(nodes)) in ((20, 8), (10, 4)):  # every mid-side node is dropped: Ansys takes straight functions
+        count = len(nodes)
+    if len(nodes) != count or (count not in (8, 20) and len(set(nodes)) < count) or min(nodes) < 1:
+        what = "drops mid-side nodes" if 0 in nodes else f"has {len(set(nodes))} different nodes instead of {count}"
+        raise Damaged(f"element {number} {what}; write it with all its nodes")
+    form = _degenerate(number, nodes) if count in (8, 20) else ""
+    for name, chosen in _FORMS[count].items():
+        if name.startswith(form):
+            return name, [nodes[i] for i in chosen]
+    raise Damaged(f"element {number} has a form that is not read")
+
+
+def _degenerate(number: int, nodes: list[int]) -> str:
+    i, j, k, l, m, n, o, p = nodes[:8]
+    form = {(False, False): "hexahedron", (True, False): "wedge", (False, True): "pyramid", (True, True): "tetra"}[
+        k == l, m == n == o == p
+    ]
+    corners = [i, j, k, m] + {"hexahedron": [l, n, o, p], "wedge": [n, o], "pyramid": [l], "tetra": []}[form]
+    if len(set(corners)) < len(corners) or (form == "wedge" and o != p):
+        raise Damaged(f"element {number} names a corner twice in a way that is neither wedge, pyramid nor tetrahedron")
+    return form
+
+
+def _material(archive: _Archive, number: int, system: int) -> DeckMaterial:
+    c, t = archive.constants.get(number, {}), archive.tables.get(number, {})
+    name = f"material {number}"
+    if "EX" not in c:
+        return DeckMaterial(name, None, _first(c, "DENS"), np.zeros(6))
+    expansion = np.array([_first(c, f"{'ALP' if 'ALPX' in c else 'CTE'}{a}") or 0.0 for a in "XYZ"])
+    if ("ALPX" in c and "ALPY" not in c) or ("CTEX" in c and "CTEY" not in c):
+        expansion[1:] = expansion[0]
+    table = None
+    if "EY" in c and c["EY"] != c["EX"]:
+        if system:
+            where = f"{name} (orthotropic in the element coordinate system {system}, which is not read)"
+            return DeckMaterial(where, None, _first(c, "DENS"), np.zeros(6))
+        C: Array = orthotropic_row(name, _orthotropic(name, c))
+    else:
+        nu = c.get("PRXY") or c.get("NUXY") or {1: 0.3}  # 0.3 is what Ansys assumes
+        ratio = nu[min(nu)]
+        rows = [[E, nu.get(place, ratio), t.get("EX", {}).get(place, 0.0)] for place, E in sorted(c["EX"].items())]
+        C, table = isotropic_rows(name, np.array(rows))
+    return DeckMaterial(name, C, _first(c, "DENS"), turned_strain(expansion, None), table)
+
+
+def _first(c: dict[str, dict[int, float]], label: str) -> float | None:
+    return c[label][min(c[label])] if label in c else None
+
+
+def _orthotropic(name: str, c: dict[str, dict[int, float]]) -> Array:
+    """E1 E2 E3 nu12 nu13 nu23 G12 G13 G23; the minor ratios NU.. become the major ones PR.. ."""
+    E = {a: _first(c, f"E{a}") for a in "XYZ"}
+    G = [_first(c, f"G{ab}") for ab in ("XY", "XZ", "YZ")]
+    if None in E.values() or None in G:
+        raise Damaged(f"the {name} is orthotropic and lacks some of EX, EY, EZ, GXY, GYZ, GXZ")
+    nu = []
+    for a, b in ("XY", "XZ", "YZ"):
+        major, minor = _first(c, f"PR{a}{b}"), _first(c, f"NU{a}{b}")
+        nu.append(major if major is not None else (minor or 0.0) * (E[a] or 0.0) / (E[b] or 1.0))
+    return np.array([E["X"], E["Y"], E["Z"], *nu, *G], dtype=float)
+
+
+def _assign_temperatures(archive: _Archive, raw: RawMesh, numbering: Numbering) -> None:
+    if not archive.nodal and archive.uniform is None:
+        return
+    raw.temperature = np.full((len(raw.points), 2), np.nan)
+    raw.temperature[:, 0] = archive.reference or 0.0
+    raw.temperature[:, 1] = archive.reference or 0.0 if archive.uniform is None else archive.uniform
+    if archive.nodal:
+        at = numbering.positions(np.array(list(archive.nodal)), "BF names")
+        raw.temperature[at, 1] = list(archive.nodal.values())

@@ -1,0 +1,213 @@
+"""Ansys archives: every form of the solid elements, components, materials; mapdl-archive reads the same files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshes
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from microslip.basis import check_basis, read_basis
+from microslip.cli import main
+from microslip.data import Mesh, UserError
+from microslip.elasticity import isotropic, orthotropic
+from microslip.fem.discretise import discretise
+from microslip.mesh import mesh_problems, read_mesh
+from microslip.modes import modal_basis
+from microslip.workflow import modes_stage, open_job
+
+# SOLID186, Element Reference: corners I J K L M N O P, mid-sides Q R S T U V W X Y Z A B on
+# IJ JK KL LI MN NO OP PM IM JN KO LP. Degenerate forms repeat corners; a mid-side between equal ones repeats them.
+MIDDLES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+CORNERS = {
+    "hexahedron": (0, 1, 2, 3, 4, 5, 6, 7), "wedge": (0, 1, 2, 2, 3, 4, 5, 5), "pyramid": (0, 1, 2, 3, 4, 4, 4, 4),
+    "tetra": (0, 1, 2, 2, 3, 3, 3, 3),
+}  # fmt: skip
+EDGES = {
+    "tetra": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)), "pyramid": meshes.PYRAMID_EDGES,
+    "wedge": meshes.WEDGE_EDGES, "hexahedron": MIDDLES,
+}  # fmt: skip
+COUNT = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4}
+
+
+def as_brick(family: str, cell: np.ndarray) -> list[int]:
+    """The nodes of a cell in the order of SOLID185 or SOLID186."""
+    corners = [int(cell[i]) for i in CORNERS[family]]
+    if len(cell) == COUNT[family]:
+        return corners
+    middle = {
+        frozenset((int(cell[a]), int(cell[b]))): int(cell[COUNT[family] + i]) for i, (a, b) in enumerate(EDGES[family])
+    }
+    return corners + [
+        middle[frozenset((corners[a], corners[b]))] if corners[a] != corners[b] else corners[a] for a, b in MIDDLES
+    ]
+
+
+def archive(mesh: Mesh, sets=(), material=("MPDATA,R5.0, 1,EX  ,1, 1, 210000.0", "MPDATA,R5.0, 1,NUXY,1, 1, 0.3",
+            "MPDATA,R5.0, 1,DENS,1, 1, 7.85e-9"), scale=1e3) -> str:  # fmt: skip
+    """CDWRITE's blocked form, in mm."""
+    kind = 186 if any(len(c[0]) > 8 for c in mesh.cells.values()) else 185
+    ids = mesh.node_id
+    lines = ["/PREP7", f"ET,1,{kind}", "ET,2,154", f"NBLOCK,6,SOLID,{ids.max():10d},{len(ids):10d}", "(3i9,6e21.13e3)"]
+    for i, x in zip(ids, mesh.points * scale, strict=True):
+        lines.append(f"{i:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in x))
+    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{mesh.n_cells:10d},{mesh.n_cells:10d}", "(19i10)"]
+    number = 0
+    for name, cells in mesh.cells.items():
+        family = next(f for f in COUNT if name.startswith(f))
+        for cell in cells:
+            number += 1
+            nodes = [int(ids[n]) for n in as_brick(family, cell)]
+            words = [1, 1, 1, 1, 0, 0, 0, 0, len(nodes), 0, number, *nodes]
+            lines += ["".join(f"{w:10d}" for w in words[k : k + 19]) for k in range(0, len(words), 19)]
+    lines.append(f"{-1:10d}")
+    for name in sets:
+        members = [int(ids[n]) for n in mesh.face_points(name)]
+        lines += [f"CMBLOCK,{name.upper()},NODE,{len(members):8d}  ! nodes", "(8i10)"]
+        lines += ["".join(f"{m:10d}" for m in members[k : k + 8]) for k in range(0, len(members), 8)]
+    return "\n".join([*lines, "MPTEMP,R5.0, 1, 1,  0.0", *material, "FINISH"]) + "\n"
+
+
+def written(folder: Path, text: str) -> Path:
+    (folder / "part.cdb").write_text(text)
+    return folder / "part.cdb"
+
+
+FORMS = ("hexahedron20", "wedge15", "pyramid13", "tetra10", "hexahedron", "wedge", "pyramid", "tetra")
+
+
+@pytest.mark.parametrize("cell_type", FORMS)
+def test_every_form_of_the_brick_comes_back_as_its_own_cell(tmp_path, cell_type):
+    """Bent cells: positions, volume, and mid-side nodes where they were."""
+    mesh = meshes.brick(cell_type, (2, 1, 2), (0.02, 0.01, 0.03), to=meshes.shaken(0.0007))
+    read = read_mesh(written(tmp_path, archive(mesh, ("z0", "x1"))), "mm")
+    assert list(read.cells) == [cell_type]
+    np.testing.assert_array_equal(read.cells[cell_type], mesh.cells[cell_type])
+    np.testing.assert_allclose(read.points, mesh.points, atol=1e-14)
+    assert discretise(read).volume == pytest.approx(discretise(mesh).volume, rel=1e-11)
+    np.testing.assert_array_equal(read.point_sets["Z0"], np.sort(mesh.face_points("z0")))
+    assert sum(map(len, read.faces["X1"].values())) == sum(map(len, mesh.faces["x1"].values()))
+    assert not mesh_problems(read)[0]
+
+
+def test_mapdl_archive_reads_the_same(tmp_path):
+    oracle = pytest.importorskip("mapdl_archive")
+    mesh = meshes.brick("wedge15", (1, 1, 2), (0.02, 0.01, 0.03))
+    path = written(tmp_path, archive(mesh, ("z0",)))
+    theirs, ours = oracle.Archive(path, parse_vtk=False), read_mesh(path, "mm")
+    np.testing.assert_allclose(theirs.nodes * 1e-3, ours.points, atol=1e-15)
+    np.testing.assert_array_equal(theirs.nnum, ours.node_id)
+    np.testing.assert_array_equal(np.sort(theirs.node_components["Z0"]), ours.node_id[ours.point_sets["Z0"]])
+    for element, cell in zip(theirs.elem, ours.cells["wedge15"], strict=True):
+        np.testing.assert_array_equal(element[10:30], [ours.node_id[n] for n in as_brick("wedge", cell)])
+
+
+def test_archives_that_ansys_itself_wrote(tmp_path):
+    """The examples of mapdl-archive: all nodes and elements, components, and meshes without faults."""
+    examples = pytest.importorskip("mapdl_archive.examples")
+    oracle = pytest.importorskip("mapdl_archive")
+    theirs, ours = oracle.Archive(examples.hexarchivefile, parse_vtk=False), read_mesh(examples.hexarchivefile, "m")
+    assert ours.n_cells == theirs.n_elem and ours.n_points == theirs.n_node
+    assert not mesh_problems(ours)[0]
+    tets = read_mesh(examples.tetarchivefile, "m")
+    assert (
+        tets.n_cells == oracle.Archive(examples.tetarchivefile, parse_vtk=False).n_elem and not mesh_problems(tets)[0]
+    )
+
+
+BODY = 'name = "part"\nlength_unit = "mm"\n[geometry]\nmesh = "part.cdb"\n[material]\nfrom = "mesh"\n'
+BODY += '[[supports]]\nface = "Z0"\n[modes]\ncount = 5\nsolver = "superlu"\n'
+
+
+def test_archive_with_its_own_material_is_the_body_it_was_written_from(tmp_path):
+    mesh = meshes.brick("wedge15", (1, 2, 4), (0.01, 0.015, 0.05))
+    written(tmp_path, archive(mesh, ("z0",)))
+    (tmp_path / "body.toml").write_text(BODY)
+    path, told = modes_stage(open_job(tmp_path, root=tmp_path))
+    basis = read_basis(path)
+    what = meshes.body(supports=[{"face": "z0"}], modes={"count": 5, "solver": "superlu"})
+    np.testing.assert_allclose(basis.groups[0, 0].omega, modal_basis(mesh, what).groups[0, 0].omega, rtol=1e-9)
+    assert not told and all(c.passed for c in check_basis(basis))
+
+
+def test_materials_of_tables_and_minor_ratios(tmp_path):
+    """MPTEMP and MPDATA of EX; NUXY = PRXY EY / EX of an orthotropic one."""
+    mesh = meshes.brick("hexahedron", (1, 1, 1))
+    hot = [
+        "MPTEMP",
+        "MPTEMP,R5.0, 2, 1, 20., 420.",
+        "MPDATA,R5.0, 2,EX,1,1, 2e5, 1.5e5",
+        "MP,NUXY,1,0.3",
+        "MP,DENS,1,7.85e-9",
+    ]
+    found = read_mesh(written(tmp_path, archive(mesh, material=hot)), "mm", "mm-t-s", 273.15).materials[0]
+    np.testing.assert_allclose(found.elasticity, isotropic(2e11, 0.3), rtol=1e-12)
+    np.testing.assert_allclose(found.temperature_table, [[293.15, 1], [693.15, 0.75]])
+    wood = [f"MP,{k},1,{v}" for k, v in dict(EX=12e3, EY=900, EZ=500, GXY=700, GYZ=250, GXZ=650, NUXY=0.37 * 900 / 12e3,
+            PRYZ=0.47, PRXZ=0.42, DENS=6e-10, ALPX=1e-5, ALPY=2e-5, ALPZ=3e-5).items()]  # fmt: skip
+    found = read_mesh(written(tmp_path, archive(mesh, material=wood)), "mm", "mm-t-s").materials[0]
+    C = orthotropic(np.array([12e9, 9e8, 5e8]), np.array([0.37, 0.47, 0.42]), np.array([7e8, 2.5e8, 6.5e8]))
+    np.testing.assert_allclose(found.elasticity, C, rtol=1e-9, atol=1)
+    np.testing.assert_allclose(found.expansion, [1e-5, 2e-5, 3e-5, 0, 0, 0])
+    assert found.density == pytest.approx(600)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (("ET,1,185", "ET,1,226"), "element 1 is of the Ansys type 226"),
+        (("ET,1,185", "ET,3,185"), "element 1 is of type 1, which no ET command defines"),
+        (("N,R5.3,LOC,       -1,\n", ""), "NBLOCK"),
+        ((f"{-1:10d}\nCMBLOCK", "CMBLOCK"), "EBLOCK"),
+        (("DENS", "KXX"), "no density"),
+        (("CMBLOCK,Z0", "CMBLOCK,OTHER"), "Z0"),
+        (("         4         4\n", "         4       999\n"), "which the file does not define"),
+    ],
+)
+def test_damaged_archives_are_refused_in_a_sentence(tmp_path, capsys, change, text):
+    whole = archive(meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.01, 0.02)), ("z0",))
+    if "999" in change[1]:  # the last node of the first element
+        line = whole.splitlines()[whole.splitlines().index("(19i10)") + 1]
+        change = (line, line[:-10] + f"{999:10d}")
+    assert change[0] in whole
+    written(tmp_path, whole.replace(*change))
+    (tmp_path / "body.toml").write_text(BODY)
+    assert main(["modes", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert text in said and "Traceback" not in said
+
+
+def test_cells_in_the_wrong_order_are_refused(tmp_path):
+    """The upper corners before the lower ones turn a brick inside out."""
+    mesh = meshes.brick("hexahedron", (1, 1, 2), (0.01, 0.01, 0.02))
+    wrong = Mesh(
+        mesh.points, {"hexahedron": mesh.cells["hexahedron"][:, [4, 5, 6, 7, 0, 1, 2, 3]]}, node_id=mesh.node_id
+    )
+    errors, _ = mesh_problems(read_mesh(written(tmp_path, archive(wrong)), "mm"))
+    assert any("inside out" in e for e in errors)
+
+
+def test_flipped_bytes_are_read_or_refused(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flip")
+    whole = archive(meshes.brick("wedge", (1, 1, 1), (0.01, 0.01, 0.02)), ("z0",)).encode()
+
+    @settings(max_examples=120, deadline=None)
+    @given(
+        st.lists(st.tuples(st.integers(0, len(whole) - 1), st.integers(0, 255)), min_size=1, max_size=3), st.booleans()
+    )
+    def flip(changes, cut):
+        data = bytearray(whole)
+        for place, value in changes:
+            data[place] = value
+        (folder / "part.cdb").write_bytes(data[: changes[0][0]] if cut else data)
+        try:
+            read = read_mesh(folder / "part.cdb", "mm", "mm-t-s")
+        except UserError as error:
+            assert "part.cdb" in str(error)
+        else:
+            assert np.isfinite(read.points).all()
+
+    flip()
