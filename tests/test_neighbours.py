@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rings
@@ -17,6 +19,7 @@ from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
 from microslip.neighbours import closed_gap, frame_change, relative_rows, stuck
+from microslip.resonances import families, travelling, wave_tracks
 from microslip.ring import phase
 
 N = 6
@@ -114,3 +117,48 @@ def test_interfaces_that_do_not_face_the_next_sector_are_refused(mesh) -> None:
     for name, words in (("left", "does not face"), ("nowhere", "has no interface")):
         with pytest.raises(UserError, match=words):
             relative_rows(basis, basis.groups[0, 1], name)
+
+
+# ---------------------------------------------------------------- waves over a range of speeds
+
+
+TOP = 600 * 30 / np.pi  # rpm
+
+
+@pytest.fixture(scope="module")
+def ranged(mesh):
+    s = settings("rubin")
+    rotation = s.rotation.model_copy(update={"speeds_rpm": (0.0, TOP), "range_rpm": (0.0, TOP)})
+    return modal_basis(mesh, s.model_copy(update={"rotation": rotation}))
+
+
+@pytest.mark.parametrize("direction", ["forward", "backward", "standing"])
+def test_waves_over_a_range_end_in_those_of_its_ends(ranged, direction: str) -> None:
+    """The curves of the Campbell diagram, made from the range, against modes solved for at both ends.
+
+    Both hold the Coriolis force in the space of their own coordinates; they differ by what those leave out of it,
+    at most by the bound that the station's group states (and at rest by nothing).
+    """
+    for k in (0, 2):
+        found = wave_tracks(ranged, k, direction)
+        assert found is not None and len(found.speeds) > 10
+        for end, station in ((0, 0), (-1, 1)):
+            g = ranged.groups[station, k]
+            wanted = travelling(g, direction).omega[:6]
+            bound = np.nanmax(g.gyroscopic.error) if station else 1e-6
+            assert bound < 0.05
+            assert np.abs(np.sort(found.omega[:, end])[:6] / wanted - 1).max() < bound
+
+
+def test_coriolis_parts_the_two_waves_over_a_range(ranged) -> None:
+    ahead, behind = (wave_tracks(ranged, 2, d) for d in ("forward", "backward"))
+    assert ahead is not None and behind is not None
+    assert np.abs(ahead.omega[:6, 0] / behind.omega[:6, 0] - 1).max() < 1e-9
+    assert np.nanmax(np.abs(ahead.omega[:6, -1] / behind.omega[:6, -1] - 1)) > 1e-3
+
+
+def test_families_at_a_speed_are_those_of_the_stations(ranged) -> None:
+    """With a range in the file the stations keep their own curves: mode numbers must not be read off the range's."""
+    with_range, without = families(ranged, 1), families(replace(ranged, ranges={}), 1)
+    np.testing.assert_array_equal(with_range.modes, without.modes)
+    np.testing.assert_array_equal(with_range.omega, without.omega)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from .data import Array, Indices, ModalBasis, ModalGroup, SpeedRange
-from .speed_range import frequencies_over
+from .speed_range import frequencies_over, waves_over
 
 LINK = 0.3
 """Two shapes with a smaller MAC than this are never taken for the same mode."""
@@ -145,13 +145,19 @@ def _assigned(table: Array) -> tuple[Indices, Array]:
     return partner, value
 
 
-def track_range(r: SpeedRange) -> Tracks:
+def track_range(r: SpeedRange, waves: str = "") -> Tracks:
     """Curves at the points of a speed range.
+
+    Args:
+        waves: ``forward`` or another sense of travel, with gyroscopic coupling; empty: without it.
 
     In its M-orthonormal coordinates the MAC with the mass as weight is the squared product of two modes, so nothing
     of the mesh's size is touched.
     """
-    omega, shapes = frequencies_over(r, r.points)
+    if waves and r.gyroscopic:
+        omega, shapes = waves_over(r, r.points, waves == "forward")
+    else:
+        omega, shapes = frequencies_over(r, r.points)
     links = [_assigned(np.abs(a.conj().T @ b) ** 2) for a, b in zip(shapes[:-1], shapes[1:], strict=True)]
     return Tracks(r.points, *_joined(list(omega), links), r.speeds)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .campbell import Tracks, crossings, follow, point_weights, track_basis
+from .campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from .coordinates import in_modes
 from .data import Array, Indices, ModalBasis, ModalGroup
 from .ring import FORWARD, aliased
@@ -147,9 +147,11 @@ def families(basis: ModalBasis, speed: int = 0) -> Families:
     at = speeds_of(basis).index(speed)
     if at:
         modes, omega = modes.copy(), np.full_like(omega, np.nan)
-        curves = tracks(basis)
+        stations = replace(basis, ranges={})
         for column, k in enumerate(harmonics.tolist()):
-            modes[:, column] = _carried(curves[k], modes[:, column], at)
+            curves = _tracks_of(stations, k, "")
+            assert curves is not None
+            modes[:, column] = _carried(curves, modes[:, column], at)
             here = modes[:, column] >= 0
             omega[here, column] = basis.groups[speed, k].omega[modes[here, column]]
     return Families(basis.groups[speed, int(harmonics[0])].speed, harmonics, modes, omega, mac)
@@ -172,8 +174,15 @@ def tracks(basis: ModalBasis, direction: str = "") -> dict[int, Tracks]:
     return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, direction)) is not None}
 
 
+def wave_tracks(basis: ModalBasis, nodal_diameter: int, direction: str) -> Tracks | None:
+    """Curves of the waves of one nodal diameter and sense of travel; None where the file does not hold them."""
+    return _tracks_of(basis, nodal_diameter, direction) if nodal_diameter in harmonics_of(basis) else None
+
+
 def _tracks_of(basis: ModalBasis, harmonic: int, direction: str) -> Tracks | None:
-    """Curves of one nodal diameter, or None."""
+    """Curves of one nodal diameter over the speed range where there is one, else over the speeds; or None."""
+    if harmonic in basis.ranges:
+        return track_range(basis.ranges[harmonic], direction)
     groups = {
         key: travelling(g, direction) if direction else eigenmodes(g)
         for key, g in basis.groups.items()

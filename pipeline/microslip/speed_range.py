@@ -27,7 +27,7 @@ from .data import (
     StressSet,
     UserError,
 )
-from .gyroscopic import gyroscopic_modes
+from .gyroscopic import gyroscopic_modes, hermitian_modes
 from .modes import canonical
 from .modes.common import Interpolant, lagrange
 from .modes.compute import modal_damping, without_massless
@@ -89,6 +89,26 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
         values, Y = parts.modes(float(speed))
         omega[i] = values[:count]
         modes.append(Y[:, :count])
+    return omega, modes
+
+
+def waves_over(r: SpeedRange, speeds: Array, forward: bool, count: int | None = None) -> tuple[Array, list[Array]]:
+    """`frequencies_over` with gyroscopic coupling, for the waves that run forward or the others.
+
+    Raises:
+        numpy.linalg.LinAlgError: the body is unstable at one of the speeds.
+    """
+    count, run_up = count or r.count, r.samples[0].run_up
+    if run_up is None:
+        return frequencies_over(r, speeds, count)
+    parts, N = interpolant(r), run_up.N
+    omega, modes = np.empty((len(speeds), count)), []
+    for i, speed in enumerate(speeds):
+        found, x = hermitian_modes(np.eye(len(N)), 2 * speed * N, parts.stiffness(float(speed)))
+        chosen = np.flatnonzero(found < 0 if forward else found > 0)
+        chosen = chosen[np.argsort(np.abs(found[chosen]), kind="stable")][:count]
+        omega[i] = np.abs(found[chosen])
+        modes.append(x[:, chosen] / np.linalg.norm(x[:, chosen], axis=0))
     return omega, modes
 
 

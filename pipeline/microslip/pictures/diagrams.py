@@ -24,6 +24,7 @@ from ..resonances import (
     resonances,
     speeds_of,
     tracks,
+    wave_tracks,
     zigzag,
 )
 from ..ring import FORWARD, STANDING, aliased
@@ -264,7 +265,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     joined = families(basis)
     found = [r for r in resonances(basis, orders) if r.frequency <= top]
     waves = {aliased(e, basis.sectors) for e in orders} or {(k, "") for k in curves}
-    excited = {wave: t[wave[0]] for wave in sorted(waves) if wave[0] in (t := tracks(basis, wave[1]))}
+    excited = {wave: t for wave in sorted(waves) if (t := wave_tracks(basis, *wave)) is not None}
     hidden, strong = _waves(axes, joined, curves, excited, rpm, top)
     for order in orders:
         axes.plot(rpm, order * rpm / 60, color=FAINT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
