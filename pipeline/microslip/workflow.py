@@ -758,6 +758,7 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         first = basis.groups[speed, harmonics_of(basis)[0]]
         state = f"{first.speed * 30 / np.pi:g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
         lines.append(f"{state}: {certificate_words(certify_ring(basis, speed))}")
+        lines += [f"  {contact_sentence(name, c)}" for name, c in first.contacts.items()]
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
             more = f"   and {g.n_modes - MOST_COLUMNS} more" if g.n_modes > MOST_COLUMNS else ""

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..body import GROUND, BodySettings, Closure
 from ..data import Array, ContactState, Indices, Material, Mesh, UserError
+from ..eigen import DirectSolver
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
 from .boundary import require_face
+from .equilibrium import BodyModel, StaticState, equilibrium
 
 
 def contact_pairs(mesh: Mesh, settings: BodySettings, materials: Sequence[Material]) -> tuple[ContactPair, ...]:
@@ -137,3 +140,53 @@ def _state(mesh: Mesh, c: Closure, of_face: dict[str, str], g: Grip) -> ContactS
         closed_share=float(g.area[g.pressure > 0].sum() / areas.sum()), penetration=g.penetration,
         penalty=float(g.pair.penalty.max()), interference=c.interference, modes=c.modes,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ContactCurve:
+    """Normal force over approach of two faces, everything else held (Sextro 3.1: stiffness from a static model).
+
+    Attributes:
+        approach: (k,) m, interference of each level. force: (k,) N. closed_share: (k,) share of the area in contact.
+    """
+
+    approach: Array
+    force: Array
+    closed_share: Array
+
+    @property
+    def stiffness(self) -> Array:
+        """(k,) N/m, dF / d approach: differences of second order between the levels."""
+        return np.gradient(self.force, self.approach)
+
+    def table(self) -> str:
+        """CSV."""
+        rows = zip(self.approach, self.force, self.stiffness, self.closed_share, strict=True)
+        lines = [",".join(f"{v:.9g}" for v in row) for row in rows]
+        return "approach_m,normal_force_N,stiffness_N_per_m,closed_share\n" + "\n".join(lines) + "\n"
+
+
+def contact_curve(
+    model: BodyModel, name: str, approaches: Array, solver: DirectSolver, speed: float = 0.0
+) -> ContactCurve:
+    """Press the contact `name` by rising interferences (k,) m, k >= 2, and record its force.
+
+    The stiffness is that of the faces and of whatever yields between them and the supports: hold the body near the
+    contact for the local part alone. Where a basis holds static compliance, that part must not be counted again.
+
+    Raises:
+        UserError: no such contact, fewer than two levels. NotConverged: no equilibrium at a level.
+    """
+    number = next((i for i, p in enumerate(model.contacts) if p.name == name), None)
+    if number is None or len(approaches) < 2:
+        raise UserError(f"closures.{name}: the curve needs a closure of that name and two or more approaches")
+    force, share = [], []
+    state: StaticState | None = None
+    for approach in approaches:
+        pairs = list(model.contacts)
+        pairs[number] = replace(pairs[number], interference=float(approach))
+        state = equilibrium(replace(model, contacts=tuple(pairs)), speed, "nonlinear", solver, state)
+        g = state.contacts[number]
+        force.append(float(np.linalg.norm(g.slave_force.sum(axis=0))))
+        share.append(float(g.area[g.pressure > 0].sum() / max(g.area.sum(), 1e-300)))
+    return ContactCurve(np.asarray(approaches, dtype=float), np.array(force), np.array(share))
