@@ -18,7 +18,7 @@ MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved
 .DELETE_ON_ERROR:
 .SECONDARY:
 .SECONDEXPANSION:
-.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all lint docs bench clean distclean
+.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -52,6 +52,9 @@ test-slow: $(READY) ## only the slow ones and the peers (CalculiX, if it is inst
 
 test-all: $(READY) ## both
 	@$(PYTEST) -m "slow or not slow"
+
+peers: $(READY) ## environments of pyHarm and Exudyn for the tests of exports (build/peers)
+	@sh tests/peers/setup.sh
 
 lint: $(READY) ## ruff and mypy
 	@.venv/bin/ruff check .
