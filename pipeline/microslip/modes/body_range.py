@@ -34,10 +34,10 @@ def body_ranges(
     """
     r = settings.rotation
     assert r.range_rpm is not None
-    if model.contacts:
+    if any(c.modes == "closed" for c in settings.closures):
         raise UserError(
-            "rotation.range_rpm: faces that close at speed make the stiffness jump, which no range can follow; leave "
-            "the range out and use rotation.speeds_rpm"
+            'rotation.range_rpm: closures whose modes are "closed" make the stiffness jump where they close, which no '
+            'range can follow; use modes = "open", or rotation.speeds_rpm alone'
         )
     low, high = (v * np.pi / 30 for v in r.range_rpm)
     report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
@@ -84,8 +84,8 @@ class _Body:
         def settle(speed: float, weights: Guess) -> Settled:
             if speed not in self.states:
                 self._settle(speed, weights)
-            nonlinear = self.settings.rotation.prestress == "nonlinear"
-            slope = (lambda fresh: self._slope(speed, fresh)[k].K) if nonlinear else None
+            smooth = self.settings.rotation.prestress == "nonlinear" and not self.model.contacts
+            slope = (lambda fresh: self._slope(speed, fresh)[k].K) if smooth else None
             return Settled(speed, self.pencils[speed][k], self.states[speed], slope)
 
         return settle
