@@ -316,13 +316,29 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
     if not weight > 0:
         return [("volume of the mesh is positive", np.inf, 0.0, "")]
     error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
-    found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, "")]
+    found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, ""), *_place_checks(basis)]
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
     for name, s in g.stresses.items():
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
+
+
+def _place_checks(basis: ModalBasis) -> _Findings:
+    """Centre and inertia of the body against its mesh: one in another unit of length, or moved, fails here."""
+    fields = np.zeros((basis.mesh.n_points, 3, 4))
+    fields[:, 0, 0], fields[:, 0, 1:] = 1.0, basis.mesh.points
+    moments, weight = modal_mass(basis.mesh, fields)
+    moments *= basis.mass / weight
+    centre = moments[0, 1:] / basis.mass
+    second = moments[1:, 1:] - basis.mass * np.outer(centre, centre)
+    inertia = np.trace(second) * np.eye(3) - second
+    size = max(float(np.ptp(basis.mesh.points, axis=0).max()), 1e-300)
+    return [
+        ("body: centre of mass is the mesh's", _largest(basis.centre - centre) / size, 1e-8, ""),
+        ("body: inertia is the mesh's", _largest(basis.inertia - inertia) / (basis.mass * size**2), 1e-8, ""),
+    ]
 
 
 def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interface, mesh_is_sound: bool) -> _Findings:
