@@ -27,6 +27,7 @@ from microslip.harmonic_balance import peaks, stuck_frequencies
 from microslip.modes import modal_basis
 from microslip.modes.patches import patch_bounds
 from microslip.pictures import lettering, plots, views
+from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
 from microslip.reduction import METHODS
@@ -724,13 +725,16 @@ def own() -> None:
     folder = BUILD / "own"
     folder.mkdir(parents=True, exist_ok=True)
     shown = play("your_own_model.md", folder)
-    for name, command in (("info", "$ microslip info"), ("modes", "$ microslip modes bracket")):
+    commands = {"info": "info", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
+    for name, command in ((n, f"$ microslip {c}") for n, c in commands.items()):
         part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
         fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
     basis = read_basis(folder / "build" / "bracket" / "basis.h5")
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
+    mast = read_basis(folder / "build" / "mast" / "basis.h5")
+    save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
 
 
 def reference() -> None:

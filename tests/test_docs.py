@@ -254,6 +254,10 @@ def test_own_model_page(tmp_path: Path) -> None:
     for file in ("bracket", "part"):
         f = read_basis(tmp_path / "build" / file / "basis.h5").groups[0, 0].frequency
         np.testing.assert_allclose(f, [number(line.split()[1]) for line in told], rtol=1e-4)
+    for file in ("two", "mast"):
+        told = [line for line in pages.filled("your_own_model.md", file).splitlines() if " Hz   D" in line]
+        f = read_basis(tmp_path / "build" / file / "basis.h5").groups[0, 0].frequency
+        np.testing.assert_allclose(f, [number(line.split()[1]) for line in told], rtol=1e-4)
     coarse = read_basis(tmp_path / "build" / "bracket-coarse" / "basis.h5").groups[0, 0].frequency[0]
     assert coarse == pytest.approx(1020.8, rel=1e-4)
 

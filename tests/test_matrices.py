@@ -487,3 +487,16 @@ def test_flipped_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, kin
             assert found.matrix.shape[0] == found.matrix.shape[1]
 
     flip()
+
+
+def test_shapes_of_lone_nodes_are_drawn(tmp_path):
+    """A picture that shows something: not one colour."""
+    pytest.importorskip("matplotlib")
+    from PIL import Image
+
+    from microslip.pictures.points import points_sheet
+
+    given_by_market(tmp_path)
+    basis, _ = made(tmp_path)
+    path = points_sheet(basis, basis.groups[0, 0], tmp_path / "a.png", 4)
+    assert path is not None and len(Image.open(path).convert("RGB").getcolors(10**7)) > 20

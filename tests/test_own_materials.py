@@ -127,7 +127,8 @@ def test_modulus_over_temperature_becomes_a_factor(tmp_path):
         (("210000., 0.3", "210000., 0.5"), "nu = 0.5"),
         (("*ELASTIC\n210000., 0.3", "*ELASTIC, TYPE=ANISO\n1.,2.,3.,4.,5.,6.,7.,8.,"), "TYPE=ANISO, which is not read"),
         (("ELSET=EALL, MATERIAL=Steel", "ELSET=EALL, MATERIAL=Brass"), "'Brass', which is not defined"),
-        (("*SOLID SECTION, ELSET=EALL", "*SOLID SECTION, ELSET=OTHER"), "8 cells from number 1 on"),
+        (("*SOLID SECTION, ELSET=EALL", "*SOLID SECTION, ELSET=OTHER"), "set 'OTHER', which is not defined"),
+        (("*SOLID SECTION", "*ELSET, ELSET=ONE\n1,\n*SOLID SECTION, ELSET=ONE, MATERIAL=Steel\n**"), "7 cells from"),
         (("210000., 0.3", "210000., x"), "no number"),
     ],
 )

@@ -216,6 +216,21 @@ def check(file: Path, /, *, quiet: Quiet = False) -> None:
     _say(f"{file}: all {len(findings)} checks passed", quiet)
 
 
+@app.command(name="import")
+def import_(file: Path, folder: Path | None = None, /, *, unit: str = "mm") -> None:
+    """Make a body.toml around another program's mesh or matrices, with all that the file brings.
+
+    Args:
+        file: a mesh (.inp, .cdb, .msh, .med, .bdf, ...) or a stiffness matrix (.mtx, .mat, .h5, .op4, .pch, .sti).
+        folder: of the new body.toml; one of the file's name if not given.
+        unit: of its lengths.
+    """
+    from .importing import import_file
+
+    for line in import_file(file, folder, unit).told:
+        print(line)
+
+
 @app.command
 def export(
     file: Path, /, *, to: str, output: Output = None, ring: Ring = False, speed: int | None = None,

@@ -448,6 +448,8 @@ def _assign_materials(deck: _Deck, raw: RawMesh) -> None:
         if key not in known:
             known[key] = len(raw.materials)
             raw.materials.append(_deck_material(deck, key, name_of_set))
+        if name_of_set.upper() not in deck.cell_sets:
+            raise Damaged(f"*SOLID SECTION names the element set '{name_of_set}', which is not defined")
         chosen = _members(deck, name_of_set.upper())
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]

@@ -94,6 +94,8 @@ def draw_all(
     drawn: dict[str, Path] = {}
     if scenes and basis.mesh.n_cells:  # a system by hand or a test has points alone
         drawn |= _scenes(basis, folder, report)
+    if not basis.mesh.n_cells:
+        drawn |= _points(basis, folder)
     report("curves")
     first = basis.groups[min(basis.groups)]
     if (path := plots.compliance_plot(basis, first, folder / "compliance.png")) is not None:
@@ -105,6 +107,15 @@ def draw_all(
     elif (tracks := track_basis(basis)) is not None:
         drawn["campbell"] = plots.campbell_plot(basis, tracks, engine_orders, folder / "campbell.png")
     return drawn
+
+
+def _points(basis: ModalBasis, folder: Path) -> dict[str, Path]:
+    """What matplotlib can show where no elements are known."""
+    from .points import points_sheet
+
+    group = _ends(basis)[0]
+    path = points_sheet(basis, group, folder / f"modes_{_rpm(group)}.png")
+    return {} if path is None else {path.stem: path}
 
 
 def _diagrams(basis: ModalBasis, folder: Path, engine_orders: Sequence[int]) -> dict[str, Path]:

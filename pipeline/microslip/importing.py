@@ -1,0 +1,149 @@
+"""From another program's file to a body folder: what the file holds becomes a body.toml that runs as it stands."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from .data import Mesh, UserError
+from .mesh import UNITS, mesh_problems, read_mesh
+from .store import write_text
+from .units import SYSTEMS, usual_system
+
+MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
+_NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
+_MESHES = (".inp", ".cdb", ".msh", ".med")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The body file that was written, and what to say of it."""
+
+    path: Path
+    told: tuple[str, ...]
+
+
+def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
+    """Write a body.toml around a mesh or matrices; nothing is copied, the file is named where it lies.
+
+    Args:
+        file: a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new body.toml; by
+            default one of the file's name here. unit: of its lengths.
+
+    Raises:
+        UserError: unreadable, or there is a body.toml already.
+    """
+    if unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    if not file.is_file():
+        raise UserError(f"{file}: there is no such file; correct the path")
+    name = re.sub(r"[^A-Za-z0-9_.-]", "-", file.stem).lstrip("-._")[:64] or "part"
+    target = (folder or Path(name)) / "body.toml"
+    if target.exists():
+        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    made = _matrices if file.suffix.lower() in MATRICES else _mesh
+    lines, told = made(file, target.parent, unit)
+    head = [f'name = "{name}"', f'length_unit = "{unit}"']
+    write_text(target, "\n".join([*head, *lines]) + "\n")
+    last = f"{target}: ready. Add supports, interfaces and loads, then: microslip modes {target.parent}"
+    return Imported(target, (*told, last))
+
+
+def _beside(file: Path, folder: Path) -> str:
+    """The file's path from the folder, as TOML text."""
+    return json.dumps(Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix())
+
+
+def _sets(mesh: Mesh) -> list[str]:
+    """Supports and interfaces to choose from, as comments."""
+    names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
+    if not names:
+        return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
+    lines = ["", "# Sets of the file: " + ", ".join(names)]
+    first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
+    lines += ["#[[supports]]             # then remove free = true at the top", f"#face = {first}"]
+    lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', f"#face = {first}"]
+    return lines
+
+
+_END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
+
+
+def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    system = usual_system(unit)
+    told = []
+    try:
+        mesh = read_mesh(file, unit, system)
+    except UserError as error:
+        mesh = read_mesh(file, unit)  # its materials alone may be at fault
+        told.append(f"warning: {error}")
+    kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
+    told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
+    told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    lines = ["free = true               # nothing is held yet", "", "[geometry]", f"mesh = {_beside(file, folder)}", ""]
+    lines.append("[material]")
+    if mesh.materials:
+        lines.append('from = "mesh"')
+        lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
+        told += [f"{m.name}: {m.density:.6g} kg/m3 in the units {system}" for m in mesh.materials]
+    else:
+        lines += ["density = 7850.0          # the file brings no material that can be used: this is steel"]
+        lines += ["young = 2.1e11", "poisson = 0.3"]
+        told.append("warning: no material was taken from the file; body.toml says steel")
+    if mesh.temperature is not None:
+        lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
+    return [*lines, *_sets(mesh), *_END], told
+
+
+def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    from .exchange.matrices import matrix_names
+
+    names = matrix_names(file)
+    told = [f"{file}: matrices {', '.join(names) or 'none'}"]
+    mass = _mass_of(file, names)
+    nodes = _nodes_of(file)
+    lines = ["free = true               # nothing is held yet", "", "[geometry.matrices]"]
+    lines.append(f"stiffness = {_beside(file, folder)}")
+    lines.append(f"mass = {_beside(mass, folder)}")
+    upper = {n.upper() for n in names}
+    for key, usual in (("damping", ("C", "BAA", "C_R")), ("gyroscopic", ("G", "G_R"))):
+        if upper & set(usual) and mass == file:
+            lines.append(f"#{key} = {_beside(file, folder)}")
+    if nodes is None:
+        lines.append('nodes = "nodes.csv"       # write it: number, x, y, z of every node')
+        told.append(f"warning: no file of nodes is beside {file.name}; write {folder / 'nodes.csv'}: number, x, y, z")
+    else:
+        lines.append(f"nodes = {_beside(nodes, folder)}")
+        told.append(f"nodes from {nodes}")
+    lines.append("#grounded = true          # the supports are in the matrices already (then remove free = true)")
+    if usual_system(unit) is None:
+        lines.append(f'units = "m-kg-s"          # of the matrices: {", ".join(SYSTEMS)}')
+    if nodes is not None and nodes.suffix in _MESHES:
+        return [*lines, *_sets(read_mesh(nodes, unit)), *_END], told
+    return [*lines, "", "#[geometry.matrices.sets]", "#tip = [1, 2, 3]", *_END], told
+
+
+def _mass_of(file: Path, names: list[str]) -> Path:
+    """The same file if it holds several matrices, else the partner beside it."""
+    if len(names) > 1:
+        return file
+    if file.suffix == ".sti":
+        return file.with_suffix(".mas")
+    for old, new in (("K", "M"), ("k", "m"), ("stiffness", "mass"), ("Stiffness", "Mass")):
+        at = file.stem.rfind(old)
+        partner = file.with_name(file.stem[:at] + new + file.stem[at + len(old) :] + file.suffix)
+        if at >= 0 and partner.is_file():
+            return partner
+    raise UserError(
+        f"{file}: no mass matrix is beside it; name the two K{file.suffix} and M{file.suffix}, or write a body.toml"
+    )
+
+
+def _nodes_of(file: Path) -> Path | None:
+    for place in [file.with_suffix(s) for s in _NODES] + [file.with_name(f"nodes{s}") for s in _NODES]:
+        if place.is_file() and place != file:
+            return place
+    return None

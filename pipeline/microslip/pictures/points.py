@@ -1,0 +1,49 @@
+"""Shapes of a body whose nodes alone are known (foreign matrices, a test): where each node is and where it goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..coordinates import in_modes
+from ..data import Array, ModalBasis, ModalGroup
+from .plots import _figure, _save
+
+MOST = 12
+COLUMNS = 4
+SHARE = 0.12
+"""Largest motion drawn, over the size of the body."""
+
+
+def points_sheet(basis: ModalBasis, group: ModalGroup, path: Path, most: int = MOST) -> Path | None:
+    """The first elastic modes as a sheet of three-dimensional sketches; None without shapes."""
+    g = group if group.to_diagonal is None else in_modes(group)
+    elastic = [j for j in range(len(g.omega)) if g.omega[j] > 0][:most]
+    if not len(g.phi) or not elastic:
+        return None
+    rows, columns = -(-len(elastic) // COLUMNS), min(COLUMNS, len(elastic))
+    figure = _figure(3.0 * columns, 3.1 * rows)
+    for place, j in enumerate(elastic, 1):
+        axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
+        _sketch(axes, basis.mesh.points, g.phi[:, :, j].real)
+        axes.set_title(f"{j + 1}: {g.omega[j] / 2 / np.pi:.5g} Hz", fontsize=10)
+    return _save(figure, path)
+
+
+def _sketch(axes: Any, points: Array, shape: Array) -> None:
+    size = max(float(np.ptp(points, axis=0).max()), 1e-12)
+    moved = points + shape * SHARE * size / max(float(np.linalg.norm(shape, axis=1).max()), 1e-300)
+    length = np.linalg.norm(shape, axis=1)
+    pairs = np.stack([points, moved], axis=1)
+    axes.scatter(*points.T, s=6, color="#c3c7ce", depthshade=False)
+    axes.scatter(*moved.T, s=14, c=length, cmap="viridis", depthshade=False)
+    for a, b in pairs if len(pairs) <= 400 else []:
+        axes.plot(*np.stack([a, b], axis=1), color="#8b919c", linewidth=0.7)
+    extent = np.maximum(np.ptp(np.vstack([points, moved]), axis=0), 0.15 * size)
+    middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
+    for limits, m, e in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, extent, strict=True):
+        limits(m - 0.55 * e, m + 0.55 * e)
+    axes.set_box_aspect(extent)
+    axes.set_axis_off()
