@@ -265,6 +265,44 @@ def export(
 
 
 @app.command
+def compare(
+    first: Path, second: Path, /, *, output: Output = None, speed: int = 0, nodal_diameter: int = 0,
+    distance: float | None = None, least: float = 0.5, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Frequencies, MAC and pairs of modes of two modal files, computed or measured; pictures side by side.
+
+    Args:
+        first: a basis.h5.
+        second: another one, in the same frame.
+        output: folder for mac.png, pairs.png and pairs.csv; nothing is written if not given.
+        speed: which of the files' speeds, counted from 0.
+        nodal_diameter: of cyclic bodies.
+        distance: m, largest distance between points that count as the same; a hundredth of the body if not given.
+        least: MAC below which modes stay unpaired.
+    """
+    from .basis import read_basis
+    from .correlation import compare_groups, pair_table
+    from .modes.sampling import on_common_points
+
+    bodies = (read_basis(first), read_basis(second))
+    seen = on_common_points(*bodies)
+    found = compare_groups(*seen, (speed, nodal_diameter), distance, least)
+    _say("\n".join(pair_table(found)), quiet)
+    if output is None:
+        return
+    from . import pictures
+    from .correlation import pair_rows
+    from .pictures.comparison import draw_comparison
+    from .store import write_text
+
+    reason = pictures.can_draw()
+    write_text(output / "pairs.csv", pair_rows(found))
+    drawn = draw_comparison(bodies, seen, found, (speed, nodal_diameter), output, not reason)
+    _warn([f"no pictures of the shapes: {reason}"] if reason else [])
+    _say("\n".join(str(f) for f in (*drawn.values(), output / "pairs.csv")), quiet)
+
+
+@app.command
 def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> None:
     """Pictures and one self-contained page of a modal file.
 

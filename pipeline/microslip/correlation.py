@@ -194,6 +194,16 @@ def _own(basis: ModalBasis, key: tuple[int, int]) -> ModalGroup:
     return group
 
 
+def pair_rows(found: Comparison) -> str:
+    """The pairs as CSV: numbers counted from 1, Hz, relative deviation, MAC, damping ratios."""
+    lines = ["first,second,first Hz,second Hz,deviation,MAC,first D,second D"]
+    for p in found.pairs:
+        (f, g), (a, b) = p.frequency, p.damping_ratio
+        deviation = f"{p.deviation:.6g}" if f > 0 else ""
+        lines.append(f"{p.first + 1},{p.second + 1},{f:.9g},{g:.9g},{deviation},{p.mac:.6f},{a:.6g},{b:.6g}")
+    return "\n".join(lines) + "\n"
+
+
 def pair_table(found: Comparison) -> list[str]:
     """Lines for the terminal: pairs with frequencies, damping and MAC, then the modes that have no partner."""
     lines = [f"{'mode':>5s} {'Hz':>12s}   {'mode':>5s} {'Hz':>12s} {'deviation':>10s} {'MAC':>7s}   D, D"]
