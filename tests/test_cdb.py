@@ -187,7 +187,7 @@ def test_cells_in_the_wrong_order_are_refused(tmp_path):
         mesh.points, {"hexahedron": mesh.cells["hexahedron"][:, [4, 5, 6, 7, 0, 1, 2, 3]]}, node_id=mesh.node_id
     )
     errors, _ = mesh_problems(read_mesh(written(tmp_path, archive(wrong)), "mm"))
-    assert any("inside out" in e for e in errors)
+    assert any("inside out (first: element 1)" in e for e in errors)
 
 
 def test_flipped_bytes_are_read_or_refused(tmp_path_factory):

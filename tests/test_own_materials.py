@@ -6,10 +6,14 @@ import decks
 import meshes
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis
 from microslip.cli import main
+from microslip.data import Mesh, UserError
 from microslip.elasticity import isotropic, orthotropic
+from microslip.mesh import read_mesh
 from microslip.workflow import modes_stage, open_job
 
 BODY = """
@@ -147,3 +151,42 @@ def test_wrong_units_are_told(tmp_path):
     lines = [*decks.mesh_lines(beam(), sets=("z0",)), "*MATERIAL, NAME=Steel", "*ELASTIC", "2.1e11, 0.3", "*DENSITY"]
     _, told = made(tmp_path, [*lines, "7850.", decks.section()])
     assert any("correct material.units" in t for t in told)
+
+
+def test_flipped_bytes_of_a_deck_are_read_or_refused(tmp_path_factory):
+    """Materials, orientations, sections and temperatures included: a mesh, or one sentence."""
+    folder = tmp_path_factory.mktemp("flip")
+    lines = [*decks.mesh_lines(meshes.brick("wedge", (1, 1, 1)), sets=("z0",)), *decks.MATERIAL, *ORTHO]
+    lines += [decks.section(), "*ELSET, ELSET=TWO", "2", decks.section("TWO", "Wood", "GRAIN"), "*EXPANSION", "1e-5"]
+    lines += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 20.", "*TEMPERATURE", "z0, 30."]
+    whole = "\n".join(lines).encode()
+
+    @settings(max_examples=150, deadline=None)
+    @given(st.lists(st.tuples(st.integers(0, len(whole) - 1), st.integers(0, 255)), min_size=1), st.booleans())
+    def flip(changes, cut):
+        data = bytearray(whole)
+        for place, value in changes:
+            data[place] = value
+        (folder / "part.inp").write_bytes(data[: changes[0][0]] if cut else data)
+        try:
+            read = read_mesh(folder / "part.inp", "mm", "mm-t-s")
+        except UserError as error:
+            assert "part.inp" in str(error)
+        else:
+            assert all(np.isfinite(m.elasticity).all() for m in read.materials)
+
+    flip()
+
+
+def test_a_bad_cell_is_named_by_its_number_though_cells_are_sorted_by_material(tmp_path, capsys):
+    """The second section's cells come first in the file; cell 2 is turned inside out."""
+    mesh = beam()
+    cells = mesh.cells["hexahedron20"].copy()
+    cells[1] = cells[1][[*range(4, 8), *range(4), *range(12, 16), *range(8, 12), *range(16, 20)]]
+    turned = Mesh(mesh.points, {"hexahedron20": cells}, mesh.faces, node_id=mesh.node_id)
+    lines = [*decks.mesh_lines(turned, sets=("z0",)), *halves(), *decks.MATERIAL, *ORTHO]
+    lines += [decks.section("HIGH", "Wood"), decks.section("LOW")]
+    (tmp_path / "part.inp").write_text("\n".join(lines) + "\n")
+    (tmp_path / "body.toml").write_text(BODY.format(material='from = "mesh"'))
+    assert main(["modes", str(tmp_path)]) == 2
+    assert "inside out (first: element 2)" in capsys.readouterr().err

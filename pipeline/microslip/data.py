@@ -67,7 +67,8 @@ class Mesh:
         node_id: (n,) numbers of the points in the file the mesh came from.
         materials: those the file brings, empty if it brings none. regions: cell type -> (e,) number of each cell's
             material, ascending; empty unless there are materials. temperature: (n, 2) of the stress-free and of the
-            actual state as the file has them, in its own unit, or None.
+            actual state as the file has them, in its own unit, or None. cell_id: cell type -> (e,) the file's numbers
+            of the cells, or nothing.
     """
 
     points: Array
@@ -78,6 +79,7 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     regions: Mapping[str, Indices] = field(default_factory=dict)
     temperature: Array | None = None
+    cell_id: Mapping[str, Indices] = field(default_factory=dict)
 
     @property
     def n_points(self) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -28,10 +30,11 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():
+        first = partial(_first, mesh, cell_type)
         repeated = (np.diff(np.sort(cells, axis=1), axis=1) == 0).any(axis=1)
         if repeated.any():
             errors.append(
-                f"{repeated.sum()} {cell_type} cells name a point twice (first: {_first(repeated)}); they are "
+                f"{repeated.sum()} {cell_type} cells name a point twice (first: {first(repeated)}); they are "
                 "degenerate, remesh"
             )
             continue
@@ -39,10 +42,10 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             volume = corner_volumes(mesh, cell_type)
         scale = np.abs(volume).mean()
         if (flat := ~(np.abs(volume) > 1e-9 * scale)).any():
-            errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {_first(flat)}); remesh")
+            errors.append(f"{flat.sum()} {cell_type} cells have no volume (first: {first(flat)}); remesh")
         elif (inverted := volume < 0).any():
             errors.append(
-                f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {_first(inverted)}); "
+                f"{inverted.sum()} of {len(cells)} {cell_type} cells are inside out (first: {first(inverted)}); "
                 "the node order is not the one of the format, or the mesh is damaged"
             )
         if cell_type in _FIRST_ORDER:
@@ -84,8 +87,10 @@ def _overlapping(mesh: Mesh) -> int:
     return found
 
 
-def _first(mask: NDArray[np.bool_]) -> int:
-    return int(np.flatnonzero(mask)[0]) + 1
+def _first(mesh: Mesh, cell_type: str, mask: NDArray[np.bool_]) -> str:
+    """The first of the chosen cells, by the file's number if it has one."""
+    first = int(np.flatnonzero(mask)[0])
+    return f"element {mesh.cell_id[cell_type][first]}" if cell_type in mesh.cell_id else str(first + 1)
 
 
 def corner_volumes(mesh: Mesh, cell_type: str) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from ..data import Array, Material
 from ..elasticity import isotropic, orthotropic
 from ..units import density, stress
-from .raw import Damaged, DeckMaterial, RawMesh
+from .raw import Damaged, DeckMaterial
 
 _SAME = 1e-6
 
@@ -64,12 +64,9 @@ def in_si(found: DeckMaterial, system: str, zero: float = 0.0) -> Material:
         raise Damaged(f"the material '{found.name}'{at} has no density")
     if not 0 < found.density < np.inf:
         raise Damaged(f"the material '{found.name}'{at} has a density of {found.density:g}")
+    if not (np.isfinite(found.expansion).all() and np.isfinite(found.elasticity).all()):
+        raise Damaged(f"the material '{found.name}'{at} holds a number that is not finite")
     table = None if found.temperature is None else found.temperature + np.array([zero, 0.0])
     return Material(
         found.density * density(system), found.elasticity * stress(system), found.expansion, table, found.name
     )
-
-
-def region_names(raw: RawMesh) -> list[str]:
-    """Material and cells of every region, for messages."""
-    return [f"{m.name or 'none'} ({m.where})" if m.where else m.name or "none" for m in raw.materials]

@@ -49,7 +49,7 @@ class RawMesh:
         point_sets: set name -> positions.
         regions: of each block, (e,) number of each cell's material, or nothing where the file brings none.
         materials: those of the file, in its own units. temperature: (n, 2) stress-free and actual ones in the file's
-            unit, NaN where none is given, or None. notes: what a person should know of what was left out.
+            unit, NaN where none is given, or None.
         cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
     """
 
@@ -61,7 +61,6 @@ class RawMesh:
     regions: list[Indices] = field(default_factory=list)
     materials: list[DeckMaterial] = field(default_factory=list)
     temperature: Array | None = None
-    notes: list[str] = field(default_factory=list)
     cell_id: list[Indices] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:

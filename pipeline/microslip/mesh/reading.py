@@ -22,7 +22,7 @@ from .cdb import read_cdb
 from .inp import read_inp
 from .materials import in_si
 from .msh import is_msh41, read_msh41
-from .raw import Damaged, RawMesh
+from .raw import NODES, Damaged, RawMesh
 from .surface import boundary_facets, faces_from_points, match_facets
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -111,6 +111,9 @@ def _read_by_meshio(path: Path) -> RawMesh:
     except Damaged:
         raise
     except (Exception, SystemExit) as error:  # meshio raises whatever its parsers meet, and exits on some
+        if isinstance(error, KeyError) and error.args[:1] and error.args[0] in NODES:
+            kind = error.args[0]
+            raise Damaged(f"cells of type {kind} are not read from {path.suffix}; use another format") from error
         text = str(error) if not isinstance(error, SystemExit) else said.getvalue()
         detail = " ".join(text.split())[-160:] or "unknown format"
         raise Damaged(f"not readable as {path.suffix or 'a file without suffix'}: {detail}") from error
@@ -200,6 +203,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
         points=points[used],
         cells={t: renumber[c] for t, c in cells.items()},
         regions={} if not raw.regions else {t: r for (t, _), r in zip(raw.blocks, raw.regions, strict=True) if len(r)},
+        cell_id=_cell_numbers(raw),
         temperature=None if raw.temperature is None else raw.temperature[used],
         point_sets={n: kept for n, s in raw.point_sets.items() if len(kept := _kept(renumber[s]))},
         node_id=raw.node_id[used],
@@ -221,6 +225,14 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
         if name not in faces and (face := faces_from_points(boundary, chosen, len(mesh.points))):
             faces[name] = face
     return replace(mesh, faces=faces)
+
+
+def _cell_numbers(raw: RawMesh) -> dict[str, Indices]:
+    """The file's numbers of the cells of each type, if it has any."""
+    found: dict[str, list[Indices]] = {}
+    for (kind, _), ids in zip(raw.blocks, raw.cell_id, strict=False):
+        found.setdefault(kind, []).append(ids)
+    return {kind: np.concatenate(parts) for kind, parts in found.items()}
 
 
 def _sort_by_region(raw: RawMesh) -> None:
