@@ -712,6 +712,8 @@ def basis_summary(basis: ModalBasis) -> list[str]:
     for (_, harmonic), g in sorted(basis.groups.items()):
         state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = "certified complete" if g.checks.get("certified") else "NOT certified"
+        if basis.source == "measured":
+            proof = "measured: others may have been missed"
         lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
         lines += [f"  {contact_sentence(name, c)}" for name, c in g.contacts.items()]
         lines += [f"  {text}" for text in sentences(g, basis.reduction)]

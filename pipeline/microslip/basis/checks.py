@@ -89,7 +89,9 @@ def _mesh_checks(basis: ModalBasis) -> _Findings:
     numbers += (basis.rotation_axis, basis.rotation_point)
     numbers += tuple(a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion))
     found.append(("body: every number is finite", _not_finite(numbers), 0.0, ""))
-    found.append(("body: mass is positive", max(-basis.mass, 0.0) if basis.mass else 1.0, 0.0, f"{basis.mass:.6g} kg"))
+    unknown = 0.0 if basis.source == "measured" else 1.0  # a test does not weigh
+    mass = max(-basis.mass, 0.0) if basis.mass else unknown
+    found.append(("body: mass is positive", mass, 0.0, f"{basis.mass:.6g} kg" if basis.mass else "not known"))
     found.append(("rotation axis has unit length", abs(float(np.linalg.norm(basis.rotation_axis)) - 1), 1e-9, ""))
     return found
 

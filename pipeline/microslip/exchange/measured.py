@@ -1,0 +1,232 @@
+"""Measured modes from a Universal File (data sets 15 or 2411: points, 55: modes, 164: units), by pyuff.
+
+A test knows some directions of some points, no mesh, no mass and nothing of completeness: the modal file says so by
+its attribute ``source`` = ``measured``. Its points are the measured ones; a monitor ``point <number>`` has one row for
+each direction that was measured there, and directions that were not are zero in phi. A direction counts as measured if
+it moves in some mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..correlation import DIRECTIONS, POINT
+from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..mesh import UNITS
+from ..modes.canonical import signs
+
+NORMAL = 2
+_KINDS = (NORMAL, 3, 7)
+"""Analysis types of a data set 55 that are modes: normal, complex of first and of second order."""
+_MOVEMENTS = {8: 0, 11: 1, 12: 2}
+"""Specific data type of a data set 55 -> how often the displacement is differentiated in time."""
+_REAL = 1e-5
+"""Imaginary over real part below which a shape counts as real: the format prints six digits."""
+
+
+@dataclass(frozen=True)
+class _Mode:
+    """omega: rad/s. damping: ratio. mass: modal mass, kg, complex if the shape is; 0 where it is not told."""
+
+    omega: float
+    damping: float
+    mass: complex
+    nodes: Indices
+    shape: Array
+
+
+def holds_modes(path: Path | str) -> bool:
+    """Whether a text file has a data set 55 in the way of Universal Files."""
+    before = b""
+    try:
+        with open(path, "rb") as file:
+            for line in file:
+                if before.strip() == b"-1" and line.strip() in (b"55", b"2414"):
+                    return True
+                before = line[:80]
+    except OSError:
+        return False
+    return False
+
+
+def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[ModalBasis, tuple[str, ...]]:
+    """A measured body, and what its reader should be told.
+
+    Args:
+        path: a Universal File. unit: of its lengths, if it has no data set 164. name: of the body; the file's if empty.
+
+    Raises:
+        UserError: no points, no modes, modes at points that have no place or at other points than the first mode.
+    """
+    path = Path(path)
+    sets = _sets(path)
+    length, force, told = _units(sets, unit)
+    number, place = _points(path, sets)
+    modes = [_mode(path, s, length, force) for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
+    if not modes:
+        raise UserError(f"{path}: holds no mode shapes (data set 55); export them from the modal analysis")
+    others = sum(s["type"] == 58 or s["type"] == 55 and s.get("analysis_type") not in _KINDS for s in sets)
+    if others:
+        told.append(f"{others} measured functions (data sets 58, 55) are left aside: only identified modes are taken")
+    modes.sort(key=lambda m: m.omega)
+    used = modes[0].nodes
+    for i, m in enumerate(modes):
+        if not np.array_equal(m.nodes, used):
+            hertz = m.omega / (2 * np.pi)
+            raise UserError(f"{path}: mode {i + 1} ({hertz:.6g} Hz) is at other points than the first one")
+    position = {int(n): i for i, n in enumerate(number)}
+    lost = [int(n) for n in used if int(n) not in position]
+    if lost:
+        raise UserError(f"{path}: point {lost[0]} of the modes has no place (data set 15 or 2411)")
+    points = place[[position[int(n)] for n in used]] / length
+    phi, scaled = _shapes(modes)
+    told.append(
+        "shapes are scaled by their modal masses"
+        if scaled
+        else "no modal masses: shapes are scaled to a largest displacement of 1, forces on them mean nothing"
+    )
+    return _basis(name or path.stem, points, used, modes, phi, scaled), tuple(told)
+
+
+def _sets(path: Path) -> list[dict[str, Any]]:
+    """The data sets that are understood.
+
+    Raises:
+        UserError: no Universal File, or damaged.
+    """
+    import pyuff
+
+    if not path.is_file():
+        raise UserError(f"{path}: there is no such file; correct the path")
+    wanted = (15, 2411, 55, 58, 164, 2420)
+    try:
+        file = pyuff.UFF(str(path))
+        kinds = [int(k) for k in file.get_set_types()]
+        if not kinds:
+            raise ValueError("it has no data sets")
+        return [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
+    except Exception as error:  # pyuff raises whatever its parsing meets
+        raise UserError(
+            f"{path}: cannot be read as a Universal File ({type(error).__name__}: {_short(error)}); export it again"
+        ) from error
+
+
+def _short(error: BaseException) -> str:
+    return " ".join(str(error).split())[:100]
+
+
+def _units(sets: list[dict[str, Any]], unit: str) -> tuple[float, float, list[str]]:
+    """What a length and a force of the file are divided by to be in m and N (data set 164)."""
+    for s in sets:
+        if s["type"] == 164 and _number(s, "length") > 0:
+            length, force = _number(s, "length"), _number(s, "force") or 1.0
+            return length, force, [f"the file's units (data set 164): {1 / length:g} m, {1 / force:g} N"]
+    return 1 / UNITS[unit], 1.0, [f"lengths taken in {unit}: the file does not tell its units (data set 164)"]
+
+
+def _number(table: dict[str, Any], key: str) -> float:
+    try:
+        value = float(np.real(table.get(key) or 0.0))
+    except (TypeError, ValueError):
+        return 0.0
+    return value if np.isfinite(value) else 0.0
+
+
+def _points(path: Path, sets: list[dict[str, Any]]) -> tuple[Indices, Array]:
+    """(p,) numbers and (p, 3) places of all points, in the file's unit."""
+    if any(s["type"] == 2420 and not _aligned(s) for s in sets):
+        raise UserError(f"{path}: has local coordinate systems (data set 2420); export it in the global one")
+    found = [s for s in sets if s["type"] in (15, 2411)]
+    if not found:
+        raise UserError(f"{path}: holds no points (data set 15 or 2411); export the geometry too")
+    try:
+        number = np.concatenate([np.atleast_1d(s["node_nums"]) for s in found]).astype(np.int64)
+        place = np.concatenate([np.column_stack([np.atleast_1d(s[c]) for c in "xyz"]) for s in found]).astype(float)
+    except (KeyError, ValueError, TypeError) as error:
+        raise UserError(f"{path}: its points cannot be read ({_short(error)}); export it again") from error
+    if len(number) != len(place) or not np.isfinite(place).all() or len(np.unique(number)) != len(number):
+        raise UserError(f"{path}: its points are incomplete or numbered twice; export it again")
+    return number, place
+
+
+def _aligned(s: dict[str, Any]) -> bool:
+    """Whether every coordinate system is the global one."""
+    matrices = np.asarray(s.get("CS_matrices", s.get("cs_matrices", ())), dtype=float).reshape(-1, 4, 3)
+    return all(np.allclose(m, np.vstack([np.eye(3), np.zeros(3)]), atol=1e-9) for m in matrices)
+
+
+def _mode(path: Path, s: dict[str, Any], length: float, force: float) -> _Mode:
+    """One data set 55; velocities and accelerations become displacements."""
+    kind, moved = int(s["analysis_type"]), s.get("spec_data_type")
+    if moved not in _MOVEMENTS:
+        raise UserError(
+            f"{path}: a mode shape (data set 55) has the specific data type {moved}; displacements, velocities and "
+            "accelerations (8, 11, 12) are read"
+        )
+    try:
+        nodes = np.atleast_1d(s["node_nums"]).astype(np.int64)
+        raw = np.column_stack([np.atleast_1d(s[f"r{i}"]) for i in (1, 2, 3)])
+    except (KeyError, ValueError, TypeError) as error:
+        raise UserError(f"{path}: a mode shape (data set 55) cannot be read ({_short(error)})") from error
+    omega, damping, mass = _eigenvalue(s, kind)
+    if not omega > 0 or not np.isfinite(raw).all() or len(np.unique(nodes)) != len(nodes):
+        raise UserError(f"{path}: a mode shape (data set 55) has no frequency, or points twice or without numbers")
+    order = np.argsort(nodes)
+    shape = raw[order] / (length * (1j * omega) ** _MOVEMENTS[moved])
+    return _Mode(omega, damping, mass * length / force, nodes[order], shape)
+
+
+def _eigenvalue(s: dict[str, Any], kind: int) -> tuple[float, float, complex]:
+    """Angular frequency, damping ratio and modal mass (0 if unknown).
+
+    Of a complex mode the modal a is phi^T (2 lambda M + C) phi = 2 i omega_d times the modal mass of light damping.
+    """
+    if kind == NORMAL:
+        vis, his = _number(s, "modal_damp_vis"), _number(s, "modal_damp_his")
+        return 2 * np.pi * _number(s, "freq"), vis or 0.5 * his, _number(s, "modal_m")
+    root = complex(s.get("eig") or 0.0)
+    omega = abs(root)
+    damped = abs(root.imag)
+    a = complex(s.get("modal_a") or 0.0)
+    return omega, -root.real / omega if omega else 0.0, a / (2j * damped) if damped else 0.0
+
+
+def _shapes(modes: Sequence[_Mode]) -> tuple[Array, bool]:
+    """(n, 3, m) shapes as real as they can be, the largest component positive, and whether masses scale them."""
+    phi = np.stack([m.shape.astype(complex) for m in modes], axis=2)
+    mass = np.array([m.mass for m in modes])
+    scaled = bool((np.abs(mass) > 0).all())
+    phi = phi / np.sqrt(np.where(np.abs(mass) > 0, mass, 1.0)) if scaled else phi / np.abs(phi).max(axis=(0, 1))
+    flat = phi.reshape(-1, len(modes))
+    flat = flat * np.exp(-0.5j * np.angle((flat**2).sum(axis=0)))  # largest real part
+    if np.abs(flat.imag).max() < _REAL * np.abs(flat).max():
+        flat = flat.real
+    return (flat * signs(flat)).reshape(phi.shape), scaled
+
+
+def _basis(
+    name: str, points: Array, number: Indices, modes: Sequence[_Mode], phi: Array, scaled: bool
+) -> ModalBasis:  # fmt: skip
+    m, n = len(modes), len(points)
+    omega, D = np.array([x.omega for x in modes]), np.array([x.damping for x in modes])
+    reads = {}
+    for i in range(n):
+        known = [c for c in range(3) if np.abs(phi[i, c]).max() > 0]
+        if known:
+            labels = tuple(DIRECTIONS[c] for c in known)
+            reads[f"{POINT}{number[i]}"] = Rows(phi[i, known], labels, "m", points[i], 0.0, np.zeros(len(known)))
+    none = np.zeros((0, 0))
+    group = ModalGroup(
+        0.0, omega, ("normal",) * m, D, np.eye(m), np.diag(omega**2), np.diag(2 * D * omega), np.zeros((m, m)), phi,
+        {}, {}, reads, {}, Compliance((), none, none, False, none), {}, np.zeros((n, 3)), {},
+    )  # fmt: skip
+    return ModalBasis(
+        name, Mesh(points, {}, {}, {}, number), {(0, 0): group}, 0.0, np.zeros(3), np.zeros((3, 3)),
+        np.array([0.0, 1.0, 0.0]), np.zeros(3), "measured", False, "measured modes",
+        {"scaling": "modal mass" if scaled else "largest displacement 1"}, source="measured",
+    )  # fmt: skip

@@ -1,0 +1,163 @@
+"""Measured modes from Universal Files: against the computed body they were taken from, and files that are wrong."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_fuzz import user_errors_only
+
+from microslip.basis import check_basis, read_basis, write_basis
+from microslip.correlation import compare_groups, measured_directions
+from microslip.data import ModalBasis, UserError
+from microslip.exchange.measured import holds_modes, read_measured
+from microslip.exchange.uff import write_uff
+
+pyuff = pytest.importorskip("pyuff")
+
+
+def chosen(basis: ModalBasis) -> np.ndarray:
+    """Positions of the points that were measured: every ninth."""
+    return np.arange(4, basis.mesh.n_points, 9)
+
+
+def measure(path: Path, basis: ModalBasis, acceleration: bool = False, mass: float = 1.0, **more: object) -> Path:
+    """A test of the body as a test program would write it: mm, mN; x and z at even points, y at odd ones."""
+    g, at = basis.groups[0, 0], chosen(basis)
+    nodes = basis.mesh.node_id[at]
+    x, y, z = 1000 * basis.mesh.points[at].T
+    file = pyuff.UFF(str(path))
+    zeros = np.zeros(len(at), dtype=int)
+    sets: list[dict] = [
+        {"type": 164, "units_code": 5, "units_description": "mm (milli newton)", "temp_mode": 1, "length": 1000.0,
+         "force": 1000.0, "temp": 1.0, "temp_offset": 0.0},
+        {"type": 15, "node_nums": nodes, "def_cs": zeros, "disp_cs": zeros, "color": zeros, "x": x, "y": y, "z": z},
+    ]  # fmt: skip
+    for j in np.arange(g.n_modes)[::-1]:  # in any order
+        phi = 1000 * g.phi[at, :, j] * np.sqrt(mass)  # mm per coordinate; a modal mass of mass kg is as many mN s2/mm
+        phi = np.where((np.arange(len(at)) % 2 == 0)[:, None], phi * [1, 0, 1], phi * [0, 1, 0])
+        if acceleration:
+            phi = -phi * g.omega[j] ** 2
+        sets.append(
+            {"type": 55, "model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 12 if acceleration else 8,
+             "data_type": 2, "load_case": 1, "mode_n": int(j) + 1, "freq": g.frequency[j], "modal_m": mass,
+             "modal_damp_vis": g.damping_ratio[j], "modal_damp_his": 0.0, "node_nums": nodes, "r1": phi[:, 0],
+             "r2": phi[:, 1], "r3": phi[:, 2], "id1": "test", "id2": "", "id3": "", "id4": "", "id5": ""} | more
+        )  # fmt: skip
+    file.write_sets(sets, "overwrite")
+    return path
+
+
+@pytest.mark.parametrize(("acceleration", "mass"), [(False, 1.0), (True, 1.0), (False, 7.0)])
+def test_a_test_of_the_beam_is_found_again(tmp_path: Path, acceleration: bool, mass: float) -> None:
+    """Six digits: frequency, damping, mass-normalised shapes in SI, whatever was measured in whatever unit."""
+    basis = small.basis()
+    g, at = basis.groups[0, 0], chosen(basis)
+    measured, told = read_measured(measure(tmp_path / "t.uff", basis, acceleration, mass))
+    h = measured.groups[0, 0]
+    np.testing.assert_allclose(measured.mesh.points, basis.mesh.points[at], atol=1e-7)  # six digits of 120 mm
+    np.testing.assert_allclose(h.omega, g.omega, rtol=2e-5)
+    np.testing.assert_allclose(h.damping_ratio, g.damping_ratio, rtol=2e-5)
+    known = measured_directions(measured, h)
+    free = basis.mesh.points[at][:, 2] > 0  # a point at the clamp moves in no mode: nobody measures it
+    assert known.sum() == 2 * free[::2].sum() + free[1::2].sum()
+    likeness = np.abs(np.einsum("nim,nim->m", h.phi, np.where(known[:, :, None], g.phi[at], 0)))
+    np.testing.assert_allclose(likeness, (g.phi[at][known] ** 2).sum(axis=0), rtol=1e-4)  # the scale is right too
+    assert "modal masses" in " ".join(told) and "0.001 m" in told[0]
+    found = compare_groups(measured, basis)
+    assert [(p.first, p.second) for p in found.pairs] == [(i, i) for i in range(g.n_modes)]
+    assert min(p.mac for p in found.pairs) > 1 - 1e-9 and max(abs(p.deviation) for p in found.pairs) < 2e-5
+
+
+def test_the_file_says_that_it_was_measured(tmp_path: Path) -> None:
+    """Round trip; the checks ask for no mass, no cells, no compliance; nothing says that modes are complete."""
+    measured, _ = read_measured(measure(tmp_path / "t.uff", small.basis()))
+    write_basis(tmp_path / "t.h5", measured)
+    again = read_basis(tmp_path / "t.h5")
+    assert again.source == "measured" and "certified" not in again.groups[0, 0].checks
+    assert [c.name for c in check_basis(again) if not c.passed] == []
+    np.testing.assert_array_equal(
+        measured_directions(again, again.groups[0, 0]), measured_directions(measured, measured.groups[0, 0])
+    )
+    computed = check_basis(replace(again, source="elements"))
+    assert {"mesh: points and cells", "body: mass is positive"} <= {c.name for c in computed if not c.passed}
+
+
+def test_without_modal_masses_shapes_have_no_scale(tmp_path: Path) -> None:
+    measured, told = read_measured(measure(tmp_path / "t.uff", small.basis(), modal_m=0.0))
+    assert np.abs(measured.groups[0, 0].phi).max(axis=(0, 1)).tolist() == [1.0] * 6
+    assert "no modal masses" in " ".join(told) and measured.provenance["scaling"] == "largest displacement 1"
+
+
+def test_shapes_written_by_the_exporter_come_back(tmp_path: Path) -> None:
+    """Real shapes as normal modes, complex ones as complex eigenvalues with modal a: the same to six digits."""
+    basis = small.basis()
+    g = basis.groups[0, 0]
+    write_uff(basis, tmp_path / "a.uff")
+    h = read_measured(tmp_path / "a.uff")[0].groups[0, 0]
+    np.testing.assert_allclose(np.abs(h.phi), np.abs(g.phi), atol=1e-5 * np.abs(g.phi).max())
+    turn = np.exp(1j * np.linspace(0, 1, basis.mesh.n_points))[:, None, None]  # a travelling wave
+    wave = replace(basis, groups={(0, 0): replace(g, phi=g.phi * turn)})
+    write_uff(wave, tmp_path / "b.uff")
+    h = read_measured(tmp_path / "b.uff")[0].groups[0, 0]
+    assert np.iscomplexobj(h.phi)
+    np.testing.assert_allclose(h.omega, g.omega, rtol=1e-5)
+    np.testing.assert_allclose(h.damping_ratio, g.damping_ratio, rtol=1e-5)
+    np.testing.assert_allclose(np.abs(h.phi), np.abs(g.phi), atol=1e-5 * np.abs(g.phi).max())
+
+
+def test_files_that_are_wrong(tmp_path: Path) -> None:
+    basis = small.basis()
+    whole = measure(tmp_path / "t.uff", basis).read_text()
+    parts = re.findall(r" {4}-1 *\n.*?\n {4}-1 *\n", whole, re.S)
+
+    def kind(part: str) -> int:
+        return int(part.split()[1])
+
+    assert "".join(parts) == whole and {kind(p) for p in parts} == {164, 15, 55}
+    assert holds_modes(tmp_path / "t.uff")
+    cases = {
+        "no modes": ("".join(p for p in parts if kind(p) != 55), "no mode shapes"),
+        "no points": ("".join(p for p in parts if kind(p) != 15), "no points"),
+        "not a file": ("hello\n", "Universal File"),
+        "empty": ("", "Universal File"),
+    }
+    for name, (text, words) in cases.items():
+        (tmp_path / f"{name}.uff").write_text(text)
+        with pytest.raises(UserError, match=words):
+            read_measured(tmp_path / f"{name}.uff")
+    strange = measure(tmp_path / "s.uff", basis, spec_data_type=2)
+    with pytest.raises(UserError, match="specific data type 2"):
+        read_measured(strange)
+    with pytest.raises(UserError, match="no such file"):
+        read_measured(tmp_path / "none.uff")
+    # metres read as millimetres: refused where it is compared
+    (tmp_path / "m.uff").write_text("".join(p for p in parts if kind(p) != 164))
+    far, told = read_measured(tmp_path / "m.uff", unit="m")
+    assert "does not tell its units" in told[0]
+    with pytest.raises(UserError, match="one unit of length"):
+        compare_groups(far, basis)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("measured")
+    measure(path / "whole.uff", small.basis())
+    return path
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.integers(0, 10**7), st.integers(0, 255)), min_size=1, max_size=30), st.booleans())
+def test_changed_bytes(folder: Path, changes: list[tuple[int, int]], cut: bool) -> None:
+    data = bytearray((folder / "whole.uff").read_bytes())
+    for place, value in changes:
+        data[place % len(data)] = value
+    (folder / "a.uff").write_bytes(data[: changes[0][0] % len(data)] if cut else data)
+    with user_errors_only():
+        read_measured(folder / "a.uff")
