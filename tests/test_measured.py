@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from test_fuzz import user_errors_only
 
 from microslip.basis import check_basis, read_basis, write_basis
+from microslip.cli import main
 from microslip.correlation import compare_groups, measured_directions
 from microslip.data import ModalBasis, UserError
 from microslip.exchange.measured import holds_modes, read_measured
@@ -143,6 +144,22 @@ def test_files_that_are_wrong(tmp_path: Path) -> None:
     assert "does not tell its units" in told[0]
     with pytest.raises(UserError, match="one unit of length"):
         compare_groups(far, basis)
+
+
+def test_import_and_compare(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a person types: the test beside the computed body."""
+    monkeypatch.chdir(tmp_path)
+    measure(tmp_path / "test.uff", small.basis())
+    write_basis(tmp_path / "small.h5", small.basis())
+    assert main(["import", "test.uff"]) == 0
+    assert main(["check", "test/basis.h5", "-q"]) == 0
+    assert main(["info", "test/basis.h5"]) == 0
+    assert "others may have been missed" in capsys.readouterr().out
+    assert main(["compare", "test/basis.h5", "small.h5"]) == 0
+    assert "1.0000" in capsys.readouterr().out
+    assert main(["import", "test.uff"]) == 2
 
 
 @pytest.fixture(scope="module")

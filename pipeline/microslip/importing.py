@@ -8,7 +8,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from .basis import write_basis
 from .data import Mesh, UserError
+from .exchange.measured import holds_modes, read_measured
 from .mesh import UNITS, mesh_problems, read_mesh
 from .store import write_text
 from .units import SYSTEMS, usual_system
@@ -41,6 +43,8 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     if not file.is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     name = re.sub(r"[^A-Za-z0-9_.-]", "-", file.stem).lstrip("-._")[:64] or "part"
+    if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
+        return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     if target.exists():
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
@@ -50,6 +54,22 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     write_text(target, "\n".join([*head, *lines]) + "\n")
     last = f"{target}: ready. Add supports, interfaces and loads, then: microslip modes {target.parent}"
     return Imported(target, (*told, last))
+
+
+_UNIVERSAL = (".uff", ".uf", ".unv", ".u")
+
+
+def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
+    """Modes of a test become a modal file at once: nothing is left to solve."""
+    if target.exists():
+        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    basis, told = read_measured(file, unit, name)
+    write_basis(target, basis)
+    group = basis.groups[0, 0]
+    first, last = group.frequency[[0, -1]]
+    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} measured points"
+    end = f"{target}: ready. Beside a computed one: microslip compare {target} OTHER.h5"
+    return Imported(target, (size, *told, end))
 
 
 def _beside(file: Path, folder: Path) -> str:
