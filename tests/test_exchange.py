@@ -16,7 +16,7 @@ import sector
 import small
 from scipy.io import loadmat, mmread
 
-from microslip.basis import write_basis
+from microslip.basis import read_basis, write_basis
 from microslip.body import BodySettings
 from microslip.cli import main
 from microslip.data import INTERFACE_ROWS, ModalBasis, UserError
@@ -255,6 +255,18 @@ def test_equations_of_motion_from_sid_are_those_of_the_floating_frame(sid: tuple
     turning = np.einsum("alc,l,c->a", Gr, velocity, w) + skew(w) @ J @ w
     exact = rest[3:6] - skew(w) @ inertia(b, q) @ w + skew(w) @ J @ w
     close(turning, exact)
+
+
+def test_a_free_body_has_no_coupling_with_its_frame(tmp_path: Path) -> None:
+    """Elastic modes of a free body are orthogonal to its rigid motions: Ct and Cr vanish at q = 0."""
+    table = small.table(supports=[], free=True, modes={"count": 9, "solver": "superlu"})
+    basis = modal_basis(small.beam(), BodySettings.model_validate(table), provenance=SOURCE)
+    writer("sid")(basis, tmp_path / "b.SID_FEM")
+    first, modal = read_sid(tmp_path / "b.SID_FEM")
+    assert first.startswith("4 nodes, 3 modes")
+    scale = np.sqrt(basis.mass)
+    assert np.abs(modal["Ct"].taylor()[0]).max() < 1e-9 * scale
+    assert np.abs(modal["Cr"].taylor()[0]).max() < 1e-9 * scale * max(small.SIZE)
 
 
 def test_nodes_of_sid_are_the_interfaces_in_body_axes(sid: tuple[str, Block]) -> None:
@@ -528,3 +540,40 @@ def test_mistakes_are_one_sentence_and_exit_code_2(
     out, err = capsys.readouterr()
     assert not out and says in err and "Traceback" not in err
     assert not any(tmp_path.iterdir())
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
+
+
+def blocks() -> dict[str, str]:
+    """Heading of docs/exchange.md -> its Python."""
+    page = (Path(__file__).parents[1] / "docs" / "exchange.md").read_text(encoding="utf-8")
+    parts = re.findall(r"^#+ (.*)$((?:.|\n)*?)(?=^#+ |\Z)", page, flags=re.M)
+    return {head: "\n".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)) for head, text in parts}
+
+
+@pytest.mark.parametrize("head", ["Matrix Market", "Universal files", "xarray"])
+def test_the_readers_lines_of_the_page_run(
+    head: str, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip({"Universal files": "pyuff", "xarray": "xarray"}.get(head, "scipy"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "basis.h5").write_bytes(file.read_bytes())
+    for form in ("mtx", "uff"):
+        assert main(["export", "basis.h5", "--to", form]) == 0
+    names: dict[str, Any] = {}
+    exec(blocks()[head], names)
+    g = read_basis(file).groups[0, 0]
+    if head == "Matrix Market":
+        i = g.compliance.labels.index("interface:right:u_n")
+        assert names["normal_compliance"] == pytest.approx(g.compliance.static[i, i], rel=1e-8)
+    elif head == "Universal files":
+        assert f"{g.frequency[0]:.5e}" == f"{names['modes'][0]['freq']:.5e}"
+    else:
+        np.testing.assert_array_equal(names["normal"], g.interfaces["right"].rows[0])
+
+
+def test_every_format_has_its_line_in_the_table() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "exchange.md").read_text(encoding="utf-8")
+    table = "\n".join(line for line in page.splitlines() if line.startswith("| ["))
+    assert all(f"`{form}`" in table for form in WRITERS)

@@ -18,10 +18,11 @@ import pytest
 import sector
 import small
 from scipy.io import loadmat
+from test_exchange import blocks
 
 from microslip.body import BodySettings
 from microslip.data import Array, ModalBasis
-from microslip.exchange import writer
+from microslip.exchange import WRITERS, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.harmonic_balance import jenkins_harmonic
@@ -158,14 +159,14 @@ def test_exudyn_takes_the_body_and_swings_it(tmp_path: Path) -> None:
     found = np.load(tmp_path / "out.npz")
     # held: its frequencies are those of the file, by eigenvalues and by a free vibration in time
     elastic = found["frequencies"][found["frequencies"] > 1]
-    np.testing.assert_allclose(elastic[: g.n_modes], g.frequency, rtol=1e-6)
+    np.testing.assert_allclose(elastic[: g.n_modes], g.frequency, rtol=1e-11)
     time, q = found["vibration"][:, 0], found["vibration"][:, 1]
     # 200 steps a period of the trapezoidal rule: (omega dt)^2 / 12 = 8e-5 too slow
     assert crossing_frequency(time, q) == pytest.approx(g.frequency[0], rel=2e-4)
-    # swinging: the rigid pendulum; amplitude 0.04 rad changes the period by 1e-4, the body is stiff
+    # swinging: the rigid pendulum, whose frequency falls by a sixteenth of the square of its amplitude (9e-5 here)
     time, angle = found["swing"][:, 0], found["swing"][:, 2]
     turned = crossing_frequency(time, angle - (angle.max() + angle.min()) / 2)
-    assert turned == pytest.approx(expected, rel=1e-3)
+    assert turned == pytest.approx(expected * (1 - (np.ptp(angle) / 2) ** 2 / 16), rel=1e-5)
     # Exudyn's integrals, made by itself from M of the finite elements, are those in the file
     table = np.load(tmp_path / "b.npz")
     names = [n for n in found.files if n.startswith("own_") and found[n].size]
@@ -189,3 +190,20 @@ def crossing_frequency(time: Array, signal: Array) -> float:
     up = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
     at = time[up] - signal[up] * (time[up + 1] - time[up]) / (signal[up + 1] - signal[up])
     return float((len(at) - 1) / (at[-1] - at[0]))
+
+
+# --- the page's lines -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("peer", "head"), [("pyharm", "pyHarm"), ("exudyn", "Exudyn")])
+def test_the_readers_lines_of_the_page_run(peer: str, head: str, tmp_path: Path) -> None:
+    if interpreter(peer) is None:
+        pytest.skip(f"{peer} is not installed: make peers")
+    writer(peer)(body("craig-bampton"), tmp_path / f"basis{WRITERS[peer].ending}")
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    done = subprocess.run(
+        [str(interpreter(peer)), "-c", blocks()[head]],
+        capture_output=True, text=True, timeout=600, cwd=tmp_path, env=environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
