@@ -40,8 +40,9 @@ PICTURES = HERE / "pictures"
 LIGHT = ("output.gauss=false", "output.nodal_stress=false")
 COARSE_SHROUD = (
     "mesh.size=12", "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}",
-    "cyclic.nodal_diameters=[0]",
+    "cyclic.nodal_diameters=[0]", "closures=[]",
 )  # fmt: skip
+AT_REST = ("rotation.speeds_rpm=[0.0]", "cyclic.nodal_diameters=[0]", "closures=[]", 'reduction="eigenmodes"')
 PRINTED_FREE, PRINTED_STUCK = (14.1, 159.55, 540.61), (120.0, 320.0, 470.0)
 SPRINGS = ("normal_stiffness", "tangential_stiffness")
 TORSION = (0, 2, 6)  # the modes of the free blade that section 5.3 prints: first bending, first and second torsion
@@ -101,7 +102,7 @@ def geometry() -> None:
     """A picture of each body with its named faces, and a table of what each is."""
     rows = []
     for body in ("blade", "shroud", "pendulum", "half-pipe"):
-        still = ("rotation.speeds_rpm=[0.0]", "cyclic.nodal_diameters=[0]") if body == "shroud" else ()
+        still = AT_REST if body == "shroud" else ()
         basis = made(body, body, *LIGHT, *still)
         with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body))
         group = basis.groups[0, 0]
@@ -520,7 +521,7 @@ def compliance() -> None:
     """How much static compliance the modes hold, for every body."""
     rows = []
     for body in ("blade", "shroud", "pendulum", "half-pipe"):
-        still = ("rotation.speeds_rpm=[0.0]", "cyclic.nodal_diameters=[0]") if body == "shroud" else ()
+        still = AT_REST if body == "shroud" else ()
         group = made(body, body, *LIGHT, *still).groups[0, 0]
         rows.append([f"`{body}`", str(group.n_modes), truncation.verdict(group).sentence])
     fill("modes.md", "verdicts", table(["body", "modes", "verdict"], rows))

@@ -25,9 +25,12 @@ Report = Callable[[str], None]
 
 def body_ranges(
     model: BodyModel, settings: BodySettings, motions: Array, rows: BodyRows, solver: eigen.DirectSolver,
-    sector: Sector | None, report: Report,
+    sector: Sector | None, settled: Mapping[float, StaticState], report: Report,
 ) -> dict[int, SpeedRange]:  # fmt: skip
     """Nodal diameter -> one basis for all speeds of `rotation.range_rpm`. Equilibria are shared.
+
+    Args:
+        settled: speed (rad/s) -> equilibria that are known already.
 
     Raises:
         UserError: instability inside the range. NotConverged: the tolerance cannot be met.
@@ -41,7 +44,7 @@ def body_ranges(
         )
     low, high = (v * np.pi / 30 for v in r.range_rpm)
     report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
-    body = _Body(model, settings, motions, rows, solver, sector, report)
+    body = _Body(model, settings, motions, rows, solver, sector, report, settled)
     found: dict[int, Common] = {}
     try:
         for k in sector.harmonics if sector else (0,):
@@ -67,6 +70,7 @@ class _Body:
     solver: eigen.DirectSolver
     sector: Sector | None
     report: Report
+    known: Mapping[float, StaticState]
     states: dict[float, StaticState] = field(default_factory=dict)
     slopes: dict[float, Array] = field(default_factory=dict)  # of the displacements
     pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
@@ -99,6 +103,9 @@ class _Body:
 
     def _settle(self, speed: float, weights: Guess) -> None:
         start, prestress = None, self.settings.rotation.prestress
+        if speed in self.known:
+            self.pencils[speed], self.states[speed] = self._pencils(self.known[speed].K), self.known[speed]
+            return
         if weights:
             u = np.sum([w * self.states[s].u for s, (w, _) in weights.items()], axis=0)
             u += np.sum([v * self.slopes[s] for s, (_, v) in weights.items() if v], axis=0)

@@ -80,6 +80,7 @@ def modal_basis(
     solver = eigen.new_solver(settings.modes.solver)
     state: StaticState | None = None
     before = 0.0
+    settled: dict[float, StaticState] = {}
     groups: dict[tuple[int, int], ModalGroup] = {}
     try:
         rows = with_characteristic(rows, model, settings, motions, solver)
@@ -89,6 +90,7 @@ def modal_basis(
                 report(f"speed {number + 1} of {len(settings.rotation.speeds_rpm)}: {rpm:g} rpm")
             state = equilibrium(model, speed, settings.rotation.prestress, solver, _guess(state, before, speed), report)
             before = speed
+            settled[speed] = state
             made = _groups(model, settings, state, speed, motions, rows, solver, sector, report)
             groups |= {(number, k): group for k, group in made.items()}
         if settings.output.stiffening and sector is None:
@@ -99,7 +101,7 @@ def modal_basis(
         if settings.rotation.range_rpm is not None:
             from .body_range import body_ranges  # which itself calls `assemble_group`
 
-            ranges = body_ranges(model, settings, motions, rows, solver, sector, report)
+            ranges = body_ranges(model, settings, motions, rows, solver, sector, settled, report)
     finally:
         solver.close()
         if sector is not None:
