@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -238,3 +241,17 @@ def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert main(["modes", "three-masses", "--set", "masses.m1.mass=-1", "-q"]) == 2
     case.write_text(case.read_text().replace('body = "three-masses"', 'body = "four"'))
     assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 2
+
+
+def test_three_masses_of_the_page(tmp_path: Path) -> None:
+    """What the page shows is what its lines print."""
+    sys.path.insert(0, str(ROOT / "docs"))
+    import pages
+
+    text = next(s.text for s in pages.steps("your_own_model.md") if s.path == "three.py")
+    (tmp_path / "three.py").write_text(text)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "pipeline")}
+    done = subprocess.run(
+        [sys.executable, "three.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == pages.filled("your_own_model.md", "three").strip("`\n")
