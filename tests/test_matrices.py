@@ -253,6 +253,26 @@ def test_every_format_brings_the_numbers_that_were_written(tmp_path, way):
     np.testing.assert_allclose(body.mesh.points, beam().points, rtol=1e-15)
 
 
+@pytest.mark.parametrize("kind", ["grid", "h5", "mat"])
+def test_nodes_come_from_grid_cards_and_tables(tmp_path, kind):
+    from microslip.exchange.matrices.nodes import read_nodes
+
+    table = np.column_stack([beam().node_id, beam().points * 1e3])
+    if kind == "grid":
+        bulk = pytest.importorskip("pyyeti.nastran.bulk")
+        bulk.wtgrids(str(tmp_path / "a.bdf"), table[:, 0], xyz=table[:, 1:], form="{:16.10f}")
+        found = read_nodes(tmp_path / "a.bdf", "", "mm")
+    elif kind == "h5":
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["mesh/nodes"] = table.T  # as MATLAB writes it
+        found = read_nodes(tmp_path / "a.h5", "mesh/nodes", "mm")
+    else:
+        scipy.io.savemat(tmp_path / "a.mat", {"nodes": table, "K": np.eye(3)})
+        found = read_nodes(tmp_path / "a.mat", "", "mm")
+    np.testing.assert_array_equal(found.node_id, beam().node_id)
+    np.testing.assert_allclose(found.points, beam().points, atol=1e-13 if kind == "grid" else 1e-17)
+
+
 def test_rows_in_another_order_and_other_units_are_the_same_body(tmp_path):
     """Rows shuffled with a list that names them; numbers in t, mm, s."""
     given_by_market(tmp_path)
