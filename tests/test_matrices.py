@@ -260,7 +260,7 @@ def test_nodes_come_from_grid_cards_and_tables(tmp_path, kind):
     table = np.column_stack([beam().node_id, beam().points * 1e3])
     if kind == "grid":
         bulk = pytest.importorskip("pyyeti.nastran.bulk")
-        bulk.wtgrids(str(tmp_path / "a.bdf"), table[:, 0], xyz=table[:, 1:], form="{:16.10f}")
+        bulk.wtgrids(str(tmp_path / "a.bdf"), beam().node_id, xyz=table[:, 1:], form="{:16.10f}")
         found = read_nodes(tmp_path / "a.bdf", "", "mm")
     elif kind == "h5":
         with h5py.File(tmp_path / "a.h5", "w") as file:
