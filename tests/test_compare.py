@@ -126,6 +126,29 @@ def test_a_measured_body_is_drawn_by_its_points_with_the_signs_of_the_other(tmp_
     assert set(drawn) == {"mac", "pairs"}
 
 
+def test_modes_go_out_as_a_universal_file_and_come_back_as_a_test(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Six printed digits: MAC 1 within their square; on another mesh the same pairs, interpolated."""
+    pytest.importorskip("pyuff")
+    assert main(["export", str(files / "a.h5"), "--to", "uff", "-o", str(tmp_path / "a.uff")]) == 0
+    assert main(["import", str(tmp_path / "a.uff"), str(tmp_path / "test")]) == 0
+    test = read_basis(tmp_path / "test" / "basis.h5")
+    assert test.source == "measured"
+    same = compare_groups(*on_common_points(small.basis(), test))
+    np.testing.assert_allclose([p.mac for p in same.pairs], 1, rtol=0, atol=1e-9)
+    np.testing.assert_allclose([p.deviation for p in same.pairs], 0, atol=6e-6)
+    other = compare_groups(*on_common_points(test, finer()))
+    assert len(other.pairs) == 6 and min(p.mac for p in other.pairs) > 0.9995
+
+
+def test_points_beside_the_mesh_go_to_the_nearest_nodes() -> None:
+    a, b = small.basis(), measured(small.basis(), 29)
+    aside = replace(b, mesh=replace(b.mesh, points=b.mesh.points + [0.0, 0.0, 0.004]))
+    assert on_common_points(a, aside)[0] is a
+    assert compare_groups(a, aside, limit=0.006).points > 0
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

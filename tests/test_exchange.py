@@ -432,6 +432,17 @@ def test_pvd_of_the_ring_is_read_by_vtk(tmp_path: Path) -> None:
     assert set(np.unique(block.cell_data["sector"])) == set(range(basis.sectors))
 
 
+def test_a_body_that_knows_points_only_is_shown_as_points(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    basis = replace(small.basis(), name="Prüfling", mesh=replace(small.basis().mesh, cells={}, faces={}, point_sets={}))
+    for form in ("exudyn", "uff", "vtu"):
+        writer(form)(basis, tmp_path / form)
+    assert np.load(tmp_path / "exudyn", allow_pickle=False)["trigList"].shape == (0, 3)
+    assert (tmp_path / "uff").read_bytes().isascii()
+    (tmp_path / "vtu").rename(tmp_path / "b.vtu")
+    assert len(meshio.read(tmp_path / "b.vtu").cells_dict["vertex"]) == basis.mesh.n_points
+
+
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 MOTION = ("exudyn", "mbdyn", "sid")

@@ -98,7 +98,10 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
             "of that speed, which a multibody program adds itself; export a group at rest (speeds_rpm = [0])"
         )
     if group.invariants is None:
-        raise UserError(f"{basis.name}: export --to {form}: the file holds no inertia integrals; compute it again")
+        raise UserError(
+            f"{basis.name}: export --to {form}: the file holds no inertia integrals, as measured modes and older files "
+            "do; compute the body on a mesh"
+        )
     return elastic(in_modes(real(group, form)), form)
 
 

@@ -30,7 +30,7 @@ def write_exudyn(basis: ModalBasis, path: Path | str) -> None:
     group = with_shapes(basis, body_in_motion(basis, "exudyn"), "exudyn")
     tables = exudyn_tables(basis, group)
     with complete_or_absent(path) as temporary, open(temporary, "wb") as file:
-        np.savez(file, allow_pickle=False, **tables)
+        np.savez(file, **tables)  # numbers and texts: nothing to pickle
 
 
 def exudyn_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
@@ -82,4 +82,4 @@ def _triangles(basis: ModalBasis) -> Array:
         found.append(facets[:, :3])
         if kind.startswith("quad"):
             found.append(facets[:, [0, 2, 3]])
-    return np.concatenate(found)
+    return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)

@@ -58,6 +58,7 @@ def _head(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list
         "** Origin of the body frame in the mesh, m: " + " ".join(f"{x:.16e}" for x in g.invariants.point)  # type: ignore[union-attr]
         + "; shapes x y z rx ry rz in body axes, phi^T M phi = 1",
         *(f"** node {i + 1}: {_ascii(a.name)}" for i, a in enumerate(nodes)),
+        *(f"** check: frequency {j + 1} of groups 9 and 10 is {f:.9g} Hz" for j, f in enumerate(g.frequency)),
         "** RECORD GROUP 1, HEADER",
         "**   REVISION,  NODE,  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.",
         f"      REV0{len(nodes):10d}{g.n_modes:10d}{0:10d}{0:10d}{0:10d}",

@@ -49,8 +49,13 @@ def _header(basis: ModalBasis) -> str:
     """Data set 151. Its dates are left blank: the same basis gives the same bytes."""
     program = f"microslip {__version__}"
     date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
-    return _set(151, [basis.name[:80], "modal basis; SI; frame of the mesh; phi^H M phi = 1", program,
+    return _set(151, [_line(basis.name), "modal basis; SI; frame of the mesh; phi^H M phi = 1", program,
                       date + f"{0:10d}{0:10d}{0:10d}", date, program, date])  # fmt: skip
+
+
+def _line(text: str) -> str:
+    """A text line of the format: 80 columns of ASCII, not blank."""
+    return text.encode("ascii", "replace").decode("ascii")[:80].strip() or "NONE"
 
 
 def _units() -> str:
@@ -86,7 +91,7 @@ def _modes(basis: ModalBasis, g: ModalGroup, speed: int, nodes: Indices) -> Iter
     where = f"{g.speed * 30 / np.pi:.6g} rpm, nodal diameter {g.harmonic}, {basis.sectors} sectors"
     complex_shapes = np.iscomplexobj(g.phi)
     for j in range(g.n_modes):
-        lines = [basis.name[:80], "mode shape, kg^-1/2, phi^H M phi = 1", "NONE", where[:80]]
+        lines = [_line(basis.name), "mode shape, kg^-1/2, phi^H M phi = 1", "NONE", where[:80]]
         lines.append(f"{'Mode Same':<10}{j + 1:10d}{' Frequency':<10}{g.frequency[j]:13.5e}"[:80])
         lines.append("".join(f"{v:10d}" for v in (1, 3 if complex_shapes else 2, 2, 8, 5 if complex_shapes else 2, 3)))
         lines += _parameters(g, j, speed, complex_shapes)

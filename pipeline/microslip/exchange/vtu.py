@@ -46,7 +46,7 @@ def write_vtu(basis: ModalBasis, path: Path | str) -> None:
         data[f"face_{name}"] = marker
     if len(basis.mesh.node_id):
         data["node"] = basis.mesh.node_id
-    mesh = meshio.Mesh(basis.mesh.points, dict(basis.mesh.cells), point_data=data)
+    mesh = meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data)
     with complete_or_absent(path) as temporary:
         meshio.write(temporary, mesh, file_format="vtu")
 
@@ -70,10 +70,15 @@ def write_pvd(basis: ModalBasis, path: Path | str) -> None:
             files[number] = path.with_name(f"{path.stem}_mode{number:03d}.vtu")
             state = (("Hz", g.frequency[j]), ("rpm", g.speed * 30 / np.pi), ("nodal_diameter", g.harmonic))
             data = _parts("shape", g.phi[:, :, j]) | {n: np.full(basis.mesh.n_points, v) for n, v in state}
-            mesh = meshio.Mesh(basis.mesh.points, dict(basis.mesh.cells), point_data=data)
+            mesh = meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data)
             with complete_or_absent(files[number]) as temporary:
                 meshio.write(temporary, mesh, file_format="vtu")
     write_text(path, _collection(files))
+
+
+def _cells(mesh: Mesh) -> dict[str, Indices]:
+    """Cells to draw; points by themselves where a body has no others."""
+    return dict(mesh.cells) or {"vertex": np.arange(mesh.n_points)[:, None]}
 
 
 def mode_label(group: ModalGroup, mode: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -16,13 +17,18 @@ MOST_POINTS = 400
 
 
 def on_common_points(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis, ModalBasis]:
-    """Both bodies at up to `MOST_POINTS` nodes of the one with fewer, if both have cells and not the same points.
+    """Both bodies at points they have in common, the shapes of one with cells interpolated there.
+
+    Two meshes: up to `MOST_POINTS` nodes of the one with fewer. A mesh and a body that knows points only: those points,
+    if they are no more and lie in the mesh (else both stay as they are, and the nearest nodes are for the comparison).
 
     Raises:
         UserError: one body is more than 2 % larger than the other or elsewhere; a node lies outside the other body by
             more than 2 % of its size.
     """
-    if not (_solid(first) and _solid(second)) or _same(first.mesh, second.mesh):
+    if not _solid(first) or not _solid(second):
+        return _at_points_of_the_other(first, second)
+    if _same(first.mesh, second.mesh):
         return first, second
     _refuse_elsewhere(first, second)
     swapped = first.mesh.n_points > second.mesh.n_points
@@ -30,6 +36,14 @@ def on_common_points(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis,
     chosen = np.unique(np.linspace(0, few.mesh.n_points - 1, MOST_POINTS).round().astype(int))
     seen = at_nodes(few, chosen), at_points(many, few.mesh.points[chosen])
     return (seen[1], seen[0]) if swapped else seen
+
+
+def _at_points_of_the_other(first: ModalBasis, second: ModalBasis) -> tuple[ModalBasis, ModalBasis]:
+    for solid, points, order in ((first, second, 1), (second, first, -1)):
+        if _solid(solid) and not _solid(points) and points.mesh.n_points <= MOST_POINTS:
+            with suppress(UserError):
+                return (at_points(solid, points.mesh.points), points)[::order]  # type: ignore[return-value]
+    return first, second
 
 
 def _refuse_elsewhere(first: ModalBasis, second: ModalBasis) -> None:
