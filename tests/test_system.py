@@ -219,6 +219,26 @@ def test_matrices_that_no_system_has() -> None:
         System("s", [Body("a", 1.0)], [Spring("ground", "a", 1.0)]).basis()
 
 
+def test_a_point_contact_has_the_extents_of_its_case(tmp_path: Path) -> None:
+    """A rigid body on one patch of the case's size: its rotations are held by k b0^2 / 12 (Sextro Eq. (5.2-41))."""
+    from microslip.case import load_case, run_case
+
+    body = Body("hub", 2.0, inertia=(0.1, 0.2, 0.3))
+    soft = Spring("ground", "hub", (1.0,) * 6)
+    system = System("hub", [body], [soft], [Contact("pad", "hub", (0, 0, 1), (0, 1, 0))],
+                    [Force("push", "hub", (1, 0, 0))], [Monitor("read", "hub")])  # fmt: skip
+    (tmp_path / "case.toml").write_text(
+        'name = "hub"\nbody = "hub"\nexcitation = "push"\nmonitor = "read"\n[[contacts]]\ninterface = "pad"\n'
+        "normal_stiffness = 1e6\ntangential_stiffness = 4e5\nwidth = 0.3\nheight = 0.6\nfriction = 0.2\n"
+        "[sweep]\nstart = 1.0\nstop = 9.0\npoints = 3\nnormal_forces = [1e6]\n"
+    )
+    stuck = run_case(load_case(tmp_path / "case.toml")[0], system.basis(), "case.toml").stuck
+    kn, kt, b2, h2 = 1e6, 4e5, 0.3**2 / 12, 0.6**2 / 12
+    held = [(kt + 1) / 2, (kt + 1) / 2, (kn + 1) / 2]  # x = t1, y = t2, z = n
+    held += [(kn * h2 + 1) / 0.1, (kn * b2 + 1) / 0.2, (kt * (b2 + h2) + 1) / 0.3]
+    np.testing.assert_allclose((2 * np.pi * stuck) ** 2, np.sort(held), rtol=1e-9)
+
+
 # ---------------------------------------------------------------- the command line
 
 

@@ -308,14 +308,17 @@ def _not_converged(responses: dict[float, FrequencyResponse]) -> list[str]:
 def _sized(c: ContactSettings, group: ModalGroup, path: Path | str) -> ContactSettings:
     """The contact with the extents of its patch; given ones that differ by more than 5 % are refused."""
     b0, h0 = (float(v) for v in group.interfaces[c.interface].extent)
+    sizes = {"width": b0, "height": h0}
     for key, own in (("width", b0), ("height", h0)):
         given = getattr(c, key)
-        if given is not None and abs(given / own - 1) > 0.05:
+        if own == 0:  # a point, of a system by hand: the patch is what the case says
+            sizes[key] = given or 0.0
+        elif given is not None and abs(given / own - 1) > 0.05:
             raise UserError(
                 f"{path}: contacts.{c.interface}.{key}: {given:g} m is not the patch's, which is {own:g} m; "
                 "leave it out or correct it (metres)"
             )
-    return c.model_copy(update={"width": b0, "height": h0})
+    return c.model_copy(update=sizes)
 
 
 def _residual(
