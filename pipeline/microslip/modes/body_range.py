@@ -52,8 +52,9 @@ def body_ranges(
                 report(f"speed range of nodal diameter {k}")
             before = found[max(found)] if found else None
             found[k] = common_coordinates(
-                body.settled(k), body.solve(k), low, high, settings.modes.count, r.range_tolerance, report, before
-            )
+                body.settled(k), body.solve(k), low, high, settings.modes.count, r.range_tolerance, report, before,
+                thrice=settings.reduction != "eigenmodes",
+            )  # fmt: skip
     except UserError as error:
         raise UserError(str(error).replace("rotation.speeds_rpm", "rotation.range_rpm")) from error
     return {k: _range(body, k, common) for k, common in found.items()}

@@ -353,8 +353,8 @@ class _Search:
             self.solved[settled.speed] = self.solve(settled)
             self.V, self.K_r, self.slopes, self.true = np.zeros((0, 0)), {}, {}, {}
 
-    def begin(self, low: float, high: float) -> None:
-        """Both ends, and between them the middle of the variable that they suggest."""
+    def begin(self, low: float, high: float, thrice: bool) -> None:
+        """Both ends, and between them the middle of the variable that they suggest; thrice: its modes too."""
         self.add(self.settled(low), solved=True)
         self.project()
         if low in self.slopes:
@@ -363,7 +363,7 @@ class _Search:
         self._vary(low, (self.solved[high].lowest - self.solved[low].lowest) / (high**2 - low**2))
         middle = 0.5 * float(variable(low, self.shift) + variable(high, self.shift))
         square = middle if self.shift is None else middle**2 - self.shift
-        self.add(self.settled(float(np.sqrt(square))), solved=True)
+        self.add(self.settled(float(np.sqrt(square))), solved=thrice)
 
     def _vary(self, low: float, rise: float) -> None:
         """The variable in which the lowest frequency, whose square rises by so much over Omega^2, is straight."""
@@ -440,11 +440,11 @@ class _Search:
 
 def common_coordinates(
     settle: Callable[[float, Guess], Settled], solve: Callable[[Settled], Solved], low: float, high: float, count: int,
-    tolerance: float, report: Report = lambda _: None, before: Common | None = None,
+    tolerance: float, report: Report = lambda _: None, before: Common | None = None, thrice: bool = True,
 ) -> Common:  # fmt: skip
     """Common coordinates for all speeds between `low` and `high`, rad/s.
 
-    Both ends and one speed between are solved. Where a held-out speed fails by interpolation it becomes a sample
+    Both ends and one speed between are samples. Where a held-out speed fails by interpolation it becomes a sample
     (its equilibrium is known already), where it fails by projection its modes are solved for too, and others are
     held out in its place.
 
@@ -452,14 +452,15 @@ def common_coordinates(
         settle: (speed, weights) -> equilibrium; the weighted displacements and slopes of the speeds settled before are
             a first guess (none: from rest). solve: equilibrium -> its shapes. count: modes whose frequencies must be
             right. tolerance: relative error of a frequency allowed at held-out speeds. before: of another nodal
-            diameter, whose samples are taken over.
+            diameter, whose samples are taken over. thrice: the speed between is solved from the start, which static
+            answers need that are to be exact at all speeds; for frequencies the held-out speeds tell whether it must.
 
     Raises:
         NotConverged: `MOST` samples do not suffice.
     """
     search = _Search(settle, solve, count)
     if before is None:
-        search.begin(low, high)
+        search.begin(low, high, thrice)
     else:
         search.begin_like(before)
     while True:
