@@ -27,7 +27,10 @@ from microslip.workflow import load_mesh, mesh_stage, open_job
 
 ROOT = Path(__file__).resolve().parents[1]
 COARSE = "{pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"
-LIGHT = ["output.gauss=false", "output.nodal_stress=false", 'reduction="eigenmodes"', "cyclic.nodal_diameters=[0]", "closures=[]"]
+LIGHT = [
+    "output.gauss=false", "output.nodal_stress=false", 'reduction="eigenmodes"', "cyclic.nodal_diameters=[0]",
+    "closures=[]",
+]  # fmt: skip
 
 
 def timed(mesh: Mesh, settings: BodySettings) -> tuple[ModalBasis, float, float]:
