@@ -46,7 +46,7 @@ def _set(number: int, lines: list[str]) -> str:
 
 
 def _header(basis: ModalBasis) -> str:
-    """Data set 151. Its dates are left blank: the same basis gives the same bytes."""
+    """Data set 151. Its dates mean nothing: the same basis gives the same bytes."""
     program = f"microslip {__version__}"
     date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
     return _set(151, [_line(basis.name), "modal basis; SI; frame of the mesh; phi^H M phi = 1", program,
