@@ -196,6 +196,62 @@ def closure() -> None:
     save(from_file(BUILD / "closure.png"), "closure_pressure")
 
 
+def bolts() -> None:
+    """The half pipe pressed by its bolts: pressure round them, and its modes with the joint open and closed."""
+    few = (*LIGHT, "modes.count=9")
+    faces = [*(f"bolt_{i}" for i in range(1, 13)), "seam_right", "seam_left"]
+    plane = 'against="ground", point=[0.0, 0.0, 0.0], normal=[0.0, 0.0, 1.0], modes="closed"'
+    closed = ", ".join(f'{{name="{f}", face="{f}", {plane}}}' for f in faces)
+    variants = {
+        "without preload, free": ("loose", "bolts=[]", "closures=[]"),
+        '`modes = "open"`': ("open",),
+        '`modes = "closed"`': ("closed", f"closures=[{closed}]"),
+    }
+    rows = []
+    for title, (name, *changes) in variants.items():
+        basis = made(f"half-pipe-{name}", "half-pipe/preloaded.toml", *few, *changes)
+        group = basis.groups[0, 0]
+        rigid = group.kind.count("rigid")
+        found = [f"{f:.2f}" for f in group.frequency[rigid : rigid + 3]]
+        rows.append([title, rigid, *found])
+        if name == "open":
+            bolt_picture(group)
+    head = ["modes", "rigid motions", "first in Hz", "second", "third"]
+    fill("contact_statics.md", "bolts", table(head, rows))
+
+
+def bolt_picture(group: ModalGroup) -> None:
+    """Pressure on the first patch of a flange, and over the distance from the bolt on all of them."""
+    fig = figure(9.6, 5.0)
+    left, right = fig.subplots(1, 2, width_ratios=[4, 5])
+    c = group.contacts["bolt_1"]
+    x, y = 1e3 * c.points[:, :2].T
+    order = np.argsort(c.pressure, kind="stable")
+    shown = left.scatter(
+        x[order], y[order], s=26, c=1e-6 * c.pressure[order], cmap="YlOrRd", vmin=0, edgecolors="#8a929c",
+        linewidths=0.3,
+    )  # fmt: skip
+    ring = np.linspace(0, 2 * np.pi, 90)
+    for radius, style in ((8, "-"), (16, "--")):
+        left.plot(65 + radius * np.cos(ring), -250 + radius * np.sin(ring), style, color="#3b6fb6", linewidth=1.4)
+    left.set(xlabel="x in mm, across the flange", ylabel="y in mm, along the pipe", aspect="equal")
+    left.set(xlim=(51, 79), ylim=(-272, -228))
+    left.set_title("patch bolt_1; blue: washer, cone", fontsize=10)
+    fig.colorbar(shown, ax=left, label="pressure in MPa", location="right", shrink=0.8)
+    plain(right)
+    for i in range(1, 13):
+        c = group.contacts[f"bolt_{i}"]
+        middle = np.array([65.0 if i < 7 else -65.0, 100 * ((i - 1) % 6 - 2.5)])
+        distance = np.linalg.norm(1e3 * c.points[:, :2] - middle, axis=1)
+        right.plot(distance, 1e-6 * c.pressure, ".", color=plots.COLOURS[0], markersize=2.5, alpha=0.5)
+    for radius, text in ((8, "washer"), (16, "cone of 45 degrees")):
+        right.axvline(radius, color="#8a929c", linewidth=1)
+        right.text(radius + 0.3, 0.97, text, transform=right.get_xaxis_transform(), fontsize=9, va="top")
+    right.set(xlabel="mm from the axis of the bolt", ylabel="pressure in MPa", xlim=(4, 24), ylim=(0, None))
+    right.set_title("all twelve patches", fontsize=10)
+    save(drawn(fig), "bolt_pressure")
+
+
 def percent_of(share: float) -> str:
     return f"{100 * share:.1f} %"
 
@@ -857,7 +913,7 @@ def arc(axes: Any, radius: float, start: float, stop: float, colour: str) -> Non
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, closure, contact, convergence, sensitivity, arrangement2, first, speed, speeds,
+        reference, geometry, closure, bolts, contact, convergence, sensitivity, arrangement2, first, speed, speeds,
         rotation, compliance, counted_once, reduction, own, cyclic,
     )  # fmt: skip
 }

@@ -140,6 +140,22 @@ def test_half_pipe_mating_faces(half_pipe: Mesh) -> None:
     assert "bolt_13" not in half_pipe.faces
 
 
+def test_half_pipe_heads(half_pipe: Mesh, tmp_path: Path) -> None:
+    """Rings under the bolt heads, opposite the patches, facing away from them; none where none are asked for."""
+    p = parameters("half-pipe")
+    assert not any(name.startswith("head_") for name in half_pipe.faces)
+    fine = {"size": 12.0, "local": {"head_1": 3.0, "head_2": 3.0}}
+    mesh = made("half-pipe", tmp_path, mesh=fine, washer_radius=8.0, length=80.0, bolts_per_seam=1)
+    ring = np.pi * (8.0**2 - p["bolt_hole"] ** 2 / 4) * 1e-6
+    for i in (1, 2):
+        area, centre, normal = face(mesh, f"head_{i}")
+        assert close(area, ring, 2e-3)  # circles of six-node triangles
+        np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-9)
+        above = face(mesh, f"bolt_{i}")[1] + [0, 0, p["flange_thickness"] * 1e-3]
+        np.testing.assert_allclose(centre, above, atol=1e-5)
+    assert "head_3" not in mesh.faces
+
+
 def test_half_pipe_surface(half_pipe: Mesh) -> None:
     p = parameters("half-pipe")
     inner, outer = p["mean_radius"] - p["wall"] / 2, p["mean_radius"] + p["wall"] / 2
@@ -354,6 +370,9 @@ WRONG = [
     ("half-pipe", {"patch_width": 30.0}, "patch_width"),
     ("half-pipe", {"patch_length": 120.0}, "patch_length"),
     ("half-pipe", {"flange_thickness": 60.0}, "flange_thickness"),
+    ("half-pipe", {"washer_radius": 12.5}, "washer_radius"),  # beyond the flange
+    ("half-pipe", {"washer_radius": 4.5}, "washer_radius"),  # no wider than the hole
+    ("half-pipe", {"washer_radius": -8.0}, "washer_radius"),
     ("pendulum", {"arm_width": 0.0}, "arm_width"),
     ("pendulum", {"radius": 1.0}, "radius"),
     ("pendulum", {"pad_size": 9.0}, "pad_size"),

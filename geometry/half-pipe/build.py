@@ -9,6 +9,7 @@ The book prints no dimensions; these are a common steel pipe with M8 bolts at a 
 """
 
 import math
+from collections.abc import Callable
 
 import gmsh
 import numpy as np
@@ -27,6 +28,7 @@ DEFAULTS = {  # mm
     "bolt_hole": 9.0,  # diameter
     "patch_width": 25.0,  # contact patch of a bolt, across the flange
     "patch_length": 40.0,  # along the pipe
+    "washer_radius": 0.0,  # of the rings under the bolt heads; 0: none are drawn
 }
 SIDES_OF_HOLE = 8  # elements around a bolt hole, at least
 
@@ -35,7 +37,10 @@ def draw(parameters: dict, mesh: dict) -> None:
     p = settled(parameters)
     volume = gmsh.model.occ.extrude([(2, cross_section(p))], 0, p["length"], 0)[1]
     drilled = gmsh.model.occ.cut([volume], drills(p))[0]
-    gmsh.model.occ.fragment(drilled, [patch for x, y in bolts(p) for patch in contact_patch(p, x, y)])
+    imprints = [patch for x, y in bolts(p) for patch in contact_patch(p, x, y)]
+    if p["washer_radius"]:
+        imprints += [ring for x, y in bolts(p) for ring in head_ring(p, x, y)]
+    gmsh.model.occ.fragment(drilled, imprints)
     gmsh.model.occ.synchronize()
     name_surfaces(p)
     name_body()
@@ -61,10 +66,31 @@ def settled(parameters: dict) -> dict:
     for name, limit, what in limits:
         if p[name] >= limit:
             raise UserError(f"geometry.parameters.{name} = {p[name]} must stay below {limit:g} ({what})")
+    refuse_washer(p)
     row = (p["bolts_per_seam"] - 1) * p["bolt_pitch"] + p["patch_length"]
     if row > p["length"]:
         raise UserError(f"geometry.parameters.length = {p['length']} is too short for a bolt row of {row:g}")
     return p
+
+
+def refuse_washer(p: dict) -> None:
+    """Refuse rings under the heads that do not lie on the flange between hole, edge, pipe and their neighbours."""
+    if p["washer_radius"] == 0:
+        return
+    limits = [
+        (p["flange_width"] / 2, "half of flange_width, so that the washer lies on the flange"),
+        (p["patch_length"] / 2, "half of patch_length, so that washers stay apart and on the flange"),
+    ]
+    if p["washer_radius"] <= p["bolt_hole"] / 2:
+        raise UserError(
+            f"geometry.parameters.washer_radius = {p['washer_radius']} must be above {p['bolt_hole'] / 2:g} (half of "
+            "bolt_hole), or 0 for no washers"
+        )
+    for limit, what in limits:
+        if p["washer_radius"] >= limit:
+            raise UserError(
+                f"geometry.parameters.washer_radius = {p['washer_radius']} must stay below {limit:g} ({what})"
+            )
 
 
 def cross_section(p: dict) -> int:
@@ -104,8 +130,15 @@ def contact_patch(p: dict, x: float, y: float) -> list[tuple[int, int]]:
     return gmsh.model.occ.cut([(2, rectangle)], [(2, hole)])[0]
 
 
+def head_ring(p: dict, x: float, y: float) -> list[tuple[int, int]]:
+    """Ring under a bolt's head, to be imprinted on the flange's far side."""
+    add, top = gmsh.model.occ.addDisk, p["flange_thickness"]
+    disk, hole = (add(x, y, top, r, r) for r in (p["washer_radius"], p["bolt_hole"] / 2))
+    return gmsh.model.occ.cut([(2, disk)], [(2, hole)])[0]
+
+
 def name_surfaces(p: dict) -> None:
-    """Bolt patches, what is left of the mating faces, the two ends, the pipe's outside and inside."""
+    """Bolt patches, rings under the heads, the rest of the mating faces, the ends, the pipe's outside and inside."""
     near, end = 1e-5 * p["length"], p["length"] / 2
 
     def flat(axis: int, value: float):
@@ -126,10 +159,24 @@ def name_surfaces(p: dict) -> None:
     for name, side in (("seam_right", 1), ("seam_left", -1)):
         rest = surfaces_where(lambda c, box, side=side: mating(c, box) and side * c[0] > 0)
         name_face(name, [tag for tag in rest if tag not in taken])
+    if p["washer_radius"]:
+        name_heads(p, flat(2, p["flange_thickness"]), near)
     name_face("end_front", surfaces_where(flat(1, -end)))
     name_face("end_rear", surfaces_where(flat(1, end)))
     for name, radius in (("outside", p["outer"]), ("inside", p["inner"])):
         name_face(name, surfaces_where(round_face(radius)))
+
+
+def name_heads(p: dict, far_side: Callable[[np.ndarray, np.ndarray], bool], near: float) -> None:
+    """Rings head_1, head_2, ... opposite the patches bolt_1, bolt_2, ..."""
+    reach = 2 * p["washer_radius"] + near
+    for number, place in enumerate(bolts(p), 1):
+        ring = surfaces_where(
+            lambda centre, box, place=place: far_side(centre, box)
+            and np.hypot(*(centre[:2] - place)) < near
+            and np.ptp(box[:, 0]) < reach
+        )
+        name_face(f"head_{number}", ring)
 
 
 def refine_holes(p: dict, mesh: dict) -> None:

@@ -70,9 +70,8 @@ def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array
         raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")
     if settings.free and settings.rotation.range_rpm is not None:
         raise UserError("rotation.range_rpm: a free body has no equilibrium at speed; hold it or leave the range out")
-    if settings.free and (settings.closures or settings.bolts):
-        key = "closures" if settings.closures else "bolts"
-        raise UserError(f"{key}: a free body has no static equilibrium under contact; hold it or remove them")
+    if settings.free and settings.closures and not settings.bolts:
+        raise UserError("closures: nothing presses the faces of a free body together; add [[bolts]] or hold the body")
     if settings.free and settings.loads:
         raise UserError("loads: a free body has no static equilibrium under loads; hold it or remove the loads")
 

@@ -32,6 +32,7 @@ from .characteristic import with_characteristic
 from .closures import bolt_forces, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
+from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
 from .sector import Sector, make_sector
 from .solution import Solution, held_compliance, solution
@@ -77,6 +78,7 @@ def modal_basis(
         motions = rigid.free_motions_of_ring(mesh.points, point, fixed, cut.rotation, cut.sectors)
     check_held(mesh, settings, centre, motions)
     refuse_overlap(mesh, settings)
+    floats = settings.free and bool(settings.bolts)
     solver = eigen.new_solver(settings.modes.solver)
     state: StaticState | None = None
     before = 0.0
@@ -88,10 +90,15 @@ def modal_basis(
             speed = rpm * np.pi / 30
             if len(settings.rotation.speeds_rpm) > 1 or speed:
                 report(f"speed {number + 1} of {len(settings.rotation.speeds_rpm)}: {rpm:g} rpm")
-            state = equilibrium(model, speed, settings.rotation.prestress, solver, _guess(state, before, speed), report)
+            prestress = settings.rotation.prestress
+            if floats:
+                state = pressed_state(model, motions, centre, prestress, settings.modes.solver, report)
+            else:
+                state = equilibrium(model, speed, prestress, solver, _guess(state, before, speed), report)
             before = speed
             settled[speed] = state
-            made = _groups(model, settings, state, speed, motions, rows, solver, sector, report)
+            about = centre if floats else None
+            made = _groups(model, settings, state, speed, motions, rows, solver, sector, report, about)
             groups |= {(number, k): group for k, group in made.items()}
         if settings.output.stiffening and sector is None:
             report("stiffening by inertia forces")
@@ -142,11 +149,13 @@ def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[flo
 
 def _groups(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
-    solver: eigen.DirectSolver, sector: Sector | None, report: Report,
+    solver: eigen.DirectSolver, sector: Sector | None, report: Report, pressed: Array | None = None,
 ) -> dict[int, ModalGroup]:  # fmt: skip
-    """Nodal diameter -> group of one state."""
+    """Nodal diameter -> group of one state; pressed: centre of mass of a free body under its bolts."""
     if sector is None:
         pencil = make_pencil(model, state.K, solver)
+        if pressed is not None:
+            pencil, motions = pressed_modes(model, state, pencil, pressed)
         solved = {0: solution(model, settings, pencil, speed, motions, rows, report)}
     else:
         solved = sector.solutions(model, settings, state, speed, motions, rows, report)

@@ -27,10 +27,10 @@ def free_motions(points: Array, centre: Array, fixed: Indices) -> Array:
     fields = rigid_fields(points, centre).reshape(-1, 6)
     size = max(float(np.ptp(points, axis=0).max()), 1e-30)
     scaled = fields / np.array([1, 1, 1, size, size, size])
-    return scaled if not len(fixed) else scaled @ _null_space(scaled[fixed])
+    return scaled if not len(fixed) else scaled @ null_space(scaled[fixed])
 
 
-def _null_space(rows: Array) -> Array:
+def null_space(rows: Array) -> Array:
     """(6, r) combinations of six motions that no row moves."""
     short = np.linalg.qr(rows, mode="r")  # the singular values and vectors of many rows in six
     _, s, vt = np.linalg.svd(short, full_matrices=True)
@@ -56,7 +56,7 @@ def free_motions_of_ring(
         rows.append(seen[which, fixed % 3] / np.array([1, 1, 1, size, size, size]))
         R = turn @ R
     scaled = rigid_fields(points, point).reshape(-1, 6) / np.array([1, 1, 1, size, size, size])
-    return scaled if not len(fixed) else scaled @ _null_space(np.concatenate(rows))
+    return scaled if not len(fixed) else scaled @ null_space(np.concatenate(rows))
 
 
 def describe(points: Array, centre: Array, motions: Array) -> list[str]:
