@@ -20,7 +20,8 @@ from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
 from microslip.neighbours import closed_gap, frame_change, relative_rows, stuck
 from microslip.resonances import families, travelling, wave_tracks
-from microslip.ring import phase
+from microslip.ring import certify_ring, phase
+from microslip.speed_range import basis_at
 
 N = 6
 AXIS = np.array([0.0, 1.0, 0.0])
@@ -162,3 +163,23 @@ def test_families_at_a_speed_are_those_of_the_stations(ranged) -> None:
     with_range, without = families(ranged, 1), families(replace(ranged, ranges={}), 1)
     np.testing.assert_array_equal(with_range.modes, without.modes)
     np.testing.assert_array_equal(with_range.omega, without.omega)
+
+
+def test_a_station_is_a_speed_of_the_file_without_a_range(ranged) -> None:
+    """`info --rpm` at a speed that was solved for gives that group; elsewhere the speeds there are told."""
+    stations = replace(ranged, ranges={})
+    assert basis_at(stations, TOP).groups[0, 2] is ranged.groups[1, 2]
+    with pytest.raises(UserError, match=f"choose one of its speeds, 0, {TOP:.6g} rpm"):
+        basis_at(stations, 0.5 * TOP)
+
+
+@pytest.mark.parametrize("reduction", ["rubin", "craig-bampton"])
+def test_the_ring_is_certified_whatever_coordinates_are_kept(mesh, reduction: str) -> None:
+    """Each mode below the certified bound has its counterpart in the reduced body, which lies above it."""
+    proof = certify_ring(modal_basis(mesh, settings(reduction)))
+    assert proof.certified and proof.count >= 4 * N
+
+
+def test_stress_of_nodal_diameters_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="is more than 6 sectors can have"):
+        body(cyclic={"sectors": N}, output={"stress_nodal_diameters": [4]})

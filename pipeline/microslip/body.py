@@ -591,6 +591,12 @@ class BodySettings(Model):
                 'closures: modes = "closed" between neighbouring sectors differs from one nodal diameter to the next '
                 'and is not supported; leave modes = "open" and couple the interfaces afterwards'
             )
+        beyond = self.output.stress_nodal_diameters
+        if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
+            raise ValueError(
+                f"output.stress_nodal_diameters: {max(beyond)} is more than "
+                f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; correct it"
+            )
         if self.cyclic and self.free:
             raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self

@@ -255,6 +255,8 @@ def export(
     if ring:
         if to != "vtu":
             raise UserError("export --ring: only vtu can hold the ring; leave --ring out for one sector")
+        if nodal_diameter is not None or rpm is not None:
+            raise UserError("export --ring: every nodal diameter of one speed is written; give --speed alone")
         from .exchange.vtu import write_ring
 
         print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed or 0))

@@ -433,10 +433,11 @@ def _engine_order_section(basis: ModalBasis, album: _Album) -> str:
         out += _say(f"The file lacks the nodal diameters of the engine orders {number_list(lacking)}.", kind="warn")
     out += album.take("safe", "Interference diagram (SAFE, ZZENF): a resonance is where a diamond lies on a dot.")
     out += album.take("campbell", "Campbell diagram; circles are true resonances.")
-    found = resonances(basis, orders) if len(speeds_of(basis)) > 1 else []
+    several = bool(basis.ranges) or len(speeds_of(basis)) > 1
+    found = resonances(basis, orders) if several else []
     if found:
         out += "<h3>True resonances</h3>\n" + _table(HEAD, [[text(c) for c in row] for row in resonance_rows(found)])
-    elif pairs and len(speeds_of(basis)) > 1:
+    elif pairs and several:
         out += _say("No engine order meets a mode of its nodal diameter between the lowest and the highest speed.")
     return out + _nearest(basis, orders)
 

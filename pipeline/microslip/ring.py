@@ -246,11 +246,13 @@ def certify_ring(basis: ModalBasis, speed: int = 0) -> RingCertificate:
 
 def _proved(g: ModalGroup) -> float:
     """Hz up to which a group holds every mode of its nodal diameter, by its inertia count."""
-    if not g.checks.get("certified") or g.to_diagonal is not None or not g.n_modes:
+    if not g.checks.get("certified") or not len(g.omega):
         return 0.0
     limit = float(g.checks.get("upper_shift_hz", 0.0))
     held = int((g.frequency <= limit).sum())
-    return limit if held >= g.checks.get("count_below_upper_shift", np.inf) else float(g.frequency[-1])
+    if held >= g.checks.get("count_below_upper_shift", np.inf):
+        return limit
+    return float(g.frequency[-1]) if g.to_diagonal is None else 0.0  # eigenmodes cut at a frequency
 
 
 def _own_orthogonality(basis: ModalBasis, g: ModalGroup) -> float:

@@ -56,13 +56,21 @@ def group_at(basis: ModalBasis, rpm: float, harmonic: int = 0) -> ModalGroup:
 
 
 def basis_at(basis: ModalBasis, rpm: float) -> ModalBasis:
-    """A modal basis with this one speed, at every nodal diameter that has a range.
+    """A modal basis with this one speed: a speed of the file as it stands, or one of its range.
 
     Raises:
         UserError: see `group_at`.
     """
+    stations = sorted({s for s, _ in basis.groups if abs(_rpm_of(basis, s) - rpm) <= 1e-9 * max(abs(rpm), 1.0)})
+    if stations:
+        groups = {(0, k): g for (s, k), g in basis.groups.items() if s == stations[0]}
+        return replace(basis, groups=groups, ranges={})
     harmonics = sorted(basis.ranges) or [0]
     return replace(basis, groups={(0, k): group_at(basis, rpm, k) for k in harmonics}, ranges={})
+
+
+def _rpm_of(basis: ModalBasis, speed: int) -> float:
+    return next(g.speed for (s, _), g in sorted(basis.groups.items()) if s == speed) * 30 / np.pi
 
 
 def _range_of(basis: ModalBasis, harmonic: int) -> SpeedRange:
@@ -71,9 +79,10 @@ def _range_of(basis: ModalBasis, harmonic: int) -> SpeedRange:
     if basis.ranges:
         known = ", ".join(str(k) for k in sorted(basis.ranges))
         raise UserError(f"nodal diameter {harmonic}: '{basis.name}' has speed ranges of {known} only; choose one")
+    stations = [_rpm_of(basis, s) for s in sorted({s for s, _ in basis.groups})]
     raise UserError(
         f"the modal file of '{basis.name}' has no speed range; write rotation.range_rpm = [low, high] and make the "
-        "modes anew, or choose one of its speeds"
+        f"modes anew, or choose one of its speeds, {', '.join(f'{rpm:.6g}' for rpm in stations)} rpm"
     )
 
 

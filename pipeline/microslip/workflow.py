@@ -535,7 +535,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         remarks.append(f"The pictures of the body are missing: {reason}")
     engine_orders = list(job.settings.rotation.engine_orders)
     drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
-    if basis.sectors > 1 and len(speeds_of(basis)) > 1:
+    if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
         found = resonances(basis, engine_orders)
         store.write_text(job.build_folder / "resonances.csv", resonance_csv(found))
     if response is not None:

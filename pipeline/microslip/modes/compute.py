@@ -34,7 +34,7 @@ from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
 from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
-from .sector import Sector, make_sector
+from .sector import Sector, cut_faces, make_sector
 from .solution import Solution, held_compliance, solution
 from .spectrum import make_pencil
 from .stress import gauss_set, nodal_set
@@ -57,10 +57,12 @@ def modal_basis(
         NotConverged: the equilibrium or the spectrum could not be found.
     """
     report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
+    axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
+    if settings.cyclic:  # before what relies on the number of sectors
+        cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
     d = discretise(mesh, coupled=[coupled_points(p) for p in pairs])
     fixed = fixed_dofs(mesh, settings)
-    axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
     sector = make_sector(d, settings, fixed, axis, point) if settings.cyclic else None
     free = free_upper(d.pattern, fixed) if sector is None else sector.static
     rows = body_rows(mesh, settings)

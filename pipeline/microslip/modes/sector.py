@@ -15,8 +15,16 @@ import scipy.sparse as sp
 from .. import eigen
 from ..body import BodySettings
 from ..condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
-from ..data import Array, Indices
-from ..fem.cyclic import CyclicUpper, SectorUnknowns, cyclic_upper, pair_cut_faces, refuse_other_facets, sector_unknowns
+from ..data import Array, Indices, Mesh
+from ..fem.cyclic import (
+    CutFaces,
+    CyclicUpper,
+    SectorUnknowns,
+    cyclic_upper,
+    pair_cut_faces,
+    refuse_other_facets,
+    sector_unknowns,
+)
 from ..fem.discretise import Discretisation
 from .body_rows import BodyRows
 from .boundary import refuse_uncyclic, require_face
@@ -86,23 +94,33 @@ class Sector:
         self.condensed.close()
 
 
+def cut_faces(mesh: Mesh, settings: BodySettings, axis: Array, point: Array) -> CutFaces:
+    """The two cut faces of a sector, paired node by node.
+
+    Raises:
+        UserError: they are missing or do not match.
+    """
+    cyclic = settings.cyclic
+    assert cyclic is not None
+    for key, face in (("left", cyclic.left), ("right", cyclic.right)):
+        require_face(mesh, face, f"cyclic.{key}")
+    return pair_cut_faces(mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors)
+
+
 def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis: Array, point: Array) -> Sector:
     """Pair the cut faces and prepare the solver that all nodal diameters and speeds share.
 
     Raises:
         UserError: cut faces that are missing or do not match, supports that hold them differently.
     """
-    cyclic = settings.cyclic
-    assert cyclic is not None
-    for key, face in (("left", cyclic.left), ("right", cyclic.right)):
-        require_face(d.mesh, face, f"cyclic.{key}")
-    cut = pair_cut_faces(d.mesh, cyclic.left, cyclic.right, axis, point, cyclic.sectors)
-    refuse_other_facets(d.mesh, cyclic.left, cyclic.right, cut)
+    cut = cut_faces(d.mesh, settings, axis, point)
+    assert settings.cyclic is not None
+    refuse_other_facets(d.mesh, settings.cyclic.left, settings.cyclic.right, cut)
     refuse_uncyclic(d.mesh, settings)
     unknowns = sector_unknowns(d.pattern, fixed, cut)
     boundary = np.concatenate([unknowns.left, unknowns.right])
     condensed = new_condensed(boundary, settings.modes.solver)
-    return Sector(cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
+    return Sector(settings.cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
 
 
 def sector_pencils(
