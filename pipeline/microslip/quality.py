@@ -21,7 +21,7 @@ def sentences(group: ModalGroup, reduction: str) -> list[str]:
         told = f"this basis is off by {_list(off)}" if off else "this basis has no motion left"
         if off and len(off) < len(hertz):
             told += ", and has no further motion"
-        found.append(f"every contact stuck: {at} Hz; {told}")
+        found.append(f"every contact stuck to the ground: {at} Hz; {told}")
     return [s for s in found if s]
 
 

@@ -14,6 +14,9 @@ import numpy as np
 from .coordinates import compliance_row
 from .data import Array, ModalGroup
 
+ROUNDING = 1e-8
+"""Share of the static compliance below which a basis holds all of it: slender bodies round off by as much."""
+
 
 @dataclass(frozen=True)
 class Coordinate:
@@ -41,8 +44,9 @@ class Coordinate:
 
     @property
     def residual(self) -> float:
-        """What the modes leave out, in `unit`."""
-        return self.static - self.modal
+        """What the modes leave out, in `unit`; zero where that is rounding."""
+        left = self.static - self.modal
+        return left if left > ROUNDING * self.static else 0.0
 
     def modes_for(self, share: float) -> int | None:
         """Smallest number of modes that holds `share`, or None if the kept ones do not."""
