@@ -445,7 +445,7 @@ def test_bolt_presses_with_its_preload():
     b = brick("hexahedron20", (3, 3, 1), (0.1, 0.1, 0.02), (0, 0, 0.02))
     mesh = together(a=a, b=b)
     sides = [{"face": f"{p}_{s}0", "directions": s} for p in "ab" for s in "xy"]
-    joint = {"name": "joint", "face": "b_z0", "against": "a_z1"}
+    joint = {"name": "joint", "face": "b_z0", "against": "a_z1", "modes": "closed"}  # it alone holds the upper plate
     bolt = {"name": "m8", "face": "b_z1", "against": "a_z0", "preload": 5e4}
     held_below = [*sides, {"face": "a_z0", "directions": "z"}]
     table = {"supports": held_below, "closures": [joint], "bolts": [bolt], "modes": {"count": 2}}

@@ -421,6 +421,12 @@ def _away_from(known: Array, M_known: Array, X: Array) -> Array:
     return X - known @ (M_known.conj().T @ X) if known.shape[1] else X
 
 
+_SINGULAR = (
+    "the stiffness is singular: a part of the body is held by nothing; hold it, or where only a contact holds it keep "
+    'the contact in the modes (closures: modes = "closed")'
+)
+
+
 def _mass_qr(W: Array, MW: Array) -> tuple[Array, Array, Array]:
     """W = Q R with Q^T M Q = 1 from W and M W, by Cholesky twice (the second pass cleans what the first leaves)."""
     total = np.eye(W.shape[1], dtype=W.dtype)
@@ -428,7 +434,10 @@ def _mass_qr(W: Array, MW: Array) -> tuple[Array, Array, Array]:
         gram = W.conj().T @ MW
         scale = np.sqrt(np.maximum(np.diag(gram).real, 1e-300))
         gram = gram / np.outer(scale, scale)
-        R = scipy.linalg.cholesky(0.5 * (gram + gram.conj().T) + 1e-15 * np.eye(len(gram))) * scale
+        try:
+            R = scipy.linalg.cholesky(0.5 * (gram + gram.conj().T) + 1e-15 * np.eye(len(gram))) * scale
+        except scipy.linalg.LinAlgError as error:
+            raise NotConverged(_SINGULAR) from error
         inverse = scipy.linalg.solve_triangular(R, np.eye(len(R)))
         W, MW, total = W @ inverse, MW @ inverse, R @ total
     return W, MW, total
