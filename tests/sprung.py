@@ -73,7 +73,7 @@ def full_frequencies(
     """
     model, pencil = full_model(mesh, settings)
     B = translation_rows(mesh, settings, model.free.free)
-    mass, centre, _ = inertia_of(model.d, model.material.density)
+    mass, centre, _ = inertia_of(model.d, [m.density for m in model.materials])
     free = rigid.free_motions(mesh.points, centre, fixed_dofs(mesh, settings)).shape[1]
     shift = rigid_shift(model) if free else 0.0
     found = []
