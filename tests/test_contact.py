@@ -32,6 +32,7 @@ from microslip.modes import equilibrium as newton
 from microslip.modes import modal_basis
 from microslip.modes.closures import contact_curve
 from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
+from microslip.speed_range import frequencies_over
 
 E, NU = STEEL["young"], STEEL["poisson"]
 FACETS = ("triangle", "triangle6", "quad", "quad8", "quad9")
@@ -369,6 +370,22 @@ def test_sector_closes_on_its_own_image_as_a_full_ring_does():
     for c in whole.contacts.values():
         assert c.normal_force == pytest.approx(expected.normal_force, rel=1e-6)
         np.testing.assert_allclose(c.pressure, expected.pressure, atol=1e-5 * expected.pressure.max())
+
+
+def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
+    """Apart at rest, pressed at the top: the range's frequencies at speeds between against equilibria of their own."""
+    mesh, top, between = shrouded(gap=1e-5), 8000.0, (3000.0, 5500.0)
+    rotation = settings_of([0.0]).rotation.model_copy(update={"range_rpm": (0.0, top)})
+    ranged = modal_basis(mesh, settings_of([0.0]).model_copy(update={"rotation": rotation}))
+    true = modal_basis(mesh, settings_of(between)).groups
+    assert true[1, 0].contacts["shroud"].normal_force > 0
+    r = ranged.ranges[0]
+    omega, _ = frequencies_over(r, np.array(between) * np.pi / 30)
+    for i in range(len(between)):
+        assert np.abs(omega[i] / true[i, 0].omega[: r.count] - 1).max() < 3 * r.tolerance  # held to it elsewhere
+    closed = settings_of([0.0], closures=[closure(modes="closed")]).model_copy(update={"rotation": rotation})
+    with pytest.raises(UserError, match="rotation.range_rpm: closures"):
+        modal_basis(mesh, closed)
 
 
 def test_shroud_closes_at_a_speed_and_presses_harder_beyond():

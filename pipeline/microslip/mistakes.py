@@ -180,11 +180,12 @@ def _words(found: list[tuple[tuple[Any, ...], Any]], error: Any, given: Any) -> 
 
 def _remedy(error: Any, given: Any) -> str:
     if error["type"] in ("float_type", "int_type", "bool_type") and isinstance(given, str):
-        return "write it without quotes" if _is_number(given) or given in ("true", "false") else "correct it"
+        return "write it without quotes" if is_number(given) or given in ("true", "false") else "correct it"
     return "correct it"
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether Python reads the text as a number."""
     try:
         float(text)
     except ValueError:

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...data import Array, Indices, UserError
+from ...mistakes import is_number
 
 LARGEST = 50_000_000
 """Rows at most: more is a damaged header."""
@@ -115,7 +116,7 @@ def table(text: str, columns: int, what: str) -> Array:
     """
     rows = [line.replace(",", " ").replace(";", " ").split() for line in text.splitlines()]
     rows = [row for row in rows if row and not row[0].startswith(("#", "%", "*"))]
-    if rows and not _is_number(rows[0][0]):
+    if rows and not is_number(rows[0][0]):
         rows = rows[1:]  # a heading
     for number, row in enumerate(rows):
         if len(row) != columns:
@@ -124,11 +125,3 @@ def table(text: str, columns: int, what: str) -> Array:
         return np.array([[float(v) for v in row] for row in rows]).reshape(-1, columns)
     except ValueError as error:
         raise Unreadable(f"{what} holds something that is no number ({str(error)[-60:]})") from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
