@@ -421,10 +421,7 @@ def _away_from(known: Array, M_known: Array, X: Array) -> Array:
     return X - known @ (M_known.conj().T @ X) if known.shape[1] else X
 
 
-_SINGULAR = (
-    "the stiffness is singular: a part of the body is held by nothing; hold it, or where only a contact holds it keep "
-    'the contact in the modes (closures: modes = "closed")'
-)
+_SINGULAR = "the stiffness is singular: a part of the body is held by nothing; support it or join it to the rest"
 
 
 def _mass_qr(W: Array, MW: Array) -> tuple[Array, Array, Array]:

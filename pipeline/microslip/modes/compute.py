@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from .characteristic import with_characteristic
 from .closures import bolt_forces, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
+from .loose import refuse_unlinked_parts
 from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
 from .sector import Sector, cut_faces, make_sector
@@ -57,6 +58,50 @@ def modal_basis(
         NotConverged: the equilibrium or the spectrum could not be found.
     """
     report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
+    b = _prepared(mesh, settings, temperature)
+    solver = eigen.new_solver(settings.modes.solver)
+    try:
+        b = replace(b, rows=with_characteristic(b.rows, b.model, settings, b.motions, solver))
+        groups, settled = _at_speeds(b, settings, solver, report)
+        groups = _stiffened(b, settings, groups, solver, report)
+        ranges = _over_ranges(b, settings, settled, solver, report)
+    finally:
+        solver.close()
+        if b.sector is not None:
+            b.sector.close()
+    basis = ModalBasis(
+        settings.name, mesh, groups, b.mass, b.centre, b.inertia, b.model.axis, b.model.point, settings.damping.source,
+        bool(b.motions.shape[1]), settings.reduction, dict(provenance or {}),
+        ranges=ranges,
+    )  # fmt: skip
+    if (cyclic := settings.cyclic) is None:
+        return basis
+    return replace(basis, sectors=cyclic.sectors, cyclic_faces=(cyclic.left, cyclic.right))
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """A body ready to be solved: its model, the rows on it, what floats, and the sector it may be.
+
+    Attributes:
+        motions: (3n, r) rigid motions that nothing holds. mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2.
+    """
+
+    model: BodyModel
+    rows: BodyRows
+    motions: Array
+    mass: float
+    centre: Array
+    inertia: Array
+    sector: Sector | None
+
+
+def _prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> _Prepared:
+    """Model, rows and rigid motions of a body, with every refusal that needs no solution.
+
+    Raises:
+        UserError: missing faces, unheld bodies and parts, impossible points.
+    """
     axis, point = np.array(settings.rotation.axis), np.array(settings.rotation.point)
     if settings.cyclic:  # before what relies on the number of sectors
         cut_faces(mesh, settings, axis, point)
@@ -73,56 +118,71 @@ def modal_basis(
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
     mass, centre, inertia = inertia_of(d, [m.density for m in model.materials])
-    if sector is None:
-        motions = rigid.free_motions(mesh.points, centre, fixed)
-    else:  # six supports may hold a ring though each lets its sector turn
-        cut = sector.unknowns.cut
-        motions = rigid.free_motions_of_ring(mesh.points, point, fixed, cut.rotation, cut.sectors)
+    motions = _floating(model, sector, centre)
     check_held(mesh, settings, centre, motions)
+    refuse_unlinked_parts(model, settings)
     refuse_overlap(mesh, settings)
-    floats = settings.free and bool(settings.bolts)
-    solver = eigen.new_solver(settings.modes.solver)
+    return _Prepared(model, rows, motions, mass, centre, inertia, sector)
+
+
+def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
+    """(3n, r) rigid motions that the supports leave; six supports may hold a ring though each lets its sector turn."""
+    points = model.d.mesh.points
+    if sector is None:
+        return rigid.free_motions(points, centre, model.fixed)
+    cut = sector.unknowns.cut
+    return rigid.free_motions_of_ring(points, model.point, model.fixed, cut.rotation, cut.sectors)
+
+
+def _at_speeds(
+    b: _Prepared, settings: BodySettings, solver: eigen.DirectSolver, report: Report
+) -> tuple[dict[tuple[int, int], ModalGroup], dict[float, StaticState]]:
+    """(number of the speed, nodal diameter) -> group, and speed in rad/s -> static state."""
+    speeds, floats = settings.rotation.speeds_rpm, settings.free and bool(settings.bolts)
+    groups: dict[tuple[int, int], ModalGroup] = {}
+    settled: dict[float, StaticState] = {}
     state: StaticState | None = None
     before = 0.0
-    settled: dict[float, StaticState] = {}
-    groups: dict[tuple[int, int], ModalGroup] = {}
-    try:
-        rows = with_characteristic(rows, model, settings, motions, solver)
-        for number, rpm in enumerate(settings.rotation.speeds_rpm):
-            speed = rpm * np.pi / 30
-            if len(settings.rotation.speeds_rpm) > 1 or speed:
-                report(f"speed {number + 1} of {len(settings.rotation.speeds_rpm)}: {rpm:g} rpm")
-            prestress = settings.rotation.prestress
-            if floats:
-                state = pressed_state(model, motions, centre, prestress, settings.modes.solver, report)
-            else:
-                state = equilibrium(model, speed, prestress, solver, _guess(state, before, speed), report)
-            before = speed
-            settled[speed] = state
-            about = centre if floats else None
-            made = _groups(model, settings, state, speed, motions, rows, solver, sector, report, about)
-            groups |= {(number, k): group for k, group in made.items()}
-        if settings.output.stiffening and sector is None:
-            report("stiffening by inertia forces")
-            operators = stiffening_operators(model, solver, motions)
-            groups = {key: with_stiffening(g, model, operators) for key, g in groups.items()}
-        ranges: dict[int, SpeedRange] = {}
-        if settings.rotation.range_rpm is not None:
-            from .body_range import body_ranges  # which itself calls `assemble_group`
+    for number, rpm in enumerate(speeds):
+        speed = rpm * np.pi / 30
+        if len(speeds) > 1 or speed:
+            report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
+        if floats:
+            state = pressed_state(
+                b.model, b.motions, b.centre, settings.rotation.prestress, settings.modes.solver, report
+            )
+        else:
+            start = _guess(state, before, speed)
+            state = equilibrium(b.model, speed, settings.rotation.prestress, solver, start, report)
+        before = speed
+        settled[speed] = state
+        about = b.centre if floats else None
+        made = _groups(b.model, settings, state, speed, b.motions, b.rows, solver, b.sector, report, about)
+        groups |= {(number, k): group for k, group in made.items()}
+    return groups, settled
 
-            ranges = body_ranges(model, settings, motions, rows, solver, sector, settled, report)
-    finally:
-        solver.close()
-        if sector is not None:
-            sector.close()
-    basis = ModalBasis(
-        settings.name, mesh, groups, mass, centre, inertia, model.axis, point, settings.damping.source,
-        bool(motions.shape[1]), settings.reduction, dict(provenance or {}),
-        ranges=ranges,
-    )  # fmt: skip
-    if (cyclic := settings.cyclic) is None:
-        return basis
-    return replace(basis, sectors=cyclic.sectors, cyclic_faces=(cyclic.left, cyclic.right))
+
+def _stiffened(
+    b: _Prepared, settings: BodySettings, groups: dict[tuple[int, int], ModalGroup], solver: eigen.DirectSolver,
+    report: Report,
+) -> dict[tuple[int, int], ModalGroup]:  # fmt: skip
+    """The groups with the stiffening by inertia forces, where it is asked for."""
+    if not settings.output.stiffening or b.sector is not None:
+        return groups
+    report("stiffening by inertia forces")
+    operators = stiffening_operators(b.model, solver, b.motions)
+    return {key: with_stiffening(g, b.model, operators) for key, g in groups.items()}
+
+
+def _over_ranges(
+    b: _Prepared, settings: BodySettings, settled: dict[float, StaticState], solver: eigen.DirectSolver, report: Report
+) -> dict[int, SpeedRange]:
+    """Nodal diameter -> basis of the range of speeds, where one is asked for."""
+    if settings.rotation.range_rpm is None:
+        return {}
+    from .body_range import body_ranges  # which itself calls `assemble_group`
+
+    return body_ranges(b.model, settings, b.motions, b.rows, solver, b.sector, settled, report)
 
 
 def _guess(state: StaticState | None, before: float, speed: float) -> StaticState | None:

@@ -39,7 +39,7 @@ def pressed_state(
         UserError: the bolts' forces are not in balance. NotConverged: no state, or the contacts open.
     """
     x = model.d.mesh.points
-    left = _not_resisted(motions, [_touching_now(model, i, x) for i in range(len(model.contacts))], every=True)
+    left = not_resisted(motions, [touching_now(model, i, x) for i in range(len(model.contacts))], every=True)
     _refuse_drift(model, left, centre)
     held = replace(model, free=free_upper(model.d.pattern, np.union1d(model.fixed, determinate(left))))
     solver = eigen.new_solver(solver_name)
@@ -49,12 +49,12 @@ def pressed_state(
         solver.close()
 
 
-def _touching_now(model: BodyModel, number: int, x: Array) -> Grip:
+def touching_now(model: BodyModel, number: int, x: Array) -> Grip:
     pair = model.contacts[number]
     return grip(pair, cut_pair(pair, x), x, np.zeros(len(pair.nodes)))
 
 
-def _not_resisted(motions: Array, grips: list[Grip], every: bool) -> Array:
+def not_resisted(motions: Array, grips: list[Grip], every: bool) -> Array:
     """(3n, q) motions (3n, r) that open or close no contact; every: at all of its points, else at closed nodes."""
     rows = [np.zeros((1, motions.shape[1]))]
     for g in grips:
@@ -99,7 +99,7 @@ def pressed_modes(
     assert isinstance(model.free, FreeUpper)
     motions = rigid.free_motions(model.d.mesh.points + state.u, centre, model.fixed)
     kept = [g for g in state.contacts if g.pair.stays_closed]
-    motions = _not_resisted(motions, kept, every=False)
+    motions = not_resisted(motions, kept, every=False)
     if not motions.shape[1]:
         return pencil, motions
     R = rigid.mass_orthonormal(model.free.restrict(motions), pencil.M)

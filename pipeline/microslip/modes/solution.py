@@ -13,11 +13,13 @@ from .. import eigen
 from ..body import BodySettings
 from ..coordinates import held
 from ..data import Array, Indices, UserError
+from ..fem.discretise import FreeUpper
 from ..mesh import longest_over_shortest
 from ..reduction import METHODS, Problem, Reduced, stuck
 from . import canonical, rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
+from .loose import refuse_loose_parts, refuse_unresolved
 from .spectrum import leading_rows, rigid_shift, static_answers
 
 Report = Callable[[str], None]
@@ -82,7 +84,7 @@ def search(
     """Modes and static answers of the stiffness about one state; where: ``nodal diameter 3``, for messages.
 
     Raises:
-        UserError: instability, more modes than degrees of freedom.
+        UserError: instability, more modes than degrees of freedom, a part that nothing holds.
     """
     R = motions[model.free.free] if motions.shape[1] else np.zeros((pencil.n, 0), dtype=pencil.dtype)
     R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
@@ -93,10 +95,13 @@ def search(
             f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
             "ask for fewer or refine"
         )
+    if isinstance(unknowns, FreeUpper):
+        refuse_loose_parts(model, pencil)
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:
         raise UserError(_divergence(settings, speed, error.count, model, where)) from error
+    refuse_unresolved(pencil, found, R.shape[1])
     B, labels = rows.stacked(settings)
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
@@ -207,7 +212,8 @@ def _divergence(settings: BodySettings, speed: float, count: int, model: BodyMod
         return (
             f"mesh: the stiffness has {count} negative eigenvalues although nothing loads the body: its cells are too "
             f"thin to be told from rounding (edges up to {longest_over_shortest(model.d.mesh):.0f} times as long as "
-            "the shortest of the cell); refine the mesh or check length_unit"
+            "the shortest of the cell), or parts of it hang together by a point or an edge only; refine the mesh, "
+            "check length_unit or join the parts"
         )
     remedy = "lower the speed"
     if settings.rotation.prestress == "none" and speed:
