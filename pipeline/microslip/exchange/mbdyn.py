@@ -16,19 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Invariants, ModalBasis, ModalGroup
-from ..store import write_text
-from .choice import STATEMENT, body_in_motion
-from .multibody import Attachment, attachments, position_cross_shape, shape_cross_shape, tilde_tilde
+from .choice import STATEMENT
+from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
 def write_mbdyn(basis: ModalBasis, path: Path | str) -> None:
-    """Write one group at rest, complete or absent. Same basis, same bytes.
-
-    Raises:
-        UserError: see `choice.body_in_motion` and `multibody.attachments`; no permission, no space.
-    """
-    group = body_in_motion(basis, "mbdyn")
-    write_text(path, "\n".join(_lines(basis, group, attachments(basis, group, "mbdyn"))) + "\n")
+    """Write one group at rest, complete or absent, see `multibody.write_flexible`."""
+    write_flexible(basis, path, "mbdyn", _lines)
 
 
 def _lines(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list[str]:

@@ -7,12 +7,16 @@ is the frame's.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..data import Array, Invariants, ModalBasis, ModalGroup, UserError
 from ..floating_frame import rotation_shape
+from ..store import write_text
+from .choice import body_in_motion
 
 _EYE = np.eye(3)
 
@@ -26,6 +30,22 @@ class Attachment:
     position: Array
     phi: Array
     psi: Array
+
+
+Lines = Callable[[ModalBasis, ModalGroup, Sequence[Attachment]], list[str]]
+
+
+def write_flexible(basis: ModalBasis, path: Path | str, form: str, lines: Lines) -> None:
+    """Write one group at rest as the lines of a text format, complete or absent. Same basis, same bytes.
+
+    Args:
+        form: its name, for messages. lines: of the file, from the group and its attachment points.
+
+    Raises:
+        UserError: see `choice.body_in_motion` and `attachments`; no permission, no space.
+    """
+    group = body_in_motion(basis, form)
+    write_text(path, "\n".join(lines(basis, group, attachments(basis, group, form))) + "\n")
 
 
 def attachments(basis: ModalBasis, g: ModalGroup, form: str) -> list[Attachment]:

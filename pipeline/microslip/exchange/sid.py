@@ -29,19 +29,12 @@ import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
 from ..frames import skew
-from ..store import write_text
-from .choice import body_in_motion
-from .multibody import Attachment, attachments, position_cross_shape, shape_cross_shape, tilde_tilde
+from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
 def write_sid(basis: ModalBasis, path: Path | str) -> None:
-    """Write one group at rest, complete or absent. Same basis, same bytes.
-
-    Raises:
-        UserError: see `choice.body_in_motion` and `multibody.attachments`; no permission, no space.
-    """
-    group = body_in_motion(basis, "sid")
-    write_text(path, "\n".join(_lines(basis, group, attachments(basis, group, "sid"))) + "\n")
+    """Write one group at rest, complete or absent, see `multibody.write_flexible`."""
+    write_flexible(basis, path, "sid", _lines)
 
 
 def _lines(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list[str]:
