@@ -1,0 +1,166 @@
+"""What every contact law is: settings as leaves, an explicit state, one step; and how a path is marched through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, TypeVar, dataclass_transform
+
+import jax
+import jax.numpy as jnp
+
+jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
+
+Array = jax.Array
+"""A jax array of doubles; one value or one per point where a setting is meant."""
+
+State = Any
+"""A pytree of arrays whose first axis counts the points."""
+
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True)
+def settings(cls: type[T]) -> type[T]:
+    """Class decorator: a frozen dataclass that is a jax pytree. Its numbers are leaves; see `static` for the rest."""
+    frozen = dataclass(frozen=True)(cls)
+    return jax.tree_util.register_dataclass(frozen)
+
+
+def static(**options: Any) -> Any:
+    """A field that is part of the program and not a number: changing it compiles anew."""
+    return field(metadata={"static": True}, **options)
+
+
+class Law:
+    """Base of the contact laws.
+
+    Frame (n, t1, t2) of the contact. ``u`` (n, 3) is the relative displacement in m, u_n > 0 closing, measured from
+    the gap at which the highest asperities just touch; ``v`` (n, 3) its velocity in m/s. The force (n, 3) in N is
+    what has to act on the contact to move it so: the normal entry is compressive and not negative, and the work of a
+    closed cycle, the integral of force . du, is the energy the contact dissipates.
+    """
+
+    def init(self, n: int) -> State:
+        """State of n points that were never loaded, at u = 0."""
+        raise NotImplementedError
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+        """Force at the end of a step that ends at ``u`` with velocity ``v``, and the state there.
+
+        Args:
+            u: (n, 3) m. v: (n, 3) m/s. dt: length of the step, s. state: at its beginning.
+        """
+        raise NotImplementedError
+
+    def limit(self, force: Array, state: State) -> Array:
+        """(n,) largest tangential force in N that goes with a normal force; ``force`` (n, 3) N."""
+        raise NotImplementedError
+
+    def slip(self, state: State) -> Array:
+        """(n, 2) path slid so far along t1 and t2, m (the mean over the contact where only a part of it slides)."""
+        raise NotImplementedError
+
+    def stored(self, u: Array, state: State) -> Array:
+        """(n,) energy in J that an unloading can give back at most."""
+        raise NotImplementedError
+
+
+@settings
+class History:
+    """A marched path of s samples and n points.
+
+    Attributes:
+        force: (s, n, 3) N. slip: (s, n, 2) m. dissipated: (s, n) J since the beginning: work done on the contact
+            less the energy it stores. state: at the end.
+    """
+
+    force: Array
+    slip: Array
+    dissipated: Array
+    state: State
+
+
+def velocities(u: Array, dt: float | Array, before: Array) -> Array:
+    """Backward differences of a path u (s, n, 3) that starts from ``before`` (n, 3): m/s."""
+    return jnp.diff(jnp.concatenate([before[None], u]), axis=0) / dt
+
+
+def march(law: Law, u: Array, dt: float | Array, state: State, v: Array | None = None) -> tuple[Array, State]:
+    """Forces along a path: ``lax.scan`` over `Law.step`.
+
+    Args:
+        u: (s, n, 3) displacements after each step, m. dt: s. state: at the beginning.
+        v: (s, n, 3) m/s; backward differences if not given, the first one taken from the second sample.
+
+    Returns:
+        (s, n, 3) forces in N and the state at the end.
+    """
+    if v is None:
+        v = velocities(u, dt, 2 * u[0] - u[1] if len(u) > 1 else u[0])
+
+    def one(carried: State, sample: tuple[Array, Array]) -> tuple[State, Array]:
+        force, after = law.step(*sample, dt, carried)
+        return after, force
+
+    state, force = jax.lax.scan(one, state, (u, v))
+    return force, state
+
+
+@jax.jit
+def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -> History:
+    """Forces, slip path and dissipated energy of a prescribed motion u (s, n, 3) in m, steps of dt seconds.
+
+    The work of a step is that of its mean force, the trapezoidal rule. It is counted from the first sample, to which
+    an unloaded contact is taken in one step, straight from u = 0.
+    """
+    state = law.init(u.shape[1]) if state is None else state
+    v = velocities(u, dt, 2 * u[0] - u[1] if len(u) > 1 else u[0])
+    force_0, state = law.step(u[0], v[0], dt, state)
+
+    def one(carried: tuple[State, Array, Array, Array], sample: tuple[Array, Array]) -> tuple[Any, tuple[Array, ...]]:
+        state, before, force_before, work = carried
+        force, state = law.step(*sample, dt, state)
+        work = work + 0.5 * jnp.sum((force + force_before) * (sample[0] - before), axis=-1)
+        return (state, sample[0], force, work), (force, law.slip(state), work - law.stored(sample[0], state))
+
+    start = (state, u[0], force_0, law.stored(u[0], state))
+    (after, *_), (force, slip, dissipated) = jax.lax.scan(one, start, (u[1:], v[1:]))
+    first = (force_0, law.slip(state), jnp.zeros(u.shape[1]))
+    whole = [jnp.concatenate([f[None], r]) for f, r in zip(first, (force, slip, dissipated), strict=True)]
+    return History(whole[0], whole[1], whole[2], after)
+
+
+def cycles(law: Law, u: Array, period: float | Array, count: int = 2) -> tuple[Array, State]:
+    """Forces (s, n, 3) over the last of ``count`` cycles of a periodic path u (s, n, 3), and the state at its end.
+
+    Starts unloaded. The slider states of most laws are periodic after the first cycle in which every point has
+    reached its largest slip: two cycles do, unless the normal load swings with the motion.
+    """
+    dt = period / len(u)
+    v = (u - jnp.roll(u, 1, axis=0)) / dt
+
+    def cycle(state: State, _: None) -> tuple[State, None]:
+        return march(law, u, dt, state, v)[1], None
+
+    state = law.init(u.shape[1])
+    if count > 1:
+        state, _ = jax.lax.scan(cycle, state, None, length=count - 1)
+    return march(law, u, dt, state, v)
+
+
+def root(value: Array) -> Array:
+    """Square root whose derivative at zero is zero, not infinite."""
+    positive = value > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, value, 1.0)), 0.0)
+
+
+def norm(vectors: Array) -> Array:
+    """Length of vectors along the last axis, differentiable at zero."""
+    return root(jnp.sum(vectors**2, axis=-1))
+
+
+def ratio(above: Array, below: Array, otherwise: float = 0.0) -> Array:
+    """above / below, and ``otherwise`` where ``below`` is not positive, without a division there."""
+    positive = below > 0
+    return jnp.where(positive, above / jnp.where(positive, below, 1.0), otherwise)
+

@@ -1,0 +1,143 @@
+"""The point contact element without mass: normal law, tangential springs and a slider, by a return map.
+
+Sextro, section 3.7, in the limit of a vanishing mass of the point P. Between the body's point M and P stand the
+normal law and two tangential springs (with dampers, if wanted); P sticks to the other body or slides on it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from .friction import Friction
+from .law import Array, Law, norm, ratio, settings
+from .normal import Normal
+
+
+class PointState(NamedTuple):
+    """State of n points: u_t (n, 2) m, elastic force (n, 2) N, share (n,) of the stiffness, slip (n, 2) m."""
+
+    tangential: Array
+    elastic: Array
+    share: Array
+    slipped: Array
+
+
+@settings
+class PointContact(Law):
+    """Point contact with stick, slip and separation in three dimensions.
+
+    The printed tangential force, stiffness times displacement with a stiffness that follows the contact area
+    (3.3-39, 3.7-21), creates energy: stuck, moved while pressed, moved back while lifted, it gives more than it took.
+    Here area that comes into contact carries nothing yet (the force grows by increments), and area that is lost takes
+    its part of the force with it (the force is rescaled). With the energy F^2 / (2 k share) every step then
+    dissipates or does nothing; on a constant area both forms are one.
+
+    Attributes:
+        normal: normal law. friction: characteristic. stiffness_1: tangential stiffness along t1 of the full area
+            (c_R0), N/m; stiffness_2: along t2, the same if None. damping: beta, s: force per rate of the normal and
+            tangential springs (3.7-18), none if None. The normal force is cut at zero (3.7-30).
+    """
+
+    normal: Normal
+    friction: Friction
+    stiffness_1: Array
+    stiffness_2: Array | None = None
+    damping: Array | None = None
+
+    def init(self, n: int) -> PointState:
+        return PointState(jnp.zeros((n, 2)), jnp.zeros((n, 2)), jnp.zeros(n), jnp.zeros((n, 2)))
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
+        share = self.normal.share(u[:, 0])
+        pressed = self._pressed(u[:, 0], v[:, 0])
+        springs = self._springs(share)
+        relaxed = state.elastic * jnp.minimum(ratio(share, state.share), 1.0)[:, None]
+        stiffness = springs if self.damping is None else springs * (1 + _column(self.damping) / dt)
+        trial = relaxed + stiffness * (u[:, 1:] - state.tangential)
+        theta = self._kept(trial, stiffness, pressed, dt)[:, None]
+        force = trial * _weight(theta, self._relative(stiffness))
+        stretched = ratio(force - relaxed, stiffness)
+        elastic = force if self.damping is None else relaxed + springs * stretched
+        slipped = state.slipped + jnp.where(share[:, None] > 0, u[:, 1:] - state.tangential - stretched, 0.0)
+        return jnp.column_stack([pressed, force]), PointState(u[:, 1:], elastic, share, slipped)
+
+    def limit(self, force: Array, state: PointState) -> Array:
+        return self.friction.coefficient(jnp.zeros(len(force))) * force[:, 0]
+
+    def slip(self, state: PointState) -> Array:
+        return state.slipped
+
+    def stored(self, u: Array, state: PointState) -> Array:
+        stretched = ratio(state.elastic**2, self._springs(state.share))
+        return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=-1)
+
+    def _pressed(self, u: Array, v: Array) -> Array:
+        force = self.normal.force(u)
+        if self.damping is not None:
+            force = jnp.maximum(force + self.damping * self.normal.stiffness(u) * v, 0.0)
+        return force
+
+    def _springs(self, share: Array) -> Array:
+        """(n, 2) tangential stiffness of the area in contact, N/m."""
+        first = self.stiffness_1 * share
+        return jnp.stack([first, first if self.stiffness_2 is None else self.stiffness_2 * share], axis=-1)
+
+    def _relative(self, stiffness: Array) -> Array | None:
+        """(n, 2) stiffness over the larger of both; None where both are one by construction."""
+        if self.stiffness_2 is None:
+            return None
+        return ratio(stiffness, jnp.max(stiffness, axis=-1, keepdims=True), 1.0)
+
+    def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float) -> Array:
+        """(n,) theta of `_weight` at which the force has come down to what friction can hold: 1 sticks."""
+        tried = norm(trial)
+        if self.stiffness_2 is None and self.friction.constant:
+            held = self.friction.coefficient(tried) * pressed
+            return jnp.where(tried > held, ratio(held, tried), 1.0)
+        return _slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt)
+
+
+def _column(value: Array) -> Array:
+    return jnp.asarray(value)[..., None]
+
+
+def _weight(theta: Array, relative: Array | None) -> Array:
+    """Share of the trial force that is left, per direction: theta / (theta + (1 - theta) k / k_max).
+
+    Friction that opposes the slip asks for force = trial - k slip with slip = lambda force (lambda >= 0): the force
+    is trial / (1 + lambda k) in each direction. With unequal stiffness this is not the radial return.
+    theta = 1 / (1 + lambda k_max) lies between 0 (all friction lost) and 1 (stick).
+    """
+    return theta if relative is None else ratio(theta, theta + (1 - theta) * relative)
+
+
+_STEPS = 40  # halvings of the interval of theta: beyond the rounding of a double after the last Newton step
+
+
+def _slide(
+    trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float
+) -> Array:
+    """theta by bisection, and one Newton step whose derivative is that of the solution (implicit function)."""
+    largest = jnp.max(stiffness, axis=-1)
+
+    def excess(theta: Array) -> Array:
+        force = norm(trial * _weight(theta[:, None], relative))
+        slip = ratio((1 - theta) * norm(trial * _weight(theta[:, None], relative)), theta * largest)
+        return force - friction.coefficient(slip / dt) * pressed
+
+    sticks = excess(jnp.ones(len(trial))) <= 0
+
+    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        above = excess(middle) > 0
+        return jnp.where(above, low, middle), jnp.where(above, middle, high)
+
+    ends = jax.lax.fori_loop(0, _STEPS, halve, (jnp.zeros(len(trial)), jnp.ones(len(trial))))
+    theta = jax.lax.stop_gradient(0.5 * (ends[0] + ends[1]))
+    value, slope = jax.jvp(excess, (theta,), (jnp.ones(len(trial)),))
+    theta = theta - jnp.where(slope > 0, value / jnp.where(slope > 0, jax.lax.stop_gradient(slope), 1.0), 0.0)
+    return jnp.where(sticks, 1.0, jnp.clip(theta, 0.0, 1.0))

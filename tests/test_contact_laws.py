@@ -1,0 +1,158 @@
+"""What every contact law must satisfy, on random closed paths: `contact.EXAMPLES` decides which laws are tried."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from microslip.contact import EXAMPLES
+from microslip.contact.law import cycles, history, march
+
+SAMPLES = 256
+TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)
+LAWS = pytest.mark.parametrize("example", EXAMPLES.values(), ids=EXAMPLES.keys())
+FORCES = jax.jit(cycles, static_argnums=3)
+MARCH = jax.jit(lambda law, u, dt: march(law, u, dt, law.init(u.shape[1]))[0])  # from the unloaded state
+TANGENT = jax.jit(lambda law, u, dt, du: jax.jvp(lambda x: MARCH(law, x, dt), (u,), (du,))[1])
+
+
+def path(seed, example, points=3, samples=SAMPLES, harmonics=3, lift=1.0):
+    """(s, n, 3) a smooth closed path of the example's size; ``lift`` is the mean normal displacement."""
+    rng = np.random.default_rng(seed)
+    t = 2 * np.pi * np.arange(samples) / samples
+    c = rng.normal(size=(2, harmonics, points, 3)) / np.arange(1, harmonics + 1)[:, None, None]
+    turns = np.outer(np.arange(1, harmonics + 1), t)
+    u = np.einsum("hs,hnk->snk", np.cos(turns), c[0]) + np.einsum("hs,hnk->snk", np.sin(turns), c[1])
+    u[..., 0] += lift
+    return jnp.asarray(u * [example.normal, example.tangential, example.tangential])
+
+
+def scale(force):
+    return float(np.abs(force).max())
+
+
+def work(force, u):
+    """(n,) work of a closed path by the trapezoidal rule, and by how much the last bit of each term could change it."""
+    terms = 0.5 * (force + np.roll(force, 1, axis=0)) * (u - np.roll(u, 1, axis=0))
+    return terms.sum(axis=(0, 2)), np.abs(terms).sum(axis=(0, 2))
+
+
+@LAWS
+@TRIES
+@given(seed=st.integers(0, 10**6))
+def test_an_open_contact_carries_nothing(example, seed) -> None:
+    """After being pressed and slid, and pulled apart."""
+    u = np.array(path(seed, example))
+    u[SAMPLES // 2 :, :, 0] = -np.abs(u[SAMPLES // 2 :, :, 0]) - example.gap
+    force = MARCH(example.law, jnp.asarray(u), example.period / SAMPLES)
+    assert np.all(np.array(force)[SAMPLES // 2 :] == 0)
+
+
+@LAWS
+@TRIES
+@given(seed=st.integers(0, 10**6))
+def test_friction_stays_in_its_cone(example, seed) -> None:
+    """A cone, not a box: the length of the tangential force is limited, not each of its components."""
+    u = path(seed, example)
+    force, state = FORCES(example.law, u, example.period, 2)
+    limits = jax.vmap(lambda f: example.law.limit(f, state))(force)
+    assert np.all(np.array(force[..., 0]) >= 0)
+    excess = np.linalg.norm(force[..., 1:], axis=-1) - limits
+    assert excess.max() <= 1e-9 * scale(force)  # bisection leaves 2^-40
+
+
+@LAWS
+@TRIES
+@given(seed=st.integers(0, 10**6), lift=st.sampled_from([0.5, 1.0, 3.0]))
+def test_a_closed_cycle_gives_no_energy(example, seed, lift) -> None:
+    """Also where the normal load varies while the contact sticks. The sum's own error is of second order."""
+    u = path(seed, example, lift=lift)
+    given_back, size = work(np.array(FORCES(example.law, u, example.period, 2)[0]), np.array(u))
+    assert np.all(given_back >= -2e-5 * size)
+
+
+@LAWS
+def test_stuck_and_moved_under_changing_load_gives_no_energy(example) -> None:
+    """Pressed, moved, released a little, moved back, pressed again: k(u_n) u_t, as printed, gives energy here."""
+    corners = np.array([[2.0, 0, 0], [2.0, 1, 0], [0.2, 1, 0], [0.2, 0, 0], [2.0, 0, 0]])
+    corners *= [example.normal, 0.02 * example.tangential, 0.02 * example.tangential]
+    s = np.linspace(0, 4, 1601)
+    u = np.column_stack([np.interp(s, range(5), c) for c in corners.T])[1:, None]
+    force = np.array(FORCES(example.law, jnp.asarray(u), example.period, 2)[0])
+    assert work(force, u)[0][0] >= -1e-12 * work(force, u)[1][0]
+
+
+@LAWS
+@TRIES
+@given(seed=st.integers(0, 10**6), angle=st.floats(0, 2 * np.pi))
+def test_turning_the_tangents_turns_the_force(example, seed, angle) -> None:
+    """Laws with two stiffnesses are tried with the mirrored tangent instead."""
+    u = path(seed, example)
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) if example.isotropic else np.diag([1.0, -1.0, 1.0])
+    force = FORCES(example.law, u, example.period, 2)[0]
+    turned = FORCES(example.law, u @ turn.T, example.period, 2)[0]
+    assert np.abs(force @ turn.T - turned).max() <= 1e-9 * scale(force)
+
+
+@LAWS
+def test_the_same_path_gives_the_same_force_twice(example) -> None:
+    u = path(1, example)
+    first, second = (np.array(FORCES(example.law, u, example.period, 2)[0]) for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+@LAWS
+def test_every_point_is_on_its_own(example) -> None:
+    u = path(2, example, points=4)
+    together = FORCES(example.law, u, example.period, 2)[0]
+    alone = FORCES(example.law, u[:, 2:3], example.period, 2)[0]
+    assert np.allclose(together[:, 2:3], alone, rtol=0, atol=1e-12 * scale(together))
+
+
+@LAWS
+@TRIES
+@given(seed=st.integers(0, 10**6))
+def test_tangent_matches_differences(example, seed) -> None:
+    """Off the transitions: where two differences of different length agree among themselves."""
+    u = path(seed, example, points=1, samples=32)
+    direction = path(seed + 1, example, points=1, samples=32)
+    dt = example.period / 32
+    tangent = np.array(TANGENT(example.law, u, dt, direction))
+    assert np.all(np.isfinite(tangent))
+    fine, coarse = (
+        np.array(MARCH(example.law, u + h * direction, dt) - MARCH(example.law, u - h * direction, dt)) / (2 * h)
+        for h in (1e-6, 1e-5)
+    )
+    smooth = np.abs(fine - coarse).max(axis=(1, 2)) < 1e-7 * np.abs(tangent).max()
+    assert np.abs(tangent - fine)[smooth].max() <= 1e-6 * np.abs(tangent).max()
+    assert smooth.sum() > 16
+
+
+@LAWS
+def test_settings_are_leaves(example) -> None:
+    """Other numbers do not compile anew."""
+    traced = []
+
+    @jax.jit
+    def run(law, u):
+        traced.append(1)
+        return march(law, u, 1e-4, law.init(2))[0]
+
+    u = path(3, example, points=2)
+    run(example.law, u)
+    run(jax.tree_util.tree_map(lambda x: 1.1 * x, example.law), u)
+    assert len(traced) == 1 and jax.tree_util.tree_leaves(example.law)
+
+
+@LAWS
+def test_dissipated_energy_grows(example) -> None:
+    """What `history` says was lost never comes back; fourfold samples leave a sixteenth of the sum's error."""
+    losses = []
+    for samples in (512, 2048):
+        lost = np.array(history(example.law, path(4, example, samples=samples), example.period / samples).dissipated)
+        losses.append(max(0.0, -np.diff(lost, axis=0).min() / lost[-1].max()))
+    assert losses[1] <= max(0.2 * losses[0], 1e-12)
