@@ -1,4 +1,4 @@
-"""The sample bodies: twisted vanes and a ring's sector of 20-node bricks, drawn without gmsh, and three masses."""
+"""The sample bodies: twisted vanes and a ring's sector of 20-node bricks, drawn without gmsh, and masses on springs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from microslip.body import BodySettings
 from microslip.data import Array, Mesh, ModalBasis
 from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
-from microslip.system import system_basis
+from microslip.system import Body, Damper, Force, Monitor, Spring, System, system_basis
 
 ROOT = Path(__file__).resolve().parents[1]
 _CORNERS = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2))
@@ -129,6 +129,18 @@ def _told(settings: BodySettings) -> dict[str, str]:
     return {"settings_sha256": "", "note": "conformance sample", "name": settings.name}
 
 
+def two_masses() -> ModalBasis:
+    """The least a file can be: two points that slide along x, a force, a probe, no interface."""
+    return System(
+        "two-masses",
+        members=[Body("m1", 1.0, (1.0, 0.0, 0.0), free="x"), Body("m2", 2.0, (2.0, 0.0, 0.0), free="x")],
+        links=[Spring("ground", "m1", 1e4), Spring("m1", "m2", 2e4), Damper("m1", "m2", 3.0)],
+        forces=[Force("shaker", "m1", direction=(1.0, 0.0, 0.0))],
+        monitors=[Monitor("end", "m2")],
+        ratio=0.005,
+    ).basis()
+
+
 def three_masses() -> ModalBasis:
     """Points alone, three modes, a damping matrix that couples them."""
     return system_basis(ROOT / "pipeline/microslip/templates/three-masses/system.toml")
@@ -180,6 +192,7 @@ def vane_range() -> ModalBasis:
 
 
 SAMPLES: dict[str, Callable[[], ModalBasis]] = {
+    "two-masses": two_masses,
     "three-masses": three_masses,
     "vane-eigenmodes": vane_eigenmodes,
     "vane-craig-bampton": vane_craig_bampton,

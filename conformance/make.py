@@ -83,7 +83,7 @@ def answers(basis: ModalBasis) -> list[dict[str, object]]:
         if basis.name == "three-masses":
             stiff = {n: [0.0, 5e3, 0.0, 0.0, 0.0, 0.0] for n in faces}
         for read in reads:
-            for springs in ({}, stiff):
+            for springs in ({}, stiff) if stiff else ({},):
                 f = frequencies(g)
                 found = response(g, compliance_row(g, read), compliance_row(g, loads[0]), f, springs)
                 asked = {"kind": "response", **where, "load": loads[0], "read": read}
@@ -105,7 +105,7 @@ def write_answers(path: Path, basis: ModalBasis) -> None:
     """A JSON file with one answer a line."""
     lines = ",\n".join("  " + json.dumps(a) for a in answers(basis))
     head = {
-        "sample": f"{basis.name}.h5",
+        "sample": f"{path.stem}.h5",
         "units": "SI; per N of the load (per Pa of a pressure); time factor exp(+i omega t)",
         "tolerance": TOLERANCE,
     }

@@ -12,19 +12,23 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+import sector
 import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
 from microslip.basis.hdf5 import HostileFile, inspect, seal, seal_state, trial
 from microslip.basis.integrals import modal_mass
 from microslip.data import Mesh, ModalBasis, UserError
+from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "modal_file.md"
+MASSES = ROOT / "pipeline/microslip/templates/three-masses/system.toml"
 
 
 def same(a: object, b: object) -> bool:
@@ -200,11 +204,23 @@ def test_the_documented_matlab_function(file: Path) -> None:
 
 
 def test_xarray_names_the_dimensions(file: Path) -> None:
+    """As docs/modal_file.md says; a sector's complex groups, a body at speed and a small system open too."""
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
-    tree = xarray.open_datatree(file, engine="h5netcdf", phony_dims="sort")
+
+    def opened(path: Path) -> Any:
+        with xarray.open_datatree(path, engine="h5netcdf", phony_dims="sort") as tree:
+            return tree.load()
+
+    tree = opened(file)
     assert tree["speed_0/nd_0/modes/phi"].dims == ("node", "axis", "mode")
     assert tree["speed_0/nd_0/stress/nodes/T"].dims == ("place", "component", "mode")
+    assert tree["speed_1/nd_0/run_up/N"].dims == ("mode", "mode_column")
+    for name, basis in (("ring", sector.basis()), ("masses", system_basis(MASSES))):
+        write_basis(file.with_name(f"{name}.h5"), basis)
+        seen = opened(file.with_name(f"{name}.h5"))
+        for (_, k), g in basis.groups.items():
+            np.testing.assert_array_equal(seen[f"speed_0/nd_{k}/modes/K_r"].values, g.K_r.real)
 
 
 # ---------------------------------------------------------------- checks
@@ -318,6 +334,27 @@ def test_quadrature_of_the_checks_is_that_of_the_assembly(cell_type: str) -> Non
     assert np.allclose(N, expected_N, rtol=0, atol=1e-13)
     assert np.allclose(dN, expected_dN, rtol=0, atol=1e-12)
     assert weights.sum() == pytest.approx(1 / 6 if "tetra" in cell_type else 1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-200, 1e200, 1e307])
+def test_absurd_numbers_are_findings_and_no_exceptions(factor: float) -> None:
+    """Whose squares overflow or vanish, in every part."""
+    basis, g = small.basis((0.0, 3000.0)), small.basis((0.0, 3000.0)).groups[0, 0]
+    assert g.invariants is not None
+    v = g.invariants
+    with np.errstate(over="ignore"):
+        K = g.K_r * factor
+    groups = [
+        dataclasses.replace(g, omega=g.omega * factor, K_r=K),
+        dataclasses.replace(g, phi=g.phi * factor),
+        dataclasses.replace(g, invariants=dataclasses.replace(v, mass=v.mass * factor)),
+        dataclasses.replace(g, invariants=dataclasses.replace(v, point=v.point * factor + factor)),
+    ]
+    wrong = [dataclasses.replace(basis, groups={**basis.groups, (0, 0): changed}) for changed in groups]
+    mesh = dataclasses.replace(basis.mesh, points=basis.mesh.points * factor)
+    wrong += [dataclasses.replace(basis, mesh=mesh), dataclasses.replace(basis, mass=basis.mass * factor)]
+    for changed in wrong:
+        assert failed(changed)
 
 
 def test_checks_do_not_raise_on_arrays_that_do_not_fit() -> None:

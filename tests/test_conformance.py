@@ -17,6 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import scipy.linalg
 
 ROOT = Path(__file__).resolve().parents[1]
 KIT = ROOT / "conformance"
@@ -164,6 +165,43 @@ def test_wrong_answers_are_found(tmp_path: Path) -> None:
     (tmp_path / "b.json").write_text('{"answers": 3}')
     with pytest.raises(validate.Refused, match="no list of answers"):
         validate.validate(KIT / "samples" / "sector-cyclic.h5", tmp_path / "b.json")
+
+
+@pytest.mark.parametrize("name", bodies.LARGE)
+def test_answers_of_the_large_samples_hold(tmp_path: Path, name: str) -> None:
+    """They are made on the spot; every state of them is asked for a response and for static answers."""
+    write_basis(tmp_path / "a.h5", built(name))
+    make.write_answers(tmp_path / "a.json", built(name))
+    assert validate.validate(tmp_path / "a.h5", tmp_path / "a.json") == []
+    told = json.loads((tmp_path / "a.json").read_text())["answers"]
+    for speed, harmonic in built(name).groups:
+        of_state = [a["kind"] for a in told if (a["speed"], a["nodal_diameter"]) == (speed, harmonic)]
+        assert {"response", "static"} <= set(of_state)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_each_sample_has_a_response_and_static_answers_with_a_tolerance(name: str) -> None:
+    told = json.loads((KIT / "answers" / f"{name}.json").read_text())
+    assert told["sample"] == f"{name}.h5" and 0 < told["tolerance"] <= 1e-7
+    for key in built(name).groups:
+        mine = [a for a in told["answers"] if (a["speed"], a["nodal_diameter"]) == key]
+        assert any(a["kind"] == "response" and len(a["frequency_Hz"]) >= 10 and max(a["real"]) > 0 for a in mine)
+        assert any(a["kind"] == "static" and a["real"][0] != 0 for a in mine)
+
+
+def test_answers_of_two_masses_by_hand() -> None:
+    """A force on the first mass moves the second by 1/k1 at rest; at w by two equations written out here, with the
+    modal damping 2 D M sqrt(M^-1 K) beside the damper."""
+    told = json.loads((KIT / "answers" / "two-masses.json").read_text())["answers"]
+    (static,) = [a for a in told if a["kind"] == "static" and a["load"] == "excitation:shaker:force"]
+    assert static["real"] == pytest.approx([1e-4], rel=1e-12)
+    M, K = np.diag([1.0, 2.0]), np.array([[3e4, -2e4], [-2e4, 2e4]])
+    C = np.array([[3.0, -3.0], [-3.0, 3.0]]) + 2 * 0.005 * M @ scipy.linalg.sqrtm(np.linalg.solve(M, K))
+    (asked,) = [a for a in told if a["kind"] == "response" and a["read"] == "monitor:end:u_x"]
+    for f, re_, im in zip(asked["frequency_Hz"], asked["real"], asked["imag"], strict=True):
+        w = 2 * np.pi * f
+        q = np.linalg.solve(K - w**2 * M + 1j * w * C, [1.0, 0.0])
+        assert re_ + 1j * im == pytest.approx(q[1], rel=1e-9)
 
 
 def test_craig_bampton_answers_at_the_contacts_are_those_of_the_full_model() -> None:

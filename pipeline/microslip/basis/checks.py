@@ -16,6 +16,7 @@ from ..data import (
     GyroscopicModes,
     Interface,
     Invariants,
+    Mesh,
     ModalBasis,
     ModalGroup,
     Rows,
@@ -100,8 +101,13 @@ def _not_finite(arrays: Iterable[Any]) -> float:
     return float(sum(int((~np.isfinite(a)).sum()) for a in arrays))
 
 
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max(initial=0.0))
+def _largest(values: Array) -> np.float64:
+    """NumPy's own number: of Python's the square of 1e200 and the division by 0 are exceptions."""
+    return np.float64(np.abs(values).max(initial=0.0))
+
+
+def _extent(mesh: Mesh) -> np.float64:
+    return np.maximum(np.ptp(mesh.points, axis=0).max(initial=0.0), 1e-300)
 
 
 def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Findings:
@@ -155,7 +161,7 @@ def _range_checks(basis: ModalBasis, r: SpeedRange, mesh_is_sound: bool) -> _Fin
     if not fits or found[-1][1]:
         return found
     found.append(("speeds of the samples rise", float((np.diff(r.speeds) <= 0).sum()), 0.0, ""))
-    shift = r.speeds[0] ** 2 + (1.0 if r.shift is None else r.shift)
+    shift = np.square(r.speeds[0]) + (1.0 if r.shift is None else r.shift)
     found.append(("variable of the polynomials is real", 0.0 if shift > 0 else 1.0, 0.0, ""))
     found.append(("interpolation error at held-out speeds is the one stated", _misstated(r), 0.0, ""))
     found.append(("frequency error at held-out speeds", _largest(r.total_error), r.tolerance, f"{h} speeds"))
@@ -281,8 +287,8 @@ def _run_up_checks(g: ModalGroup, r: RunUp) -> _Findings:
 
 def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings:
     """The integrals against the rigid body's numbers, against each other and against the mass-normalised shapes."""
-    size = max(float(np.ptp(basis.mesh.points, axis=0).max()), _largest(basis.centre - v.point), 1e-300)
-    found: _Findings = [("invariants: mass", abs(v.mass / basis.mass - 1), 1e-9, "")]
+    size = max(_extent(basis.mesh), _largest(basis.centre - v.point))
+    found: _Findings = [("invariants: mass", abs(np.float64(v.mass) / basis.mass - 1), 1e-9, "")]
     if not g.u_static.any():  # else the body has moved
         r = basis.centre - v.point
         about = basis.inertia + basis.mass * (r @ r * np.eye(3) - np.outer(r, r))
@@ -336,7 +342,7 @@ def _place_checks(basis: ModalBasis) -> _Findings:
     centre = moments[0, 1:] / basis.mass
     second = moments[1:, 1:] - basis.mass * np.outer(centre, centre)
     inertia = np.trace(second) * np.eye(3) - second
-    size = max(float(np.ptp(basis.mesh.points, axis=0).max()), 1e-300)
+    size = _extent(basis.mesh)
     return [
         ("body: centre of mass is the mesh's", _largest(basis.centre - centre) / size, 1e-8, ""),
         ("body: inertia is the mesh's", _largest(basis.inertia - inertia) / (basis.mass * size**2), 1e-8, ""),

@@ -223,7 +223,7 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     modes = group.create_group("modes")
     mode = put_scale(modes, "mode", np.arange(1, g.n_modes + 1))
     column = put_scale(modes, "mode_column", np.arange(1, g.n_modes + 1))
-    group["mode"] = mode
+    group["mode"], group["mode_column"] = mode, column  # where run_up and gyroscopic find them
     fewer = len(g.omega) < g.n_modes
     own = put_scale(modes, "own_mode", np.arange(1, len(g.omega) + 1)) if fewer else mode
     for name, data, unit in (
