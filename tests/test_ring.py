@@ -579,3 +579,33 @@ def test_gyroscopic_coupling_splits_the_speeds_of_forward_and_backward_waves() -
         exact = w0 / np.sqrt(e**2 - (end**2 - w0**2) / top)
         assert found[e].speed == pytest.approx(exact, rel=1e-9)
     assert found[3].speed < omega[3] / 3 and found[9].speed > omega[3] / 9
+
+
+def test_both_waves_are_printed_and_stand_in_the_report() -> None:
+    """Every frequency with gyroscopic coupling is shown with its nodal diameter and its direction of travel."""
+    from microslip.data import GyroscopicModes
+    from microslip.report import _ring_whirl
+    from microslip.resonances import waves_of
+    from microslip.workflow import basis_summary
+
+    basis, groups = chain(12, 1e5, 3e4, 0.3, (0.0, 20000.0)), {}
+    for (s, k), g in basis.groups.items():
+        waves = np.array([0.9, -1.1]) * g.omega[0] if multiplicity(k, 12) == 2 else g.omega
+        n = len(waves)
+        zero, shapes = np.zeros(n), np.ones((1, n), complex)
+        coupled = GyroscopicModes(waves, shapes, zero, zero, ("",) * n, zero + 0.02)
+        groups[s, k] = replace(g, gyroscopic=coupled if s else None)
+    basis = replace(basis, groups=groups)
+    f = basis.groups[1, 3].frequency[0]
+    shown = {way: (float(hertz[0]), float(bound[0])) for way, (hertz, bound) in waves_of(basis.groups[1, 3]).items()}
+    assert shown == {"backward": (pytest.approx(0.9 * f), 0.02), "forward": (pytest.approx(1.1 * f), 0.02)}
+    assert waves_of(basis.groups[0, 3]) == {} and list(waves_of(basis.groups[1, 6])) == ["standing"]
+    lines = basis_summary(basis)
+    assert f"  k =   3  {0.9 * f:10.5g}  Hz backward" in lines and f"  k =   3  {1.1 * f:10.5g}  Hz forward" in lines
+    assert sum(line == "  at most           2  % too high" for line in lines) == 1  # one speed has coupling
+    page = _ring_whirl([g for (s, _), g in sorted(basis.groups.items()) if s])
+    assert "k = 3<br>backward" in page and f"{1.1 * f:#.6g}" in page
+    assert "k = 6<br>standing" in page and "2&nbsp;%" in page
+    growing = replace(groups[1, 3].gyroscopic, growth=np.array([1.0, 0.0]))
+    lost = replace(basis, groups=groups | {(1, 3): replace(groups[1, 3], gyroscopic=growing)})
+    assert any("nodal diameter 3: The rotating body is UNSTABLE" in line for line in basis_summary(lost))

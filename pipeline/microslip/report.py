@@ -23,7 +23,18 @@ from .coordinates import basis_in_modes
 from .data import ContactState, Interface, ModalBasis, ModalGroup, SpeedRange
 from .gyroscopic import stability_sentence
 from .quality import sentences
-from .resonances import HEAD, eigenmodes, harmonics_of, margins, resonances, speeds_of, unanswered
+from .resonances import (
+    HEAD,
+    eigenmodes,
+    harmonics_of,
+    margins,
+    resonances,
+    speeds_of,
+    unanswered,
+    waves_of,
+    whirl_bounds,
+    whirl_sentence,
+)
 from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
 from .store import write_text
@@ -395,7 +406,8 @@ def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
         out += _say(f"{where}{certificate_words(proof)}.", kind="" if proof.certified else "warn")
     out += _say(
         "Sector j moves as the sector itself times exp(i j k 2 pi / N), k the nodal diameter. A frequency at 0 < k < "
-        "N/2 belongs to two modes of the ring, waves that run forward and backward; no gyroscopic coupling is in it.",
+        "N/2 belongs to two modes of the ring, waves that run forward and backward; no gyroscopic coupling is in it. "
+        "Where the file has the coupling, frequencies with it stand in a table of their own.",
         kind="plain",
     )
     out += album.take("nodal_diameters", "Frequency over nodal diameter; each line is a family of modes.")
@@ -406,7 +418,23 @@ def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
     for i, s in enumerate(speeds):
         shown = _ring_table([eigenmodes(basis.groups[s, k]) for k in held])
         out += shown if i == 0 else _hidden(f"Frequencies at {_at(basis.groups[s, held[0]])}", shown)
+        out += _ring_whirl([basis.groups[s, k] for k in held])
     return out
+
+
+def _ring_whirl(groups: Sequence[ModalGroup]) -> str:
+    """Backward and forward waves of every nodal diameter with gyroscopic coupling, if a speed's groups hold it."""
+    if (words := whirl_sentence(groups)) is None:
+        return ""
+    waves = [(f"k = {g.harmonic}<br>{way}", f) for g in groups for way, (f, _) in waves_of(g).items()]
+    bounds = [f"{100 * b:.2g}&nbsp;%" if np.isfinite(b) else "" for b in whirl_bounds(groups)]
+    rows = [
+        [str(j + 1), *(f"{f[j]:#.6g}" if j < len(f) else "" for _, f in waves), bound] for j, bound in enumerate(bounds)
+    ]
+    table = _table([f"Hz at {_at(groups[0])}, mode", *(head for head, _ in waves), "too high by at most"], rows)
+    stable = all(g.gyroscopic is None or g.gyroscopic.stable for g in groups)
+    title = f"Waves with gyroscopic coupling at {_at(groups[0])}, in the rotating frame"
+    return _say(f"{_at(groups[0])}: {words}", kind="plain" if stable else "bad") + _hidden(title, table)
 
 
 def _ring_table(groups: Sequence[ModalGroup]) -> str:
@@ -465,7 +493,8 @@ def _modes(basis: ModalBasis, album: _Album) -> str:
         names = [n for n in album.left if n.startswith("mode_") and n.endswith(f"_{rpm}")]
         if names:
             shown = "".join(album.take(n) for n in names)
-            single += _hidden(f"Each mode at {_at(group)}", f'<div class="row">{shown}</div>')
+            of = f" of nodal diameter {group.harmonic}" if basis.sectors > 1 else ""
+            single += _hidden(f"Each mode{of} at {_at(group)}", f'<div class="row">{shown}</div>')
     return rings + moving + sheets + single
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from .campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from .coordinates import in_modes
 from .data import Array, Indices, ModalBasis, ModalGroup
-from .ring import FORWARD, aliased
+from .gyroscopic import stability_sentence
+from .ring import BACKWARD, FORWARD, STANDING, aliased
 
 
 @dataclass(frozen=True)
@@ -119,14 +120,51 @@ def travelling(group: ModalGroup, direction: str) -> ModalGroup:
     forward. Standing waves, and groups without the coupling, keep their frequencies for both.
     """
     plain, g = eigenmodes(group), group.gyroscopic
-    if g is None or not g.stable:
-        return plain
-    chosen = np.flatnonzero(g.omega < 0 if direction == FORWARD else g.omega > 0)
-    chosen = chosen[np.argsort(np.abs(g.omega[chosen]), kind="stable")][: plain.n_modes]
-    if len(chosen) < plain.n_modes:
+    chosen = _waves(group, direction, plain.n_modes)
+    if g is None or chosen is None:
         return plain
     phi = group.phi @ g.shapes[:, chosen] if len(group.phi) else plain.phi
     return replace(plain, omega=np.abs(g.omega[chosen]), phi=phi)
+
+
+def _waves(group: ModalGroup, direction: str, count: int) -> Indices | None:
+    """(count,) which of the modes with gyroscopic coupling run this way, the lowest; None: not so many are known."""
+    g = group.gyroscopic
+    if g is None or not g.stable:
+        return None
+    chosen = np.flatnonzero(g.omega < 0 if direction == FORWARD else g.omega > 0)
+    chosen = chosen[np.argsort(np.abs(g.omega[chosen]), kind="stable")][:count]
+    return chosen if len(chosen) == count else None
+
+
+def waves_of(group: ModalGroup) -> dict[str, tuple[Array, Array]]:
+    """Direction -> frequencies (m,) in Hz with gyroscopic coupling, and how much too high they are at most, (m,).
+
+    Both waves of 0 < k < N/2, else ``standing``. Empty where the group holds no coupling, or where a mode grows.
+    """
+    g, count = group.gyroscopic, eigenmodes(group).n_modes
+    if g is None or not g.stable:
+        return {}
+    ways = (BACKWARD, FORWARD) if (g.omega < 0).any() else (STANDING,)
+    found = {way: _waves(group, way, count) for way in ways}
+    return {way: (g.frequency[w], g.error[w]) for way, w in found.items() if w is not None}
+
+
+def whirl_sentence(groups: Sequence[ModalGroup]) -> str | None:
+    """Stability of a ring from its nodal diameters at one speed; None: it holds no gyroscopic coupling."""
+    found = [(g, y) for g in groups if (y := g.gyroscopic) is not None]
+    lost = [f"nodal diameter {g.harmonic}: {stability_sentence(y)}" for g, y in found if not y.stable]
+    return " ".join(lost) or next((stability_sentence(y) for _, y in found), None)
+
+
+def whirl_bounds(groups: Sequence[ModalGroup]) -> Array:
+    """(m,) how much too high the frequencies of `waves_of` are at most, over all waves of a speed; NaN: not known."""
+    errors = [e for g in groups for _, e in waves_of(g).values()]
+    known = np.full((len(errors), max((len(e) for e in errors), default=0)), -1.0)
+    for row, e in zip(known, errors, strict=True):
+        row[: len(e)] = np.nan_to_num(e, nan=-1.0)
+    worst = known.max(axis=0, initial=-1.0)
+    return np.where(worst < 0, np.nan, worst)
 
 
 def _groups(basis: ModalBasis) -> dict[tuple[int, int], ModalGroup]:

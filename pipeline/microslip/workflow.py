@@ -25,12 +25,21 @@ from .body import BodySettings, MaterialSettings, MatrixFiles, implausible, load
 from .case import CaseResult, load_case, run_case
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, SpeedRange, UserError
+from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, read_mesh
 from .quality import sentences
 from .report import contact_sentence
-from .resonances import eigenmodes, harmonics_of, resonance_csv, resonances, speeds_of
+from .resonances import (
+    eigenmodes,
+    harmonics_of,
+    resonance_csv,
+    resonances,
+    speeds_of,
+    waves_of,
+    whirl_bounds,
+    whirl_sentence,
+)
 from .ring import certificate_words, certify_ring
 from .units import SYSTEMS, usual_system
 
@@ -752,6 +761,24 @@ MOST_COLUMNS = 10
 """Frequencies shown of each nodal diameter on the terminal."""
 
 
+def _hertz_line(frequency: Array) -> str:
+    return "".join(f"{f:10.5g}" for f in frequency[:MOST_COLUMNS])
+
+
+def _ring_whirl(groups: list[ModalGroup]) -> list[str]:
+    """A line of frequencies with gyroscopic coupling for each nodal diameter and wave, if a speed's groups hold it."""
+    if (words := whirl_sentence(groups)) is None:
+        return []
+    lines = [f"  with gyroscopic coupling, in the rotating frame. {words}"]
+    for g in groups:
+        lines += [f"  k = {g.harmonic:3d}  {_hertz_line(f)}  Hz {way}" for way, (f, _) in waves_of(g).items()]
+    bounds = 100 * whirl_bounds(groups)[:MOST_COLUMNS]
+    if np.isfinite(bounds).any():
+        shown = "".join(f"{b:10.2g}" if np.isfinite(b) else f"{'':10}" for b in bounds)
+        lines.append(f"  at most  {shown}  % too high")
+    return lines
+
+
 def _ring_summary(basis: ModalBasis) -> list[str]:
     """A line of frequencies for each nodal diameter, at each speed."""
     lines = [f"one of {basis.sectors} cyclic sectors; the numbers above are of one"]
@@ -764,8 +791,8 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
             more = f"   and {g.n_modes - MOST_COLUMNS} more" if g.n_modes > MOST_COLUMNS else ""
-            shown = "".join(f"{f:10.5g}" for f in g.frequency[:MOST_COLUMNS])
-            lines.append(f"  k = {g.harmonic:3d}  {shown}  Hz{more}")
+            lines.append(f"  k = {g.harmonic:3d}  {_hertz_line(g.frequency)}  Hz{more}")
+        lines += _ring_whirl([basis.groups[speed, k] for k in harmonics_of(basis)])
     first = basis.groups[min(basis.groups)]
     if first.interfaces:
         lines.append(f"compliance at nodal diameter {first.harmonic}: {sentence(basis, first)}")

@@ -160,7 +160,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
                 images = list(views.mode_pictures(studio, group, MOST_MODES, camera))
                 keep(f"modes_{_rpm(group)}", views.contact_sheet(studio, group, images))
                 for j, image in enumerate(images):
-                    keep(f"mode_{j + 1:02d}_{_rpm(group)}", views.mode_caption(image, group, j))
+                    keep(f"mode_{j + 1:02d}_{_rpm(group)}", views.mode_caption(studio, image, group, j))
             report("animations")
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")

@@ -140,6 +140,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes = figure.subplots()
     _plain(axes)
     _family_lines(axes, found, top, width=0.8)
+    _family_labels(axes, found, top)
     for k, f in shut.items():
         axes.plot([k] * int((f <= top).sum()), f[f <= top], "s", color=INK, markersize=5, zorder=4, clip_on=False)
     axes.set_ylim(0, top)
@@ -240,7 +241,8 @@ def _on_line(axes: Axes, text: str, k: int, hertz: float, direction: str, at_edg
 def _close_ones(axes: Axes, found: Sequence[Margin], top: float) -> None:
     for m in found:
         if m.frequency <= top:
-            axes.plot(m.nodal_diameter, m.frequency, "o", mfc="none", mec="#d02020", mew=1.8, markersize=12, zorder=4)
+            where: dict[str, Any] = {"mec": "#d02020", "mew": 1.8, "markersize": 12, "zorder": 4, "clip_on": False}
+            axes.plot(m.nodal_diameter, m.frequency, "o", mfc="none", **where)
 
 
 # --- Campbell ------------------------------------------------------------------------------------------------------

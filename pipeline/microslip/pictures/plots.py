@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -240,23 +240,61 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
 # --- static contact ------------------------------------------------------------------------------------------------
 
 
+MOST_CLOSURES, CURVES_BESIDE = 12, 3
+"""Closures whose pressure is drawn, and up to how many stand one below the other with a force curve each."""
+
+
 def closure_plot(basis: ModalBasis, path: Path) -> Path | None:
     """Pressure on every face that touches at the highest speed, and its normal force over the speeds (or None)."""
     states = {g.speed: g.contacts for g in basis.groups.values() if g.contacts}
-    last = states[max(states)] if states else {}
-    if not any(c.normal_force for c in last.values()):
+    if not any(c.normal_force for contacts in states.values() for c in contacts.values()):
         return None
-    several = len(states) > 1
-    figure = _figure(9.6, 3.2 * len(last))
-    panels = figure.subplots(len(last), 2 if several else 1, squeeze=False, width_ratios=[3, 2] if several else [1])
-    for row, (name, c) in zip(panels, last.items(), strict=True):
-        _pressure_map(row[0], name, c)
-        if several:
-            rpm = [w * 30 / np.pi for w in sorted(states)]
-            _plain(row[1])
-            row[1].plot(rpm, [states[w][name].normal_force for w in sorted(states)], "o-", color=COLOURS[0])
-            row[1].set(xlabel="rpm", ylabel="normal force in N", ylim=(0, None))
+    states = dict(sorted(states.items()))
+    names = list(states[max(states)])
+    draw = _closures_beside if len(names) <= CURVES_BESIDE else _closures_tiled
+    figure = draw(states, names[:MOST_CLOSURES])
+    more = f" (first {MOST_CLOSURES} of {len(names)})" if len(names) > MOST_CLOSURES else ""
+    figure.suptitle(f"{basis.name}: contact at {max(states) * 30 / np.pi:.6g} rpm{more}", fontweight="bold")
     return _save(figure, path)
+
+
+States = Mapping[float, Mapping[str, ContactState]]
+
+
+def _closures_beside(states: States, names: Sequence[str]) -> Figure:
+    """A row for each closure: its pressure, and its force over the speeds."""
+    several = len(states) > 1
+    figure = _figure(9.6, 0.4 + 3.2 * len(names))
+    panels = figure.subplots(len(names), 2 if several else 1, squeeze=False, width_ratios=[3, 2] if several else [1])
+    for row, name in zip(panels, names, strict=True):
+        _pressure_map(row[0], name, states[max(states)][name])
+        if several:
+            _force_curves(row[1], states, [name])
+    return figure
+
+
+def _closures_tiled(states: States, names: Sequence[str], columns: int = 4) -> Figure:
+    """Pressures beside each other, and all forces in one diagram below."""
+    rows, several = math.ceil(len(names) / columns), len(states) > 1
+    figure = _figure(3.4 * columns, 0.4 + 3.1 * (rows + several))
+    grid = figure.add_gridspec(rows + several, columns)
+    for i, name in enumerate(names):
+        _pressure_map(figure.add_subplot(grid[i // columns, i % columns]), name, states[max(states)][name])
+    if several:
+        axes = figure.add_subplot(grid[rows, :])
+        _force_curves(axes, states, names)
+        axes.legend(fontsize=8, ncols=2, loc="upper left")
+    return figure
+
+
+def _force_curves(axes: Axes, states: States, names: Sequence[str]) -> None:
+    """Normal forces over the speeds that were solved for."""
+    _plain(axes)
+    rpm = [speed * 30 / np.pi for speed in states]
+    for i, name in enumerate(names):
+        force = [contacts[name].normal_force for contacts in states.values()]
+        axes.plot(rpm, force, "o-", color=COLOURS[i % len(COLOURS)], label=name)
+    axes.set(xlabel="rotation speed in rpm", ylabel="normal force in N", ylim=(0, None))
 
 
 def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
@@ -274,5 +312,5 @@ def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
     axes.set_aspect("equal")
     axes.margins(0.06)
     axes.set(xlabel="mm along the face", ylabel="mm")
-    axes.set_title(f"{name}: {c.normal_force:.4g} N on {percent(c.closed_share)} of the face", fontsize=10)
+    axes.set_title(f"{name}: {c.normal_force:.4g} N\non {percent(c.closed_share)} of the face", fontsize=10)
     axes.figure.colorbar(shown, ax=axes, label="pressure in MPa", location="bottom", shrink=0.6)

@@ -337,9 +337,15 @@ def _deform(studio: Studio, data: Any, group: ModalGroup, mode: int, phase: floa
     studio.stage.reshape(data, studio.outside.triangles, studio.points + phase * moved, value)
 
 
-def mode_caption(image: Picture, group: ModalGroup, mode: int) -> Picture:
-    """The picture with number, frequency and speed."""
-    return captioned(image, mode_title(group, mode) + at_speed(group), "amplified; grey lines: at rest", 20)
+def mode_caption(studio: Studio, image: Picture, group: ModalGroup, mode: int) -> Picture:
+    """The picture with number, frequency, speed and nodal diameter."""
+    state = at_speed(group) + of_nodal_diameter(studio, group)
+    return captioned(image, mode_title(group, mode) + state, "amplified; grey lines: at rest", 20)
+
+
+def of_nodal_diameter(studio: Studio, group: ModalGroup) -> str:
+    """Which nodal diameter a sector is shown at; nothing for a body without cyclic symmetry."""
+    return f", nodal diameter {group.harmonic}" if studio.basis.sectors > 1 else ""
 
 
 def contact_sheet(studio: Studio, group: ModalGroup, images: Sequence[Picture]) -> Picture:
@@ -359,7 +365,7 @@ def contact_sheet(studio: Studio, group: ModalGroup, images: Sequence[Picture]) 
 def animation(studio: Studio, group: ModalGroup, mode: int, camera: Camera, steps: int = 11) -> list[Picture]:
     """Frames of one full swing of a mode."""
     data = _deformable(studio, DISPLACEMENT_MAP, (0.0, 1.0))
-    title = mode_title(group, mode) + at_speed(group)
+    title = mode_title(group, mode) + at_speed(group) + of_nodal_diameter(studio, group)
     half = []
     for phase in np.sin(np.linspace(-np.pi / 2, np.pi / 2, steps)):
         _deform(studio, data, group, mode, float(phase))
