@@ -51,6 +51,8 @@ def complaint(table: dict[str, Any]) -> str:
 
 # one mistake each -> what the only sentence must say
 MISTAKES: list[tuple[dict[str, Any], str]] = [
+    ({"cyclic": {"sectors": 24, "nodal_diameters": 3}}, 'cyclic.nodal_diameters: must be "all" or a list of whole'),
+    ({"cyclic": {"sectors": 24, "nodal_diameters": [0, 3.5]}}, "nodal_diameters: must be \"all\" or a list of whole n"),
     ({"materal": {}}, "materal: unknown key; did you mean 'material'?"),
     ({"material__densty": 7850.0, "material__density": ...}, "material.densty: unknown key; did you mean 'density'?"),
     ({"mesh": {"szie": 3.0}}, "mesh.szie: unknown key; did you mean 'size'?"),

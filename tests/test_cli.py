@@ -101,8 +101,12 @@ def test_check_info_and_export_of_a_modal_file(folder: Path, capsys: pytest.Capt
     assert main(["check", file]) == 0
     out, err = said(capsys)
     assert err == "" and "FAIL" not in out and out.count("ok   ") > 15 and "checks passed" in out.splitlines()[-1]
-    assert main(["info", file]) == 0
+    assert main(["check", file, "--short"]) == 0
+    assert said(capsys)[0].splitlines()[-1] == out.splitlines()[-1]
+    assert main(["info", file, "--speed", "0"]) == 0
     assert "6 modes, certified complete" in said(capsys)[0]
+    assert main(["info", file, "--speed", "1"]) == 2
+    assert "--speed 1: the file has 1; count from 0" in said(capsys)[1]
     for format_ in ("mat", "vtu"):
         assert main(["export", file, "--to", format_, "-o", f"out.{format_}"]) == 0
         assert said(capsys)[0].strip() == f"out.{format_}" and (folder / f"out.{format_}").stat().st_size > 1000

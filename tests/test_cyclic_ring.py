@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from meshes import body, moved, nearest, rotation_matrix, with_sets
 
 from microslip.data import Mesh, UserError
+from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
 from microslip.modes.rows import patch
@@ -513,3 +514,17 @@ def test_faces_that_do_not_match_are_refused():
     points[mesh.face_points("cyclic_right")[3]] += [0.0, 2e-4, 0.0]
     with pytest.raises(UserError, match="cyclic"):
         modal_basis(replace(mesh, points=points), settings(6, mesh))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"axis": np.array([1.0, 0.0, 0.0])}, "not turned about this axis.*correct rotation.axis"),
+        ({"point": np.array([0.01, 0.0, 0.0])}, "not turned about this axis.*rotation.point"),
+        ({"sectors": 7}, "makes 6 sectors, not 7"),
+    ],
+)
+def test_a_wrong_axis_is_told_from_faces_that_do_not_match(change, words):
+    given = {"axis": rings.AXIS, "point": np.zeros(3), "sectors": 6} | change
+    with pytest.raises(UserError, match=words):
+        pair_cut_faces(sector(), "cyclic_left", "cyclic_right", **given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import meshes
@@ -15,8 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from microslip import pictures
-from microslip.data import ModalBasis
+from microslip.data import ContactState, ModalBasis
 from microslip.pictures import lettering, scene
+from microslip.pictures.plots import closure_plot
 
 pytest.importorskip("pyvista")
 pytest.importorskip("matplotlib")
@@ -165,6 +167,20 @@ def test_a_free_body_moves_with_its_first_elastic_modes(tmp_path: Path) -> None:
 def test_curves_need_no_3d(tmp_path: Path) -> None:
     found = pictures.draw_all(small.basis((0.0, 3000.0)), tmp_path, scenes=False)
     assert sorted(found) == ["campbell", "compliance"]
+
+
+@pytest.mark.parametrize(("count", "speeds"), [(1, (0.0,)), (2, (0.0, 3000.0)), (14, (0.0,)), (14, (0.0, 3000.0))])
+def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[float, ...], tmp_path: Path) -> None:
+    from PIL import Image
+
+    x = np.stack(np.meshgrid(np.arange(40.0), np.arange(6.0), [0.0]), axis=-1).reshape(-1, 3) * 1e-3
+    one, basis, force = np.ones(len(x)), small.basis(speeds), np.array([0.0, 0.0, 240.0])
+    state = ContactState("a", "b", 0, "", 240.0, force, x[0], x, 1e-6 * one, 1e6 * one, one, 1.0, 0.0, 1.0, 0.0)
+    groups = {k: replace(g, contacts={f"c{i}": state for i in range(count)}) for k, g in basis.groups.items()}
+    path = closure_plot(replace(basis, groups=groups), tmp_path / "closure.png")
+    assert path is not None and closure_plot(basis, path) is None
+    with Image.open(path) as image:
+        assert max(image.size) < 2000 and min(image.size) > 150
 
 
 @needs_scenes

@@ -609,3 +609,36 @@ def test_both_waves_are_printed_and_stand_in_the_report() -> None:
     growing = replace(groups[1, 3].gyroscopic, growth=np.array([1.0, 0.0]))
     lost = replace(basis, groups=groups | {(1, 3): replace(groups[1, 3], gyroscopic=growing)})
     assert any("nodal diameter 3: The rotating body is UNSTABLE" in line for line in basis_summary(lost))
+
+
+def test_pictures_find_the_stress_where_the_file_has_it() -> None:
+    """The static state is the same at every nodal diameter, its stress may stand at one of them only."""
+    from microslip.data import StressSet
+    from microslip.pictures import _sector, _stressed, _with_static_stress
+
+    basis = sector.basis(6, 4)
+    n, one = basis.mesh.n_points, np.ones((basis.mesh.n_points, 6, basis.groups[0, 2].n_modes))
+    held = StressSet("nodal-averaged", basis.mesh.points, one, one * (1 + 2j), np.ones((n, 6)), np.ones(n))
+    assert _stressed(basis) == 0 and _with_static_stress(basis, basis.groups[0, 0]) is basis.groups[0, 0]
+    basis = replace(basis, groups=basis.groups | {(0, 2): replace(basis.groups[0, 2], stresses={"nodes": held})})
+    assert _stressed(basis) == 2
+    assert _with_static_stress(basis, basis.groups[0, 0]).stresses["nodes"] is held
+    alone = _sector(basis, 2)
+    assert list(alone.groups) == [(0, 2)] and alone.name.endswith("nodal diameter 2")
+    assert np.isrealobj(alone.groups[0, 2].stresses["nodes"].stress)
+
+
+def test_each_check_once_shows_the_worst() -> None:
+    from microslip.basis import Check
+    from microslip.basis.checks import worst_of_each
+
+    def check(where: str, value: float, limit: float = 1.0) -> Check:
+        return Check(f"{where}: a", value, limit, value <= limit)
+
+    values = {"speed_0/nd_0": 0.1, "speed_1/nd_12": 0.9, "range/nd_3": 2.0, "range/nd_4": 0.5}
+    every = [check(where, value) for where, value in values.items()]
+    assert worst_of_each(every) == [every[1], every[2]]
+    low = check("speed_0: ring of 24", 3.0, 2.0)
+    assert worst_of_each([check("speed_2: ring of 24", 9.0, 10.0), low]) == [low]  # one that failed, whatever its value
+    found = check_basis(sector.basis(6, 4, (0.0, 3000.0)))
+    assert 10 < len(worst_of_each(found)) < len(found) / 6

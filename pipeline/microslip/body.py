@@ -55,12 +55,22 @@ def _whole(value: Any) -> Any:
     return value
 
 
+def _nodal_diameters(value: Any) -> Any:
+    if value == "all":
+        return value
+    listed = value if isinstance(value, list | tuple) else [None]
+    if any(isinstance(v, bool) or not isinstance(v, int) or v < 0 for v in listed):
+        raise ValueError('must be "all" or a list of whole numbers, none negative; write [0, 3] for 0 and 3')
+    return tuple(value)
+
+
 def _has_length(value: tuple[float, ...]) -> tuple[float, ...]:
     if not any(value):
         raise ValueError("a direction must not be [0, 0, 0]")
     return value
 
 
+NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_nodal_diameters)]
 Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
 Positive = Annotated[float, BeforeValidator(_float), Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_nan=False)]
@@ -286,9 +296,7 @@ class Cyclic(Model):
     sectors: Annotated[int, Field(ge=3, le=1000)]
     left: FaceName = "cyclic_left"
     right: FaceName = "cyclic_right"
-    nodal_diameters: (
-        Literal["all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], BeforeValidator(_tuple)]
-    ) = "all"
+    nodal_diameters: NodalDiameters = "all"
 
     @model_validator(mode="after")
     def _possible(self) -> Cyclic:
@@ -519,9 +527,7 @@ class Output(Model):
     gauss: bool = True
     nodal_stress: bool = True
     stiffening: bool = False
-    stress_nodal_diameters: (
-        Literal["all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], BeforeValidator(_tuple)]
-    ) = "all"
+    stress_nodal_diameters: NodalDiameters = "all"
 
     @model_validator(mode="after")
     def _possible(self) -> Output:

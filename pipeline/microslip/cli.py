@@ -37,6 +37,7 @@ Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, he
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
 
+Short = Annotated[bool, Parameter(show_default=False, help="each check once, the worst speed and nodal diameter")]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 PACKAGE = Path(__file__).parent
@@ -196,19 +197,20 @@ def respond(
 
 
 @app.command
-def check(file: Path, /, *, quiet: Quiet = False) -> None:
+def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate.
 
     Args:
         file: a basis.h5.
     """
     from .basis import check_basis, read_basis
+    from .basis.checks import worst_of_each
     from .ring import ring_checks
 
     basis = read_basis(file)
     findings = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in findings if not c.passed]
-    for c in findings if not quiet else failed:
+    for c in failed if quiet else worst_of_each(findings) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
     if failed:
@@ -329,12 +331,17 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
 
 
 @app.command
-def info(file: Path, /, *, unit: str = "mm", rpm: float | None = None) -> None:
+def info(
+    file: Path, /, *, unit: str = "mm", speed: int | None = None, nodal_diameter: int | None = None,
+    rpm: float | None = None,
+) -> None:  # fmt: skip
     """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), or a body.toml.
 
     Args:
         file: basis.h5, a mesh, a STEP or BREP file, or a body.toml.
         unit: unit of length of a mesh or CAD file.
+        speed: of a modal file: this one of its speeds only, counted from 0.
+        nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: what it holds at this speed.
     """
     from .mesh import UNITS
@@ -346,10 +353,12 @@ def info(file: Path, /, *, unit: str = "mm", rpm: float | None = None) -> None:
     suffix = file.suffix.lower()
     if suffix in (".h5", ".hdf5"):
         from .basis import read_basis
+        from .exchange.choice import select
         from .workflow import basis_summary
 
         basis = read_basis(file)
-        print("\n".join(basis_summary(basis if rpm is None else _at_speed(basis, rpm))))
+        basis = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
+        print("\n".join(basis_summary(basis)))
     elif suffix in (".step", ".stp", ".brep", ".iges", ".igs"):
         _cad_info(file, unit)
     elif suffix == ".toml" or file.is_dir():

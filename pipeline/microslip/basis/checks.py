@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -44,6 +45,18 @@ class Check:
     limit: float
     passed: bool
     remark: str = ""
+
+
+def worst_of_each(findings: Iterable[Check]) -> list[Check]:
+    """Each check once over all speeds and nodal diameters: one that failed, else the nearest to its limit."""
+    kinds: dict[str, list[Check]] = {}
+    for c in findings:
+        kinds.setdefault(re.sub(r"^(speed|range)(_\d+)?(/nd_\d+)?: ", r"\1: ", c.name), []).append(c)
+
+    def nearness(c: Check) -> tuple[bool, float]:
+        return not c.passed, c.value / c.limit if c.limit and np.isfinite(c.limit) else 0.0
+
+    return [max(found, key=nearness) for found in kinds.values()]
 
 
 def check_basis(basis: ModalBasis) -> list[Check]:

@@ -22,10 +22,10 @@ def select(basis: ModalBasis, speed: int | None, nodal_diameter: int | None) -> 
     """
     speeds, harmonics = len(speeds_of(basis)), sorted({k for _, k in basis.groups})
     if speed is not None and not 0 <= speed < speeds:
-        raise UserError(f"{basis.name}: export --speed {speed}: the file has {speeds}; count from 0")
+        raise UserError(f"{basis.name}: --speed {speed}: the file has {speeds}; count from 0")
     if nodal_diameter is not None and nodal_diameter not in harmonics:
         known = ", ".join(map(str, harmonics))
-        raise UserError(f"{basis.name}: export --nodal-diameter {nodal_diameter}: the file has {known}")
+        raise UserError(f"{basis.name}: --nodal-diameter {nodal_diameter}: the file has {known}; choose one of these")
     wanted = (speed, nodal_diameter)
     return replace(
         basis,

@@ -147,7 +147,7 @@ def write_ring(basis: ModalBasis, path: Path | str, speed: int = 0) -> Path:
         raise UserError(f"{basis.name}: export --ring: the body is not cyclic; leave --ring out")
     groups = {k: eigenmodes(g) for (s, k), g in sorted(basis.groups.items()) if s == speed}
     if not groups:
-        raise UserError(f"{basis.name}: export --speed {speed}: the file has {len(speeds_of(basis))}; count from 0")
+        raise UserError(f"{basis.name}: --speed {speed}: the file has {len(speeds_of(basis))}; count from 0")
     path, (outside, used) = Path(path), _outside(basis)
     ring = replicate(outside, basis.rotation_axis, basis.rotation_point, basis.sectors)
     rows = ["rpm,nodal diameter,mode,Hz,modes of the ring"]

@@ -483,6 +483,11 @@ def _on_pattern(K: sp.coo_matrix, pattern: Pattern, pair: ContactPair) -> Array:
 
 
 def _slid(pair: ContactPair) -> str:
+    if pair.interference > pair.slide:
+        return (
+            f"closures.{pair.name}.interference: {pair.interference:.3g} m is more than the faces have room to give "
+            f"way (they may slide by {pair.slide:.3g} m, about their elements); correct it (it is in length_unit)"
+        )
     return (
         f"closures.{pair.name}: the faces slide on each other by more than {pair.slide:.3g} m, which was provided for; "
         "set closures.slide to the sliding you expect"

@@ -98,11 +98,22 @@ def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, di
             f"cyclic: '{right}' is '{left}' turned by -2 pi / {N} about the rotation axis; exchange left and right, or "
             "turn the axis round"
         )
+    if _congruent(x, y) and not _same_circles(x, y, axis, 0.5 * spacing):
+        return (
+            f"rotation: the faces '{left}' and '{right}' are alike, but are not turned about this axis onto each other "
+            "(their points lie on other circles round it); correct rotation.axis and rotation.point"
+        )
     angle = _angle_between(x, y, axis)
-    if angle and abs(2 * np.pi / angle - N) > 0.01 * N:
+    count = 2 * np.pi / angle if angle else float(N)
+    if abs(count - round(count)) > 0.01 * count:
+        return (
+            f"rotation.axis: the faces '{left}' and '{right}' are {np.degrees(angle):.4g} degrees apart about it, "
+            "which is no whole number of sectors; correct rotation.axis and point"
+        )
+    if abs(count - N) > 0.01 * N:
         return (
             f"cyclic.sectors: the faces '{left}' and '{right}' are {np.degrees(angle):.4g} degrees apart about the "
-            f"rotation axis, which makes {2 * np.pi / angle:.4g} sectors, not {N}; correct sectors, or rotation.axis "
+            f"rotation axis, which makes {count:.4g} sectors, not {N}; correct sectors, or rotation.axis "
             "and point"
         )
     if len(x) != len(y):
@@ -113,6 +124,19 @@ def _no_match(x: Array, y: Array, left: str, right: str, axis: Array, N: int, di
         f"cyclic: '{right}' is not '{left}' turned by 2 pi / {N} about the rotation axis, node by node: {why}; mesh "
         "the two faces alike (gmsh: setPeriodic), cut faces that do not match are not tied"
     )
+
+
+def _congruent(x: Array, y: Array) -> bool:
+    """Whether two sets of points have the same distances from their middles."""
+    a, b = (np.sort(np.linalg.norm(v - v.mean(axis=0), axis=1)) for v in (x, y))
+    return len(a) == len(b) and bool(np.abs(a - b).max() < _CLOSE * a.max())
+
+
+def _same_circles(x: Array, y: Array, axis: Array, within: float) -> bool:
+    """Whether two sets of points lie on the same circles round the axis: the same heights and radii."""
+    n = axis / np.linalg.norm(axis)
+    at = [np.stack([v @ n, np.linalg.norm(v - np.outer(v @ n, n), axis=1)], axis=1) for v in (x, y)]
+    return float(_nearest(at[0], at[1])[0].max()) < within and float(_nearest(at[1], at[0])[0].max()) < within
 
 
 def _angle_between(x: Array, y: Array, axis: Array) -> float:

@@ -86,7 +86,8 @@ def draw_all(
         ``mode_<number>_<rpm>rpm``, ``animation_<number>``, ``stress_modes``, ``static``, ``compliance``,
         ``closure``, ``campbell``; of a cyclic sector also ``ring_modes_<rpm>rpm``, ``ring_wave_nd<k>``,
         ``nodal_diameters`` and ``safe``, while the pictures of the sector itself are those of its lowest nodal
-        diameter (real parts of the shapes). What does not apply to the body is not there.
+        diameter (real parts of the shapes), those of stresses of the lowest that has stress modes. What does not
+        apply to the body is not there.
     """
     basis = basis_in_modes(basis)
     folder = Path(folder)
@@ -149,9 +150,11 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
         report("pictures of mesh and interfaces")
         keep("mesh", views.mesh_picture(studio))
         keep("interfaces", views.interface_picture(studio))
-        keep("static", views.static_picture(studio, _ends(basis)[-1]))
+        keep("static", views.static_picture(studio, _with_static_stress(basis, _ends(basis)[-1])))
+        stressed = studio
         if basis.sectors > 1:
-            studio = replace(studio, basis=_sector(basis))
+            stressed = replace(studio, basis=_sector(basis, _stressed(basis)))
+            studio = replace(studio, basis=_sector(basis, min(basis.groups)[1]))
         shown = [g for g in _ends(studio.basis) if len(g.phi)]
         if shown:
             camera = views.mode_camera(studio, shown, MOST_MODES)
@@ -164,7 +167,7 @@ def _scenes(basis: ModalBasis, folder: Path, report: Report) -> dict[str, Path]:
             report("animations")
             drawn |= _animations(studio, shown[0], folder)
             report("pictures of stresses")
-            keep("stress_modes", views.stress_sheet(studio, shown[0], STRESSED, camera))
+            keep("stress_modes", views.stress_sheet(stressed, _ends(stressed.basis)[0], STRESSED, camera))
     finally:
         studio.stage.close()
     return drawn
@@ -176,16 +179,28 @@ def _ends(basis: ModalBasis) -> list[ModalGroup]:
     return [basis.groups[k] for k in dict.fromkeys((keys[0], keys[-1]))]
 
 
-def _sector(basis: ModalBasis) -> ModalBasis:
-    """The sector at its lowest nodal diameter as a body of its own: its eigenmodes, real parts of complex shapes."""
-    lowest = min(k for _, k in basis.groups)
+def _stressed(basis: ModalBasis) -> int:
+    """The lowest nodal diameter whose stress modes the file holds at its nodes, else the lowest of all."""
+    return min((k for (_, k), g in basis.groups.items() if "nodes" in g.stresses), default=min(basis.groups)[1])
+
+
+def _with_static_stress(basis: ModalBasis, group: ModalGroup) -> ModalGroup:
+    """The group with the stress of its static state, which is the same at every nodal diameter of the speed."""
+    if "nodes" in group.stresses:
+        return group
+    alike = [g.stresses["nodes"] for g in basis.groups.values() if g.speed == group.speed and "nodes" in g.stresses]
+    return replace(group, stresses={"nodes": alike[0]}) if alike else group
+
+
+def _sector(basis: ModalBasis, k: int) -> ModalBasis:
+    """The sector at a nodal diameter as a body of its own: its eigenmodes, real parts of complex shapes."""
     groups = {}
-    for (speed, k), g in basis.groups.items():
-        if k == lowest:
+    for (speed, harmonic), g in basis.groups.items():
+        if harmonic == k:
             count = eigenmodes(g).n_modes
             stresses = {n: replace(s, stress=s.stress.real[..., :count]) for n, s in g.stresses.items()}
             groups[speed, k] = replace(eigenmodes(g), phi=g.phi.real[:, :, :count], stresses=stresses)
-    return replace(basis, name=f"{basis.name}, nodal diameter {lowest}", groups=groups)
+    return replace(basis, name=f"{basis.name}, nodal diameter {k}", groups=groups)
 
 
 def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> dict[str, Path]:

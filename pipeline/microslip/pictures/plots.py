@@ -264,10 +264,11 @@ States = Mapping[float, Mapping[str, ContactState]]
 def _closures_beside(states: States, names: Sequence[str]) -> Figure:
     """A row for each closure: its pressure, and its force over the speeds."""
     several = len(states) > 1
-    figure = _figure(9.6, 0.4 + 3.2 * len(names))
+    last = states[max(states)]
+    figure = _figure(9.6, 0.4 + sum(_height(last[name], 5.2 if several else 8.6) for name in names))
     panels = figure.subplots(len(names), 2 if several else 1, squeeze=False, width_ratios=[3, 2] if several else [1])
     for row, name in zip(panels, names, strict=True):
-        _pressure_map(row[0], name, states[max(states)][name])
+        _pressure_map(row[0], name, last[name])
         if several:
             _force_curves(row[1], states, [name])
     return figure
@@ -276,10 +277,12 @@ def _closures_beside(states: States, names: Sequence[str]) -> Figure:
 def _closures_tiled(states: States, names: Sequence[str], columns: int = 4) -> Figure:
     """Pressures beside each other, and all forces in one diagram below."""
     rows, several = math.ceil(len(names) / columns), len(states) > 1
-    figure = _figure(3.4 * columns, 0.4 + 3.1 * (rows + several))
-    grid = figure.add_gridspec(rows + several, columns)
+    last = states[max(states)]
+    high = [max(_height(last[name], 2.6) for name in names)] * rows + [3.0] * several
+    figure = _figure(3.4 * columns, 0.4 + sum(high))
+    grid = figure.add_gridspec(rows + several, columns, height_ratios=high)
     for i, name in enumerate(names):
-        _pressure_map(figure.add_subplot(grid[i // columns, i % columns]), name, states[max(states)][name])
+        _pressure_map(figure.add_subplot(grid[i // columns, i % columns]), name, last[name])
     if several:
         axes = figure.add_subplot(grid[rows, :])
         _force_curves(axes, states, names)
@@ -297,11 +300,22 @@ def _force_curves(axes: Axes, states: States, names: Sequence[str]) -> None:
     axes.set(xlabel="rotation speed in rpm", ylabel="normal force in N", ylim=(0, None))
 
 
+def _on_face(c: ContactState) -> tuple[Array, Array]:
+    """Coordinates of a face's points along its two long directions, mm."""
+    middle = c.points - c.points.mean(axis=0)
+    x, y = 1e3 * (middle @ np.linalg.svd(middle, full_matrices=False)[2][:2].T).T
+    return x, y
+
+
+def _height(c: ContactState, width: float) -> float:
+    """Inches that the map of a face needs, drawn so wide, with its title and colour bar."""
+    x, y = _on_face(c)
+    return 1.75 + width * min(float(np.ptp(y)) / max(float(np.ptp(x)), 1e-9), 0.6)
+
+
 def _pressure_map(axes: Axes, name: str, c: ContactState) -> None:
     """The face seen along its normal: points sized by their area, coloured by the pressure."""
-    middle = c.points - c.points.mean(axis=0)
-    across = np.linalg.svd(middle, full_matrices=False)[2][:2]  # the two long directions of the face
-    x, y = 1e3 * (middle @ across.T).T
+    x, y = _on_face(c)
     order = np.argsort(c.pressure, kind="stable")
     box = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
     size = np.clip(c.areas * 1e6 / box**2 * 4e4, 6, 200)
