@@ -21,9 +21,10 @@ import sector
 import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
-from microslip.basis.hdf5 import HostileFile, inspect, seal, seal_state, trial
+from microslip.basis.hdf5 import seal, seal_state
 from microslip.basis.integrals import modal_mass
 from microslip.data import Mesh, ModalBasis, UserError
+from microslip.hostile import HostileFile, inspect, trial
 from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -46,7 +46,6 @@ from .units import SYSTEMS, usual_system
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
 
-_READS_BY_GMSH = {".unv"}
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
@@ -80,7 +79,7 @@ class Job:
     def mesh_file(self) -> Path:
         """The mesh the body is assembled on: the product of its build or CAD file, or the user's own."""
         own = self.settings.geometry.mesh
-        if own is not None and Path(own).suffix.lower() not in _READS_BY_GMSH:
+        if own is not None:
             return self.folder / own
         return self.root / "meshes" / f"{self.settings.name}.msh"
 
@@ -139,14 +138,14 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     geometry = job.settings.geometry
     if geometry.matrices is not None:
         raise UserError(f"{job.path}: geometry.matrices: there is nothing to mesh; type: microslip modes {job.folder}")
-    if geometry.mesh is not None and job.mesh_file == job.folder / geometry.mesh:
+    if geometry.mesh is not None:
         if not job.mesh_file.is_file():
             raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
         return job.mesh_file
     product = output or job.mesh_file
-    source = job.folder / (geometry.build or geometry.cad or geometry.mesh or "")
+    source = job.folder / (geometry.build or geometry.cad or "")
     if not source.is_file():
-        key = "build" if geometry.build else "cad" if geometry.cad else "mesh"
+        key = "build" if geometry.build else "cad"
         raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
     inputs = {
         "geometry": job.raw["geometry"],
@@ -171,18 +170,15 @@ def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
     settings = {**job.raw, "folder": str(job.folder.resolve())}
     if job.settings.geometry.build:
         command = [sys.executable, str(source.resolve())]
-    elif job.settings.geometry.cad:
-        command = [sys.executable, "-m", "microslip.cad"]
     else:
-        command = [sys.executable, "-m", "microslip.cad", "--convert"]
+        command = [sys.executable, "-m", "microslip.cad"]
     with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
         table = Path(scratch) / "settings.json"
         table.write_text(json.dumps(settings))
-        given = source if job.settings.geometry.mesh else table
         made = Path(scratch) / "mesh.msh"
         paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
-        done = subprocess.run([*command, str(given), str(made)], capture_output=True, text=True, env=environment)
+        done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())

@@ -10,7 +10,6 @@ import gmsh
 from microslip.cad.drawing import default_size, finish, guarded, name_body, positive_size, read_settings
 from microslip.cad.faces import name_picked, table
 from microslip.cad.solids import load
-from microslip.store import complete_or_absent
 
 
 def mesh_cad(settings_file: str, out: str) -> None:
@@ -28,24 +27,14 @@ def mesh_cad(settings_file: str, out: str) -> None:
     finish(mesh, out)
 
 
-def convert(mesh_file: str, out: str) -> None:
-    """Rewrite a mesh that only gmsh reads (such as .unv, with its groups) as MSH, nodes and cells as they are."""
-    gmsh.open(mesh_file)
-    gmsh.option.setNumber("Mesh.SaveAll", 1)
-    with complete_or_absent(out) as temporary:
-        gmsh.write(str(temporary))
-
-
 def main(arguments: list[str]) -> None:
-    """Command line: SETTINGS OUT, --list FILE UNIT, or --convert MESH OUT."""
+    """Command line: SETTINGS OUT, or --list FILE UNIT."""
     if len(arguments) == 3 and arguments[0] == "--list":
         guarded(lambda: print(table(Path(arguments[1]), arguments[2])), arguments[1])
-    elif len(arguments) == 3 and arguments[0] == "--convert":
-        guarded(lambda: convert(*arguments[1:]), arguments[1])
     elif len(arguments) == 2:
         guarded(lambda: mesh_cad(*arguments), arguments[0])
     else:
-        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT | --convert MESH OUT.msh")
+        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT")
 
 
 if __name__ == "__main__":

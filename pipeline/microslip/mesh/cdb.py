@@ -85,12 +85,12 @@ def _widths(lines: list[str], at: int, what: str) -> list[tuple[int, int, str]]:
     fields, place = [], 0
     for count, kind, width in re.findall(r"(\d*)([ie])(\d+)", re.sub(r"\.\d+(e\d+)?", "", line)):
         if not 0 < int(width) < 100 or int(count or 1) > 1000:
-            raise Damaged(f"{what} has the format {line}, which cannot be")
+            raise Damaged(f"{what} has the format {line[:60]}, which cannot be")
         for _ in range(int(count or 1)):
             fields.append((place, place + int(width), kind))
             place += int(width)
     if not fields:
-        raise Damaged(f"{what} has the format {line}, which is not read")
+        raise Damaged(f"{what} has the format {line[:60]}, which is not read")
     return fields
 
 
@@ -115,6 +115,8 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
     fields = _widths(lines, at, "NBLOCK")
     whole = [f for f in fields if f[2] == "i"]
     real = [f for f in fields if f[2] == "e"][:3]
+    if not whole or len(real) < 3:
+        raise Damaged("NBLOCK has a format without a number and three coordinates")
     for number, line in enumerate(lines[at + 1 :], at + 1):
         if line.strip().upper().startswith("N,") or line.strip() == "-1":
             return number + 1

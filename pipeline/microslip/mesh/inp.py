@@ -22,6 +22,8 @@ from .raw import Damaged, DeckMaterial, Numbering, RawMesh
 _SOLIDS = {
     4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge", 15: "wedge15",
 }  # fmt: skip
+_BRICK27 = (*range(20), 26, 24, 23, 25, 21, 22, 20)
+"""Places in C3D27 (after the edges the centre, then the faces S1 to S6) of VTK's nodes."""
 _CORNERS = {3: 3, 6: 3, 4: 4, 8: 4, 9: 4}  # nodes of a facet -> its corners
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
@@ -199,7 +201,8 @@ def _read_elements(deck: _Deck, parameters: dict[str, str], lines: list[str]) ->
     if len(table) % (count + 1):
         raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
     table = table.reshape(-1, count + 1)
-    cells = _Cells(_SOLIDS[count] if solid else "facet", table[:, 0], table[:, 1:])
+    nodes = table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]
+    cells = _Cells(_SOLIDS[count] if solid else "facet", table[:, 0], nodes)
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in parameters:
         _set(deck, deck.cell_sets, parameters["ELSET"]).append(cells.ids)

@@ -1,7 +1,7 @@
 """Any mesh file -> `Mesh`: named faces, unit of length, quality gates.
 
-gmsh's MSH 4.1, Abaqus and Ansys files have readers of their own (`msh`, `inp`, `cdb`), which keep node numbers and
-notice damage; every other format goes through meshio, which is called here only. Node orders are VTK's from here on.
+Readers of their own (`msh` for MSH 4.1, `inp`, `cdb`, `med`, `unv`, `bdf`) keep node numbers and notice damage. Other
+versions of MSH, VTU and VTK files go through meshio, which is called here only. Node orders are VTK's from here on.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import contextlib
 import io
 import re
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,17 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
+from ..hostile import trial
 from ..topology import CELL_TYPES, FACET_CORNERS
+from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
 from .materials import in_si
+from .med import read_med
 from .msh import is_msh41, read_msh41
 from .raw import NODES, Damaged, RawMesh
 from .surface import boundary_facets, faces_from_points, match_facets
+from .unv import read_unv
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
@@ -36,8 +41,8 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
     """Read a volume mesh with its named sets.
 
     Args:
-        path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, an Ansys ``.cdb``, or any file meshio reads (``.med``,
-            ``.vtu``, ``.bdf``, ...).
+        path: gmsh's ``.msh``, an Abaqus or CalculiX ``.inp``, an Ansys ``.cdb``, ``.med``, ``.unv``, ``.vtu``, ``.vtk``
+            or Nastran's ``.bdf``.
         unit: of the file's coordinates, a key of `UNITS`. system: of the units its materials are written in, a key of
             `units.SYSTEMS`; None: its materials are left out. zero: K of the file's temperature 0.
 
@@ -64,14 +69,23 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
 
 
+_READERS: dict[str, Callable[[Path], RawMesh]] = {
+    ".inp": read_inp, ".cdb": read_cdb, ".anf": read_cdb, ".med": read_med, ".unv": read_unv, ".bdf": read_bdf,
+    ".nas": read_bdf, ".fem": read_bdf, ".dat": read_bdf,
+}  # fmt: skip
+_BY_MESHIO = (".msh", ".vtu", ".vtk")
+
+
 def _read_raw(path: Path) -> RawMesh:
-    if path.suffix.lower() == ".msh" and is_msh41(path):
+    suffix = path.suffix.lower()
+    if suffix == ".msh" and is_msh41(path):
         return read_msh41(path)
-    if path.suffix.lower() == ".inp":
-        return read_inp(path)
-    if path.suffix.lower() in (".cdb", ".anf"):
-        return read_cdb(path)
-    return _read_by_meshio(path)
+    if suffix in _READERS:
+        return _READERS[suffix](path)
+    if suffix in _BY_MESHIO:
+        return _read_by_meshio(path)
+    known = ", ".join([*_READERS, *_BY_MESHIO])
+    raise Damaged(f"meshes are not read from a file '{suffix}', but from {known}")
 
 
 def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
@@ -103,17 +117,21 @@ def _read_by_meshio(path: Path) -> RawMesh:
     import meshio
 
     _check_sections(path)
+    _check_xml(path)
+    if trouble := trial(_TRIAL, path):
+        raise Damaged(f"reading it {trouble if trouble.startswith('wants') else 'by meshio ' + trouble}")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _from_meshio(meshio.read(path), path.suffix.lower())
+            return _from_meshio(meshio.read(path))
     except Damaged:
         raise
     except (Exception, SystemExit) as error:  # meshio raises whatever its parsers meet, and exits on some
         if isinstance(error, KeyError) and error.args[:1] and error.args[0] in NODES:
             kind = error.args[0]
-            raise Damaged(f"cells of type {kind} are not read from {path.suffix}; use another format") from error
+            better = "write it as MSH 4.1" if path.suffix.lower() == ".msh" else "write it as .msh, .inp, .med or .unv"
+            raise Damaged(f"cells of type {kind} are not read from this kind of {path.suffix}; {better}") from error
         text = str(error) if not isinstance(error, SystemExit) else said.getvalue()
         detail = " ".join(text.split())[-160:] or "unknown format"
         raise Damaged(f"not readable as {path.suffix or 'a file without suffix'}: {detail}") from error
@@ -134,13 +152,28 @@ def _check_sections(path: Path) -> None:
         raise Damaged("it holds a number that a file of this size cannot need")
 
 
-def _from_meshio(mesh: Any, suffix: str) -> RawMesh:
+_TRIAL = """
+import meshio
+try:
+    meshio.read(path)
+except SystemExit:
+    pass
+"""
+
+
+def _check_xml(path: Path) -> None:
+    """A mesh needs no entities; those of XML can grow without bounds and name other files."""
+    if path.suffix.lower() == ".vtu" and re.search(rb"<!\s*(DOCTYPE|ENTITY)", path.read_bytes(), re.IGNORECASE):
+        raise Damaged("it declares entities of XML, which no mesh needs")
+
+
+def _from_meshio(mesh: Any) -> RawMesh:
     points = np.asarray(mesh.points, dtype=float)
     raw = RawMesh(points, np.arange(1, len(points) + 1))
     for block in mesh.cells:
         nodes = _valid(block.data, len(points))
         if block.type in CELL_TYPES:
-            raw.blocks.append((block.type, nodes[:, _mirrored(block.type)] if suffix == ".med" else nodes))
+            raw.blocks.append((block.type, nodes))
         elif block.type not in FACET_CORNERS and block.type not in _IGNORED:
             raw.blocks.append((block.type, nodes))
     for name, chosen in (mesh.point_sets or {}).items():
@@ -164,18 +197,6 @@ def _valid(indices: Any, count: int) -> Indices:
     return indices
 
 
-def _mirrored(cell_type: str) -> Indices:
-    """Permutation between VTK's order and the mirrored one of MED, which meshio leaves as it is."""
-    kind = CELL_TYPES[cell_type]
-    corners = {4: [0, 2, 1, 3], 5: [0, 3, 2, 1, 4], 6: [0, 2, 1, 3, 5, 4], 8: [0, 3, 2, 1, 4, 7, 6, 5]}[kind.corners]
-    image = kind.reference[: kind.corners][corners]
-    # the affine map that takes each corner to its mirrored partner takes every other node to its own
-    ones = np.ones((kind.corners, 1))
-    map_ = np.linalg.lstsq(np.hstack([kind.reference[: kind.corners], ones]), image, rcond=None)[0]
-    moved = np.hstack([kind.reference, np.ones((len(kind.reference), 1))]) @ map_
-    return np.abs(moved[:, None] - kind.reference[None]).sum(axis=2).argmin(axis=1)
-
-
 def _cell_sets(raw: Any) -> dict[str, list]:
     """Set name -> chosen cells of each block. meshio leaves the groups of gmsh's format 2.2 as numbers of cells."""
     sets = {str(k): v for k, v in (raw.cell_sets or {}).items() if not str(k).startswith("gmsh:")}
@@ -183,12 +204,6 @@ def _cell_sets(raw: Any) -> dict[str, list]:
     for name, (number, dimension) in (raw.field_data or {}).items() if numbers is not None else ():
         pairs = zip(raw.cells, numbers or (), strict=True)
         sets.setdefault(str(name), [np.flatnonzero(v == number) if b.dim == dimension else [] for b, v in pairs])
-    families = (raw.cell_data or {}).get("cell_tags", [])
-    for number, names in getattr(raw, "cell_tags", {}).items():  # MED: a family of cells may bear several names
-        for name in names:
-            chosen = [np.flatnonzero(np.asarray(f) == number) for f in families]
-            pairs = zip(sets.get(name, chosen), chosen, strict=True)
-            sets[name] = [np.union1d(a, b) for a, b in pairs]
     return sets
 
 

@@ -7,7 +7,6 @@ MATLAB 7.3 stores them). Nothing that leaves the file is followed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,10 @@ import h5py
 import numpy as np
 import scipy.sparse as sp
 
-from ...basis.hdf5 import HostileFile, inspect, trial
+from ...hostile import HostileFile, read_hdf5
 from .found import DENSE, Found, Unreadable, square
 
 _WAYS = (("row", "col", "data"), ("indptr", "indices", "data"), ("jc", "ir", "data"))
-_TRIAL = """
-import h5py
-from microslip.basis.hdf5 import inspect
-with h5py.File(path, "r") as file:
-    inspect(file)
-    file.visititems(lambda name, item: item[()] if isinstance(item, h5py.Dataset) else None)
-"""
 _SKIP = "#refs#"
 
 
@@ -62,24 +54,12 @@ def read_table(path: Path, name: str, columns: int) -> Any:
 
 
 def _guarded(path: Path, action: Callable[[h5py.File], Any]) -> Any:
-    if trouble := _tried(path, path.stat().st_mtime_ns):
-        raise Unreadable(f"it is damaged (HDF5 {trouble} on it)")
     try:
-        with h5py.File(path, "r") as file:
-            inspect(file)
-            return action(file)
+        return read_hdf5(path, action)
     except HostileFile as error:
+        if isinstance(error.__cause__, Unreadable):
+            raise error.__cause__ from None
         raise Unreadable(str(error)) from error
-    except Unreadable:
-        raise
-    except Exception as error:  # HDF5 raises whatever it meets
-        raise Unreadable(f"it is damaged or no HDF5 file ({' '.join(str(error).split())[:100]})") from error
-
-
-@cache
-def _tried(path: Path, changed: int) -> str:
-    """What happens to a process that reads the file, once for each state of it."""
-    return trial(_TRIAL, path)
 
 
 def _names(group: h5py.Group, where: str = "") -> list[str]:

@@ -1,0 +1,225 @@
+"""Reader of Nastran bulk data: grid points, solid elements, materials, sets of points, shells as faces.
+
+Written against the Quick Reference Guide: GRID, CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC1
+and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or sixteen columns or between commas.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Indices
+from ..elasticity import turned_strain
+from .materials import isotropic_rows
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+
+_BRICK20, _WEDGE15 = (*range(12), *range(16, 20), *range(12, 16)), (*range(9), *range(12, 15), *range(9, 12))
+"""Places of VTK's nodes: mid-side nodes of the lower edges, the upright ones, the upper ones."""
+_SOLIDS: dict[str, dict[int, tuple[str, Sequence[int]]]] = {
+    "CTETRA": {4: ("tetra", range(4)), 10: ("tetra10", range(10))},
+    "CHEXA": {8: ("hexahedron", range(8)), 20: ("hexahedron20", _BRICK20)},
+    "CPENTA": {6: ("wedge", range(6)), 15: ("wedge15", _WEDGE15)},
+    "CPYRAM": {5: ("pyramid", range(5)), 13: ("pyramid13", range(13))},
+}
+_SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
+_SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
+_CORD = {"CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S"}
+_MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
+_READ = {"GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC1", *_SOLIDS, *_SHELLS, *_MATERIALS}
+
+Cards = dict[str, list[list[str]]]
+
+
+def read_bdf(path: Path) -> RawMesh:
+    """Read a bulk data file.
+
+    Raises:
+        Damaged: content that is inconsistent, or whose meaning would be lost.
+    """
+    cards: Cards = {}
+    for card in _cards(path.read_text(encoding="latin-1")):
+        cards.setdefault(card[0], []).append(card)
+    raw = _grid(cards)
+    numbering = Numbering(raw.node_id)
+    properties = _elements(cards, raw, numbering)
+    raw.materials = [_material(cards, p) for p in properties] if cards.get("PSOLID") else []
+    if not raw.materials:
+        raw.regions = []
+    _shells(cards, raw, numbering)
+    for name, label, first in (("SET1", "SET", 2), ("SPC1", "SPC", 3)):
+        for card in cards.get(name, []):
+            members = np.array(_listed(card, first), dtype=np.int64)
+            raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
+    return raw
+
+
+# cards ---------------------------------------------------------------------------------------------------------------
+
+
+def _cards(text: str) -> Iterator[list[str]]:
+    """Name and fields of every card that matters, its continuations joined."""
+    lines = text.splitlines()
+    begin = next((i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.IGNORECASE)), -1)
+    card: list[str] = []
+    for line in lines[begin + 1 :]:
+        line = line.split("$")[0].expandtabs(8).rstrip()
+        if not line:
+            continue
+        if re.match(r"\s*ENDDATA\b", line, re.IGNORECASE):
+            break
+        if re.match(r"\s*INCLUDE\b", line, re.IGNORECASE):
+            raise Damaged("it includes another file; write the bulk data in one")
+        words = _fields(line)
+        if words[0] == "" or words[0][0] in "+*":
+            if card:
+                card += words[1:]
+            continue
+        if card and card[0] in _READ:
+            yield card
+        card = [words[0].upper().rstrip("*").strip(), *words[1:]]
+    if card and card[0] in _READ:
+        yield card
+
+
+def _fields(line: str) -> list[str]:
+    """Name and eight (or four wide) fields of a line."""
+    if "," in line:
+        words = [word.strip() for word in line.split(",")]
+        count = 4 if words[0].endswith("*") or words[0].startswith("*") else 8
+        return (words + [""] * count)[: count + 1]
+    width, count = (16, 4) if "*" in line[:8] else (8, 8)
+    return [line[:8].strip(), *(line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count))]
+
+
+def _at(card: list[str], place: int) -> str:
+    return card[place] if place < len(card) else ""
+
+
+def _whole(card: list[str], place: int, otherwise: int | None = None) -> int:
+    text = _at(card, place)
+    if not text and otherwise is not None:
+        return otherwise
+    if not re.fullmatch(r"[+-]?\d{1,12}", text):
+        raise Damaged(f"{card[0]} {_at(card, 1)} holds '{text[:20]}' where a whole number belongs")
+    return int(text)
+
+
+def _real(card: list[str], place: int) -> float | None:
+    """A number as Nastran writes it: 1.5-3 is 1.5E-3. None: blank."""
+    text = _at(card, place).upper().replace("D", "E")
+    if not text:
+        return None
+    try:
+        return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text) if "E" not in text else text)
+    except ValueError:
+        raise Damaged(f"{card[0]} {_at(card, 1)} holds '{text[:20]}' where a number belongs") from None
+
+
+def _listed(card: list[str], first: int) -> list[int]:
+    """Numbers from a place on; A THRU B is a range."""
+    words = [w for w in card[first:] if w]
+    members: list[int] = []
+    for i, word in enumerate(words):
+        if word.upper() == "THRU":
+            if not members or i + 1 >= len(words) or not words[i + 1].isdecimal() or len(words[i + 1]) > 9:
+                raise Damaged(f"{card[0]} {_at(card, 1)} holds THRU without its ends")
+            members += range(members[-1] + 1, min(int(words[i + 1]), members[-1] + 10**8))
+        elif word.isdecimal() and len(word) < 13:
+            members.append(int(word))
+        else:
+            raise Damaged(f"{card[0]} {_at(card, 1)} holds '{word[:20]}' where the number of a point belongs")
+    return members
+
+
+# content -------------------------------------------------------------------------------------------------------------
+
+
+def _grid(cards: Cards) -> RawMesh:
+    if not cards.get("GRID"):
+        raise Damaged("it holds no GRID card")
+    ids, points = [], []
+    for card in cards["GRID"]:
+        ids.append(_whole(card, 1))
+        if _whole(card, 2, 0) != 0:
+            raise Damaged(f"GRID {ids[-1]} uses the local coordinate system {card[2]}; write it in the basic one")
+        points.append([_real(card, place) or 0.0 for place in (3, 4, 5)])
+    return RawMesh(np.array(points), np.array(ids, dtype=np.int64))
+
+
+def _elements(cards: Cards, raw: RawMesh, numbering: Numbering) -> list[int]:
+    """Add the solids; the properties that they name, in the order of their regions."""
+    blocks: dict[str, list[tuple[int, int, list[int]]]] = {}
+    properties: dict[int, int] = {}
+    for name in _SOLIDS:
+        for card in cards.get(name, []):
+            number, region = _whole(card, 1), properties.setdefault(_whole(card, 2), len(properties))
+            kind, nodes = _cell(name, number, card)
+            blocks.setdefault(kind, []).append((number, region, nodes))
+    for kind, found in blocks.items():
+        cells = np.array([nodes for _, _, nodes in found], dtype=np.int64)
+        raw.blocks.append((kind, numbering.positions(cells, "an element names")))
+        raw.cell_id.append(np.array([n for n, _, _ in found], dtype=np.int64))
+        raw.regions.append(np.array([r for _, r, _ in found]))
+    ids, count = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *raw.cell_id]), return_counts=True)
+    if (count > 1).any():
+        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
+    return list(properties)
+
+
+def _cell(name: str, number: int, card: list[str]) -> tuple[str, list[int]]:
+    forms = _SOLIDS[name]
+    nodes = [_whole(card, place, 0) for place in range(3, len(card))]
+    while nodes and nodes[-1] == 0:
+        nodes.pop()
+    if len(nodes) not in forms or min(nodes) < 1:
+        named = " or ".join(str(n) for n in sorted(forms))
+        raise Damaged(f"element {number} ({name}) has {sum(n > 0 for n in nodes)} nodes; {named} are read")
+    kind, places = forms[len(nodes)]
+    return kind, [nodes[i] for i in places]
+
+
+def _material(cards: Cards, property_: int) -> DeckMaterial:
+    """What a property's cells are made of."""
+    solid = next((c for c in cards["PSOLID"] if _whole(c, 1) == property_), None)
+    if solid is None:
+        return DeckMaterial("", None, None, np.zeros(6), None, f"of property {property_}, which no PSOLID defines")
+    number, where = _whole(solid, 2), f"PSOLID {property_}"
+    card = next((c for c in cards.get("MAT1", []) if _whole(c, 1) == number), None)
+    if card is None:
+        others = [c[0] for m in _MATERIALS for c in cards.get(m, []) if _at(c, 1) == str(number)]
+        name = f"{(others or ['MAT1'])[0]} {number}"
+        return DeckMaterial(name + ("" if others else " (missing)"), None, None, np.zeros(6), None, where)
+    E, G, nu = (_real(card, place) for place in (2, 3, 4))
+    if E is None and G is not None and nu is not None:
+        E = 2 * G * (1 + nu)
+    if nu is None and E is not None and G:
+        nu = E / (2 * G) - 1
+    name = f"MAT1 {number}"
+    if E is None or nu is None:
+        return DeckMaterial(name, None, _density(cards, card), np.zeros(6), None, where)
+    C, _ = isotropic_rows(name, np.array([[E, nu, 0.0]]))
+    expansion = turned_strain(np.full(3, _real(card, 6) or 0.0), None)
+    return DeckMaterial(name, C, _density(cards, card), expansion, None, where)
+
+
+def _density(cards: Cards, card: list[str]) -> float | None:
+    """RHO times PARAM WTMASS, which turns a weight into a mass."""
+    factor = next((_real(c, 2) for c in cards.get("PARAM", []) if _at(c, 1).upper() == "WTMASS"), None)
+    density = _real(card, 5)
+    return density if density is None or factor is None else density * factor
+
+
+def _shells(cards: Cards, raw: RawMesh, numbering: Numbering) -> None:
+    """Faces by the property of the shells that lie on them."""
+    found: dict[tuple[str, int], list[list[int]]] = {}
+    for name, corners in _SHELLS.items():
+        for card in cards.get(name, []):
+            nodes = [_whole(card, 3 + i) for i in range(corners)]
+            found.setdefault((f"PSHELL {_whole(card, 2, _whole(card, 1))}", corners), []).append(nodes)
+    for (label, _), facets in found.items():
+        table: Indices = np.array(facets, dtype=np.int64)
+        raw.facets.setdefault(label, []).append(numbering.positions(table, f"a shell of {label} names"))
