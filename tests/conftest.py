@@ -1,12 +1,43 @@
-"""One thread (the same bits at every run) and a fixed seed for the property tests."""
+"""One thread (the same bits at every run), a fixed seed for the property tests, and no silent skips where none may be."""
 
 import os
+import re
+from collections.abc import Iterator
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
     "microslip", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow], database=None
 )
 settings.load_profile("microslip")
+
+ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")
+"""Why a test is skipped where another program or package is missing. With MICROSLIP_PEERS=required that fails."""
+
+
+def missing(outcome: str, reason: Any) -> bool:
+    """Whether a skipped test wanted a program that must be there."""
+    required = os.environ.get("MICROSLIP_PEERS") == "required"
+    return required and outcome == "skipped" and bool(ABSENT.search(str(reason)))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[Any]:
+    report = yield
+    if missing(report.outcome, report.longrepr) and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"{item.nodeid}: skipped, but MICROSLIP_PEERS=required: {report.longrepr}"
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[Any]:
+    report = yield
+    if missing(report.outcome, report.longrepr):
+        report.outcome = "failed"
+        report.longrepr = f"{collector.nodeid}: skipped, but MICROSLIP_PEERS=required: {report.longrepr}"
+    return report

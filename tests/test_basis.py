@@ -344,9 +344,9 @@ def test_absurd_numbers_are_findings_and_no_exceptions(factor: float) -> None:
     assert g.invariants is not None
     v = g.invariants
     with np.errstate(over="ignore"):
-        K = g.K_r * factor
+        K, omega = g.K_r * factor, g.omega * factor
     groups = [
-        dataclasses.replace(g, omega=g.omega * factor, K_r=K),
+        dataclasses.replace(g, omega=omega, K_r=K),
         dataclasses.replace(g, phi=g.phi * factor),
         dataclasses.replace(g, invariants=dataclasses.replace(v, mass=v.mass * factor)),
         dataclasses.replace(g, invariants=dataclasses.replace(v, point=v.point * factor + factor)),

@@ -341,6 +341,21 @@ def test_mbdyn_invariants_are_the_derivatives_of_the_inertia(tmp_path: Path) -> 
     close(Inv5, -Inv5.transpose(0, 2, 1))
 
 
+def test_inertia_from_mbdyns_invariants_is_that_of_the_deformed_body(tmp_path: Path) -> None:
+    """J(q) = J_0 + (Inv8 + Inv8^T) q - Inv9 q q at a deflection as large as the body, to rounding."""
+    basis = body()
+    writer("mbdyn")(basis, tmp_path / "b.fem")
+    read, b = read_fem(tmp_path / "b.fem"), floating_body(basis, stiffened=False)
+    m = b.n_modes
+    mass, centre, about = read[12][0], read[12][1:4], read[12][4:].reshape(3, 3)
+    J0 = about + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    Inv8, Inv9 = read[16].reshape(3, m, 3), read[18].reshape(3, m, m, 3)
+    q = np.random.default_rng(5).normal(size=m) * max(small.SIZE) * np.sqrt(mass)
+    first, second = np.einsum("ijk,j->ik", Inv8, q), np.einsum("ijlk,j,l->ik", Inv9, q, q)
+    assert np.abs(second).max() > 1e-2 * np.abs(J0).max(), "the second order must show"
+    close(J0 + first + first.T - second, inertia(b, q), 1e-11)
+
+
 # --- pyHarm -----------------------------------------------------------------------------------------------------------
 
 

@@ -1,7 +1,8 @@
 """Exports in the programs they are for: Octave, pyHarm and Exudyn build the body and compute with it.
 
 pyHarm and Exudyn live in environments of their own, made by ``make peers`` (tests/peers/setup.sh); elsewhere their
-interpreters may be named by MICROSLIP_PYHARM and MICROSLIP_EXUDYN. Without them the tests are skipped.
+interpreters may be named by MICROSLIP_PYHARM and MICROSLIP_EXUDYN. Without them the tests are skipped, or fail with
+MICROSLIP_PEERS=required, as in CI.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ def needs(name: str) -> pytest.MarkDecorator:
 
 
 def ask(name: str, script: str, *words: str | Path) -> None:
-    """Run a script in a peer's environment."""
+    """Run a script in a peer's environment, in the folder of its last word: pyHarm leaves a folder where it runs."""
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(
         [str(interpreter(name)), str(PEERS / script), *map(str, words)],
-        capture_output=True, text=True, timeout=600, env=environment,
+        capture_output=True, text=True, timeout=600, env=environment, cwd=Path(words[-1]).parent,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
 

@@ -336,3 +336,66 @@ def test_make_of_a_body_is_set_up_then_mesh_then_modes_then_report(tmp_path: Pat
     assert "setup.sh" in make("-n", "test", folder=clone).splitlines()[0]
     for target in ("test-all", "lint", "docs", "bench", "clean", "all", "half-pipe", "pendulum-mesh"):
         make("-n", target, folder=clone)
+
+
+# ---------------------------------------------------------------- .ci/run and the programs that exports are for
+
+
+def continuous_integration(folder: Path, *fails: str, **environment: str) -> tuple[int, list[str], str]:
+    """Exit code, the make targets that were asked for, and the words of .ci/run where make and apt-get are stand-ins."""
+    (folder / ".ci").mkdir(parents=True)
+    shutil.copy(ROOT / ".ci" / "run", folder / ".ci" / "run")
+    path, log = folder / "path", folder / "log"
+    path.mkdir()
+    for tool in ("bash", "env", "id", "dirname"):
+        (path / tool).symlink_to(str(shutil.which(tool)))
+    failing = "|".join(fails or ("nothing",))
+    scripts = {
+        "make": f'echo "$1 $MICROSLIP_PEERS" >>"{log}"\ncase "$1" in {failing}) exit 2 ;; esac',
+        "apt-get": f'case "$1" in {failing}) exit 100 ;; esac',
+    }
+    for name, text in scripts.items():
+        (path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (path / name).chmod(0o755)
+    (path / "id").unlink()
+    (path / "id").write_text("#!/bin/sh\necho 0\n")
+    (path / "id").chmod(0o755)
+    done = subprocess.run(
+        [str(folder / ".ci" / "run")], capture_output=True, text=True, timeout=60,
+        env={"PATH": str(path), **environment},
+    )  # fmt: skip
+    return done.returncode, log.read_text().splitlines() if log.exists() else [], done.stdout + done.stderr
+
+
+@POSIX
+def test_ci_stops_where_a_step_or_a_peer_fails(tmp_path: Path) -> None:
+    steps = "setup lint test peers test-slow blade shroud".split()
+    code, asked, said = continuous_integration(tmp_path / "whole")
+    assert (code, asked) == (0, [f"{s} required" for s in steps]), said
+    for number, failing in enumerate(steps):
+        code, asked, said = continuous_integration(tmp_path / failing, failing)
+        assert code != 0 and [a.split()[0] for a in asked] == steps[: number + 1], said
+    code, asked, said = continuous_integration(tmp_path / "no-apt", "install")
+    assert code != 0 and not asked and "apt-get install calculix-ccx octave" in said
+    code, asked, said = continuous_integration(tmp_path / "asked", "peers", "install", MICROSLIP_PEERS="optional")
+    assert (code, asked) == (0, [f"{s} optional" for s in steps]), said
+
+
+@pytest.mark.parametrize(("required", "code"), [("required", 1), ("optional", 0)])
+def test_a_skip_for_want_of_a_program_fails_where_it_is_required(required: str, code: int, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "tests" / "conftest.py", tmp_path / "conftest.py")
+    (tmp_path / "test_a.py").write_text(
+        "import pytest\n"
+        "@pytest.mark.skipif(True, reason='Octave is not installed')\ndef test_a(): pass\n"
+        "def test_b(): pytest.importorskip('no_such_package')\n"
+        "@pytest.mark.skipif(True, reason='signals of POSIX systems')\ndef test_c(): pass\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", ".", "test_a.py"]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=60,
+        env={**os.environ, "MICROSLIP_PEERS": required},
+    )  # fmt: skip
+    assert done.returncode == code, done.stdout + done.stderr
+    if required == "required":
+        assert "1 skipped" in done.stdout and "Octave is not installed" in done.stdout
+        assert "no_such_package" in done.stdout

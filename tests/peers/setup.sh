@@ -1,6 +1,6 @@
 #!/bin/sh
 # Make an environment of its own for every program that exports are tried in: build/peers/<name> from <name>.txt beside.
-# An argument names one of them. What cannot be installed is said and left out: its tests are then skipped.
+# An argument names one of them. What cannot be installed is said and left out: its tests are then skipped; exit code 1.
 set -u
 cd "$(dirname "$0")/../.."
 unset PYTHONPATH PYTHONHOME
@@ -21,11 +21,14 @@ make_one() { # name
     printf '%s\n' "$wanted" >"$place/.ready"
 }
 
+failed=0
 for name in ${1:-pyharm exudyn}; do
     if make_one "$name"; then
         echo "$name: build/peers/$name"
     else
         rm -rf "build/peers/$name"
         echo "$name could not be installed: its tests are skipped" >&2
+        failed=1
     fi
 done
+exit $failed

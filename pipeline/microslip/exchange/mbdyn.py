@@ -1,11 +1,12 @@
-"""MBDyn: the .fem file of its modal joint, record groups 1, 2, 5 to 10 and 12 to 17 of the published layout.
+"""MBDyn: the .fem file of its modal joint, record groups 1, 2, 5 to 10 and 12 to 18 of the published layout.
 
 Nodes are the attachment points (interfaces by their rigid fit, monitors), six components each in body axes; the body
 frame has the axes of the mesh and its origin at the reference point of the inertia integrals. Groups 12 (mass, centre,
-inertia about it) and 14 to 17 (invariants 3, 4, 8, 5) hold the integrals of the finite elements, so no lumped masses
+inertia about it) and 14 to 18 (invariants 3, 4, 8, 5, 9) hold the integrals of the finite elements, so no lumped masses
 (group 11) are needed: with S_j the integral of rho phi_j, invariant 3 is S_j, 4 that of rho r x phi_j, 8 that of
--rho r~ phi~_j, 5 that of rho phi_i x phi_j. Invariant 9 (group 18), the second-order change of the inertia, is left
-out.
+-rho r~ phi~_j, 5 that of rho phi_i x phi_j, 9 that of rho phi~_i phi~_j. The inertia about the origin of the body frame
+is then J(q) = J_0 + sum (Inv8_j + Inv8_j^T) q_j - sum Inv9_ij q_i q_j, exactly. Invariants 8 and 9 are printed row by
+row, in each row mode after mode (of 9: for each first mode all second ones) with three columns.
 """
 
 from __future__ import annotations
@@ -85,6 +86,7 @@ def _invariants(v: Invariants) -> list[str]:
         (15, 4): position_cross_shape(v),
         (16, 8): np.hstack(list(-tilde_tilde(v.position_shape))),
         (17, 5): shape_cross_shape(v).reshape(3, -1),
+        (18, 9): tilde_tilde(v.shape_shape).transpose(2, 0, 1, 3).reshape(3, -1),
     }
     lines: list[str] = []
     for (group, invariant), table in tables.items():
