@@ -1,4 +1,4 @@
-"""One thread (the same bits at every run), a fixed seed for the property tests, and no silent skips where none may be."""
+"""One thread (the same bits at every run), a fixed seed for the property tests, no silent skips where none may be."""
 
 import os
 import re

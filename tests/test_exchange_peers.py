@@ -84,6 +84,30 @@ def test_octave_builds_the_system_and_answers_as_we_do(reduction: str, tmp_path:
 
 
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")
+def test_octave_rubs_the_body_along_a_force_direction(tmp_path: Path) -> None:
+    """One elastic dry friction element, sampled in Octave, in the closed form of one Jenkins element here.
+
+    512 samples a period: the kinks of the force are hit within 1 / 512 of a period, so its harmonic is off by the
+    square of that times their number, some 1e-5.
+    """
+    basis, k, limit, force = body("craig-bampton"), 4e6, 6.0, 10.0
+    g = basis.groups[0, 0]
+    writer("mat")(basis, tmp_path / "b.mat")
+    T, f = g.interfaces["left"].rows[0], force * g.excitations["shaker"].rows[0]
+    omega = np.array([0.9, 1.03, 1.1]) * g.omega[0]
+    lines = ",".join(f"{w:.17e}" for w in omega)
+    ask_octave(tmp_path, f"nlvib_friction('{tmp_path / 'b.mat'}', 'left:u_n', {k!r}, {limit!r}, {force!r}, [{lines}])")
+    found = loadmat(tmp_path / "out.mat")["u"].ravel()
+    slips = np.abs(found) * k > limit
+    assert slips.any() and not slips.all(), "it must stick at one frequency and slip at another"
+    for w, u in zip(omega, found, strict=True):
+        Z = -(w**2) * g.M_r + 1j * w * g.C_r + g.K_r
+        closed, _ = jenkins_harmonic(np.abs([u]), k, limit)
+        expected = T @ np.linalg.solve(Z, f - closed[0] * u * T)
+        assert abs(u - expected) < 3e-5 * abs(u)
+
+
+@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")
 def test_octave_answers_for_a_complex_nodal_diameter(tmp_path: Path) -> None:
     """Complex arrays: W loads by its columns, T reads, and the answer is the same."""
     basis = sector.basis()

@@ -342,7 +342,7 @@ def test_make_of_a_body_is_set_up_then_mesh_then_modes_then_report(tmp_path: Pat
 
 
 def continuous_integration(folder: Path, *fails: str, **environment: str) -> tuple[int, list[str], str]:
-    """Exit code, the make targets that were asked for, and the words of .ci/run where make and apt-get are stand-ins."""
+    """Exit code, the targets asked for, and the words of .ci/run where make and apt-get are stand-ins."""
     (folder / ".ci").mkdir(parents=True)
     shutil.copy(ROOT / ".ci" / "run", folder / ".ci" / "run")
     path, log = folder / "path", folder / "log"
