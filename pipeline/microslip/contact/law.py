@@ -14,7 +14,7 @@ Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""
 
 State = Any
-"""A pytree of arrays whose first axis counts the points."""
+"""A pytree of arrays whose last axis counts the points: the tangents of many points are then computed side by side."""
 
 T = TypeVar("T")
 
@@ -33,6 +33,9 @@ def static(**options: Any) -> Any:
 
 class Law:
     """Base of the contact laws.
+
+    A setting is one number or has the points along its last axis, in the order of the rows of ``u``; a table, the
+    same for all points, has a last axis of length one. States have the points along their last axis.
 
     Frame (n, t1, t2) of the contact. ``u`` (n, 3) is the relative displacement in m, u_n > 0 closing, measured from
     the gap at which the highest asperities just touch; ``v`` (n, 3) its velocity in m/s. The force (n, 3) in N is
@@ -155,8 +158,8 @@ def root(value: Array) -> Array:
 
 
 def norm(vectors: Array) -> Array:
-    """Length of vectors along the last axis, differentiable at zero."""
-    return root(jnp.sum(vectors**2, axis=-1))
+    """Length of vectors along the first axis, differentiable at zero."""
+    return root(jnp.sum(vectors**2, axis=0))
 
 
 def ratio(above: Array, below: Array, otherwise: float = 0.0) -> Array:

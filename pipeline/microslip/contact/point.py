@@ -6,18 +6,19 @@ normal law and two tangential springs (with dampers, if wanted); P sticks to the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from .friction import Friction
-from .law import Array, Law, norm, ratio, settings
+from .law import Array, Law, norm, ratio, root, settings
 from .normal import Normal
 
 
 class PointState(NamedTuple):
-    """State of n points: u_t (n, 2) m, elastic force (n, 2) N, share (n,) of the stiffness, slip (n, 2) m."""
+    """State of n points: u_t (2, n) m, elastic force (2, n) N, share (n,) of the stiffness, slip (2, n) m."""
 
     tangential: Array
     elastic: Array
@@ -48,31 +49,32 @@ class PointContact(Law):
     damping: Array | None = None
 
     def init(self, n: int) -> PointState:
-        return PointState(jnp.zeros((n, 2)), jnp.zeros((n, 2)), jnp.zeros(n), jnp.zeros((n, 2)))
+        return PointState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n), jnp.zeros((2, n)))
 
     def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
-        share = self.normal.share(u[:, 0])
-        pressed = self._pressed(u[:, 0], v[:, 0])
+        approach, tangential = u.T[0], u.T[1:]
+        share = self.normal.share(approach)
+        pressed = self._pressed(approach, v.T[0])
         springs = self._springs(share)
-        relaxed = state.elastic * jnp.minimum(ratio(share, state.share), 1.0)[:, None]
-        stiffness = springs if self.damping is None else springs * (1 + _column(self.damping) / dt)
-        trial = relaxed + stiffness * (u[:, 1:] - state.tangential)
-        theta = self._kept(trial, stiffness, pressed, dt)[:, None]
+        relaxed = state.elastic * jnp.minimum(ratio(share, state.share), 1.0)
+        stiffness = springs if self.damping is None else springs * (1 + self.damping / dt)
+        trial = relaxed + stiffness * (tangential - state.tangential)
+        theta = self._kept(trial, stiffness, pressed, dt)
         force = trial * _weight(theta, self._relative(stiffness))
         stretched = ratio(force - relaxed, stiffness)
         elastic = force if self.damping is None else relaxed + springs * stretched
-        slipped = state.slipped + jnp.where(share[:, None] > 0, u[:, 1:] - state.tangential - stretched, 0.0)
-        return jnp.column_stack([pressed, force]), PointState(u[:, 1:], elastic, share, slipped)
+        slipped = state.slipped + jnp.where(share > 0, tangential - state.tangential - stretched, 0.0)
+        return jnp.concatenate([pressed[None], force]).T, PointState(tangential, elastic, share, slipped)
 
     def limit(self, force: Array, state: PointState) -> Array:
         return self.friction.coefficient(jnp.zeros(len(force))) * force[:, 0]
 
     def slip(self, state: PointState) -> Array:
-        return state.slipped
+        return state.slipped.T
 
     def stored(self, u: Array, state: PointState) -> Array:
         stretched = ratio(state.elastic**2, self._springs(state.share))
-        return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=-1)
+        return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
 
     def _pressed(self, u: Array, v: Array) -> Array:
         force = self.normal.force(u)
@@ -81,15 +83,15 @@ class PointContact(Law):
         return force
 
     def _springs(self, share: Array) -> Array:
-        """(n, 2) tangential stiffness of the area in contact, N/m."""
+        """(2, n) tangential stiffness of the area in contact, N/m."""
         first = self.stiffness_1 * share
-        return jnp.stack([first, first if self.stiffness_2 is None else self.stiffness_2 * share], axis=-1)
+        return jnp.stack([first, first if self.stiffness_2 is None else self.stiffness_2 * share])
 
     def _relative(self, stiffness: Array) -> Array | None:
-        """(n, 2) stiffness over the larger of both; None where both are one by construction."""
+        """(2, n) stiffness over the larger of both; None where both are one by construction."""
         if self.stiffness_2 is None:
             return None
-        return ratio(stiffness, jnp.max(stiffness, axis=-1, keepdims=True), 1.0)
+        return ratio(stiffness, jnp.max(stiffness, axis=0), 1.0)
 
     def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float) -> Array:
         """(n,) theta of `_weight` at which the force has come down to what friction can hold: 1 sticks."""
@@ -98,10 +100,6 @@ class PointContact(Law):
             held = self.friction.coefficient(tried) * pressed
             return jnp.where(tried > held, ratio(held, tried), 1.0)
         return _slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt)
-
-
-def _column(value: Array) -> Array:
-    return jnp.asarray(value)[..., None]
 
 
 def _weight(theta: Array, relative: Array | None) -> Array:
@@ -114,21 +112,53 @@ def _weight(theta: Array, relative: Array | None) -> Array:
     return theta if relative is None else ratio(theta, theta + (1 - theta) * relative)
 
 
-_STEPS = 40  # halvings of the interval of theta: beyond the rounding of a double after the last Newton step
-
-
 def _slide(
     trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float
 ) -> Array:
-    """theta by bisection, and one Newton step whose derivative is that of the solution (implicit function)."""
-    largest = jnp.max(stiffness, axis=-1)
+    """theta where friction holds what is left: a search without derivatives, then one Newton step, whose derivative
+    is that of the solution (implicit function theorem)."""
+    largest = jnp.max(stiffness, axis=0)
 
     def excess(theta: Array) -> Array:
-        force = norm(trial * _weight(theta[:, None], relative))
-        slip = ratio((1 - theta) * norm(trial * _weight(theta[:, None], relative)), theta * largest)
+        force = norm(trial * _weight(theta, relative))
+        slip = ratio((1 - theta) * force, theta * largest)
         return force - friction.coefficient(slip / dt) * pressed
 
-    sticks = excess(jnp.ones(len(trial))) <= 0
+    sticks = excess(jnp.ones(trial.shape[1])) <= 0
+    if friction.constant:
+        theta = _secular(trial, relative, friction.coefficient(largest) * pressed)
+    else:
+        theta = _halved(excess, trial.shape[1])
+    theta = jax.lax.stop_gradient(theta)
+    value, slope = jax.jvp(excess, (theta,), (jnp.ones(trial.shape[1]),))
+    theta = theta - jnp.where(slope > 0, value / jnp.where(slope > 0, jax.lax.stop_gradient(slope), 1.0), 0.0)
+    return jnp.where(sticks, 1.0, jnp.clip(theta, 0.0, 1.0))
+
+
+_STEPS = 40  # halvings of the interval of theta; the Newton step after them squares what is left
+_NEWTON = 8  # steps of an iteration that is exact for equal stiffness; enough for stiffnesses of a ratio of 1e-4
+
+
+def _secular(trial: Array, relative: Array | None, held: Array) -> Array:
+    """theta where the force is ``held`` (n,): Newton's method on 1/|force| over lambda, as for trust regions.
+
+    1/|force(lambda)| is concave and nearly straight (More & Sorensen, SIAM J. Sci. Stat. Comput. 4, 1983), so the
+    iteration rises monotonically from lambda = 0.
+    """
+    trial, relative, held = (x if x is None else jax.lax.stop_gradient(x) for x in (trial, relative, held))
+    relative = jnp.ones_like(trial) if relative is None else relative
+    multiplier = jnp.zeros(trial.shape[1])
+    for _ in range(_NEWTON):
+        left = trial / (1 + multiplier * relative)
+        square = jnp.sum(left**2, axis=0)
+        fall = jnp.sum(relative * left**2 / (1 + multiplier * relative), axis=0)
+        multiplier = jnp.maximum(multiplier + ratio(square, fall) * (ratio(root(square), held, jnp.inf) - 1), 0.0)
+        multiplier = jnp.where(held > 0, multiplier, jnp.inf)
+    return 1 / (1 + multiplier)
+
+
+def _halved(excess: Callable[[Array], Array], count: int) -> Array:
+    """theta by bisection: a characteristic that falls with the speed makes more than one root possible."""
 
     def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         low, high = ends
@@ -136,8 +166,5 @@ def _slide(
         above = excess(middle) > 0
         return jnp.where(above, low, middle), jnp.where(above, middle, high)
 
-    ends = jax.lax.fori_loop(0, _STEPS, halve, (jnp.zeros(len(trial)), jnp.ones(len(trial))))
-    theta = jax.lax.stop_gradient(0.5 * (ends[0] + ends[1]))
-    value, slope = jax.jvp(excess, (theta,), (jnp.ones(len(trial)),))
-    theta = theta - jnp.where(slope > 0, value / jnp.where(slope > 0, jax.lax.stop_gradient(slope), 1.0), 0.0)
-    return jnp.where(sticks, 1.0, jnp.clip(theta, 0.0, 1.0))
+    low, high = jax.lax.fori_loop(0, _STEPS, halve, (jnp.zeros(count), jnp.ones(count)))
+    return 0.5 * (low + high)

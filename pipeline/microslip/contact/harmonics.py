@@ -1,0 +1,104 @@
+"""Harmonics of the contact force from harmonics of the displacement, with all derivatives: alternating frequency/time.
+
+The points of a contact do not know of each other, so the derivative is taken per point, with respect to the 3 (2 H + 1)
+displacement harmonics of that point alone, and contracted with the kinematics of the contact afterwards.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .law import Array, Law, State
+
+CHUNK = 120
+"""Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
+
+
+def waves(harmonics: int, samples: int) -> tuple[Array, Array]:
+    """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform.
+
+    Raises:
+        ValueError: fewer than 2 H + 1 samples cannot hold H harmonics.
+    """
+    if samples < 2 * harmonics + 1:
+        raise ValueError(f"{samples} samples cannot hold {harmonics} harmonics; take at least {2 * harmonics + 1}")
+    t = 2 * np.pi * np.arange(samples) / samples
+    pairs = [f(h * t) for h in range(1, harmonics + 1) for f in (np.cos, np.sin)]
+    values = np.column_stack([np.ones(samples), *pairs])
+    weights = np.full(2 * harmonics + 1, 2.0 / samples)
+    weights[0] = 1.0 / samples
+    return jnp.asarray(values), jnp.asarray(weights[:, None] * values.T)
+
+
+@partial(jax.jit, static_argnames=("samples", "count", "chunk"))
+def force_harmonics(
+    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK
+) -> tuple[Array, Array]:
+    """Harmonics of the force in the last of ``count`` cycles, and their derivative.
+
+    Args:
+        u: (n, 3, 2 H + 1) displacement: mean, cos, sin, cos 2, sin 2, ... in m. period: s. samples: a cycle.
+        chunk: points at a time; the cost is linear in the number of points whatever it is.
+
+    Returns:
+        (n, 3, 2 H + 1) force in N and (n, 3, 2 H + 1, 3, 2 H + 1) its derivative in N/m.
+    """
+    n = u.shape[0]
+    if n <= chunk:
+        return _with_derivative(law, u, period, samples, count)
+    parts = -(-n // chunk)
+    filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
+    leaves, tree = jax.tree_util.tree_flatten(law)
+    own = [jnp.ndim(leaf) > 0 and jnp.shape(leaf)[-1] == n for leaf in leaves]
+    split = [_split(leaf, parts, chunk) for leaf, mine in zip(leaves, own, strict=True) if mine]
+
+    def one(part: tuple[list[Array], Array]) -> tuple[Array, Array]:
+        per_point = iter(part[0])
+        mixed = [next(per_point) if mine else leaf for leaf, mine in zip(leaves, own, strict=True)]
+        return _with_derivative(tree.unflatten(mixed), part[1], period, samples, count)
+
+    force, slope = jax.lax.map(one, (split, filled))
+    return force.reshape(-1, *u.shape[1:])[:n], slope.reshape(-1, *slope.shape[2:])[:n]
+
+
+def _split(leaf: Array, parts: int, chunk: int) -> Array:
+    """(..., n) in (parts, ..., chunk), filled with the last value."""
+    fill = [(0, 0)] * (jnp.ndim(leaf) - 1) + [(0, parts * chunk - leaf.shape[-1])]
+    whole = jnp.pad(leaf, fill, mode="edge").reshape(*leaf.shape[:-1], parts, chunk)
+    return jnp.moveaxis(whole, -2, 0)
+
+
+def _with_derivative(law: Law, u: Array, period: Array | float, samples: int, count: int) -> tuple[Array, Array]:
+    """Tangents along every harmonic, the same for all points, pushed through the cycles together."""
+    size = u.shape[1] * u.shape[2]
+
+    def push(direction: Array) -> tuple[Array, Array]:
+        tangent = jnp.broadcast_to(direction.reshape(u.shape[1:]), u.shape)
+        return jax.jvp(lambda x: _harmonics(law, x, period, samples, count), (u,), (tangent,))
+
+    force, slope = jax.vmap(push, out_axes=(None, 0))(jnp.eye(size))
+    return force, jnp.moveaxis(slope, 0, -1).reshape(*u.shape, *u.shape[1:])
+
+
+def _harmonics(law: Law, u: Array, period: Array | float, samples: int, count: int) -> Array:
+    """(n, 3, 2 H + 1) of the last cycle."""
+    harmonics = u.shape[2] // 2
+    values, transform = waves(harmonics, samples)
+    rates = (values - jnp.roll(values, 1, axis=0)) * (samples / period)
+
+    def one(state: State, row: tuple[Array, Array]) -> tuple[State, Array]:
+        force, after = law.step(u @ row[0], u @ row[1], period / samples, state)
+        return after, force
+
+    def cycle(state: State, _: None) -> tuple[State, None]:
+        return jax.lax.scan(lambda s, row: (one(s, row)[0], None), state, (values, rates))[0], None
+
+    state = law.init(u.shape[0])
+    if count > 1:
+        state, _ = jax.lax.scan(cycle, state, None, length=count - 1)
+    _, force = jax.lax.scan(one, state, (values, rates))
+    return jnp.einsum("hs,snk->nkh", transform, force)

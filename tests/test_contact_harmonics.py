@@ -1,0 +1,104 @@
+"""Force harmonics of contact points and their derivatives."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from microslip.contact import EXAMPLES
+from microslip.contact.friction import Coulomb
+from microslip.contact.harmonics import force_harmonics, waves
+from microslip.contact.law import cycles
+from microslip.contact.normal import Preload
+from microslip.contact.point import PointContact
+
+ROUGH = EXAMPLES["rough point"]
+
+
+def some(n, harmonics=3, seed=0, example=ROUGH):
+    rng = np.random.default_rng(seed)
+    u = rng.normal(size=(n, 3, 2 * harmonics + 1)) / 3 * np.array([[1.0], [1], [1]])
+    u *= np.array([example.normal, example.tangential, example.tangential])[:, None]
+    u[:, 0, 0] += example.normal
+    return jnp.asarray(u)
+
+
+def test_transform_is_the_inverse_of_the_waves() -> None:
+    values, transform = waves(4, 9)
+    assert np.allclose(transform @ values, np.eye(9), rtol=0, atol=1e-15)
+
+
+def test_too_few_samples_are_refused() -> None:
+    with pytest.raises(ValueError, match="at least 9"):
+        waves(4, 8)
+
+
+def test_a_jenkins_element_has_its_closed_form() -> None:
+    """Complex stiffness at three times the slip limit (Sextro Eqs. (5.2-24) to (5.2-28), errata): the first harmonic
+    of sampled cycles converges with the second power of the step."""
+    k, limit, x = 2e7, 40.0, 3.0
+    theta = np.arccos(1 - 2 / x)
+    exact = k * ((theta - np.sin(2 * theta) / 2) / np.pi + 4j * (x - 1) / (np.pi * x**2))
+    law = PointContact(Preload(jnp.asarray(100.0)), Coulomb(jnp.asarray(0.4)), jnp.asarray(k))
+    u = jnp.zeros((1, 3, 3)).at[0, 1, 1].set(x * limit / k)
+    errors = []
+    for samples in (64, 256, 1024):
+        f = force_harmonics(law, u, 1.0, samples=samples)[0][0, 1]
+        errors.append(abs((f[1] - 1j * f[2]) / u[0, 1, 1] - exact) / k)
+    assert errors[-1] < 1e-5 and all(a > 8 * b for a, b in zip(errors, errors[1:], strict=False))
+
+
+def orbit(a, b, limit):
+    """First cosine and sine of the force along t1 on the path (a cos, b sin), stiffness 1."""
+    law = PointContact(Preload(jnp.asarray(1.0)), Coulomb(jnp.asarray(limit)), jnp.asarray(1.0))
+    u = jnp.zeros((1, 3, 3)).at[0, 1, 1].set(a).at[0, 2, 2].set(b)
+    return force_harmonics(law, u, 1.0, samples=4096, count=3)[0][0, 1, 1:]
+
+
+def test_on_a_circular_orbit_the_force_lags_by_a_constant_angle() -> None:
+    """Radius a beyond the limit R: the force has length R and lags by arccos(R / (k a)) (errata to 5.2-25..28)."""
+    assert np.allclose(orbit(1.0, 1.0, 0.5), [0.5 * 0.5, -0.5 * np.sqrt(0.75)], rtol=0, atol=1e-3)
+
+
+def test_on_an_elliptic_orbit_the_limit_is_a_cone_and_not_a_box() -> None:
+    """Each axis on its own would give the Jenkins element's 0.5 along t1 at twice its limit, whatever t2 does."""
+    a, b, limit = 1.0, 2.0, 0.5
+    force, forces = np.zeros(2), []
+    path = [np.array([a * np.cos(t), b * np.sin(t)]) for t in np.linspace(0, 6 * np.pi, 30001)]
+    for before, after in zip(path, path[1:], strict=False):
+        force = force + after - before
+        force = force * min(1.0, limit / np.hypot(*force))
+        forces.append(force[0])
+    last = np.array(forces[-10000:])
+    expected = 2 * np.mean(last * np.cos(2 * np.pi * np.arange(1, 10001) / 10000))
+    assert orbit(a, b, limit)[0] == pytest.approx(expected, abs=1e-3) and expected < 0.15
+
+
+@pytest.mark.parametrize("name", ["rough point", "rough point, two stiffnesses", "rough point, damped"])
+def test_derivative_matches_differences(name) -> None:
+    example = EXAMPLES[name]
+    u = some(6, example=example)
+    direction = some(6, seed=1, example=example)
+    slope = np.einsum("nkhlj,nlj->nkh", force_harmonics(example.law, u, example.period)[1], direction)
+    step = 1e-6
+    up, down = (force_harmonics(example.law, u + s * direction, example.period)[0] for s in (step, -step))
+    assert np.abs(slope - (up - down) / (2 * step)).max() <= 1e-5 * np.abs(slope).max()  # transitions inside the step
+
+
+def test_chunks_and_values_per_point_change_nothing() -> None:
+    n = 50
+    law = dataclasses.replace(ROUGH.law, friction=Coulomb(jnp.linspace(0.1, 0.5, n)))
+    whole = force_harmonics(law, some(n), ROUGH.period)
+    parts = force_harmonics(law, some(n), ROUGH.period, chunk=16)
+    for a, b in zip(whole, parts, strict=True):
+        assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+def test_harmonics_are_those_of_the_marched_cycle() -> None:
+    u = some(4)
+    values, transform = waves(3, 64)
+    force, _ = cycles(ROUGH.law, jnp.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)
+    expected = jnp.einsum("hs,snk->nkh", transform, force)
+    found = force_harmonics(ROUGH.law, u, ROUGH.period)[0]
+    assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(force).max())
