@@ -59,7 +59,7 @@ def force_harmonics(
     def one(part: tuple[list[Array], Array]) -> tuple[Array, Array]:
         per_point = iter(part[0])
         mixed = [next(per_point) if mine else leaf for leaf, mine in zip(leaves, own, strict=True)]
-        return _with_derivative(tree.unflatten(mixed), part[1], period, samples, count)
+        return _with_derivative(jax.tree_util.tree_unflatten(tree, mixed), part[1], period, samples, count)
 
     force, slope = jax.lax.map(one, (split, filled))
     return force.reshape(-1, *u.shape[1:])[:n], slope.reshape(-1, *slope.shape[2:])[:n]

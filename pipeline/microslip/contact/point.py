@@ -145,8 +145,8 @@ def _secular(trial: Array, relative: Array | None, held: Array) -> Array:
     1/|force(lambda)| is concave and nearly straight (More & Sorensen, SIAM J. Sci. Stat. Comput. 4, 1983), so the
     iteration rises monotonically from lambda = 0.
     """
-    trial, relative, held = (x if x is None else jax.lax.stop_gradient(x) for x in (trial, relative, held))
-    relative = jnp.ones_like(trial) if relative is None else relative
+    trial, held = jax.lax.stop_gradient(trial), jax.lax.stop_gradient(held)
+    relative = jnp.ones_like(trial) if relative is None else jax.lax.stop_gradient(relative)
     multiplier = jnp.zeros(trial.shape[1])
     for _ in range(_NEWTON):
         left = trial / (1 + multiplier * relative)
