@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -597,6 +598,15 @@ def test_one_contact_on_every_basis_moves_alike(method):
         assert share.held + share.supplied + 1 / beside.normal == pytest.approx(whole, rel=1e-5), given.includes
 
 
+def test_two_elastic_bodies_are_freed_of_their_bulk_one_after_the_other():
+    """Two bars end to end with a surface between them; what both bases hold and what is left make the whole."""
+    surface, g = ContactStiffness(3e9, (2e9, 2e9), SURFACE), bar("rubin")
+    whole = in_series(in_series(of_patch(g, "rubin", "right"), of_patch(g, "rubin", "right")), surface)
+    once = for_basis(whole, g, "rubin", "right")
+    assert for_basis(once, g, "rubin", "right").all == pytest.approx(surface.all, rel=1e-4)
+    assert whole.normal < once.normal < surface.normal
+
+
 def test_stiffness_that_cannot_count_the_bulk_is_refused():
     stiff = ContactStiffness(1e12, (1e12, 1e12), BULK_AND_SURFACE)
     with pytest.raises(UserError, match="said to count the bulk"):
@@ -723,6 +733,18 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
         joined(one, "side")
     with pytest.raises(UserError, match="includes must be"):
         joined(one, "face", includes="all")
+
+
+def test_a_nodal_diameter_is_joined_like_its_real_form():
+    """Turning the phase of every mode (a complex basis of the same body) must not move a frequency."""
+    g = bar("eigenmodes", 4)
+    face, phase = g.interfaces["right"], np.exp(1j * np.arange(4))
+    turned = replace(face, rows=face.rows * phase, shapes=face.shapes * phase)
+    twisted = replace(g, interfaces={"right": turned})
+    k = np.array([2e9, 1e9])
+    for includes in (SURFACE, BULK_AND_SURFACE):
+        real, waves = (joined(x, "right", includes=includes)(k) for x in (g, twisted))
+        assert waves == pytest.approx(real, rel=1e-12)
 
 
 def test_node_of_a_mode_at_the_contact_is_refused():

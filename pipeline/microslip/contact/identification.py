@@ -233,7 +233,8 @@ def joined(
     k_n h0^2/12 about t1, k_n b0^2/12 about t2 (Sextro 5.2).
 
     Args:
-        first, contact: a body and its interface. second, other: the body that faces it; a rigid wall if None.
+        first, contact: a body and its interface, real or of a nodal diameter (complex). second, other: the body that
+            faces it; a rigid wall if None.
         includes: SURFACE adds the static compliance that the modes leave out in series, so that the stiffness found
             is the surface's; BULK_AND_SURFACE leaves it to the stiffness, as the book's c_N0 beside eigenmodes.
         given: {"normal": N/m} or {"tangential": N/m}: known, and not among the stiffnesses of the model then.
@@ -263,7 +264,7 @@ def joined(
         k_n, k_t = (known[n] if n in known else next(asked) for n in ("normal", "tangential"))
         springs = k_n * spread_n + k_t * spread_t
         joint = springs[:, None] * np.linalg.inv(np.eye(6) + R * springs)  # also where a spring is zero
-        values = scipy.linalg.eigvalsh(np.diag(omega2) + T.T @ (0.5 * (joint + joint.T)) @ T)
+        values = scipy.linalg.eigvalsh(np.diag(omega2) + T.conj().T @ (0.5 * (joint + joint.conj().T)) @ T)
         return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
 
     return model
@@ -272,12 +273,12 @@ def joined(
 def _relative(groups: Sequence[tuple[ModalGroup, str]]) -> tuple[Array, Array, Array]:
     """omega^2 (m,), rows (6, m) of the relative motion in the first contact's frame, residual compliance (6, 6)."""
     turn = groups[0][0].interfaces[groups[0][1]].rotation
-    rows, R = [], np.zeros((6, 6))
+    rows, left = [], []
     for sign, (g, name) in zip((1.0, -1.0), groups, strict=False):
         face = g.interfaces[name]
         Q = np.kron(np.eye(2), turn @ face.rotation.T)
         rows.append(sign * Q @ face.rows)
         labels = [f"interface:{name}:{row}" for row in INTERFACE_ROWS]
         at = [g.compliance.labels.index(label) for label in labels]
-        R += Q @ g.compliance.residual[np.ix_(at, at)] @ Q.T
-    return np.concatenate([g.omega**2 for g, _ in groups]), np.hstack(rows), R
+        left.append(Q @ g.compliance.residual[np.ix_(at, at)] @ Q.T)
+    return np.concatenate([g.omega**2 for g, _ in groups]), np.hstack(rows), sum(left[1:], left[0])

@@ -123,8 +123,10 @@ def for_basis(
     Of a surface the bulk that the basis does not hold is added in series; of bulk and surface the part is taken out
     that the basis holds beyond plain eigenmodes.
 
+    Of two elastic bodies call it for the one and, with what it returns, for the other.
+
     Args:
-        given: of the whole contact at this body (a share of two bodies must be split before). Others: `of_patch`.
+        given: of the whole contact. Others: see `of_patch`.
 
     Raises:
         UserError: the stiffness is said to count the bulk, but is stiffer than the bulk alone.
