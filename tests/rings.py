@@ -31,9 +31,9 @@ AXIS = np.array([0.0, 1.0, 0.0])  # positive rotation carries z (radial) towards
 
 def bladed_sector(
     cell_type: str = "hexahedron20", sectors: int = 6, bore: float = 0.06, rim: float = 0.16, tip: float = 0.26,
-    width: float = 0.03, spiral: float = 0.25, lean: float = 0.12,
+    width: float = 0.03, spiral: float = 0.25, lean: float = 0.12, gap: float = 0.15,
 ) -> Mesh:  # fmt: skip
-    """A disc sector with a staggered blade off its middle and a shroud that leaves a gap to its neighbours.
+    """A disc sector with a staggered blade off its middle and a shroud that leaves a gap (share of the pitch).
 
     Nothing is mirror symmetric: the cyclic faces are spirals, the blade stands at one side of the rim and leans with
     the axial coordinate. Faces: bore, cyclic_left, cyclic_right, contact_left, contact_right, front (y = 0), top.
@@ -45,7 +45,7 @@ def bladed_sector(
     def to(p: Array) -> Array:
         z = np.interp(p[:, 2], np.linspace(0, 1, 5), height)
         above = np.clip(z - z0, 0, None) / (1 - z0)
-        phi = angle * ((p[:, 0] - 0.5) * (1 - 0.15 * above) + spiral * z) + lean * above * (2 * p[:, 1] - 0.6)
+        phi = angle * ((p[:, 0] - 0.5) * (1 - gap * above) + spiral * z) + lean * above * (2 * p[:, 1] - 0.6)
         r = np.interp(z, height, radius)
         return np.column_stack([r * np.sin(phi), width * p[:, 1] * (1 + 0.2 * (1 - z)), r * np.cos(phi)])
 

@@ -505,7 +505,6 @@ def test_number_of_sectors_must_be_known():
         ({"closures": [closure(point=[0.0, 0, 0])]}, "describe the ground"),
         ({"closures": [closure(), closure()]}, "used twice"),
         ({"bolts": [{"name": "b", "face": "z0", "preload": -1.0}]}, "greater than 0"),
-        ({"cyclic": {"sectors": 12}, "closures": [closure(modes="closed")]}, "differs from one nodal diameter"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, reason):

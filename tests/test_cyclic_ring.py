@@ -528,3 +528,67 @@ def test_a_wrong_axis_is_told_from_faces_that_do_not_match(change, words):
     given = {"axis": rings.AXIS, "point": np.zeros(3), "sectors": 6} | change
     with pytest.raises(UserError, match=words):
         pair_cut_faces(sector(), "cyclic_left", "cyclic_right", **given)
+
+
+JOINED = {"speeds_rpm": [3000.0], "prestress": "nonlinear", "gyroscopic": False}
+
+
+@cache
+def joined_ring() -> np.ndarray:
+    """Frequencies of a full ring whose shrouds are six contacts of one body, closed in its modes."""
+    mesh = rings.full_ring(rings.bladed_sector(gap=0.0), 6).mesh
+    closures = [
+        {"name": f"c{j}", "face": f"contact_right_{j}", "against": f"contact_left_{(j + 1) % 6}", "modes": "closed",
+         "interference": 1e-4}
+        for j in range(6)
+    ]  # fmt: skip
+    described = {"supports": [{"face": "bore"}], "rotation": JOINED, "closures": closures, "modes": {"count": 24}}
+    return modal_basis(mesh, body(**described)).groups[0, 0].frequency
+
+
+def joined(side: str = "right", **more):
+    other, shift = ("left", 1) if side == "right" else ("right", -1)
+    closure = {"name": "c", "face": f"contact_{side}", "against": f"contact_{other}", "sector_shift": shift}
+    described = {
+        "supports": [{"face": "bore"}], "rotation": JOINED, "cyclic": {"sectors": 6}, "modes": {"count": 6},
+        "closures": [{**closure, "modes": "closed", "interference": 1e-4}],
+    }  # fmt: skip
+    return modal_basis(rings.bladed_sector(gap=0.0), body(**(described | more)))
+
+
+def of_the_ring(basis) -> np.ndarray:
+    every = [np.repeat(g.frequency[:6], 1 if k in (0, 3) else 2) for (_, k), g in basis.groups.items()]
+    return np.sort(np.concatenate(every))
+
+
+@pytest.mark.parametrize("backend", ["auto", "superlu"])
+def test_shrouds_that_stay_closed_couple_the_sectors_as_they_do_the_ring(backend):
+    """The contact's stiffness between neighbours, with its phase, against six contacts within one body.
+
+    Newton ends at 1e-9 of the displacement in either; the sixth mode of a sector limits what can be compared.
+    """
+    basis = joined(modes={"count": 6, "solver": backend})
+    frequency, exact = of_the_ring(basis), joined_ring()
+    np.testing.assert_allclose(frequency[:20], exact[:20], rtol=1e-7)
+    opened = of_the_ring(joined(closures=[]))
+    assert (exact[:6] > 1.02 * opened[:6]).all()
+    assert all(g.checks["certified"] and g.checks["backward_error"] < 1e-12 for g in basis.groups.values())
+    assert {g.contacts["c"].modes for g in basis.groups.values()} == {"closed"}
+
+
+def test_either_side_may_press_on_the_other():
+    """Pressing left on right gives the pressures to other nodes: the same ring to what the mesh knows of an edge."""
+    one, other = joined(), joined("left")
+    for key, g in one.groups.items():
+        np.testing.assert_allclose(other.groups[key].frequency[:3], g.frequency[:3], rtol=0.03)
+
+
+@pytest.mark.parametrize("method", ["rubin", "craig-bampton"])
+def test_reductions_keep_the_coupling_of_closed_shrouds(method):
+    interface = {"name": "top", "face": "top", "t2": [0.0, 1.0, 0.0]}
+    exact = joined()
+    reduced = joined(reduction=method, interfaces=[interface], modes={"count": 12})
+    for key, g in exact.groups.items():
+        static = reduced.groups[key].compliance
+        assert abs(static.residual[:3, :3]).max() < 1e-8 * abs(static.static[:3, :3]).max()
+        np.testing.assert_allclose(reduced.groups[key].frequency[:2], g.frequency[:2], rtol=1e-3)

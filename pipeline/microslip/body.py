@@ -592,11 +592,6 @@ class BodySettings(Model):
                 raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
         if self.closures and self.rotation.prestress != "nonlinear":
             raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
-        if self.cyclic and any(c.modes == "closed" and c.sector_shift for c in self.closures):
-            raise ValueError(
-                'closures: modes = "closed" between neighbouring sectors differs from one nodal diameter to the next '
-                'and is not supported; leave modes = "open" and couple the interfaces afterwards'
-            )
         beyond = self.output.stress_nodal_diameters
         if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
             raise ValueError(

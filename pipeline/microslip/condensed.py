@@ -3,7 +3,8 @@
 At a shift s the sector with its cut faces apart has one real symmetric matrix A = K - s M for all nodal diameters.
 Its interior is factorised and condensed on the two cut faces, S = A_bb - A_bi A_ii^-1 A_ib. A nodal diameter only adds
 u_right = R u_left exp(+i k 2 pi / N), that is u_b = P_k u_left, so its own factorisation is that of the small
-Hermitian P_k^H S P_k, and its inertia is n(A_ii) + n(P_k^H S P_k) (Haynsworth).
+Hermitian P_k^H S P_k, and its inertia is n(A_ii) + n(P_k^H S P_k) (Haynsworth). Faces of neighbours that stay in
+contact belong to the boundary too; their stiffness, which depends on k, is added to the small matrix.
 """
 
 from __future__ import annotations
@@ -143,18 +144,21 @@ class HarmonicSolver(DirectSolver):
     """Solutions of T_k^H A T_k q = T_k^H f for one nodal diameter; many share one `Condensed`.
 
     Args:
-        condensed: of the sector, its boundary the left and then the right degrees of freedom on the cut faces.
-        block: (b, b) right = block times left times phase. transformation: (f, m) T_k.
-        stay: (m,) position of each unknown among the f free degrees of freedom.
+        condensed: of the sector, its boundary the degrees of freedom on the cut faces and those that `between` joins.
+        transformation: (f, m) T_k. stay: (m,) position of each unknown among the f free degrees of freedom, ascending.
+        between: (f, f) Hermitian, what joins neighbouring sectors besides the cut faces at this nodal diameter
+            (contacts), or None.
     """
 
     def __init__(
-        self, condensed: Condensed, block: sp.csr_matrix, phase: complex | float, transformation: sp.csr_matrix,
-        stay: Indices,
-    ) -> None:  # fmt: skip
+        self, condensed: Condensed, transformation: sp.csr_matrix, stay: Indices, between: sp.csr_matrix | None = None
+    ) -> None:
         self.condensed, self.name = condensed, condensed.name
-        self._P = sp.csr_matrix(sp.vstack([sp.csr_matrix(sp.identity(block.shape[0])), phase * block]))
+        edge = condensed.boundary
+        own = np.searchsorted(stay, edge[np.isin(edge, stay)])
+        self._P = transformation[edge][:, own].tocsr()
         self._T, self._stay = transformation, stay
+        self._between = None if between is None else (self._P.conj().T @ between[edge][:, edge] @ self._P).toarray()
 
     def factorise(self, upper: sp.csr_matrix) -> None:
         self.condensed.factorise(upper)
@@ -162,7 +166,8 @@ class HarmonicSolver(DirectSolver):
 
     def _reduce(self) -> _Dense:
         half = self._P.conj().T @ self.condensed.schur
-        dense = _Dense((self._P.T @ half.T).T)  # P^H S P
+        S = (self._P.T @ half.T).T  # P^H S P
+        dense = _Dense(S if self._between is None else S + self._between)
         self.condensed.reduced = (self, dense)
         return dense
 

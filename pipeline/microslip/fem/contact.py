@@ -75,6 +75,11 @@ class ContactPair:
     size: float
     stays_closed: bool = False
 
+    @property
+    def between_sectors(self) -> bool:
+        """Whether the master belongs to a neighbouring sector."""
+        return not np.allclose(self.turn, np.eye(3))
+
     def neighbour(self, x: Array) -> Array:
         """(n, 3) where the points of the master's body stand, for positions x (n, 3) of the slave's."""
         return (x - self.about) @ self.turn.T + self.about
@@ -121,7 +126,7 @@ def _local_sizes(n: int, faces: Facets, areas: list[Array]) -> Array:
 def _refuse_misplaced(pair: ContactPair, face: str, against: str | Plane) -> None:
     key = f"closures.{pair.name}"
     other = "the plane" if isinstance(against, Plane) else f"'{against}'" + (
-        "" if np.allclose(pair.turn, np.eye(3)) else " of the neighbouring sector"
+        " of the neighbouring sector" if pair.between_sectors else ""
     )
     cuts = cut_pair(pair, pair.points)
     if not cuts.points:

@@ -109,8 +109,14 @@ class Closing:
         parts = zip(self.pairs, self.cuts, self.multipliers, strict=True)
         return sum(float(np.sum(grip(p, c, x, m, self.level).force * change)) for p, c, m in parts)
 
-    def stiffened(self, K: Array, pattern: Pattern, kept: bool = False) -> Array:
-        """(p, 3, 3) stiffness with that of the contacts, or of those that stay closed in the modes, N/m."""
+    def stiffened(self, K: Array, pattern: Pattern, kept: bool = False, neighbours: bool = True) -> Array:
+        """(p, 3, 3) stiffness with that of the contacts, N/m.
+
+        Args:
+            kept: of those alone that stay closed in the modes. neighbours: False leaves out those between sectors,
+                whose stiffness depends on the nodal diameter.
+        """
         chosen = [g for g in self.grips if g.pair.stays_closed or not kept]
+        chosen = [g for g in chosen if neighbours or not g.pair.between_sectors]
         return sum((contact_stiffness(g, pattern, self.bent) for g in chosen), start=K)
 

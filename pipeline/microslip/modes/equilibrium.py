@@ -76,8 +76,9 @@ class StaticState:
         u: (n, 3) m. H: per block displacement gradients (e, q, 3, 3), None if the reference geometry is used.
         stress: per block (e, q, 6) second Piola-Kirchhoff stress, Pa. K: (p, 3, 3) stiffness about the state with
         the centrifugal softening, N/m: without the stiffness of contacts, whose forces stay as dead loads, but for
-        those that stay closed. prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton. contacts: as
-        they press in the state.
+        those that stay closed; of a cyclic sector without those between neighbours, which depend on the nodal
+        diameter (`sector.contact_between`). prestress: ``none``, ``linear``, ``nonlinear``. iterations: of Newton.
+        contacts: as they press in the state.
     """
 
     u: Array
@@ -259,7 +260,8 @@ def _newton_at(
         K = _tangent(model, H, stress)
         closing.move(points + u, steps[-1] if steps else np.inf)
         if _stands(steps) and closing.settled:
-            K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, kept=True)
+            whole = isinstance(free, FreeUpper)  # else a sector, whose neighbours count by nodal diameter (`sector`)
+            K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)
         outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))

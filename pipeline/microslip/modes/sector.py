@@ -6,7 +6,7 @@ Hermitian between. The travelling wave -k is the complex conjugate and is not so
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from .. import eigen
 from ..body import BodySettings
 from ..condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
 from ..data import Array, Indices, Mesh
+from ..fem.contact import Grip, contact_matrix
 from ..fem.cyclic import (
     CutFaces,
     CyclicUpper,
@@ -71,7 +72,7 @@ class Sector:
         Raises:
             UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
         """
-        pencils = sector_pencils(model, state.K, self.unknowns, self.condensed, self.harmonics)
+        pencils = sector_pencils(model, state.K, self.unknowns, self.condensed, self.harmonics, state.contacts)
         first = pencils[self.harmonics[0]]
         report(
             f"{len(pencils)} nodal diameters of {self.unknowns.cut.sectors} sectors: {first.n} unknowns, "
@@ -118,18 +119,44 @@ def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis:
     refuse_other_facets(d.mesh, settings.cyclic.left, settings.cyclic.right, cut)
     refuse_uncyclic(d.mesh, settings)
     unknowns = sector_unknowns(d.pattern, fixed, cut)
-    boundary = np.concatenate([unknowns.left, unknowns.right])
+    boundary = np.concatenate([unknowns.left, unknowns.right, _in_contact(d.mesh, settings, unknowns)])
     condensed = new_condensed(boundary, settings.modes.solver)
     return Sector(settings.cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
 
 
+def _in_contact(mesh: Mesh, settings: BodySettings, unknowns: SectorUnknowns) -> Indices:
+    """Positions, among the free degrees of freedom, of those on faces that neighbours keep closed, off the cut ones."""
+    kept = [c for c in settings.closures if c.modes == "closed" and c.sector_shift]
+    if not kept:
+        return np.zeros(0, dtype=np.int64)
+    points = np.unique(np.concatenate([mesh.face_points(f) for c in kept for f in (c.face, c.against)]))
+    found = np.flatnonzero(np.isin(unknowns.apart.free // 3, points))
+    return np.setdiff1d(found, np.concatenate([unknowns.left, unknowns.right]))
+
+
+def contact_between(grips: Sequence[Grip], unknowns: SectorUnknowns, harmonic: int) -> sp.csr_matrix | None:
+    """(f, f) stiffness of the contacts that neighbours keep closed, at a nodal diameter, N/m; None without any.
+
+    The neighbour at +2 pi / N moves with the phase exp(+i k 2 pi / N), the one at -2 pi / N with its conjugate. Each
+    contact is counted once, with the sector whose face it presses.
+    """
+    kept = [g for g in grips if g.pair.stays_closed and g.pair.between_sectors]
+    if not kept:
+        return None
+    phase, free = unknowns.cut.phase(harmonic), unknowns.apart.free
+    phases = [phase if np.allclose(g.pair.turn, unknowns.cut.rotation) else np.conj(phase) for g in kept]
+    first, *others = [contact_matrix(g, phase=p)[free][:, free] for g, p in zip(kept, phases, strict=True)]
+    return sum(others, start=first).tocsr()
+
+
 def sector_pencils(
-    model: BodyModel, K: Array, unknowns: SectorUnknowns, condensed: Condensed, harmonics: tuple[int, ...]
-) -> dict[int, eigen.Pencil]:
+    model: BodyModel, K: Array, unknowns: SectorUnknowns, condensed: Condensed, harmonics: tuple[int, ...],
+    grips: Sequence[Grip] = (),
+) -> dict[int, eigen.Pencil]:  # fmt: skip
     """Nodal diameter -> its pencil on the sector's unknowns.
 
     Args:
-        K: (p, 3, 3) stiffness over the pattern about the static state.
+        K: (p, 3, 3) stiffness over the pattern about the static state. grips: its contacts.
     """
     parts = pencil_parts(unknowns.apart, model.M, K)
     shifted = _remembered(parts.shifted)
@@ -137,9 +164,11 @@ def sector_pencils(
     pencils = {}
     for k in harmonics:
         T = unknowns.transformation(k)
-        solver = HarmonicSolver(condensed, unknowns.block, unknowns.cut.phase(k), T, stay)
+        between = contact_between(grips, unknowns, k)
+        k_norm = parts.k_norm + (0.0 if between is None else float(abs(between).sum(axis=1).max()))
+        solver = HarmonicSolver(condensed, T, stay, between)
         pencils[k] = eigen.Pencil(
-            shifted, _congruent(T, parts.K), _congruent(T, parts.M), T.shape[1], parts.k_norm, parts.m_norm, solver,
+            shifted, _congruent(T, parts.K, between), _congruent(T, parts.M), T.shape[1], k_norm, parts.m_norm, solver,
             dtype=complex if np.iscomplexobj(T.data) else float,
         )  # fmt: skip
     return pencils
@@ -158,12 +187,13 @@ def _remembered(shifted: Callable[[float], sp.csr_matrix]) -> Callable[[float], 
     return again
 
 
-def _congruent(T: sp.csr_matrix, product: MatVec) -> MatVec:
-    """x -> T^H A T x from a product with the real A."""
+def _congruent(T: sp.csr_matrix, product: MatVec, between: sp.csr_matrix | None = None) -> MatVec:
+    """x -> T^H (A + B) T x from a product with the real A and a Hermitian B."""
     H = T.conj().T.tocsr()
 
     def congruent(x: Array) -> Array:
         moved = (T @ x).reshape(T.shape[0], -1)
-        return (H @ as_complex(product(as_real(moved)), moved.dtype)).reshape(x.shape)
+        found = as_complex(product(as_real(moved)), moved.dtype)
+        return (H @ (found if between is None else found + between @ moved)).reshape(x.shape)
 
     return congruent
