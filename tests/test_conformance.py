@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -105,6 +106,37 @@ def test_the_validator_needs_nothing_but_h5py_and_numpy() -> None:
     names |= {n.module.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
     assert names - set(sys.stdlib_module_names) == {"h5py", "numpy"}
     assert "pickle" not in names
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of an environment with h5py and numpy and nothing else."""
+    folder = tmp_path_factory.mktemp("bare") / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    (site,) = folder.glob("[Ll]ib/**/site-packages")
+    for package in (h5py, np):
+        place = Path(package.__file__).parent
+        for part in (place, place.with_name(f"{place.name}.libs")):
+            if part.exists():
+                shutil.copytree(part, site / part.name, symlinks=True, ignore=shutil.ignore_patterns("tests"))
+    return next(folder.glob("[bS]*/python*"))
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_validator_runs_where_there_is_only_h5py_and_numpy(name: str, bare: Path, tmp_path: Path) -> None:
+    """The kit without the scripts that make it, in an environment without microslip, scipy or any other package."""
+    kit = shutil.copytree(KIT, tmp_path / "kit", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    shutil.copy(KIT / "validate.py", kit)
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+
+    def asked(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [str(bare), *words], cwd=kit, env=environment, capture_output=True, text=True, timeout=120
+        )  # fmt: skip
+
+    assert "No module named 'scipy'" in asked("-c", "import scipy").stderr
+    done = asked("validate.py", f"samples/{name}.h5", "--answers", f"answers/{name}.json")
+    assert done.returncode == 0 and "conforms and its answers agree" in done.stdout, done.stdout + done.stderr
 
 
 # ---------------------------------------------------------------- samples and answers

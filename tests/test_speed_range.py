@@ -354,6 +354,47 @@ def test_the_command_line_reads_any_speed_of_the_range(tmp_path, capsys) -> None
     assert "outside the speed range of 'test', 0 to 16000 rpm" in capsys.readouterr().err
 
 
+def test_exports_at_any_speed_of_the_range(tmp_path, capsys) -> None:
+    """--rpm writes the reduced body of that speed, bit for bit what `group_at` gives; at a station the station's own.
+
+    Multibody formats take a body at rest, so they take 0 rpm and refuse another speed.
+    """
+    from scipy.io import loadmat, mmread
+
+    from microslip.cli import main
+
+    file, out = tmp_path / "basis.h5", tmp_path / "out"
+    write_basis(file, ranged())
+    for rpm in (0.0, 5432.1, TOP):
+        g = basis_at(ranged(), rpm).groups[0, 0]
+        assert g.speed == pytest.approx(rpm * np.pi / 30, rel=1e-12)
+        words = ["export", str(file), "--rpm", repr(rpm), "-o"]
+        assert main([*words, str(tmp_path / "a.mat"), "--to", "mat"]) == 0
+        b = loadmat(tmp_path / "a.mat", struct_as_record=False, squeeze_me=True)
+        assert [n for n in b if n.startswith("speed_")] == ["speed_0"] and b["speed_0"].Omega == g.speed
+        for name, value in {"K": g.K_r, "G": g.G_r, "D": g.C_r, "phi": g.phi, "u_static": g.u_static}.items():
+            np.testing.assert_array_equal(getattr(b["speed_0"], name), value)
+        assert main([*words, str(tmp_path / "mtx"), "--to", "mtx"]) == 0
+        assert [p.name for p in (tmp_path / "mtx").iterdir() if p.is_dir()] == ["speed_0"]
+        np.testing.assert_array_equal(np.asarray(mmread(tmp_path / "mtx" / "speed_0" / "K_r.mtx")), g.K_r)
+        for form in ("uff", "vtu", "pvd"):
+            assert main([*words, str(tmp_path / f"a.{form}"), "--to", form]) == 0
+    capsys.readouterr()
+    for form in ("exudyn", "mbdyn", "sid"):
+        assert main(["export", str(file), "--to", form, "--rpm", "0", "-o", str(tmp_path / form)]) == 0
+        assert main(["export", str(file), "--to", form, "--rpm", "5000", "-o", str(out)]) == 2
+        assert "a group at rest" in capsys.readouterr().err
+    for words, says in (
+        (["--rpm", "17000"], "outside the speed range of 'test', 0 to 16000 rpm"),
+        (["--rpm", "nan"], "outside the speed range"),
+        (["--rpm", "5000", "--speed", "0"], "leave --speed out"),
+        (["--rpm", "5000", "--nodal-diameter", "2"], "the file has 0"),
+    ):
+        assert main(["export", str(file), "--to", "mat", *words, "-o", str(out)]) == 2
+        err = capsys.readouterr().err
+        assert says in err and len(err.splitlines()) == 1 and not out.exists()
+
+
 def test_campbell_diagram_of_the_range() -> None:
     """Fifty speeds, dots at the samples, curves that follow the shapes."""
     tracks = track_basis(ranged())

@@ -263,6 +263,8 @@ def export(
 
         print(write_ring(read_basis(file), output or file.with_name(f"{file.stem}_ring.pvd"), speed or 0))
         return
+    if rpm is not None and speed is not None:
+        raise UserError("export --rpm: it chooses the speed already; leave --speed out")
     target = output or file.with_name(file.stem + WRITERS[to].ending)
     basis = read_basis(file)
     writer(to)(select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter), target)

@@ -1,7 +1,9 @@
 """A basis as xarray sees it: a tree of data sets with named axes, units in the attributes.
 
 ``/`` the mesh's points, ``/speed_0`` or ``/speed_0/nd_3`` a group. Complex arrays are complex. Nothing is copied that
-xarray need not copy, and nothing is written: ``tree.to_netcdf`` or ``tree["speed_0"].to_dataset()`` do what is wanted.
+xarray need not copy; a slash in a name, which xarray keeps for paths, is written %2F, a % then %25, as in the modal
+file; a variable of an axis's name gets an underscore behind it. Nothing is written: ``tree.to_netcdf`` or
+``tree["speed_0"].to_dataset()`` do what is wanted.
 """
 
 from __future__ import annotations
@@ -32,7 +34,11 @@ def to_xarray(basis: ModalBasis) -> Any:
     for (speed, harmonic), group in sorted(basis.groups.items()):
         place = f"/speed_{speed}" + (f"/nd_{harmonic}" if basis.sectors > 1 else "")
         tree[place] = _group(basis, group, xarray)
-    return xarray.DataTree.from_dict(tree, name=basis.name)
+    return xarray.DataTree.from_dict(tree, name=_name(basis.name))
+
+
+def _name(name: str) -> str:
+    return name.replace("%", "%25").replace("/", "%2F")
 
 
 def _root(basis: ModalBasis, xarray: Any) -> Any:
@@ -59,21 +65,24 @@ def _group(basis: ModalBasis, g: ModalGroup, xarray: Any) -> Any:
     table |= _compliance(g, coords) | _stress(g, coords)
     if any("interface_row" in entry[0] for entry in table.values()):
         coords["interface_row"] = list(INTERFACE_ROWS)
-    named_units = {n: (d, v, {"units": _UNITS[n]} if n in _UNITS else {}) for n, (d, v, *_) in table.items()}
+    axes = {*coords, *(axis for entry in table.values() for axis in entry[0])}
+    named_units = {
+        n + "_" * (n in axes): (d, v, {"units": _UNITS[n]} if n in _UNITS else {}) for n, (d, v, *_) in table.items()
+    }
     attrs = {"speed_rad_per_s": g.speed, "nodal_diameter": g.harmonic, "prestress": g.prestress}
     return xarray.Dataset(named_units, coords=coords, attrs=attrs)
 
 
 def _interfaces(named: Mapping[str, Interface]) -> dict[str, Any]:
-    return {f"interface_{n}": (("interface_row", "mode"), i.rows) for n, i in named.items()}
+    return {f"interface_{_name(n)}": (("interface_row", "mode"), i.rows) for n, i in named.items()}
 
 
 def _rows(kind: str, named: Mapping[str, Rows], coords: dict[str, Any]) -> dict[str, Any]:
     table = {}
     for name, rows in named.items():
-        axis = f"{kind}_{name}_row"
+        axis = f"{kind}_{_name(name)}_row"
         coords[axis] = list(rows.labels)
-        table[f"{kind}_{name}"] = ((axis, "mode"), rows.rows)
+        table[f"{kind}_{_name(name)}"] = ((axis, "mode"), rows.rows)
     return table
 
 
