@@ -49,6 +49,13 @@ def massless() -> ModalBasis:
     return modal_basis(bodies.vane((1, 1, 3), 0.4), settings)
 
 
+def macneal() -> ModalBasis:
+    """Residual shapes and stresses beside the modes."""
+    gauge = {"name": "root", "point": [0.0, 0.0, 0.0], "direction": [0.0, 0.0, 1.0]}
+    settings = bodies.vane_settings("macneal", reduction="macneal", gauges=[gauge], output={"gauss": True})
+    return modal_basis(bodies.vane((1, 1, 3), 0.4), settings)
+
+
 def two_materials() -> ModalBasis:
     """A mesh that brings its materials, both of the same numbers."""
     basis = built("vane-eigenmodes")
@@ -67,7 +74,7 @@ def every_kind(folder: Path) -> list[Path]:
     for name in bodies.SAMPLES:
         write_basis(folder / f"{name}.h5", built(name))
         found.append(folder / f"{name}.h5")
-    for name, basis in (("massless", massless()), ("materials", two_materials())):
+    for name, basis in (("massless", massless()), ("macneal", macneal()), ("materials", two_materials())):
         write_basis(folder / f"{name}.h5", basis)
         found.append(folder / f"{name}.h5")
     return found

@@ -174,6 +174,31 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
 
 
 @app.command
+def closure(
+    body: Path, name: str | None = None, /, *, low: Annotated[float, Parameter(name="--from")] = 0.0,
+    high: Annotated[float, Parameter(name="--to")], points: int = 9, rpm: float = 0.0, output: Output = None,
+    set_: Set = (), quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Press a closure step by step: its normal force and stiffness over the approach, as a table and a picture.
+
+    Args:
+        body: a body.toml with [[closures]], or the folder that holds it.
+        name: of the closure; may be left out where there is only one.
+        low: first approach of the faces (their interference), in the body's length_unit; negative: a gap.
+        high: last one.
+        points: number of steps.
+        rpm: speed of rotation.
+        output: folder for the table and the picture; build/NAME if not given.
+    """
+    from .workflow import closure_stage, open_job
+
+    job = open_job(body, list(set_))
+    with progress(f"closure of {job.settings.name}", quiet) as report:
+        found = closure_stage(job, name, low, high, points, rpm, output, report)
+    _say("\n".join(map(str, found)), quiet)
+
+
+@app.command
 def respond(
     case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:  # fmt: skip

@@ -249,6 +249,26 @@ class Compliance:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """What the modes leave out of the static answer to forces on interface and load rows (MacNeal).
+
+    With coordinates q and forces f on the rows the displacement is ``group.phi @ q + phi @ f``; strain, stress and
+    gauges alike.
+
+    Attributes:
+        labels: r texts, those of `Compliance.labels` that belong to interfaces and excitations.
+        phi: (n, 3, r) m per unit force; may be empty. gauges: name -> (1, r) strain per unit force.
+        strain, stress: stress set -> (s, 6, r), 1 and Pa per unit force.
+    """
+
+    labels: tuple[str, ...]
+    phi: Array
+    gauges: Mapping[str, Array]
+    strain: Mapping[str, Array]
+    stress: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
 class GyroscopicModes:
     """Complex modes q = x exp(i omega t) of M_r q'' + G_r q' + K_r q = 0, in the frame that turns with the body.
 
@@ -388,7 +408,7 @@ class ModalGroup:
         spin_softening: whether -Omega^2 M P is in K.
         run_up: what a change of the speed adds, or None. gyroscopic: modes with G_r, or None (at rest).
         invariants: inertia integrals for large rigid motion, or None (a cyclic sector).
-        contacts: closures of the static state.
+        contacts: closures of the static state. residual: shapes and stresses beside the modes (``macneal``), or None.
     """
 
     speed: float
@@ -416,6 +436,7 @@ class ModalGroup:
     gyroscopic: GyroscopicModes | None = None
     invariants: Invariants | None = None
     contacts: Mapping[str, ContactState] = field(default_factory=dict)
+    residual: Residual | None = None
 
     @property
     def frequency(self) -> Array:

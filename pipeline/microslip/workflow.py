@@ -339,6 +339,42 @@ def _assembled_here(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBas
         raise UserError(f"{job.path}: {error}") from error
 
 
+def closure_stage(
+    job: Job, name: str | None, low: float, high: float, points: int, rpm: float, output: Path | None = None,
+    report: Report = lambda _: None,
+) -> list[Path]:  # fmt: skip
+    """Force over approach of one closure: CSV and PNG in build/<name>/ or `output`.
+
+    Args:
+        name: of the closure; None for the only one. low, high: approach of the faces, in the body's length_unit.
+
+    Raises:
+        UserError, NotConverged: see `modes.closure_curve`.
+    """
+    from .modes import closure_curve
+    from .pictures.plots import closure_curve_plot
+
+    known = [c.name for c in job.settings.closures]
+    if name is None and len(known) != 1:
+        raise UserError(f"{job.path}: closures: the body has {', '.join(known) or 'none'}; name one of them")
+    if not low < high or points < 2:
+        raise UserError("closure --from, --to, --points: give two or more points over a rising approach")
+    chosen, scale = name or known[0], UNITS[job.settings.length_unit]
+    mesh, warnings = load_mesh(job, mesh_stage(job, report=report))
+    for warning in warnings:
+        report(f"warning: {warning}")
+    try:
+        settings, temperature = with_temperature(job, mesh)
+        levels = np.linspace(low, high, points) * scale
+        curve = closure_curve(mesh, settings, chosen, levels, rpm * np.pi / 30, temperature, report)
+    except UserError as error:
+        raise UserError(f"{job.path}: {error}") from error
+    folder = output or job.basis_file.parent
+    table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
+    store.write_text(table, curve.table())
+    return [table, closure_curve_plot(curve, f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm", picture)]
+
+
 def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:
     """The modal basis of a body that another program has assembled, and warnings."""
     from .exchange.matrices import read_matrices

@@ -227,6 +227,11 @@ def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
         wanted += [(i_v.point, (3,)), (i_v.first_moment, (3,)), (i_v.second_moment, (3, 3)), (i_v.shape, (3, m))]
         wanted += [(i_v.position_shape, (3, 3, m)), (i_v.shape_shape, (3, 3, m, m))]
         wanted += [(i_v.stiffening, (len(MOTIONS) if len(i_v.stiffening) else 0, m, m))]
+    if (f := g.residual) is not None:
+        k = len(f.labels)
+        wanted += [(f.phi, (n if f.phi.shape[0] else 0, 3, k))]
+        wanted += [(a, (len(g.gauges[name].labels), k)) for name, a in f.gauges.items()]
+        wanted += [(a, (len(g.stresses[x].weights), 6, k)) for s in (f.strain, f.stress) for x, a in s.items()]
     forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
     return forces in (0, motions) and own <= m and all(a.shape == shape for a, shape in wanted)
 
@@ -255,6 +260,8 @@ def _numbers(g: ModalGroup) -> list[Any]:
         found += [c.closed_share, c.penetration, c.penalty, c.interference]
     for s in g.stresses.values():
         found += [s.strain, s.stress, s.static_stress, s.points, s.weights]
+    if g.residual is not None:
+        found += [g.residual.phi, *g.residual.gauges.values(), *g.residual.strain.values(), *g.residual.stress.values()]
     return found
 
 
@@ -338,12 +345,21 @@ def _shape_checks(basis: ModalBasis, g: ModalGroup) -> _Findings:
         return [("volume of the mesh is positive", np.inf, 0.0, "")]
     error = _largest(inner * basis.mass / weight - np.eye(g.n_modes))
     found: _Findings = [("shapes are mass-orthonormal on the mesh", error, 1e-8, ""), *_place_checks(basis)]
+    if g.residual is not None and g.residual.phi.size:
+        found.append(("residual shapes are mass-orthogonal to the modes", _beside(basis, g, g.residual.phi), 1e-6, ""))
     if basis.mesh.materials:
         found.append(("mass of the mesh's materials", abs(weight / basis.mass - 1), 1e-8, ""))
     volume = cell_volumes(basis.mesh) if g.stresses else 0.0
     for name, s in g.stresses.items():
         found.append((f"volume of stress set {name}", abs(float(s.weights.sum()) / volume - 1), 1e-9, ""))
     return found
+
+
+def _beside(basis: ModalBasis, g: ModalGroup, residual: Array) -> float:
+    """Largest cosine between a residual shape and a mode, in the mass of the mesh."""
+    inner, _ = modal_mass(basis.mesh, np.concatenate([g.phi, residual], axis=2))
+    size = np.sqrt(np.maximum(np.diag(inner).real, 1e-300))
+    return _largest((inner / np.outer(size, size))[: g.n_modes, g.n_modes :])
 
 
 def _place_checks(basis: ModalBasis) -> _Findings:

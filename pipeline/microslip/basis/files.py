@@ -31,6 +31,7 @@ from ..data import (
     Mesh,
     ModalBasis,
     ModalGroup,
+    Residual,
     Rows,
     RunUp,
     SpeedRange,
@@ -254,6 +255,8 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     _write_state(group, g, axis)
     if g.contacts:
         _write_contacts(group, g)
+    if g.residual is not None:
+        _write_residual(group, g.residual)
     if g.run_up is not None:
         _write_run_up(group, g.run_up, mode, column)
     if g.gyroscopic is not None:
@@ -369,6 +372,31 @@ def _write_gyroscopic(group: h5py.Group, modes: GyroscopicModes, mode: h5py.Data
     put(where, "direction", np.array(modes.direction, dtype="U"), scales=[whirl])
     put(where, "error", modes.error, "1", scales=[whirl])
     put(where, "shapes", modes.shapes, "1", scales=[mode, whirl])
+
+
+def _write_residual(group: h5py.Group, r: Residual) -> None:
+    file, where = group.file, group.create_group("residual")
+    force = put_scale(where, "force", np.array(r.labels, dtype="U"))
+    if r.phi.shape[0]:
+        put(where, "phi", r.phi, "m per unit force", scales=[file["node"], file["axis"], force])
+    for name, values in r.gauges.items():
+        row = group[f"gauge/{_escaped(name)}/row"]
+        put(where.require_group("gauge"), _escaped(name), values, "1 per unit force", scales=[row, force])
+    for name in r.stress:
+        scales = [group[f"stress/{name}/place"], file["component"], force]
+        put(where.require_group("strain"), name, r.strain[name], "1 per unit force", scales=scales)
+        put(where.require_group("stress"), name, r.stress[name], "Pa per unit force", scales=scales)
+
+
+def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dict[str, StressSet]) -> Residual:
+    labels = _texts(where, "force")
+    r = len(labels)
+    held = [{k: _array(where[kind], k, len(sets[k].weights), 6, r) for k in where[kind]} if kind in where else {}
+            for kind in ("strain", "stress")]  # fmt: skip
+    return Residual(
+        labels, _array(where, "phi", n, 3, r) if "phi" in where else np.zeros((0, 3, r)),
+        {k: _array(where["gauge"], _escaped(k), len(v.labels), r) for k, v in gauges.items()}, *held,
+    )  # fmt: skip
 
 
 _CONTACT_NUMBERS = {
@@ -624,6 +652,8 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
     state = group["rotation"]
     labels = _texts(group, "compliance_row")
     r = len(labels)
+    gauges = _read_rows(group["gauge"], m)
+    stresses = {name: _read_stress(group, name, m) for name in group["stress"]} if "stress" in group else {}
     return ModalGroup(
         speed=float(where.attrs["Omega"]), omega=omega, kind=kind,
         damping_ratio=_array(modes, "damping_ratio", p), M_r=_array(modes, "M_r", m, m), K_r=_array(modes, "K_r", m, m),
@@ -635,13 +665,13 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
             for name in _names(file["interfaces"])
         },
         excitations=_read_rows(group["excitation"], m), monitors=_read_rows(group["monitor"], m),
-        gauges=_read_rows(group["gauge"], m),
+        gauges=gauges,
         compliance=Compliance(
             labels, _array(group, "compliance_static", r, r), _array(group, "compliance_modal", r, r),
             bool(group["compliance_static"].attrs["inertia_relief"]),
             _array(group, "compliance_plain", r, r),
         ),
-        stresses={name: _read_stress(group, name, m) for name in group["stress"]} if "stress" in group else {},
+        stresses=stresses,
         u_static=_array(state, "u_static", n, 3),
         checks={name: float(_array(group["checks"], name)) for name in group["checks"]},
         prestress=str(state.attrs["prestress"]), harmonic=int(group["cyclic"].attrs["harmonic"]),
@@ -650,6 +680,7 @@ def _read_group(file: h5py.File, where: h5py.Group, group: h5py.Group, mesh: Mes
         gyroscopic=_read_gyroscopic(group["gyroscopic"], m) if "gyroscopic" in group else None,
         invariants=_read_invariants(group["invariants"], m) if "invariants" in group else None,
         contacts=_read_contacts(group["contacts"]) if "contacts" in group else {},
+        residual=_read_residual(group["residual"], n, gauges, stresses) if "residual" in group else None,
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """Equilibrium at speed, eigenmodes, static answers, strain and stress modes, interface rows."""
 
-from .compute import modal_basis
+from .compute import closure_curve, modal_basis
 from .foreign import foreign_basis
 
-__all__ = ["foreign_basis", "modal_basis"]
+__all__ = ["closure_curve", "foreign_basis", "modal_basis"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,8 @@ from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
 from .boundary import require_face
 from .equilibrium import BodyModel, StaticState, equilibrium
+
+Report = Callable[[str], None]
 
 
 def contact_pairs(mesh: Mesh, settings: BodySettings, materials: Sequence[Material]) -> tuple[ContactPair, ...]:
@@ -167,8 +169,9 @@ class ContactCurve:
 
 
 def contact_curve(
-    model: BodyModel, name: str, approaches: Array, solver: DirectSolver, speed: float = 0.0
-) -> ContactCurve:
+    model: BodyModel, name: str, approaches: Array, solver: DirectSolver, speed: float = 0.0,
+    report: Report = lambda _: None,
+) -> ContactCurve:  # fmt: skip
     """Press the contact `name` by rising interferences (k,) m, k >= 2, and record its force.
 
     The stiffness is that of the faces and of whatever yields between them and the supports: hold the body near the
@@ -189,4 +192,5 @@ def contact_curve(
         g = state.contacts[number]
         force.append(float(np.linalg.norm(g.slave_force.sum(axis=0))))
         share.append(float(g.area[g.pressure > 0].sum() / max(g.area.sum(), 1e-300)))
+        report(f"approach {approach:.4g} m: {force[-1]:.4g} N, {100 * share[-1]:.3g} % of the face in contact")
     return ContactCurve(np.asarray(approaches, dtype=float), np.array(force), np.array(share))

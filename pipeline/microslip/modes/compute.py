@@ -16,9 +16,11 @@ from ..data import (
     Mesh,
     ModalBasis,
     ModalGroup,
+    Residual,
     RunUp,
     SpeedRange,
     StressSet,
+    UserError,
 )
 from ..fem.contact import coupled_points
 from ..fem.discretise import Discretisation, discretise, free_upper
@@ -29,7 +31,7 @@ from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
 from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
 from .characteristic import with_characteristic
-from .closures import bolt_forces, contact_pairs, contact_states
+from .closures import ContactCurve, bolt_forces, contact_curve, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
 from .loose import refuse_unlinked_parts
@@ -58,7 +60,7 @@ def modal_basis(
         NotConverged: the equilibrium or the spectrum could not be found.
     """
     report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
-    b = _prepared(mesh, settings, temperature)
+    b = prepared(mesh, settings, temperature)
     solver = eigen.new_solver(settings.modes.solver)
     try:
         b = replace(b, rows=with_characteristic(b.rows, b.model, settings, b.motions, solver))
@@ -80,7 +82,7 @@ def modal_basis(
 
 
 @dataclass(frozen=True)
-class _Prepared:
+class Prepared:
     """A body ready to be solved: its model, the rows on it, what floats, and the sector it may be.
 
     Attributes:
@@ -96,7 +98,7 @@ class _Prepared:
     sector: Sector | None
 
 
-def _prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> _Prepared:
+def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> Prepared:
     """Model, rows and rigid motions of a body, with every refusal that needs no solution.
 
     Raises:
@@ -122,7 +124,7 @@ def _prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> 
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
     refuse_overlap(mesh, settings)
-    return _Prepared(model, rows, motions, mass, centre, inertia, sector)
+    return Prepared(model, rows, motions, mass, centre, inertia, sector)
 
 
 def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
@@ -135,7 +137,7 @@ def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
 
 
 def _at_speeds(
-    b: _Prepared, settings: BodySettings, solver: eigen.DirectSolver, report: Report
+    b: Prepared, settings: BodySettings, solver: eigen.DirectSolver, report: Report
 ) -> tuple[dict[tuple[int, int], ModalGroup], dict[float, StaticState]]:
     """(number of the speed, nodal diameter) -> group, and speed in rad/s -> static state."""
     speeds, floats = settings.rotation.speeds_rpm, settings.free and bool(settings.bolts)
@@ -163,7 +165,7 @@ def _at_speeds(
 
 
 def _stiffened(
-    b: _Prepared, settings: BodySettings, groups: dict[tuple[int, int], ModalGroup], solver: eigen.DirectSolver,
+    b: Prepared, settings: BodySettings, groups: dict[tuple[int, int], ModalGroup], solver: eigen.DirectSolver,
     report: Report,
 ) -> dict[tuple[int, int], ModalGroup]:  # fmt: skip
     """The groups with the stiffening by inertia forces, where it is asked for."""
@@ -175,7 +177,7 @@ def _stiffened(
 
 
 def _over_ranges(
-    b: _Prepared, settings: BodySettings, settled: dict[float, StaticState], solver: eigen.DirectSolver, report: Report
+    b: Prepared, settings: BodySettings, settled: dict[float, StaticState], solver: eigen.DirectSolver, report: Report
 ) -> dict[int, SpeedRange]:
     """Nodal diameter -> basis of the range of speeds, where one is asked for."""
     if settings.rotation.range_rpm is None:
@@ -183,6 +185,34 @@ def _over_ranges(
     from .body_range import body_ranges  # which itself calls `assemble_group`
 
     return body_ranges(b.model, settings, b.motions, b.rows, solver, b.sector, settled, report)
+
+
+def closure_curve(
+    mesh: Mesh, settings: BodySettings, name: str, approaches: Array, speed: float = 0.0,
+    temperature: Array | None = None, report: Report = lambda _: None,
+) -> ContactCurve:  # fmt: skip
+    """Force over approach of one closure of a body, see `closures.contact_curve`.
+
+    Args:
+        approaches: (k,) m, rising. speed: rad/s.
+
+    Raises:
+        UserError: no such closure, a free body, as `modal_basis`. NotConverged: no equilibrium at a level.
+    """
+    known = [c.name for c in settings.closures]
+    if name not in known:
+        raise UserError(f"closures: there is no closure '{name}'; the body has {', '.join(known) or 'none'}")
+    if settings.free:
+        raise UserError("free: a free body has nothing to be pressed against; hold it for the curve of a closure")
+    report(f"assembling {mesh.n_cells} cells, {3 * mesh.n_points} degrees of freedom")
+    b = prepared(mesh, settings, temperature)
+    solver = eigen.new_solver(settings.modes.solver)
+    try:
+        return contact_curve(b.model, name, approaches, solver, speed, report)
+    finally:
+        solver.close()
+        if b.sector is not None:
+            b.sector.close()
 
 
 def _guess(state: StaticState | None, before: float, speed: float) -> StaticState | None:
@@ -241,13 +271,8 @@ def assemble_group(
     run_up = run_up_terms(model, state, shapes, Mphi, harmonic)
     run_up = without_massless(run_up, reduced)
     G = 2 * speed * run_up.N
-    stresses: dict[str, StressSet] = {}
     if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
         report("strain and stress modes")
-        if settings.output.gauss:
-            stresses["gauss"] = gauss_set(model, state, shapes)
-        if settings.output.nodal_stress:
-            stresses["nodes"] = nodal_set(model, state, shapes, harmonic)
     u = state.u.reshape(-1)
     return ModalGroup(
         speed=speed,
@@ -268,13 +293,46 @@ def assemble_group(
         monitors={k: reduced_rows(v, phi, u) for k, v in rows.monitors.items()},
         gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
         compliance=Compliance(labels, s.static, modal, bool((omega == 0).any()), s.eigenmodes),
-        stresses=stresses,
+        stresses=_stress_sets(model, settings, state, shapes, harmonic),
         u_static=state.u,
         checks={**_checks(s.found, model, state, s.kept), **s.indicators},
         prestress=state.prestress if (speed or model.loaded) else "none",
         harmonic=harmonic,
         spin_softening=model.spin_softening,
         contacts=contact_states(model.d.mesh, settings, state.contacts),
+        residual=_residual(model, settings, state, rows, s, harmonic),
+    )
+
+
+def _stress_sets(
+    model: BodyModel, settings: BodySettings, state: StaticState, shapes: Array, harmonic: int
+) -> dict[str, StressSet]:
+    """The sets that the settings ask for, of shapes (n, 3, m)."""
+    found: dict[str, StressSet] = {}
+    if settings.output.stress_at(harmonic):
+        if settings.output.gauss:
+            found["gauss"] = gauss_set(model, state, shapes)
+        if settings.output.nodal_stress:
+            found["nodes"] = nodal_set(model, state, shapes, harmonic)
+    return found
+
+
+def _residual(
+    model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, s: Solution, harmonic: int
+) -> Residual | None:
+    """Shapes, gauges, strain and stress of the residual attachment modes that the solver adds (MacNeal)."""
+    if s.residual is None:
+        return None
+    n, r = model.d.mesh.n_points, s.residual.shape[1]
+    whole = s.unknowns.expand(s.residual, n)
+    shapes = whole.reshape(n, 3, r)
+    sets = _stress_sets(model, settings, state, shapes, harmonic) if r else {}
+    return Residual(
+        s.residual_labels,
+        shapes if settings.output.shapes else np.zeros((0, 3, r)),
+        {k: reduced_gauge(v, whole, state).rows for k, v in rows.gauges.items()},
+        {name: x.strain for name, x in sets.items()},
+        {name: x.stress for name, x in sets.items()},
     )
 
 

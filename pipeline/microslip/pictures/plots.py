@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from ..modes.closures import ContactCurve
+
 COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f", "#5b6270", "#94a112")
 
 
@@ -38,6 +40,36 @@ def _plain(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, color="#dde0e6", linewidth=0.7)
     axes.set_axisbelow(True)
+
+
+# --- closure -------------------------------------------------------------------------------------------------------
+
+
+def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
+    """Normal force of a closure over the approach of its faces, and its slope, the stiffness of the contact."""
+    figure = _figure(9.6, 4.2)
+    left, right = figure.subplots(1, 2)
+    x, unit = _length(curve.approach)
+    for axes, y, name in ((left, curve.force, "normal force in N"), (right, curve.stiffness, "stiffness in N/m")):
+        _plain(axes)
+        axes.plot(x, y, "-o", color=COLOURS[0], linewidth=1.6, markersize=4)
+        axes.set_xlabel(f"approach of the faces in {unit}")
+        axes.set_ylabel(name)
+        axes.set_ylim(bottom=0)
+    share = left.twinx()
+    share.plot(x, 100 * curve.closed_share, "--", color=COLOURS[1], linewidth=1.2)
+    share.set_ylabel("share of the face in contact in %", color=COLOURS[1])
+    share.set_ylim(bottom=0)
+    share.spines["top"].set_visible(False)
+    figure.suptitle(title, fontweight="bold")
+    return _save(figure, path)
+
+
+def _length(values: Array) -> tuple[Array, str]:
+    """Lengths (m) in a unit that needs no powers of ten."""
+    top = float(np.abs(values).max())
+    scale, unit = next(((s, u) for s, u in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")) if top * s >= 0.1), (1e9, "nm"))
+    return values * scale, unit
 
 
 # --- compliance ----------------------------------------------------------------------------------------------------
