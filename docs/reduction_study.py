@@ -60,15 +60,19 @@ def studied(mesh: Mesh, settings: BodySettings) -> Study:
     return Study(mesh, settings, groups, seconds)
 
 
-def soft_to_stiff(s: Study, count: int) -> list[list[str]]:
-    """Rows of a table: largest error of the `count` lowest frequencies, by spring and method."""
-    exact = full_frequencies(s.mesh, s.settings, patch_statics(s.groups["rubin"]), RATIOS, count)
-    rows = []
-    for ratio, f in zip(RATIOS, exact, strict=True):
-        found = [reduced_frequencies(s.groups[m], m, ratio, count) for m in METHODS]
-        errors = [np.abs(w / f - 1).max() for w in found]
-        rows.append([f"{ratio:g}", f"{f[0] / 2 / np.pi:.2f} Hz", *(f"{e:.0e}" for e in errors)])
-    return rows
+def soft_to_stiff(s: Study, count: int) -> tuple[Array, Array]:
+    """(springs,) first frequency of the full model, Hz, and (springs, methods) error of the `count` lowest ones."""
+    exact = np.array(full_frequencies(s.mesh, s.settings, patch_statics(s.groups["rubin"]), RATIOS, count))
+    found = [[reduced_frequencies(s.groups[m], m, ratio, count) for m in METHODS] for ratio in RATIOS]
+    return exact[:, 0] / 2 / np.pi, np.abs(np.array(found) / exact[:, None] - 1).max(axis=2)
+
+
+def error_rows(exact: Array, errors: Array) -> list[list[str]]:
+    """Rows of a table: spring, first frequency of the full model, error of every method."""
+    return [
+        [f"{ratio:g}", f"{f:.2f} Hz", *(f"{e:.0e}" for e in row)]
+        for ratio, f, row in zip(RATIOS, exact, errors, strict=True)
+    ]
 
 
 def cost_rows(s: Study) -> list[list[str]]:

@@ -147,6 +147,10 @@ def test_residual_stresses_travel_through_the_file(rpm, tmp_path):
         np.testing.assert_array_equal(a.strain[name], b.strain[name])
         np.testing.assert_array_equal(a.stress[name], b.stress[name])
     assert basis("rubin", rpm).groups[0, 0].residual is None
+    xarray = pytest.importorskip("xarray")
+    with xarray.open_datatree(tmp_path / "b.h5", engine="h5netcdf", phony_dims="sort") as tree:
+        assert tree["speed_0/nd_0/residual/stress/gauss/T"].dims == ("place", "component", "force")
+        assert tree["speed_0/nd_0/residual/gauge/root/T"].dims == ("row", "force")
 
 
 def test_residual_shapes_read_the_residual_compliance():

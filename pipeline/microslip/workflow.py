@@ -355,7 +355,7 @@ def closure_stage(
     from .pictures.plots import closure_curve_plot
 
     known = [c.name for c in job.settings.closures]
-    if name is None and len(known) != 1:
+    if name not in (known if len(known) != 1 else [*known, None]):
         raise UserError(f"{job.path}: closures: the body has {', '.join(known) or 'none'}; name one of them")
     if not low < high or points < 2:
         raise UserError("closure --from, --to, --points: give two or more points over a rising approach")

@@ -380,22 +380,24 @@ def _write_residual(group: h5py.Group, r: Residual) -> None:
     if r.phi.shape[0]:
         put(where, "phi", r.phi, "m per unit force", scales=[file["node"], file["axis"], force])
     for name, values in r.gauges.items():
-        row = group[f"gauge/{_escaped(name)}/row"]
-        put(where.require_group("gauge"), _escaped(name), values, "1 per unit force", scales=[row, force])
-    for name in r.stress:
-        scales = [group[f"stress/{name}/place"], file["component"], force]
-        put(where.require_group("strain"), name, r.strain[name], "1 per unit force", scales=scales)
-        put(where.require_group("stress"), name, r.stress[name], "Pa per unit force", scales=scales)
+        item = where.create_group(f"gauge/{_escaped(name)}")
+        item["row"] = group[f"gauge/{_escaped(name)}/row"]
+        put(item, "T", values, "1 per unit force", scales=[item["row"], force])
+    for kind, unit in (("strain", "1"), ("stress", "Pa")):
+        for name, values in sorted(getattr(r, kind).items()):
+            item = where.create_group(f"{kind}/{name}")
+            item["place"] = group[f"stress/{name}/place"]
+            put(item, "T", values, f"{unit} per unit force", scales=[item["place"], file["component"], force])
 
 
 def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dict[str, StressSet]) -> Residual:
     labels = _texts(where, "force")
     r = len(labels)
-    held = [{k: _array(where[kind], k, len(sets[k].weights), 6, r) for k in where[kind]} if kind in where else {}
+    held = [{k: _array(where[kind], f"{k}/T", len(sets[k].weights), 6, r) for k in where.get(kind, ())}
             for kind in ("strain", "stress")]  # fmt: skip
     return Residual(
         labels, _array(where, "phi", n, 3, r) if "phi" in where else np.zeros((0, 3, r)),
-        {k: _array(where["gauge"], _escaped(k), len(v.labels), r) for k, v in gauges.items()}, *held,
+        {k: _array(where, f"gauge/{_escaped(k)}/T", len(v.labels), r) for k, v in gauges.items()}, *held,
     )  # fmt: skip
 
 

@@ -321,14 +321,14 @@ def _residual(
     model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, s: Solution, harmonic: int
 ) -> Residual | None:
     """Shapes, gauges, strain and stress of the residual attachment modes that the solver adds (MacNeal)."""
-    if s.residual is None:
+    if s.reduced.residual is None:
         return None
-    n, r = model.d.mesh.n_points, s.residual.shape[1]
-    whole = s.unknowns.expand(s.residual, n)
+    n, r = model.d.mesh.n_points, s.reduced.residual.shape[1]
+    whole = s.unknowns.expand(s.reduced.residual, n)
     shapes = whole.reshape(n, 3, r)
     sets = _stress_sets(model, settings, state, shapes, harmonic) if r else {}
     return Residual(
-        s.residual_labels,
+        s.force_labels,
         shapes if settings.output.shapes else np.zeros((0, 3, r)),
         {k: reduced_gauge(v, whole, state).rows for k, v in rows.gauges.items()},
         {name: x.strain for name, x in sets.items()},

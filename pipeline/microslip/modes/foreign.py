@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .. import eigen
 from ..body import BodySettings
-from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, UserError
+from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual, UserError
 from ..frames import skew
 from ..reduction import Reduced, stuck
 from . import canonical, rigid
@@ -391,7 +391,16 @@ def _group(
             **s.indicators,
         },
         prestress="none" if not speed else "foreign",
+        residual=_residual(settings, s, layout.width // 3, n),
     )  # fmt: skip
+
+
+def _residual(settings: BodySettings, s: Solution, rows: int, n: int) -> Residual | None:
+    """Residual shapes at the n points (of `rows` triples of rows); foreign matrices know neither strain nor gauges."""
+    if s.reduced.residual is None:
+        return None
+    shapes = s.unknowns.expand(s.reduced.residual, n).reshape(rows, 3, s.reduced.residual.shape[1])
+    return Residual(s.force_labels, shapes[: n if settings.output.shapes else 0], {}, {}, {})
 
 
 def _damping(body: Matrices, settings: BodySettings, reduced: Reduced, free: Indices) -> tuple[Array, Array]:

@@ -64,8 +64,7 @@ class Solution:
         found: every mode solved for; the first `kept` were reduced. reduced: shapes on the `unknowns`.
         answers: (m, r) static answers to the rows named by `labels`. static: (r, r) compliance;
             eigenmodes: (r, r) the part of it that the kept eigenmodes alone hold. indicators: see `reduction.stuck`.
-        residual: (m, r') what the kept modes leave of the answers to interface and load rows, named by
-            `residual_labels`, where the method lets the solver add it.
+        force_labels: names of the interface and load rows that the reduction knows.
     """
 
     found: eigen.Spectrum
@@ -77,8 +76,7 @@ class Solution:
     unknowns: Unknowns
     labels: tuple[str, ...]
     indicators: Mapping[str, float]
-    residual: Array | None = None
-    residual_labels: tuple[str, ...] = ()
+    force_labels: tuple[str, ...] = ()
 
 
 def search(
@@ -180,10 +178,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     quality = stuck.indicators(
         settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero
     )  # fmt: skip
-    residual = problem.residual(slice(None)) if settings.reduction == "macneal" else None
-    return Solution(
-        s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, residual, problem.labels
-    )
+    return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
 
 
 def solution(

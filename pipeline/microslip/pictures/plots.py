@@ -47,20 +47,20 @@ def _plain(axes: Axes) -> None:
 
 def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
     """Normal force of a closure over the approach of its faces, and its slope, the stiffness of the contact."""
-    figure = _figure(9.6, 4.2)
-    left, right = figure.subplots(1, 2)
+    figure = _figure(10.5, 3.9)
     x, unit = _length(curve.approach)
-    for axes, y, name in ((left, curve.force, "normal force in N"), (right, curve.stiffness, "stiffness in N/m")):
+    panels = (
+        (curve.force, "normal force in N"),
+        (curve.stiffness, "stiffness in N/m"),
+        (100 * curve.closed_share, "share of the face in contact in %"),
+    )
+    for axes, (y, name) in zip(figure.subplots(1, 3), panels, strict=True):
         _plain(axes)
         axes.plot(x, y, "-o", color=COLOURS[0], linewidth=1.6, markersize=4)
         axes.set_xlabel(f"approach of the faces in {unit}")
         axes.set_ylabel(name)
-        axes.set_ylim(bottom=0)
-    share = left.twinx()
-    share.plot(x, 100 * curve.closed_share, "--", color=COLOURS[1], linewidth=1.2)
-    share.set_ylabel("share of the face in contact in %", color=COLOURS[1])
-    share.set_ylim(bottom=0)
-    share.spines["top"].set_visible(False)
+        axes.set_ylim(0, 1.08 * max(float(y.max()), 1e-300))
+        axes.ticklabel_format(axis="y", scilimits=(-3, 5), useMathText=True)
     figure.suptitle(title, fontweight="bold")
     return _save(figure, path)
 

@@ -10,18 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from . import craig_bampton, dual, eigenmodes, massless, rubin, stuck
+from . import craig_bampton, dual, eigenmodes, macneal, massless, rubin, stuck
 from .problem import Problem, Reduced
 
 METHODS: dict[str, Callable[[Problem], Reduced]] = {
     "eigenmodes": eigenmodes.reduce,
-    "macneal": eigenmodes.reduce,
+    "macneal": macneal.reduce,
     "rubin": rubin.reduce,
     "craig-bampton": craig_bampton.reduce,
     "dual-craig-bampton": dual.reduce,
     "massless-boundary": massless.reduce,
 }
-"""Method name -> function. ``macneal`` keeps the eigenmodes: its residual flexibility, the compliance they leave
-out, stands in the file beside them and adds no coordinates."""
+"""Method name -> function."""
 
 __all__ = ["METHODS", "Problem", "Reduced", "stuck"]

@@ -70,6 +70,8 @@ class Reduced:
         to_diagonal: (c, p) V with V^H M_r V = 1 and V^H K_r V = diag(omega^2), None if they are diagonal already;
             p < c where the method has coordinates without mass or with forces for coordinates.
         omega: (p,) rad/s, ascending, of the reduced body with nothing on its interfaces.
+        residual: (n, r) displacement under a unit force on each row of the problem that stands beside the
+            coordinates and is added by the solver, or None.
     """
 
     vectors: Array
@@ -78,6 +80,7 @@ class Reduced:
     K_r: Array
     omega: Array
     to_diagonal: Array | None = None
+    residual: Array | None = None
 
 
 def hermitian(A: Array) -> Array:
