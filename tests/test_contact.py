@@ -32,7 +32,7 @@ from microslip.modes import equilibrium as newton
 from microslip.modes import modal_basis
 from microslip.modes.closures import contact_curve
 from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
-from microslip.speed_range import frequencies_over
+from microslip.speed_range import frequencies_over, group_at
 
 E, NU = STEEL["young"], STEEL["poisson"]
 FACETS = ("triangle", "triangle6", "quad", "quad8", "quad9")
@@ -372,6 +372,10 @@ def test_sector_closes_on_its_own_image_as_a_full_ring_does():
         np.testing.assert_allclose(c.pressure, expected.pressure, atol=1e-5 * expected.pressure.max())
 
 
+def top_force(r) -> float:
+    return r.samples[-1].contacts["shroud"].normal_force
+
+
 def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
     """Apart at rest, pressed at the top: the range's frequencies at speeds between against equilibria of their own."""
     mesh, top, between = shrouded(gap=1e-5), 8000.0, (3000.0, 5500.0)
@@ -383,6 +387,14 @@ def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
     omega, _ = frequencies_over(r, np.array(between) * np.pi / 30)
     for i in range(len(between)):
         assert np.abs(omega[i] / true[i, 0].omega[: r.count] - 1).max() < 3 * r.tolerance  # held to it elsewhere
+        at, found = group_at(ranged, between[i]), true[i, 0].contacts["shroud"]
+        c = at.contacts["shroud"]
+        assert abs(c.normal_force - found.normal_force) <= at.checks["normal_force_error"] < 0.5 * top_force(r)
+        assert c.areas @ c.pressure == pytest.approx(c.normal_force) and (c.pressure >= 0).all()
+    for g in r.samples:  # at the equilibria themselves nothing is lost
+        again = group_at(ranged, g.speed * 30 / np.pi)
+        assert again.contacts["shroud"].normal_force == pytest.approx(g.contacts["shroud"].normal_force, abs=1e-9)
+        assert again.checks["normal_force_error"] == 0
     closed = settings_of([0.0], closures=[closure(modes="closed")]).model_copy(update={"rotation": rotation})
     with pytest.raises(UserError, match="rotation.range_rpm: closures"):
         modal_basis(mesh, closed)

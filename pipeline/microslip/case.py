@@ -163,7 +163,7 @@ def run_case(
     free = frequency_response(group, [], force, watch, frequency)
     closed = [_contact(c, max(forces), s) for c, s in zip(contacts, springs, strict=True)]
     stuck = stuck_frequencies(group, closed, residual)
-    remarks = tuple(counted + _lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
+    remarks = tuple(counted + _between(settings, group) + _lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
     return CaseResult(settings, responses, free, stuck, resonances, group.speed, remarks)
 
 
@@ -267,6 +267,14 @@ def _static_force(interface: str, group: ModalGroup) -> float | None:
     """Normal force of the closure on an interface, or on the one it faces, N."""
     partner = group.interfaces[interface].partner
     return next((c.normal_force for c in group.contacts.values() if c.interface in {interface, partner} - {""}), None)
+
+
+def _between(settings: CaseSettings, group: ModalGroup) -> list[str]:
+    """A remark where the static normal force is one between two equilibria of a speed range."""
+    error = group.checks.get("normal_force_error", 0.0)
+    if settings.sweep.normal_forces != "static" or not error:
+        return []
+    return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
 
 
 def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:

@@ -18,6 +18,7 @@ from .coordinates import compliance_rows, in_coordinates
 from .data import (
     Array,
     Compliance,
+    ContactState,
     GyroscopicModes,
     ModalBasis,
     ModalGroup,
@@ -136,6 +137,7 @@ class _Evaluated:
         found = interpolant(r)
         self.K, self.modes = found.stiffness(speed), found.modes(speed)
         self.T = compliance_rows(r.samples[0])
+        self.contacts = contacts_between(r, speed)
 
     def between(self, values: Iterable[Array]) -> Array:
         """An array of every sample, interpolated entry by entry."""
@@ -166,8 +168,12 @@ class _Evaluated:
             gyroscopic=self._gyroscopic(reduced, run_up),
             to_diagonal=reduced.to_diagonal,
             compliance=compliance,
-            checks={"held_out_error": float(self.range.total_error.max())},
+            checks={"held_out_error": float(self.range.total_error.max()), **self._contact_checks()},
         )
+
+    def _contact_checks(self) -> dict[str, float]:
+        error = normal_force_error(self.range, self.speed)
+        return {"normal_force_error": error} if self.contacts and np.isfinite(error) else {}
 
     def _gyroscopic(self, reduced: Reduced, run_up: RunUp | None) -> GyroscopicModes | None:
         if run_up is None or not (self.speed and self.range.gyroscopic):
@@ -191,7 +197,7 @@ class _Evaluated:
             u_static=self.between(g.u_static for g in r.samples),
             compliance=self._compliance(),
             run_up=self._run_up(),
-            contacts={},
+            contacts=self.contacts,
             invariants=None,  # they follow the displaced body and are asked for at speeds of their own
             prestress=last.prestress if self.speed else r.samples[0].prestress,
         )
@@ -256,6 +262,62 @@ class _Evaluated:
         if not self.range.signs and phi.shape[0]:
             decisive = phi.reshape(-1, phi.shape[2])[canonical.by_place(self.basis.mesh.points)]
         return Y * canonical.signs(decisive @ Y)
+
+
+# --- static contacts -----------------------------------------------------------------------------------------------
+
+
+def _around(r: SpeedRange, speed: float) -> tuple[int, float]:
+    """The sample below a speed, and the share of the way to the next one, in the square of the speed."""
+    square = r.speeds**2
+    i = int(np.clip(np.searchsorted(r.speeds, speed, side="right") - 1, 0, len(square) - 2))
+    return i, float((speed**2 - square[i]) / (square[i + 1] - square[i]))
+
+
+def contacts_between(r: SpeedRange, speed: float) -> dict[str, ContactState]:
+    """Forces, pressures and gaps of the closures at a speed, rad/s: straight lines in Omega^2 between two equilibria.
+
+    The load grows with Omega^2, and what is closed changes where it will: a polynomial through all equilibria would
+    swing about the speed at which a contact closes. `normal_force_error` says how far to trust it.
+    """
+    i, share = _around(r, speed)
+    low, high = r.samples[i].contacts, r.samples[i + 1].contacts
+    return {name: _contact_between(low[name], high[name], share) for name in low if name in high}
+
+
+def _contact_between(a: ContactState, b: ContactState, share: float) -> ContactState:
+    def line(x: Array, y: Array) -> Array:
+        return (1 - share) * x + share * y
+
+    force, pressure = line(a.force, b.force), line(a.pressure, b.pressure)
+    size, pulls = float(np.linalg.norm(force)), line(np.array(a.normal_force), np.array(b.normal_force))
+    total = float(a.areas @ pressure)
+    weights = (1 - share) * a.normal_force, share * b.normal_force
+    centre = (weights[0] * a.centre + weights[1] * b.centre) / pulls if pulls else line(a.centre, b.centre)
+    return replace(
+        a, force=force, normal_force=size, centre=centre, pressure=pressure * (size / total if total else 1.0),
+        gap=line(a.gap, b.gap), closed_share=float(line(np.array(a.closed_share), np.array(b.closed_share))),
+        penetration=max(a.penetration, b.penetration), penalty=max(a.penalty, b.penalty),
+    )  # fmt: skip
+
+
+def normal_force_error(r: SpeedRange, speed: float) -> float:
+    """N: what `contacts_between` errs by at the equilibria around a speed where these are left out, at most.
+
+    Left out, an equilibrium is bridged over a wider gap than that in which the speed lies. 0 at an equilibrium, NaN
+    where fewer than three are known.
+    """
+    i, share = _around(r, speed)
+    if min(abs(share), abs(1 - share)) < 1e-9:
+        return 0.0
+    left_out = [j for j in (i, i + 1) if 0 < j < len(r.samples) - 1]
+    square, worst = r.speeds**2, float("nan")
+    for j in left_out:
+        part = (square[j] - square[j - 1]) / (square[j + 1] - square[j - 1])
+        for name, c in r.samples[j].contacts.items():
+            ends = [r.samples[e].contacts[name].normal_force for e in (j - 1, j + 1)]
+            worst = float(np.fmax(worst, abs((1 - part) * ends[0] + part * ends[1] - c.normal_force)))
+    return worst
 
 
 def _rayleigh(source: str) -> tuple[float, float]:

@@ -756,7 +756,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         if basis.source == "measured":
             proof = "measured: others may have been missed"
         lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
-        lines += [f"  {contact_sentence(name, c)}" for name, c in g.contacts.items()]
+        lines += contact_lines(g)
         lines += [f"  {text}" for text in sentences(g, basis.reduction)]
         lines += [
             f"  {i + 1:4d}  {f:14.6g} Hz   D = {d:.4g}   {k}"
@@ -779,6 +779,16 @@ def between_stations(groups: list[ModalGroup]) -> str:
         f"from the basis of the speed range; at the speeds held out its frequencies err by {max(errors):.1e} at most "
         "and the inertia count finds no further mode"
     )
+
+
+def contact_lines(group: ModalGroup) -> list[str]:
+    """What each closure does, and how well that is known at a speed inside a range."""
+    lines = [f"  {contact_sentence(name, c)}" for name, c in group.contacts.items()]
+    if lines and "held_out_error" in group.checks:
+        error = group.checks.get("normal_force_error", float("nan"))
+        sure = f"to about {error:.3g} N" if np.isfinite(error) else "how well is not known"
+        lines.append(f"    (between the equilibria of the range, along straight lines in the speed squared; {sure})")
+    return lines
 
 
 def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
@@ -831,7 +841,7 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
         state = f"{first.speed * 30 / np.pi:g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
         proof = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
         lines.append(f"{state}: {proof or certificate_words(certify_ring(basis, speed))}")
-        lines += [f"  {contact_sentence(name, c)}" for name, c in first.contacts.items()]
+        lines += contact_lines(first)
         lines += [f"  {text}" for text in sentences(first, basis.reduction)]
         for g in groups:
             more = f"   and {g.n_modes - MOST_COLUMNS} more" if g.n_modes > MOST_COLUMNS else ""
