@@ -163,8 +163,9 @@ def run_case(
     free = frequency_response(group, [], force, watch, frequency)
     closed = [_contact(c, max(forces), s) for c, s in zip(contacts, springs, strict=True)]
     stuck = stuck_frequencies(group, closed, residual)
-    remarks = tuple(counted + _between(settings, group) + _lift_off(responses) + _too_coarse(group, settings) + _not_converged(responses))
-    return CaseResult(settings, responses, free, stuck, resonances, group.speed, remarks)
+    remarks = counted + _between(settings, group) + _lift_off(responses) + _too_coarse(group, settings)
+    remarks += _not_converged(responses)
+    return CaseResult(settings, responses, free, stuck, resonances, group.speed, tuple(remarks))
 
 
 Springs = tuple[float, float, float]
