@@ -943,11 +943,23 @@ def arc(axes: Any, radius: float, start: float, stop: float, colour: str) -> Non
     axes.annotate("", (x[-1], y[-1]), (x[-3], y[-3]), arrowprops=tip)
 
 
+# contact stiffness -------------------------------------------------------------------------------------------------
+
+
+def stiffness_sources() -> None:
+    """When a contact is a spring, when it yields, how it slips; the layer of 5.3 by its sides."""
+    import stiffness_study as study
+
+    fill("contact_stiffness.md", "layers", table(*study.layers()))
+    save(drawn(study.picture(figure(10.5, 3.4), plain)), "contact_stiffness")
+
+
 STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, closure, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2, first,
         speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
+        stiffness_sources,
     )  # fmt: skip
 }
 

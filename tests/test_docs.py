@@ -212,6 +212,17 @@ def test_contact_statics_page(tmp_path: Path) -> None:
     assert basis.groups[0, 0].contacts["shroud"].normal_force == pytest.approx(float(told[2]), rel=2e-3)
 
 
+def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its table made again, and what its example prints."""
+    import stiffness_study
+
+    assert pages.filled("contact_stiffness.md", "layers") == pages.table(*stiffness_study.layers())
+    text = (DOCS / "contact_stiffness.md").read_text(encoding="utf-8")
+    code, printed = re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S)[0]
+    exec(compile(code, "contact_stiffness.md", "exec"), {})
+    assert capsys.readouterr().out.strip() == printed
+
+
 def test_geometry_page(tmp_path: Path) -> None:
     """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
     basis = made(tmp_path, "pendulum", "modes.count=3")
