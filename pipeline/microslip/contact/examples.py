@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 
 from .friction import Coulomb
-from .heights import Polynomial
+from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .law import Law
-from .normal import Penalty, Rough
+from .normal import Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
 
 
@@ -35,7 +35,14 @@ def _value(number: float) -> jnp.ndarray:
     return jnp.asarray(number, dtype=float)
 
 
+def _rough(heights: Heights) -> Example:
+    return Example(PointContact(Rough(_value(2.4e8), _value(12e-6), heights), _COULOMB, _C), 1.2e-5, 8e-6)
+
+
 _ROUGH = Rough(_value(2.4e8), _value(12e-6), Polynomial())
+_HYPERBOLIC = Hyperbolic(_value(2.4e8), _value(12e-6), Polynomial(), _value(120e-6))
+_MEASURED = measured([0, 2e-6, 5e-6, 9e-6, 14e-6], [0, 20, 240, 900, 2100], 2.4e8)
+_GROUND = tabulated([0, 0.12, 0.3, 0.38, 0.55, 0.8, 0.95, 1.1], [0, 0.01, 0.12, 0.26, 0.63, 0.9, 0.98, 1])
 _COULOMB = Coulomb(_value(0.3))
 _C = _value(0.9e8)
 
@@ -45,5 +52,14 @@ EXAMPLES: dict[str, Example] = {
     "rough point, two stiffnesses": Example(
         PointContact(_ROUGH, _COULOMB, _C, _value(0.4e8)), 1.2e-5, 8e-6, isotropic=False
     ),
+    "linear heights": _rough(Linear()),
+    "exponential heights, cut": _rough(Cut(Exponential(_value(4.0)))),
+    "Gaussian heights, cut": _rough(Cut(Gaussian(_value(0.5), _value(0.22)))),
+    "tabulated heights": _rough(_GROUND),
+    "hyperbolic point": Example(PointContact(_HYPERBOLIC, _COULOMB, _C), 1.2e-5, 8e-6),
+    "potential point": Example(
+        PointContact(Potential(_value(2e3), _value(12e-6), _value(2.5)), _COULOMB, _C), 1.2e-5, 8e-6
+    ),
+    "measured point": Example(PointContact(_MEASURED, _COULOMB, _C), 1.2e-5, 8e-6),
     "rough point, damped": Example(PointContact(_ROUGH, _COULOMB, _C, None, _value(2e-4)), 1.2e-5, 8e-6),
 }

@@ -166,4 +166,3 @@ def ratio(above: Array, below: Array, otherwise: float = 0.0) -> Array:
     """above / below, and ``otherwise`` where ``below`` is not positive, without a division there."""
     positive = below > 0
     return jnp.where(positive, above / jnp.where(positive, below, 1.0), otherwise)
-
