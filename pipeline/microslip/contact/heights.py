@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.stats import norm as normal_distribution
+from numpy.typing import ArrayLike
 
 from ..errors import UserError
 from .law import Array, settings
@@ -228,7 +229,7 @@ def _looked_up(table: Array, x: Array) -> tuple[Array, Array, Array, Array]:
     return start[:3], slope, jnp.clip(x - start[3], 0.0, width), jnp.maximum(x - nodes[-1], 0.0)
 
 
-def tabulated(x: np.ndarray | Array, area: np.ndarray | Array, name: str = "height distribution") -> Tabulated:
+def tabulated(x: ArrayLike, area: ArrayLike, name: str = "height distribution") -> Tabulated:
     """A table of the cumulative height distribution, checked.
 
     Args:

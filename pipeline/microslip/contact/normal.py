@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
@@ -265,7 +266,7 @@ class Measured(Normal):
         return self.force_at[j], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
-def measured(u: np.ndarray, force: np.ndarray, nominal: float | None = None, name: str = "measured curve") -> Measured:
+def measured(u: ArrayLike, force: ArrayLike, nominal: float | None = None, name: str = "measured curve") -> Measured:
     """The law through measured points, which must not fall.
 
     Slopes of Fritsch and Carlson (harmonic means), which do not overshoot; zero at the first point, where the contact
