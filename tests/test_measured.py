@@ -146,6 +146,57 @@ def test_files_that_are_wrong(tmp_path: Path) -> None:
         compare_groups(far, basis)
 
 
+def respond(path: Path, basis: ModalBasis, scale: float = 1.0) -> Path:
+    """Add what a hammer and one accelerometer would measure: mm/s2 over mN, from the modes of the body itself."""
+    g, at = basis.groups[0, 0], chosen(basis)
+    f = np.linspace(0.5 * g.frequency[0], 1.02 * g.frequency[-1], 1500)
+    W, w, D = 2 * np.pi * f[:, None], g.omega, g.damping_ratio
+    sets = []
+    for point, way in ((2, 3), (4, 1), (6, -3), (1, 2)):
+        r = np.sign(way) * g.phi[at[point], abs(way) - 1] * g.phi[at[4], 0]
+        H = scale * (-(W**2) * r / (w**2 - W**2 + 2j * D * w * W)).sum(axis=1)
+        sets.append(
+            {"type": 58, "binary": 0, "func_type": 4, "rsp_node": int(basis.mesh.node_id[at[point]]), "rsp_dir": way,
+             "ref_node": int(basis.mesh.node_id[at[4]]), "ref_dir": 1, "ord_data_type": 6, "abscissa_spacing": 1,
+             "abscissa_min": f[0], "abscissa_inc": f[1] - f[0], "num_pts": len(f), "abscissa_spec_data_type": 18,
+             "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "z_axis_spec_data_type": 0, "data": H,
+             "x": f, "id1": "", "id2": "", "id3": "", "id4": "", "id5": "", "rsp_ent_name": "NONE",
+             "ref_ent_name": "NONE", "load_case_id": 0}
+        )  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(sets, "add")
+    return path
+
+
+def test_measured_responses_judge_the_modes(tmp_path: Path) -> None:
+    """The responses of the body itself: FRAC 1 and level 1 to the six digits of the shapes, in mm and mN."""
+    basis = small.basis()
+    group = replace(basis.groups[0, 0], damping_ratio=np.full(basis.groups[0, 0].n_modes, 0.01))
+    basis = replace(basis, groups={(0, 0): group})
+    path = respond(measure(tmp_path / "t.uff", basis), basis)
+    told = read_measured(path)[1]
+    found = re.search(r"(\d) of 4 .* FRAC (\S+) \(.*\) to (\S+), levels (\S+) to (\S+) times", told[-1])
+    assert found is not None and found[1] == "4"
+    assert all(abs(float(found[i]) - 1) < 2e-3 for i in (2, 3, 4, 5))
+    # a modal mass 100 times too large, or a force said to be in N, is told
+    wrong = respond(measure(tmp_path / "w.uff", basis, modal_m=100.0), basis)
+    assert "0.01 times as strongly" in read_measured(wrong)[1][-1]
+    # responses in g instead of mm/s2
+    wrong = respond(measure(tmp_path / "g.uff", basis), basis, 1 / 9806.65)
+    assert "times as strongly" in read_measured(wrong)[1][-1]
+    # without modal masses they say nothing
+    blind = respond(measure(tmp_path / "b.uff", basis, modal_m=0.0), basis)
+    assert "left aside" in read_measured(blind)[1][-1]
+
+
+def test_functions_alone_are_refused_with_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    respond(tmp_path / "t.uff", small.basis())
+    assert main(["import", "t.uff"]) == 2
+    assert "4 measured functions and no mode shapes (data set 55); identify modes" in capsys.readouterr().err
+
+
 def test_import_and_compare(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -165,7 +216,7 @@ def test_import_and_compare(
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("measured")
-    measure(path / "whole.uff", small.basis())
+    respond(measure(path / "whole.uff", small.basis()), small.basis())
     return path
 
 

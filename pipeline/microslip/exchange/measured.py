@@ -1,4 +1,4 @@
-"""Measured modes from a Universal File (data sets 15 or 2411: points, 55: modes, 164: units), by pyuff.
+"""Measured modes from a Universal File, by pyuff (data sets 15 or 2411: points, 55: modes, 58: functions, 164: units).
 
 A test knows some directions of some points, no mesh, no mass and nothing of completeness: the modal file says so by
 its attribute ``source`` = ``measured``. Its points are the measured ones; a monitor ``point <number>`` has one row for
@@ -19,6 +19,8 @@ from ..correlation import DIRECTIONS, POINT
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
 from ..mesh import UNITS
 from ..modes.canonical import signs
+from .functions import fits
+from .functions import told as functions_told
 
 NORMAL = 2
 _KINDS = (NORMAL, 3, 7)
@@ -41,12 +43,12 @@ class _Mode:
 
 
 def holds_modes(path: Path | str) -> bool:
-    """Whether a text file has a data set 55 in the way of Universal Files."""
+    """Whether a text file has modes or measured functions in the way of Universal Files."""
     before = b""
     try:
         with open(path, "rb") as file:
             for line in file:
-                if before.strip() == b"-1" and line.strip() in (b"55", b"2414"):
+                if before.strip() == b"-1" and line[:80].split()[:1] in ([b"55"], [b"58"], [b"58b"], [b"2414"]):
                     return True
                 before = line[:80]
     except OSError:
@@ -66,13 +68,12 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
     path = Path(path)
     sets = _sets(path)
     length, force, told = _units(sets, unit)
-    number, place = _points(path, sets)
     modes = [_mode(path, s, length, force) for s in sets if s["type"] == 55 and s.get("analysis_type") in _KINDS]
-    if not modes:
-        raise UserError(f"{path}: holds no mode shapes (data set 55); export them from the modal analysis")
     others = sum(s["type"] == 58 or s["type"] == 55 and s.get("analysis_type") not in _KINDS for s in sets)
-    if others:
-        told.append(f"{others} measured functions (data sets 58, 55) are left aside: only identified modes are taken")
+    if not modes:
+        found = f"{others} measured functions and no" if others else "no"
+        raise UserError(f"{path}: holds {found} mode shapes (data set 55); identify modes in the test program first")
+    number, place = _points(path, sets)
     modes.sort(key=lambda m: m.omega)
     used = modes[0].nodes
     for i, m in enumerate(modes):
@@ -90,7 +91,11 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
         if scaled
         else "no modal masses: shapes are scaled to a largest displacement of 1, forces on them mean nothing"
     )
-    return _basis(name or path.stem, points, used, modes, phi, scaled), tuple(told)
+    basis = _basis(name or path.stem, points, used, modes, phi, scaled)
+    if others:
+        functions = [s for s in sets if s["type"] == 58] if scaled else []
+        told += functions_told(fits(functions, basis.groups[0, 0], used, length / force), others)
+    return basis, tuple(told)
 
 
 def _sets(path: Path) -> list[dict[str, Any]]:
