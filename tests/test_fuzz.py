@@ -24,9 +24,11 @@ from test_mesh import INP, TET
 
 from microslip.basis import read_basis, write_basis
 from microslip.body import BodySettings, load_body, override, validate
+from microslip.case import load_case
 from microslip.data import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modes import modal_basis
+from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -116,6 +118,26 @@ def test_any_bytes_as_a_body_file(folder: Path, data: bytes) -> None:
     (folder / "body.toml").write_bytes(data)
     with user_errors_only():
         load_body(folder / "body.toml")
+
+
+TEMPLATES = ROOT / "pipeline" / "microslip" / "templates" / "three-masses"
+SYSTEM, CASE = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("system.toml", "case.toml"))
+
+
+@settings(max_examples=150)
+@given(EDITS, st.booleans())
+def test_changed_system_files(folder: Path, edits: list[tuple[int, int, str]], words: bool) -> None:
+    (folder / "system.toml").write_bytes((token_edited if words else edited)(SYSTEM, edits))
+    with user_errors_only():
+        system_basis(folder / "system.toml")
+
+
+@settings(max_examples=150)
+@given(EDITS, st.booleans())
+def test_changed_case_files(folder: Path, edits: list[tuple[int, int, str]], words: bool) -> None:
+    (folder / "case.toml").write_bytes((token_edited if words else edited)(CASE, edits))
+    with user_errors_only():
+        load_case(folder / "case.toml")
 
 
 NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([0, 1, -1, 10**400, -(10**400), 1e308, 5e-324]))
@@ -275,6 +297,7 @@ WORKER = """
 import random, sys
 from pathlib import Path
 from microslip.basis import check_basis, files
+from microslip.case import load_case
 from microslip.data import UserError
 from test_fuzz import flipped
 data, out = Path(sys.argv[1]).read_bytes()[:-120], Path(sys.argv[2])  # without its seal

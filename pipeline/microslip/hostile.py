@@ -67,7 +67,7 @@ def read_hdf5(path: Path, action: Callable[[h5py.File], Any]) -> Any:
     Raises:
         HostileFile: hostile content, no HDF5 file, or damage in whatever way it shows. The text leaves out the file.
     """
-    if trouble := _tried(path, path.stat().st_mtime_ns):
+    if trouble := tried(path, _READ_ALL):
         raise HostileFile(f"it is damaged (HDF5 {trouble} on it)")
     try:
         with h5py.File(path, "r") as file:
@@ -79,10 +79,14 @@ def read_hdf5(path: Path, action: Callable[[h5py.File], Any]) -> Any:
         raise HostileFile(f"it is damaged or no HDF5 file ({' '.join(str(error).split())[:100]})") from error
 
 
+def tried(path: Path, code: str) -> str:
+    """`trial`, once for each state of a file."""
+    return _tried(path.resolve(), code, path.stat().st_mtime_ns, path.stat().st_size)
+
+
 @cache
-def _tried(path: Path, changed: int) -> str:
-    """What happens to a process that reads the file, once for each state of it."""
-    return trial(_READ_ALL, path)
+def _tried(path: Path, code: str, changed: int, size: int) -> str:
+    return trial(code, path)
 
 
 _READ_ALL = """

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
-from ..hostile import trial
+from ..hostile import tried
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf import read_bdf
 from .cdb import read_cdb
@@ -118,8 +118,8 @@ def _read_by_meshio(path: Path) -> RawMesh:
 
     _check_sections(path)
     _check_xml(path)
-    if trouble := trial(_TRIAL, path):
-        raise Damaged(f"reading it {trouble if trouble.startswith('wants') else 'by meshio ' + trouble}")
+    if trouble := tried(path, _TRIAL):
+        raise Damaged(f"reading it {trouble}")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():

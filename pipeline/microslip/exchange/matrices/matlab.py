@@ -7,6 +7,7 @@ from typing import Any
 
 import h5py
 
+from ...hostile import tried
 from . import hdf5
 from .found import DENSE, Found, Unreadable, square
 
@@ -43,7 +44,17 @@ def read(path: Path, name: str) -> Found:
     return Found(square(_trusting(scipy.io.loadmat, path, variable_names=[name])[name], name))
 
 
+_TRIAL = """
+import scipy.io
+scipy.io.whosmat(str(path))
+scipy.io.loadmat(str(path))
+"""
+
+
 def _trusting(reader: Any, path: Path, **how: Any) -> Any:
+    """Call scipy, whose compiled parser does not survive every damaged file."""
+    if trouble := tried(path, _TRIAL):
+        raise Unreadable(f"it is damaged (reading it {trouble})")
     try:
         return reader(str(path), **how)
     except (Exception, SystemExit) as error:  # scipy raises whatever its parser meets
