@@ -9,11 +9,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import decks
 import h5py
 import meshes
 import numpy as np
 import pytest
 from test_bdf import bulk
+from test_cdb import archive
 from test_fuzz import flipped, user_errors_only
 
 from microslip.cli import main
@@ -341,6 +343,37 @@ def test_formats_that_may_lead_elsewhere_are_not_opened(tmp_path: Path, suffix: 
     (tmp_path / f"a{suffix}").write_text("!!python/object/apply:os.system [exit]\n")
     with pytest.raises(UserError, match="meshes are not read from a file"):
         read_mesh(tmp_path / f"a{suffix}", "m")
+
+
+# nodes in any order ----------------------------------------------------------------------------------------------
+
+
+def shuffled(text: str, first: int, last: int, lines_each: int) -> str:
+    """The records of nodes between two lines in another order."""
+    lines = text.splitlines()
+    records = [lines[i : i + lines_each] for i in range(first, last, lines_each)]
+    random.Random(1).shuffle(records)
+    return "\n".join([*lines[:first], *(line for r in records for line in r), *lines[last:], ""])
+
+
+@pytest.mark.parametrize("suffix", [".inp", ".cdb", ".bdf", ".unv"])
+def test_nodes_may_stand_in_any_order(tmp_path: Path, suffix: str) -> None:
+    """Cells and sets go by number: the same places, the numbers kept."""
+    mesh = tetrahedra()
+    n = mesh.n_points
+    text, first, each = {
+        ".inp": ("\n".join(decks.mesh_lines(mesh, 1.0, ("z0",))), 1, 1),
+        ".cdb": (archive(mesh, ("z0",), scale=1.0), 5, 1),
+        ".bdf": (bulk(mesh), 3, 2),
+        ".unv": (unv(mesh), 2, 2),
+    }[suffix]
+    for name, content in (("sorted", text), ("shuffled", shuffled(text, first, first + each * n, each))):
+        (tmp_path / f"{name}{suffix}").write_text(content)
+    one, other = (read_mesh(tmp_path / f"{name}{suffix}", "m") for name in ("sorted", "shuffled"))
+    assert one.node_id.tolist() != other.node_id.tolist()
+    np.testing.assert_array_equal(one.points[one.cells["tetra"]], other.points[other.cells["tetra"]])
+    for name in one.point_sets:
+        assert set(one.node_id[one.point_sets[name]]) == set(other.node_id[other.point_sets[name]])
 
 
 # changed bytes -------------------------------------------------------------------------------------------------------

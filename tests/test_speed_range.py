@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -393,6 +394,46 @@ def test_exports_at_any_speed_of_the_range(tmp_path, capsys) -> None:
         assert main(["export", str(file), "--to", "mat", *words, "-o", str(out)]) == 2
         err = capsys.readouterr().err
         assert says in err and len(err.splitlines()) == 1 and not out.exists()
+
+
+CASE = """
+name = "test"
+body = "test"
+speed_rpm = {rpm}
+excitation = "gas"
+amplitude = 1e5
+monitor = "end"
+[[contacts]]
+interface = "tip"
+normal_stiffness = 2e7
+tangential_stiffness = 1e7
+friction = 0.2
+slides_along = "t2"
+[sweep]
+start = {start}
+stop = {stop}
+points = 60
+normal_forces = [50.0]
+"""
+
+
+def test_a_case_responds_at_any_speed_of_the_range(tmp_path) -> None:
+    """The free peak stands where the body solved for at that speed has its mode; a stored speed needs no range."""
+    from microslip.case import load_case, run_case
+
+    path, group = tmp_path / "case.toml", solved(9000.0)
+    text = {"start": 0.9 * group.frequency[0], "stop": 1.1 * group.frequency[0]}
+    path.write_text(CASE.format(rpm=9000.0, **text))
+    found = run_case(load_case(path)[0], ranged(), path)
+    assert found.speed == pytest.approx(9000 * np.pi / 30, rel=1e-12)
+    peak = found.free.frequency[np.abs(found.free.monitor).argmax()]
+    assert peak == pytest.approx(group.frequency[0], rel=0.2 / 59)  # a step of the sweep
+    assert abs(ranged().groups[0, 0].frequency[0] / group.frequency[0] - 1) > 0.02  # at rest it is elsewhere
+    stored = run_case(load_case(path)[0], basis_at(ranged(), 9000.0), path)  # 9000 rpm is a speed of this file
+    np.testing.assert_allclose(stored.responses[50.0].monitor, found.responses[50.0].monitor, rtol=1e-12)
+    (tmp_path / "case.toml").write_text(CASE.format(rpm=17000.0, **text))
+    with pytest.raises(UserError, match=r"case.toml: speed_rpm: 17000 rpm is outside the speed range"):
+        run_case(load_case(path)[0], ranged(), path)
 
 
 def test_campbell_diagram_of_the_range() -> None:

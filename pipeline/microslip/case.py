@@ -34,7 +34,7 @@ from .harmonic_balance import (
     refined_peaks,
     stuck_frequencies,
 )
-from .speed_range import group_at
+from .speed_range import basis_at
 
 
 class ContactSettings(Model):
@@ -232,10 +232,10 @@ def _what_is_counted(
 
 
 def _at_speed(settings: CaseSettings, basis: ModalBasis, path: Path | str) -> ModalGroup:
-    """The group of a stored speed (`speed`, a number), or of any speed inside the body's range (`speed_rpm`)."""
+    """The group of a stored speed (`speed`, a number), or of one in rpm, stored or in the body's range."""
     if settings.speed_rpm is not None:
         try:
-            return group_at(basis, settings.speed_rpm)
+            return basis_at(basis, settings.speed_rpm).groups[0, 0]
         except UserError as error:
             raise UserError(f"{path}: speed_rpm: {error}") from error
     if (settings.speed, 0) not in basis.groups:
