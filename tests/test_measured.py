@@ -177,6 +177,11 @@ def test_measured_responses_judge_the_modes(tmp_path: Path) -> None:
     found = re.search(r"(\d) of 4 .* FRAC (\S+) \(.*\) to (\S+), levels (\S+) to (\S+) times", told[-1])
     assert found is not None and found[1] == "4"
     assert all(abs(float(found[i]) - 1) < 2e-3 for i in (2, 3, 4, 5))
+    file = pyuff.UFF(str(path))
+    sets = [s | ({"binary": 1} if s["type"] == 58 else {}) for s in file.read_sets()]
+    pyuff.UFF(str(tmp_path / "binary.uff")).write_sets(sets, "overwrite")
+    assert b"58b" in (tmp_path / "binary.uff").read_bytes()
+    assert read_measured(tmp_path / "binary.uff")[1][-1] == told[-1]
     # a modal mass 100 times too large, or a force said to be in N, is told
     wrong = respond(measure(tmp_path / "w.uff", basis, modal_m=100.0), basis)
     assert "0.01 times as strongly" in read_measured(wrong)[1][-1]

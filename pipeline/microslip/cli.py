@@ -248,7 +248,7 @@ def import_(file: Path, folder: Path | None = None, /, *, unit: str = "mm") -> N
     """Make a body.toml around another program's mesh or matrices, or a modal file from measured modes.
 
     Args:
-        file: a mesh (.inp, .cdb, .msh, .med, .bdf, ...), a stiffness matrix (.mtx, .mat, .h5, .op4, .pch, .sti), or
+        file: a mesh (.inp, .cdb, .bdf, .med, .unv, .msh), a stiffness matrix (.mtx, .mat, .h5, .op4, .pch, .sti), or
             modes of a test (.uff, .unv with data set 55).
         folder: of the new body.toml or basis.h5; one of the file's name if not given.
         unit: of its lengths, where the file does not tell.

@@ -8,6 +8,7 @@ it moves in some mode.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,7 +115,9 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         kinds = [int(k) for k in file.get_set_types()]
         if not kinds:
             raise ValueError("it has no data sets")
-        return [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return [file.read_sets(i) | {"type": k} for i, k in enumerate(kinds) if k in wanted]
     except Exception as error:  # pyuff raises whatever its parsing meets
         raise UserError(
             f"{path}: cannot be read as a Universal File ({type(error).__name__}: {_short(error)}); export it again"

@@ -71,7 +71,7 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".inp": read_inp, ".cdb": read_cdb, ".anf": read_cdb, ".med": read_med, ".unv": read_unv, ".bdf": read_bdf,
-    ".nas": read_bdf, ".fem": read_bdf, ".dat": read_bdf,
+    ".nas": read_bdf, ".fem": read_bdf, ".dat": read_bdf, ".uff": read_unv, ".uf": read_unv,
 }  # fmt: skip
 _BY_MESHIO = (".msh", ".vtu", ".vtk")
 
@@ -85,16 +85,16 @@ def _read_raw(path: Path) -> RawMesh:
     if suffix in _BY_MESHIO:
         return _read_by_meshio(path)
     known = ", ".join([*_READERS, *_BY_MESHIO])
-    raise Damaged(f"meshes are not read from a file '{suffix}', but from {known}")
+    raise UserError(f"{path}: meshes are not read from a file '{suffix}'; use one of {known}")
 
 
 def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
     foreign = sorted({kind for kind, cells in raw.blocks if kind not in CELL_TYPES and len(cells)})
     if foreign:
-        raise UserError(
-            f"{path}: cells of type {', '.join(foreign)} cannot be assembled; "
-            f"convert the mesh to one of {', '.join(CELL_TYPES)}"
-        )
+        way = f"convert the mesh to one of {', '.join(CELL_TYPES)}"
+        if {"wedge18", "pyramid14"} & set(foreign):
+            way += " (in gmsh: Mesh.SecondOrderIncomplete = 1)"
+        raise UserError(f"{path}: cells of type {', '.join(foreign)} cannot be assembled; {way}")
     _sort_by_region(raw)
     cells: dict[str, list[Indices]] = {}
     for kind, connectivity in raw.blocks:
