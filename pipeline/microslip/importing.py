@@ -17,7 +17,7 @@ from .units import SYSTEMS, usual_system
 
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
-_MESHES = (".inp", ".cdb", ".msh", ".med")
+_MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
 
 
 @dataclass(frozen=True)
