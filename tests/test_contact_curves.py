@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from microslip.contact.curves import NormalCurve, curve, read_curve
+from microslip.contact.hertz import Hertz
+from microslip.contact.series import BULK
+from microslip.contact.solids import Solid
 from microslip.data import UserError
+from microslip.modes.closures import ContactCurve
 
 ROUGH, C_N0 = 12e-6, 240e6
 
@@ -139,6 +143,20 @@ def test_columns_by_name_units_and_an_opening_branch(tmp_path):
     c = read_curve(path, displacement=3, force="F (kN)", force_unit="kN", gap=True)
     assert c.knots == pytest.approx(np.array([-10, -8, -6, -4, -2]) * 1e-6)
     assert c.loads == pytest.approx([0, 2, 9, 30, 70])
+
+
+def test_a_closure_of_finite_elements_is_read_as_a_law(tmp_path):
+    """The file that `microslip closure` leaves, here with Hertz' force: third order again, but for the first gap."""
+    ball = Hertz.sphere(Solid(2.1e11, 0.3), Solid(2.1e11, 0.3), 0.05)
+    u = np.linspace(-5e-6, 2e-5, 51)
+    path = tmp_path / "closure.csv"
+    path.write_text(ContactCurve(u, ball.force(u), np.zeros(51)).table())
+    c = read_curve(path, "approach_m", "normal_force_N", "m", includes=BULK)
+    assert c.separation == pytest.approx(0.0, abs=1e-12) and c.includes == BULK
+    between = np.linspace(1e-6, 2e-5, 77)
+    assert c.force(between) == pytest.approx(ball.force(between), abs=2e-4 * c.loads[-1])
+    with pytest.raises(UserError, match="includes: 'all' is unknown"):
+        read_curve(path, "approach_m", "normal_force_N", "m", includes="all")
 
 
 LINES = "u,F\n0,0\n1,2\n2,9\n3,30\n4,70\n"

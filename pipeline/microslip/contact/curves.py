@@ -20,6 +20,7 @@ from scipy.optimize import isotonic_regression
 
 from ..compliance import BULK_AND_SURFACE
 from ..data import Array, Indices, UserError
+from .series import INCLUDES
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
@@ -33,9 +34,12 @@ class NormalCurve:
 
     Attributes:
         knots: (k,) approaches, m, rising, the first one where the contact opens. loads: (k,) N there, the first one 0.
-            slopes: (k,) N/m there, the first one 0. includes: what compliance was measured, see
-            `microslip.compliance`; a rig measures both, unless the bodies' own yielding was taken off.
+            slopes: (k,) N/m there, the first one 0. includes: what compliance was measured, one of
+            `series.INCLUDES`; a rig measures both, unless the bodies' own yielding was taken off.
         source: for reports.
+
+    Raises:
+        UserError: an unknown word.
     """
 
     knots: Array
@@ -43,6 +47,10 @@ class NormalCurve:
     slopes: Array
     includes: str = BULK_AND_SURFACE
     source: str = "given"
+
+    def __post_init__(self) -> None:
+        if self.includes not in INCLUDES:
+            raise UserError(f"includes: '{self.includes}' is unknown; choose one of {', '.join(INCLUDES)}")
 
     @property
     def separation(self) -> float:
@@ -118,7 +126,7 @@ def curve(
     Args:
         approach: (k,) m, rising, positive closing. force: (k,) N, not negative, not falling. noise: N, a force may
             fall by as much between neighbours; it is evened then (isotonic regression, the nearest curve that does
-            not fall). includes: `microslip.compliance.SURFACE` or `BULK_AND_SURFACE`. name: file, for messages.
+            not fall). includes: one of `series.INCLUDES`. name: file, for messages.
         places: (k,) lines of the file the points stand in.
 
     Raises:
@@ -202,7 +210,9 @@ def read_curve(
     path: Path | str, displacement: int | str = 1, force: int | str = 2, length_unit: str = "um", force_unit: str = "N",
     gap: bool = False, noise: float = 0.0, includes: str = BULK_AND_SURFACE,
 ) -> NormalCurve:  # fmt: skip
-    """A measured curve from a file of columns: comma, semicolon, tab or blanks between them, ``#`` before remarks.
+    """A curve from a file of columns, measured or of ``microslip closure``.
+
+    Comma, semicolon, tab or blanks between the columns, ``#`` before remarks.
 
     Args:
         displacement, force: columns, counted from 1 or named as in the file's first line. length_unit: one of
