@@ -483,6 +483,29 @@ def test_same_basis_same_bytes(form: str, tmp_path: Path) -> None:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
 
 
+@pytest.mark.parametrize("form", sorted(WRITERS))
+def test_every_file_says_units_frame_order_and_signs(form: str, tmp_path: Path) -> None:
+    """In words, where its reader sees them; the universal file has 80 columns and a data set of units for it."""
+    path = tmp_path / f"x{WRITERS[form].ending}"
+    writer(form)(body(reduction="craig-bampton"), path)
+    if form in ("mat", "pyharm"):
+        said = str(loadmat(path, squeeze_me=True)["readme"])
+    elif form == "exudyn":
+        said = str(np.load(path)["microslip_readme"])
+    else:
+        files = [p for p in tmp_path.rglob("*") if p.suffix in (".txt", ".vtu", ".pvd", ".fem", ".SID_FEM", ".uff")]
+        texts = [p.read_bytes()[:3000].decode("latin-1") for p in files]
+        said = texts[0]
+        assert all("SI" in t for t in texts)
+    order = {
+        "mat": "", "pyharm": "Physical coordinates first", "exudyn": "x, y, z of each node in turn",
+        "mtx": "coordinates.csv", "mbdyn": "x y z rx ry rz", "sid": "m1(row, q, column)", "uff": "x y z of each node",
+        "vtu": "vectors x y z", "pvd": "vectors x y z",
+    }  # fmt: skip
+    assert "SI" in said and "of the mesh" in said and order[form] in said
+    assert form == "uff" or "forces positive along their displacements" in said
+
+
 @pytest.mark.parametrize("form", ["exudyn", "uff", "pvd"])
 def test_missing_shapes_are_named(form: str, tmp_path: Path) -> None:
     basis = small.basis()

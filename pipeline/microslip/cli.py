@@ -316,6 +316,8 @@ def compare(
     from .correlation import compare_groups, pair_table
     from .modes.sampling import on_common_points
 
+    if not 0 <= least <= 1:
+        raise UserError(f"compare --least {least:g}: a MAC lies between 0 and 1; choose a number there")
     bodies = (read_basis(first), read_basis(second))
     seen = on_common_points(*bodies)
     found = compare_groups(*seen, (speed, nodal_diameter), distance, least)

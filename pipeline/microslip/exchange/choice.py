@@ -10,8 +10,11 @@ from ..coordinates import in_modes
 from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
 from ..resonances import speeds_of
 
-STATEMENT = "SI units (m, kg, s, N, rad, Pa), frequencies in Hz where so called; right-handed frame of the mesh"
-"""What every text file says of its units and frame."""
+STATEMENT = (
+    "SI units (m, kg, s, N, rad, Pa), frequencies in Hz where so called; right-handed frame of the mesh; "
+    "forces positive along their displacements"
+)
+"""What every file says of its units, frame and signs."""
 
 
 def select(basis: ModalBasis, speed: int | None, nodal_diameter: int | None) -> ModalBasis:

@@ -19,6 +19,7 @@ import numpy as np
 from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
 from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows, UserError
 from ..store import complete_or_absent
+from .choice import STATEMENT
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"
 _KEYWORDS = {
@@ -55,6 +56,7 @@ def mat_tables(basis: ModalBasis) -> dict[str, Any]:
     tables: dict[str, Any] = {
         "format": f"{FORMAT} {FORMAT_VERSION}",
         "units": "SI: m, kg, s, N, rad, Pa",
+        "readme": STATEMENT,
         "conventions": {key: text for key, text in CONVENTIONS.items() if key != "dimensions"},
         "name": basis.name,
         "reduction": basis.reduction,

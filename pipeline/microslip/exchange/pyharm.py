@@ -58,7 +58,7 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
         "Fex_name": np.array(names, dtype=object).reshape(-1, 1),
         "omega": g.omega, "Omega": g.speed,
         "readme": f"{basis.name}: {STATEMENT}. Physical coordinates first: for each of nodes the six dofs in its frame "
-        "(rotation has n, t1, t2 as rows, n outwards), then nmodes modal ones. Positive forces act along the dofs. "
+        "(rotation has n, t1, t2 as rows, n outwards), then nmodes modal ones. "
         "Check: eigenvalues of (K, M) are omega^2 (without the massless coordinates).",
     }  # fmt: skip
 

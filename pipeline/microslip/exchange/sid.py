@@ -56,6 +56,7 @@ def _first(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> str
     origin = " ".join(f"{x:.9g}" for x in g.invariants.point)  # type: ignore[union-attr]
     text = (
         f"{len(nodes)} nodes, {g.n_modes} modes, {basis.name} by microslip; SI; axes of the mesh, origin ({origin}); "
+        "forces positive along their displacements; "
         f"m1(row, q, column); omega products xx yy zz xy yz xz; nodes {names}"
     )
     return text.encode("ascii", "replace").decode("ascii")

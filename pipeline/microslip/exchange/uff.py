@@ -49,7 +49,8 @@ def _header(basis: ModalBasis) -> str:
     """Data set 151. Its dates mean nothing: the same basis gives the same bytes."""
     program = f"microslip {__version__}"
     date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
-    return _set(151, [_line(basis.name), "modal basis; SI; frame of the mesh; phi^H M phi = 1", program,
+    said = "modal basis; SI; frame of the mesh, x y z of each node; phi^H M phi = 1"
+    return _set(151, [_line(basis.name), said, program,
                       date + f"{0:10d}{0:10d}{0:10d}", date, program, date])  # fmt: skip
 
 

@@ -5,6 +5,7 @@ Several speeds stand beside each other in one file, their names then begin with 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from ..mesh import boundary_facets
 from ..resonances import eigenmodes, speeds_of
 from ..ring import expand, multiplicity, replicate, ring_scale, sector_rotation
 from ..store import complete_or_absent, write_text
-from .choice import with_shapes
+from .choice import STATEMENT, with_shapes
 
 
 def write_vtu(basis: ModalBasis, path: Path | str) -> None:
@@ -46,9 +47,7 @@ def write_vtu(basis: ModalBasis, path: Path | str) -> None:
         data[f"face_{name}"] = marker
     if len(basis.mesh.node_id):
         data["node"] = basis.mesh.node_id
-    mesh = meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data)
-    with complete_or_absent(path) as temporary:
-        meshio.write(temporary, mesh, file_format="vtu")
+    _save(meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data), path)
 
 
 def write_pvd(basis: ModalBasis, path: Path | str) -> None:
@@ -70,10 +69,21 @@ def write_pvd(basis: ModalBasis, path: Path | str) -> None:
             files[number] = path.with_name(f"{path.stem}_mode{number:03d}.vtu")
             state = (("Hz", g.frequency[j]), ("rpm", g.speed * 30 / np.pi), ("nodal_diameter", g.harmonic))
             data = _parts("shape", g.phi[:, :, j]) | {n: np.full(basis.mesh.n_points, v) for n, v in state}
-            mesh = meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data)
-            with complete_or_absent(files[number]) as temporary:
-                meshio.write(temporary, mesh, file_format="vtu")
+            _save(meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data), files[number])
     write_text(path, _collection(files))
+
+
+COMMENT = f"<!--microslip: {STATEMENT}; vectors x y z; phi^H M phi = 1; stress xx yy zz xy yz xz-->"
+
+
+def _save(mesh: Any, path: Path | str) -> None:
+    """A meshio mesh as a VTU file; its third line says units, frame and order."""
+    import meshio
+
+    with complete_or_absent(path) as temporary:
+        meshio.write(temporary, mesh, file_format="vtu")
+        text = temporary.read_bytes()
+        temporary.write_bytes(re.sub(rb"<!--.*?-->", COMMENT.encode(), text, count=1))
 
 
 def _cells(mesh: Mesh) -> dict[str, Indices]:
@@ -189,9 +199,7 @@ def _write_ring_group(basis: ModalBasis, ring: Mesh, group: ModalGroup, path: Pa
         turned = [group.u_static @ sector_rotation(basis, j).T for j in range(basis.sectors)]
         data["u_static"] = _single(np.concatenate(turned))
     sector = [np.repeat(np.arange(basis.sectors), len(c) // basis.sectors) for c in ring.cells.values()]
-    mesh = meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector})
-    with complete_or_absent(path) as temporary:
-        meshio.write(temporary, mesh, file_format="vtu")
+    _save(meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector}), path)
 
 
 def _collection(files: Mapping[int, Path]) -> str:
@@ -199,5 +207,5 @@ def _collection(files: Mapping[int, Path]) -> str:
     sets = "".join(f'    <DataSet timestep="{k}" part="0" file="{escape(f.name)}"/>\n' for k, f in files.items())
     return (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-        f"  <Collection>\n{sets}  </Collection>\n</VTKFile>\n"
+        f"{COMMENT}\n  <Collection>\n{sets}  </Collection>\n</VTKFile>\n"
     )
