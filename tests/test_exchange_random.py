@@ -23,7 +23,10 @@ from microslip.exchange.mat import field_names
 from microslip.frames import skew
 from microslip.system import Body, Contact, Force, Monitor, System
 
-NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), min_size=1, max_size=9)
+NAMES = st.text(
+    st.one_of(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), st.sampled_from("\n\t\r*-")),
+    min_size=1, max_size=9,
+)  # fmt: skip
 
 
 @st.composite
@@ -120,7 +123,7 @@ def test_universal_files_give_their_printed_digits_back(
     (nodes,) = [s for s in sets if s["type"] == 2411]
     np.testing.assert_array_equal(np.stack([nodes[a] for a in "xyz"], axis=1), basis.mesh.points)
     modes = [s for s in sets if s["type"] == 55]
-    assert len(modes) == g.n_modes
+    assert len(modes) == g.n_modes and sets[0]["type"] == 151 and sets[1]["type"] == 164
 
     def printed(values: Array) -> Array:
         return np.array([float(f"{v:.5e}") for v in np.ravel(values)])
@@ -163,6 +166,8 @@ def test_mbdyns_invariants_are_the_sums_over_the_points(
     path, g = tmp_path_factory.mktemp("mbdyn") / "b.fem", basis.groups[0, 0]
     writer("mbdyn")(basis, path)
     read = read_fem(path)
+    head = path.read_text(encoding="ascii").split("** RECORD GROUP 1,")[0].splitlines()
+    assert all(line.startswith("** ") for line in head) and len(head) == 3 + len(read[2]) + g.n_modes
     masses, r, u = crosses(basis)
     m = g.n_modes
     np.testing.assert_array_equal(read[9], g.M_r)

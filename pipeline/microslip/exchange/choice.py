@@ -136,6 +136,12 @@ def _columns(phi: Array, keep: Indices) -> Array:
     return phi[:, :, keep] if len(phi) else phi
 
 
+def one_line(text: str) -> str:
+    """A text as one line of printable ASCII, for formats that know lines and nothing else."""
+    plain = " ".join(text.split()).encode("ascii", "replace").decode("ascii")
+    return "".join(c if c.isprintable() else "?" for c in plain)
+
+
 def node_numbers(basis: ModalBasis) -> Indices:
     """(n,) numbers of the nodes: those of the mesh file, or counted from 1."""
     ids = basis.mesh.node_id

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Invariants, ModalBasis, ModalGroup
-from .choice import STATEMENT
+from .choice import STATEMENT, one_line
 from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
@@ -49,20 +49,16 @@ def _head(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list
     """Comments and record group 1."""
     return [
         "** MBDyn MODAL DATA FILE",
-        f"** {_ascii(basis.name)}, written by microslip. {STATEMENT}.",
+        f"** {one_line(basis.name)}, written by microslip. {STATEMENT}.",
         "** Origin of the body frame in the mesh, m: " + " ".join(f"{x:.16e}" for x in g.invariants.point)  # type: ignore[union-attr]
         + "; shapes x y z rx ry rz in body axes, phi^T M phi = 1",
-        *(f"** node {i + 1}: {_ascii(a.name)}" for i, a in enumerate(nodes)),
+        *(f"** node {i + 1}: {one_line(a.name)}" for i, a in enumerate(nodes)),
         *(f"** check: frequency {j + 1} of groups 9 and 10 is {f:.9g} Hz" for j, f in enumerate(g.frequency)),
         "** RECORD GROUP 1, HEADER",
         "**   REVISION,  NODE,  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.",
         f"      REV0{len(nodes):10d}{g.n_modes:10d}{0:10d}{0:10d}{0:10d}",
         "**",
     ]  # fmt: skip
-
-
-def _ascii(name: str) -> str:
-    return name.encode("ascii", "replace").decode("ascii")
 
 
 def _integers(values: Sequence[int]) -> list[str]:

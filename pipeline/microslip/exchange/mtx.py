@@ -130,7 +130,7 @@ def _readme(basis: ModalBasis) -> str:
     ]
     return f"""{MARK}
 
-Body {basis.name}, reduction {basis.reduction}.
+Body {" ".join(basis.name.split())}, reduction {basis.reduction}.
 {STATEMENT}. Time factor exp(+i omega t).
 
 M_r q'' + (C_r + G_r) q' + K_r q = T^H f, displacements u = T q, with T the rows in interface_*, excitation_* and

@@ -29,6 +29,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
 from ..frames import skew
+from .choice import one_line
 from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
@@ -59,7 +60,7 @@ def _first(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> str
         "forces positive along their displacements; "
         f"m1(row, q, column); omega products xx yy zz xy yz xz; nodes {names}"
     )
-    return text.encode("ascii", "replace").decode("ascii")
+    return one_line(text)
 
 
 def _node(number: int, a: Attachment) -> list[str]:

@@ -22,7 +22,7 @@ from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..mesh import boundary_facets
 from ..resonances import eigenmodes
 from ..store import write_text
-from .choice import node_numbers, with_shapes
+from .choice import node_numbers, one_line, with_shapes
 
 TRIANGLE, QUAD = 41, 44
 """FE descriptors of data set 2412 (linear plane-stress elements, which stand for a skin to draw)."""
@@ -56,7 +56,7 @@ def _header(basis: ModalBasis) -> str:
 
 def _line(text: str) -> str:
     """A text line of the format: 80 columns of ASCII, not blank."""
-    return text.encode("ascii", "replace").decode("ascii")[:80].strip() or "NONE"
+    return one_line(text)[:80].strip() or "NONE"
 
 
 def _units() -> str:
