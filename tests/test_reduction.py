@@ -19,6 +19,7 @@ from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model
 from microslip.modes.solution import held_compliance
 from microslip.modes.spectrum import make_pencil
+from microslip.quality import percent_off
 from microslip.reduction import METHODS, Problem
 from microslip.reduction.craig_bampton import fixed_interface_modes
 from microslip.workflow import basis_summary
@@ -400,3 +401,5 @@ def test_the_summary_says_how_good_a_basis_is():
     assert "contacts exact" in lines and "above the certified ones" in lines and "every contact stuck" in lines
     assert "the solver adds the rest" in "\n".join(basis_summary(block("macneal")[2]))
     assert "no motion left" in "\n".join(basis_summary(block("eigenmodes", 6)[2]))
+    shares = {1e-7: "less than 0.0001 %", 2.34e-5: "0.0023 %", 0.0123: "1.2 %", 0.1: "10 %", 0.9999: "100 %"}
+    assert {e: percent_off(e) for e in shares} == shares

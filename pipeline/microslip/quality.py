@@ -45,4 +45,6 @@ def _list(errors: list[float]) -> str:
 
 def percent_off(error: float) -> str:
     """An error as per cent; below what the reference resolves it is called so."""
-    return "less than 0.0001 %" if error < 1e-6 else f"{100 * error:.2g} %"
+    if error < 1e-6:
+        return "less than 0.0001 %"
+    return f"{100 * error:.2g} %" if error < 0.1 else f"{100 * error:.0f} %"
