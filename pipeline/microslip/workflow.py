@@ -50,7 +50,7 @@ PACKAGE = Path(__file__).parent
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
     "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
-    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "elements.py", "units.py",
+    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "elements.py", "units.py", "hostile.py",
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
 _CASE_CODE = (
