@@ -196,6 +196,16 @@ def closure() -> None:
     save(from_file(BUILD / "closure.png"), "closure_pressure")
 
 
+def closed() -> None:
+    """Nodal diameters of the shroud whose neighbours press on each other along the normal, free to slide."""
+    from microslip.pictures import diagrams
+
+    pressed = ('closures.shroud.modes="closed"', "rotation.speeds_rpm=[4500]")
+    basis = replace(made("shroud-closed", "shroud", *LIGHT, *pressed), name="shroud, contacts closed")
+    diagrams.stuck_plot(basis, BUILD / "closed_nodal_diameters.png")
+    save(from_file(BUILD / "closed_nodal_diameters.png"), "closed_nodal_diameters")
+
+
 def contact_stiffness() -> None:
     """The shroud pressed step by step at speed: the picture of the verb `closure`."""
     chosen = (*COARSE_SHROUD[:2], "rotation.speeds_rpm=[3000.0]")
@@ -957,8 +967,8 @@ def stiffness_sources() -> None:
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, closure, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2, first,
-        speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
+        reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
+        first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
         stiffness_sources,
     )  # fmt: skip
 }

@@ -411,9 +411,7 @@ def _ring_frequencies(basis: ModalBasis, album: _Album) -> str:
         kind="plain",
     )
     out += album.take("nodal_diameters", "Frequency over nodal diameter; each line is a family of modes.")
-    out += album.take(
-        "nodal_diameters_stuck", "The two limits of friction: neighbours apart, and stuck to each other without slip."
-    )
+    out += album.take("nodal_diameters_stuck", "Neighbours as in the modes, and stuck to each other without slip.")
     out += _say(*(range_sentence(k, r) for k, r in sorted(basis.ranges.items())), kind="plain")
     for i, s in enumerate(speeds):
         shown = _ring_table([eigenmodes(basis.groups[s, k]) for k in held])

@@ -146,8 +146,10 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes.set_ylim(0, top)
     _nodal_axis(axes, basis)
     axes.set_ylabel("frequency in Hz")
-    axes.set_title(f"{basis.name}: neighbours apart and stuck, {_rpm_text(found.speed)}", fontweight="bold")
-    note = f"lines: contacts open; black squares: the contact '{name}' and its neighbour do not move on each other"
+    kept = any(c.modes == "closed" and c.sector_shift for c in basis.groups[speed, harmonics[0]].contacts.values())
+    apart, state = ("sliding", "closed along their normal") if kept else ("apart", "open")
+    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {_rpm_text(found.speed)}", fontweight="bold")
+    note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     _note(axes, note, -0.11)
     return _save(figure, path)
 
