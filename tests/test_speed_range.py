@@ -240,9 +240,14 @@ def test_modes_veer_inside_the_range() -> None:
     np.testing.assert_allclose(group_at(basis, rpm).omega, true.omega[:5], rtol=2 * r.tolerance)
 
 
-def test_at_a_solved_speed_the_range_gives_what_was_solved_for() -> None:
-    """Frequencies, rows with their signs, static state, gauges, compliance, Coriolis: to rounding of the root."""
-    basis = ranged()
+@pytest.mark.parametrize(("reduction", "compliance"), [("macneal", 1e-6), ("eigenmodes", 2e-3)])
+def test_at_a_solved_speed_the_range_gives_what_was_solved_for(reduction: str, compliance: float) -> None:
+    """Frequencies, rows with their signs, static state, gauges, compliance, Coriolis: to rounding of the root.
+
+    For eigenmodes alone the speed between is refined from the ends; what they leave of the compliance is a straight
+    line there.
+    """
+    basis = ranged(reduction=reduction)
     r = basis.ranges[0]
     rpm = float(r.speeds[r.solved][1] * 30 / np.pi)  # between the ends
     got, true = group_at(basis, rpm), solved(rpm)
@@ -255,8 +260,9 @@ def test_at_a_solved_speed_the_range_gives_what_was_solved_for() -> None:
     for kind in ("monitors", "gauges"):
         for name, b in getattr(true, kind).items():
             np.testing.assert_allclose(getattr(got, kind)[name].static, b.static, rtol=1e-6)
-    static = np.abs(true.compliance.static).max()
-    np.testing.assert_allclose(got.compliance.static, true.compliance.static, atol=1e-6 * static)
+    size = np.sqrt(np.diag(true.compliance.static))
+    left = (got.compliance.static - true.compliance.static) / np.outer(size, size)
+    assert np.abs(left).max() < compliance
     np.testing.assert_allclose(got.G_r, true.G_r[:6, :6], atol=1e-5 * np.abs(true.G_r).max())
     np.testing.assert_allclose(got.phi, true.phi[:, :, :6], atol=1e-5 * np.abs(true.phi).max())
 

@@ -196,6 +196,12 @@ def new_solver(name: str = "auto") -> DirectSolver:
     return BACKENDS[available_backends()[0] if name == "auto" else name]()
 
 
+def symmetric_product(upper: sp.csr_matrix) -> MatVec:
+    """Products of a symmetric matrix, given by its upper triangle, with an (n,) or (n, r) array."""
+    diagonal, lower = upper.diagonal(), upper.T
+    return lambda x: upper @ x + lower @ x - (diagonal * x.T).T
+
+
 class Unstable(NotConverged):
     """K - shift M has negative eigenvalues where it must not: the body diverges. `count`: how many."""
 
@@ -284,7 +290,7 @@ def search(
         values, vectors = _lanczos(pencil, max(wanted, 1), shift, tolerance, known)
         every = len(values) < max(wanted, 1) or len(zeros) + len(values) >= pencil.n  # no further one exists
         values, vectors = np.concatenate([zeros, values]), np.hstack([known, vectors])
-        keep, gap = _gap(values, count)
+        keep, gap = first_gap(values, count)
         if keep or every:
             break
         extra *= 4
@@ -358,7 +364,7 @@ def _orthonormal(pencil: Pencil, X: Array) -> tuple[Array, Array]:
     return X @ root, MX @ root
 
 
-def _gap(values: Array, count: int) -> tuple[int, tuple[float, float]]:
+def first_gap(values: Array, count: int) -> tuple[int, tuple[float, float]]:
     """How many values to keep, at least `count`, and the gap after them; 0 if no gap was seen."""
     for keep in range(max(count, 1), len(values)):
         low, high = values[keep - 1], values[keep]

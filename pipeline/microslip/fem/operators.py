@@ -192,3 +192,20 @@ def tangent_tensor(elasticity: Array, factor: Array | None, H: Array | None, str
     for k in range(3):
         A[..., k, :, k, :] += S
     return A
+
+
+def tangent_tensor_slope(elasticity: Array, factor: Array | None, H: Array, dH: Array, stress_slope: Array) -> Array:
+    """(e, q, 3, 3, 3, 3) derivative of `tangent_tensor` along dH: dF C F^T + F C dF^T + dS.
+
+    Args:
+        H, dH: (e, q, 3, 3) displacement gradient and its change. stress_slope: (e, q, 6) change of the stress.
+    """
+    C, F = to_tensor(elasticity), np.eye(3) + H
+    half = np.einsum("eqki,iIjJ,eqlj->eqkIlJ", dH, C, F, optimize=True)
+    A = half + np.transpose(half, (0, 1, 4, 5, 2, 3))
+    if factor is not None:
+        A *= factor[..., None, None, None, None]
+    S = to_symmetric(stress_slope)
+    for k in range(3):
+        A[..., k, :, k, :] += S
+    return A

@@ -13,11 +13,11 @@ from ..data import Array, ModalGroup, SpeedRange, UserError
 from ..reduction import Reduced
 from . import canonical
 from .body_rows import BodyRows
-from .common import SPARE, Common, Guess, Settled, Solved, common_coordinates, lagrange
-from .compute import assemble_group
+from .common import Common, Guess, Settled, Solved, common_coordinates, lagrange
+from .compute import assemble_group, searched_state
 from .equilibrium import BodyModel, StaticState, equilibrium, stiffness_slope
 from .sector import HarmonicUnknowns, Sector, sector_pencils
-from .solution import Solution, Unknowns, solution
+from .solution import Searched, Solution, Unknowns, reduced_solution, with_spares
 from .spectrum import leading_rows, make_pencil
 
 Report = Callable[[str], None]
@@ -25,12 +25,14 @@ Report = Callable[[str], None]
 
 def body_ranges(
     model: BodyModel, settings: BodySettings, motions: Array, rows: BodyRows, solver: eigen.DirectSolver,
-    sector: Sector | None, settled: Mapping[float, StaticState], report: Report,
+    sector: Sector | None, settled: Mapping[float, StaticState], searched: Mapping[float, Mapping[int, Searched]],
+    report: Report,
 ) -> dict[int, SpeedRange]:  # fmt: skip
     """Nodal diameter -> one basis for all speeds of `rotation.range_rpm`. Equilibria are shared.
 
     Args:
-        settled: speed (rad/s) -> equilibria that are known already.
+        settled: speed (rad/s) -> equilibria that are known already. searched: speed -> nodal diameter -> modes that
+            are, a few more of them than are asked for.
 
     Raises:
         UserError: instability inside the range. NotConverged: the tolerance cannot be met.
@@ -44,7 +46,7 @@ def body_ranges(
         )
     low, high = (v * np.pi / 30 for v in r.range_rpm)
     report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
-    body = _Body(model, settings, motions, rows, solver, sector, report, settled)
+    body = _Body(model, settings, motions, rows, solver, sector, report, settled, searched)
     found: dict[int, Common] = {}
     try:
         for k in sector.harmonics if sector else (0,):
@@ -72,6 +74,7 @@ class _Body:
     sector: Sector | None
     report: Report
     known: Mapping[float, StaticState]
+    searched: Mapping[float, Mapping[int, Searched]]
     states: dict[float, StaticState] = field(default_factory=dict)
     slopes: dict[float, Array] = field(default_factory=dict)  # of the displacements
     pencils: dict[float, Mapping[int, eigen.Pencil]] = field(default_factory=dict)
@@ -123,18 +126,18 @@ class _Body:
 
     def solve(self, k: int) -> Callable[[Settled], Solved]:
         """Certified modes, and with the methods that use them the static answers and fixed-interface modes."""
-        modes = self.settings.modes.model_copy(update={"count": self.settings.modes.count + SPARE})
-        more = self.settings.model_copy(update={"modes": modes})
+        more = with_spares(self.settings)
 
         def solve(settled: Settled) -> Solved:
             speed = settled.speed
             if speed not in self.solutions:
-                common = (self.motions, self.rows, self.report)
-                self.solutions[speed] = (
-                    {0: solution(self.model, more, settled.pencil, speed, *common)}
-                    if self.sector is None
-                    else self.sector.solutions(self.model, more, self.states[speed], speed, *common)
+                common = (self.motions, self.rows, self.solver, self.sector, self.report)
+                every = self.searched.get(speed) or searched_state(
+                    self.model, more, self.states[speed], speed, *common
                 )
+                self.solutions[speed] = {
+                    n: reduced_solution(self.model, more, s, self.rows) for n, s in every.items()
+                }
             found = self.solutions[speed][k]
             shapes = [found.found.vectors]
             if self.settings.reduction not in ("eigenmodes", "macneal"):
@@ -151,7 +154,7 @@ def _range(body: _Body, k: int, common: Common) -> SpeedRange:
     assert r.range_rpm is not None
     return SpeedRange(
         samples=tuple(_samples(body, k, common, phi)),
-        solved=np.array([s.speed in common.solved for s in common.samples]),
+        solved=np.array([s.speed in common.solved or s.speed in common.refined for s in common.samples]),
         form=common.form,
         shift=common.shift,
         count=_kept(settings, common),

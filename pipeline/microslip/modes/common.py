@@ -16,8 +16,9 @@ it at the samples, and a sample counts twice.
 
 Two errors are told apart at held-out speeds, where the true equilibrium and the true K are at hand:
 interpolation (frequencies from the interpolated against those from the projected K) and projection (from the
-projected K against those with the residuals of all modes added to V, each solved for once). The factorisation that
-this takes also counts the eigenvalues below the band, so that a mode which the samples do not know is noticed.
+projected K against those of the speed itself, for which V is widened by the residuals of all modes, solved for with one
+factorisation). This also counts the eigenvalues below the band, so that a mode which the samples do not know is
+noticed. The modes so found widen V where the speed becomes a sample.
 
 Nothing here knows finite elements: the body comes as two functions. All arrays may be complex (Hermitian K).
 """
@@ -37,7 +38,10 @@ SPAN = 1e-12
 """Directions of the union of shapes whose squared M-norm is a smaller share than this are rounding."""
 
 SPARE = 4
-"""Modes solved for beyond those wanted: one that comes down into the band between two samples is then known."""
+"""Modes known beyond those wanted: one that comes down into the band between two samples is then known."""
+
+ROUNDS = 6
+"""Corrections at a speed at most; one does where V is good."""
 
 MOST = 12
 """Samples at most: a range that needs more is better cut in two."""
@@ -45,7 +49,7 @@ MOST = 12
 CLEAR = 0.02
 """Eigenvalues that differ by this share are told apart by a count between them."""
 
-FAR = 30.0
+FAR = 10.0
 """Where the error is so many times the tolerance, more than one sample is added at a time."""
 
 FORMS = ("stiffness", "root")
@@ -96,7 +100,8 @@ class Common:
     Attributes:
         V: (n, c) M-orthonormal shapes. samples: the settled body at rising speeds, held-out ones among them.
         K_r: (s, c, c) at the samples. slopes: (s - h, c, c) dK_r/dOmega^2 at those not held out, or none, (0, c, c).
-        solved: speed -> its solution. held_out: the errors found. orthogonality: largest entry of |V^H M V - 1|.
+        solved: speed -> its solution. refined: speeds whose modes were refined from those, and are in V as well.
+        held_out: the errors found. orthogonality: largest entry of |V^H M V - 1|.
         form: ``stiffness`` or ``root``. shift: a of the variable sqrt(Omega^2 + a), (rad/s)^2; None for Omega^2.
     """
 
@@ -105,6 +110,7 @@ class Common:
     K_r: Array
     slopes: Array
     solved: dict[float, Solved]
+    refined: set[float]
     held_out: list[HeldOut]
     orthogonality: float
     form: str
@@ -256,9 +262,32 @@ def orthonormal_union(shapes: Array, M: eigen.MatVec) -> tuple[Array, float]:
     return V, worst
 
 
+def beyond(V: Array, shapes: Array, M: eigen.MatVec, least: float = SPAN**0.5) -> Array:
+    """(n, k) M-orthonormal basis of what shapes, of M-norm 1 at most, have outside V, where that exceeds `least`."""
+    if V.shape[1]:
+        MV = M(V)
+        for _ in range(2):
+            shapes = shapes - V @ (MV.conj().T @ shapes)
+        size = norms(shapes, M)
+        shapes = shapes[:, size > least] / size[size > least]
+        shapes = shapes - V @ (MV.conj().T @ shapes)
+    return orthonormal_union(shapes, M)[0] if shapes.shape[1] else shapes
+
+
+def norms(shapes: Array, M: eigen.MatVec) -> Array:
+    return np.sqrt(np.einsum("ij,ij->j", shapes.conj(), M(shapes)).real)
+
+
 def projected(K: eigen.MatVec, V: Array) -> Array:
     K_r = V.conj().T @ K(V)
     return 0.5 * (K_r + K_r.conj().T)
+
+
+def bordered(K_r: Array, K: eigen.MatVec, V: Array, W: Array) -> Array:
+    """`projected` on [V, W] from K_r on V."""
+    KW = K(W)
+    side, corner = V.conj().T @ KW, W.conj().T @ KW
+    return np.block([[K_r, side], [side.conj().T, 0.5 * (corner + corner.conj().T)]])
 
 
 def frequencies(K_r: Array, count: int) -> Array:
@@ -274,31 +303,40 @@ def largest_difference(omega: Array, reference: Array) -> float:
 # held-out speeds ---------------------------------------------------------------------------------------------------
 
 
-def better_frequencies(held: Settled, V: Array, K_r: Array, count: int) -> Array | None:
-    """(count,) rad/s with the residuals of all modes, solved for once, added to V; None if a mode is missing.
+@dataclass(frozen=True)
+class Refined:
+    """Frequencies (count,), rad/s, and M-orthonormal modes (n, k) of one speed, the count of them confirmed."""
 
-    r = (K - theta M) V y is what V leaves of a mode; (K - sigma M)^-1 r is its correction (one step of Davidson's
-    method with the exact inverse), so the error that is left is of second order in that of V.
+    frequencies: Array
+    shapes: Array
+
+
+def refined(held: Settled, V: Array, K_r: Array, count: int, tolerance: float) -> Refined | None:
+    """The modes of a speed with one factorisation, begun from V; None if V does not know one of them.
+
+    r = (K - theta M) V y is what V leaves of a mode; (K - sigma M)^-1 r is its correction (Davidson's method with an
+    exact inverse). V is widened by the corrections of all modes until the frequencies move by less than a tenth of the
+    tolerance; what is left then is of second order in the last corrections.
     """
     pencil = held.pencil
     theta, Y = np.linalg.eigh(K_r)
     band, sigma = _end_of_band(theta, count)
-    X = V @ Y[:, :band]
-    residual = pencil.K(X) - pencil.M(X) * theta[:band]
     pencil.solver.factorise(pencil.shifted(sigma))
     below = pencil.solver.negative()
-    more = pencil.solve(residual)
-    MV = pencil.M(V)
-    for _ in range(2):
-        more = more - V @ (MV.conj().T @ more)
-    size = np.sqrt(np.einsum("ij,ij->j", more.conj(), pencil.M(more)).real)
-    more = more[:, size > 1e-13]
-    if more.shape[1]:
-        V = np.hstack([V, orthonormal_union(more, pencil.M)[0]])
-    values = np.linalg.eigvalsh(projected(pencil.K, V))
-    if below != (values < sigma).sum():
+    for _ in range(ROUNDS):
+        X, before = V @ Y[:, :band], theta[:count]
+        W = beyond(V, pencil.solve(pencil.K(X) - pencil.M(X) * theta[:band]), pencil.M, least=1e-9)
+        K_r, V = bordered(K_r, pencil.K, V, W), np.hstack([V, W])
+        theta, Y = np.linalg.eigh(K_r)
+        if largest_difference(_roots(theta[:count]), _roots(before)) < 0.1 * tolerance:
+            break
+    if below != (theta < sigma).sum():
         return None
-    return np.sqrt(np.maximum(values[:count], 0.0))
+    return Refined(_roots(theta[:count]), V @ Y[:, : count + SPARE])
+
+
+def _roots(values: Array) -> Array:
+    return np.sqrt(np.maximum(values, 0.0))
 
 
 def _end_of_band(theta: Array, count: int) -> tuple[int, float]:
@@ -322,17 +360,19 @@ class _Search:
     settle: Callable[[float, Guess], Settled]
     solve: Callable[[Settled], Solved]
     count: int
+    tolerance: float
+    thrice: bool
     samples: dict[float, Settled] = field(default_factory=dict)
     solved: dict[float, Solved] = field(default_factory=dict)
     held: dict[float, Settled] = field(default_factory=dict)
     form: str = "root"
     shift: float | None = None
     V: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    orthogonality: float = 0.0
     K_r: dict[float, Array] = field(default_factory=dict)
     slopes: dict[float, Array] = field(default_factory=dict)
     slope_of: dict[float, eigen.MatVec] = field(default_factory=dict)
-    true: dict[float, Array | None] = field(default_factory=dict)
+    true: dict[float, Refined | None] = field(default_factory=dict)
+    refined: set[float] = field(default_factory=set)
 
     def settled(self, speed: float) -> Settled:
         """Equilibrium at a speed, begun from those known: from the samples with their slopes where they have some."""
@@ -343,27 +383,53 @@ class _Search:
         start = lagrange(np.array(known), speed, self.shift) if len(known) > 1 else np.zeros(0)
         return self.settle(speed, {s: (w, 0.0) for s, w in zip(known, start, strict=False)})
 
-    def add(self, settled: Settled, solved: bool) -> None:
-        """Make a speed a sample; a solved one widens the coordinates."""
-        self.samples[settled.speed] = settled
-        before = self.held.pop(settled.speed, None)
+    def add(self, settled: Settled, modes: bool) -> None:
+        """Make a speed a sample, with its modes if they are to widen the coordinates."""
+        speed = settled.speed
+        self.samples[speed] = settled
+        before = self.held.pop(speed, None)
         if settled.slope is not None:
-            self.slope_of[settled.speed] = settled.slope(before is None)
-        if solved:
-            self.solved[settled.speed] = self.solve(settled)
-            self.V, self.K_r, self.slopes, self.true = np.zeros((0, 0)), {}, {}, {}
+            self.slope_of[speed] = settled.slope(before is None)
+        if not modes:
+            return
+        if self.thrice or len(self.solved) < 2 or self._found(settled) is None:
+            self.solved[speed] = self.solve(settled)
+        else:
+            self.refined.add(speed)
+        self._widen(self._shapes(speed), settled.pencil.M)
 
-    def begin(self, low: float, high: float, thrice: bool) -> None:
-        """Both ends, and between them the middle of the variable that they suggest; thrice: its modes too."""
-        self.add(self.settled(low), solved=True)
+    def _widen(self, shapes: Array, M: eigen.MatVec) -> None:
+        """V and all that is projected on it, widened by shapes."""
+        shapes = shapes / norms(shapes, M)
+        if not self.V.size:
+            self.V = orthonormal_union(shapes, M)[0]
+            return
+        W = beyond(self.V, shapes, M)
+        settled = {**self.samples, **self.held}
+        self.K_r = {s: bordered(A, settled[s].pencil.K, self.V, W) for s, A in self.K_r.items()}
+        self.slopes = {s: bordered(A, self.slope_of[s], self.V, W) for s, A in self.slopes.items()}
+        self.V = np.hstack([self.V, W])
+
+    def _found(self, settled: Settled) -> Refined | None:
+        """The modes of a speed found from the coordinates as they are, or as they were when it was first asked for."""
+        if self.true.get(settled.speed) is None:
+            self.project()
+            K_r = self.K_r[settled.speed]
+            self.true[settled.speed] = refined(settled, self.V, K_r, self.count, self.tolerance)
+        return self.true[settled.speed]
+
+    def begin(self, low: float, high: float) -> None:
+        """Both ends, and between them the middle of the variable that they suggest."""
+        self.add(self.settled(low), modes=True)
         self.project()
         if low in self.slopes:
-            self._vary(low, float(self.slopes[low][0, 0].real))  # of the lowest mode, a first guess
-        self.add(self.settled(high), solved=True)
+            lowest = np.linalg.eigh(self.K_r[low])[1][:, 0]
+            self._vary(low, float((lowest.conj() @ self.slopes[low] @ lowest).real))  # a first guess
+        self.add(self.settled(high), modes=True)
         self._vary(low, (self.solved[high].lowest - self.solved[low].lowest) / (high**2 - low**2))
         middle = 0.5 * float(variable(low, self.shift) + variable(high, self.shift))
         square = middle if self.shift is None else middle**2 - self.shift
-        self.add(self.settled(float(np.sqrt(square))), solved=thrice)
+        self.add(self.settled(float(np.sqrt(square))), modes=True)
 
     def _vary(self, low: float, rise: float) -> None:
         """The variable in which the lowest frequency, whose square rises by so much over Omega^2, is straight."""
@@ -372,12 +438,12 @@ class _Search:
     def begin_like(self, other: Common) -> None:
         self.form, self.shift = other.form, other.shift
         held = {h.speed for h in other.held_out}
-        for sample in other.samples:
-            settled = self.settled(sample.speed)
-            if sample.speed in held:
-                self.held[sample.speed] = settled
+        settled = {s.speed: self.settled(s.speed) for s in other.samples}
+        for speed in sorted(settled, key=lambda s: s not in other.solved):  # those solved for first
+            if speed in held:
+                self.held[speed] = settled[speed]
             else:
-                self.add(settled, sample.speed in other.solved)
+                self.add(settled[speed], speed in other.solved or speed in other.refined)
 
     def interpolant(self, form: str) -> Interpolant:
         speeds = sorted(self.samples)
@@ -391,49 +457,54 @@ class _Search:
                 self.held[speed] = self.settled(speed)
 
     def project(self) -> None:
-        """V and the projected K of every sample, as far as they are not known."""
-        if not self.V.size:
-            lowest = self.samples[min(self.samples)].pencil
-            shapes = np.hstack([self.solved[s].shapes for s in sorted(self.solved)])
-            self.V, self.orthogonality = orthonormal_union(shapes, lowest.M)
-            self.V = self.V @ np.linalg.eigh(projected(lowest.K, self.V))[1]  # modes at the lowest speed
-        for speed, settled in self.samples.items():
+        """The projected K and its slope at every speed, as far as they are not known."""
+        for speed, settled in {**self.samples, **self.held}.items():
             if speed not in self.K_r:
                 self.K_r[speed] = projected(settled.pencil.K, self.V)
-            if speed not in self.slopes and speed in self.slope_of:
-                self.slopes[speed] = projected(self.slope_of[speed], self.V)
+        for speed, slope in self.slope_of.items():
+            if speed not in self.slopes:
+                self.slopes[speed] = projected(slope, self.V)
+
+    def _shapes(self, speed: float) -> Array:
+        found = self.solved.get(speed) or self.true[speed]
+        assert found is not None
+        return found.shapes
 
     def examine(self) -> list[HeldOut]:
-        """Errors of the better form at every held-out speed."""
-        held = [self.held[s] for s in sorted(self.held)]
-        for h in held:
-            if h.speed not in self.true:
-                self.K_r[h.speed] = projected(h.pencil.K, self.V)
-                self.true[h.speed] = better_frequencies(h, self.V, self.K_r[h.speed], self.count)
-        found = {form: self._errors(self.interpolant(form)) for form in FORMS}
-        self.form = min(FORMS, key=lambda form: max(h.interpolation for h in found[form]))
-        return found[self.form]
+        """Errors of the better form at every held-out speed.
 
-    def _errors(self, f: Interpolant) -> list[HeldOut]:
-        return [self._error(f, speed, self.K_r[speed], self.true[speed]) for speed in sorted(self.held)]
+        The modes of a speed that is far off by interpolation alone, and will be a sample, are not looked for.
+        """
+        self.project()
+        off = {form: [self._interpolation(self.interpolant(form), s) for s in sorted(self.held)] for form in FORMS}
+        self.form = min(FORMS, key=lambda form: max(off[form]))
+        f, worst = self.interpolant(self.form), max(off[self.form])
+        pairs = zip(sorted(self.held), off[self.form], strict=True)
+        return [self._error(f, s, e, e == worst or e <= FAR * self.tolerance) for s, e in pairs]
 
-    def _error(self, f: Interpolant, speed: float, exact: Array, true: Array | None) -> HeldOut:
-        here, guess = frequencies(exact, self.count), f.modes(speed)[0][: self.count]
-        interpolation = largest_difference(guess, here)
+    def _interpolation(self, f: Interpolant, speed: float) -> float:
+        return largest_difference(f.modes(speed)[0][: self.count], frequencies(self.K_r[speed], self.count))
+
+    def _error(self, f: Interpolant, speed: float, interpolation: float, known: bool) -> HeldOut:
+        if not known:
+            return HeldOut(speed, interpolation, 0.0, interpolation)
+        true = self._found(self.held[speed])
         if true is None:
             return HeldOut(speed, interpolation, np.inf, np.inf)
-        return HeldOut(speed, interpolation, largest_difference(here, true), largest_difference(guess, true))
+        here, guess = frequencies(self.K_r[speed], self.count), f.modes(speed)[0][: self.count]
+        projection, total = (largest_difference(omega, true.frequencies) for omega in (here, guess))
+        return HeldOut(speed, interpolation, projection, total)
 
-    def widen(self, found: list[HeldOut], tolerance: float, report: Report) -> None:
-        """Held-out speeds that fail become samples; the one with the largest projection error is solved for."""
+    def widen(self, found: list[HeldOut], report: Report) -> None:
+        """Held-out speeds that fail become samples; the one with the largest projection error brings its modes."""
         unknown = max(found, key=lambda h: h.projection)
         worst = max(found, key=lambda h: h.interpolation)
         for h in found:
-            solved = h is unknown and h.projection > 0.5 * tolerance
-            far = h.interpolation > FAR * tolerance
-            if solved or far or (h is worst and h.interpolation > 0.5 * tolerance):
-                report(f"one sample more: {_rpm(h.speed)}" + (", with its modes" if solved else ""))
-                self.add(self.held[h.speed], solved)
+            modes = h is unknown and h.projection > 0.5 * self.tolerance
+            far = h.interpolation > FAR * self.tolerance
+            if modes or far or (h is worst and h.interpolation > 0.5 * self.tolerance):
+                report(f"one sample more: {_rpm(h.speed)}" + (", with its modes" if modes else ""))
+                self.add(self.held[h.speed], modes)
         if len(self.held) == len(found):  # both within half of the tolerance, their sum is not
             self.add(self.held[unknown.speed], True)
 
@@ -444,23 +515,24 @@ def common_coordinates(
 ) -> Common:  # fmt: skip
     """Common coordinates for all speeds between `low` and `high`, rad/s.
 
-    Both ends and one speed between are samples. Where a held-out speed fails by interpolation it becomes a sample
-    (its equilibrium is known already), where it fails by projection its modes are solved for too, and others are
-    held out in its place.
+    Both ends are solved for, one speed between is refined from them, and these are samples. Where a held-out speed
+    fails by interpolation it becomes a sample (its equilibrium is known already), where it fails by projection its
+    modes are added too, and others are held out in its place.
 
     Args:
         settle: (speed, weights) -> equilibrium; the weighted displacements and slopes of the speeds settled before are
             a first guess (none: from rest). solve: equilibrium -> its shapes. count: modes whose frequencies must be
             right. tolerance: relative error of a frequency allowed at held-out speeds. before: of another nodal
-            diameter, whose samples are taken over. thrice: the speed between is solved from the start, which static
-            answers need that are to be exact at all speeds; for frequencies the held-out speeds tell whether it must.
+            diameter, whose samples are taken over. thrice: every speed whose modes are added is solved for, the
+            one between too, as static answers need that are to be exact at all speeds; for frequencies the modes
+            refined there do.
 
     Raises:
         NotConverged: `MOST` samples do not suffice.
     """
-    search = _Search(settle, solve, count)
+    search = _Search(settle, solve, count, tolerance, thrice)
     if before is None:
-        search.begin(low, high, thrice)
+        search.begin(low, high)
     else:
         search.begin_like(before)
     while True:
@@ -479,17 +551,22 @@ def common_coordinates(
                 f"{len(search.samples)} samples between {_rpm(low)} and {_rpm(high)} leave a frequency error of "
                 f"{max(h.total for h in found):.1e}; cut the range in two or raise the tolerance {tolerance:g}"
             )
-        search.widen(found, tolerance, report)
+        search.widen(found, report)
 
 
 def _result(search: _Search, found: list[HeldOut]) -> Common:
+    """In the modes at the lowest speed."""
     every = {**search.samples, **search.held}
-    f = search.interpolant(search.form)
-    K_r = np.array([search.K_r[s] for s in sorted(every)])
-    slopes = np.array([search.slopes[s] for s in f.samples if s in search.slopes]).reshape(-1, *K_r.shape[1:])
     samples = [every[s] for s in sorted(every)]
+    Y = np.linalg.eigh(search.K_r[samples[0].speed])[1]
+    V = search.V @ Y
+    worst = float(np.abs(V.conj().T @ samples[0].pencil.M(V) - np.eye(V.shape[1])).max())
+    f = search.interpolant(search.form)
+    K_r = np.array([Y.conj().T @ search.K_r[s.speed] @ Y for s in samples])
+    slopes = [Y.conj().T @ search.slopes[s] @ Y for s in f.samples if s in search.slopes]
     return Common(
-        search.V, samples, K_r, slopes, search.solved, found, search.orthogonality, search.form, f.shift
+        V, samples, K_r, np.array(slopes).reshape(-1, *K_r.shape[1:]), search.solved, search.refined, found, worst,
+        search.form, f.shift,
     )  # fmt: skip
 
 

@@ -38,7 +38,15 @@ from .loose import refuse_unlinked_parts
 from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
 from .sector import Sector, cut_faces, make_sector
-from .solution import Solution, held_compliance, solution
+from .solution import (
+    Searched,
+    Solution,
+    held_compliance,
+    reduced_solution,
+    searched,
+    with_spares,
+    without_spares,
+)
 from .spectrum import make_pencil
 from .stress import gauss_set, nodal_set
 
@@ -64,9 +72,9 @@ def modal_basis(
     solver = eigen.new_solver(settings.modes.solver)
     try:
         b = replace(b, rows=with_characteristic(b.rows, b.model, settings, b.motions, solver))
-        groups, settled = _at_speeds(b, settings, solver, report)
+        groups, settled, ends = _at_speeds(b, settings, solver, report)
         groups = _stiffened(b, settings, groups, solver, report)
-        ranges = _over_ranges(b, settings, settled, solver, report)
+        ranges = _over_ranges(b, settings, settled, ends, solver, report)
     finally:
         solver.close()
         if b.sector is not None:
@@ -138,11 +146,12 @@ def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
 
 def _at_speeds(
     b: Prepared, settings: BodySettings, solver: eigen.DirectSolver, report: Report
-) -> tuple[dict[tuple[int, int], ModalGroup], dict[float, StaticState]]:
-    """(number of the speed, nodal diameter) -> group, and speed in rad/s -> static state."""
+) -> tuple[dict[tuple[int, int], ModalGroup], dict[float, StaticState], dict[float, Mapping[int, Searched]]]:
+    """(number of the speed, nodal diameter) -> group; speed in rad/s -> static state, and modes at ends of a range."""
     speeds, floats = settings.rotation.speeds_rpm, settings.free and bool(settings.bolts)
     groups: dict[tuple[int, int], ModalGroup] = {}
     settled: dict[float, StaticState] = {}
+    ends: dict[float, Mapping[int, Searched]] = {}
     state: StaticState | None = None
     before = 0.0
     for number, rpm in enumerate(speeds):
@@ -159,9 +168,15 @@ def _at_speeds(
         before = speed
         settled[speed] = state
         about = b.centre if floats else None
-        made = _groups(b.model, settings, state, speed, b.motions, b.rows, solver, b.sector, report, about)
+        end = rpm in (settings.rotation.range_rpm or ())  # whose basis begins with its modes and a few more
+        asked = with_spares(settings) if end else settings
+        found = searched_state(b.model, asked, state, speed, b.motions, b.rows, solver, b.sector, report, about)
+        if end:
+            ends[speed] = found
+            found = {k: without_spares(s, settings.modes.count) for k, s in found.items()}
+        made = _groups(b.model, settings, state, speed, b.rows, found, report)
         groups |= {(number, k): group for k, group in made.items()}
-    return groups, settled
+    return groups, settled, ends
 
 
 def _stiffened(
@@ -177,14 +192,15 @@ def _stiffened(
 
 
 def _over_ranges(
-    b: Prepared, settings: BodySettings, settled: dict[float, StaticState], solver: eigen.DirectSolver, report: Report
-) -> dict[int, SpeedRange]:
+    b: Prepared, settings: BodySettings, settled: Mapping[float, StaticState],
+    ends: Mapping[float, Mapping[int, Searched]], solver: eigen.DirectSolver, report: Report,
+) -> dict[int, SpeedRange]:  # fmt: skip
     """Nodal diameter -> basis of the range of speeds, where one is asked for."""
     if settings.rotation.range_rpm is None:
         return {}
     from .body_range import body_ranges  # which itself calls `assemble_group`
 
-    return body_ranges(b.model, settings, b.motions, b.rows, solver, b.sector, settled, report)
+    return body_ranges(b.model, settings, b.motions, b.rows, solver, b.sector, settled, ends, report)
 
 
 def closure_curve(
@@ -239,19 +255,28 @@ def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[flo
     return float(m), centre, np.trace(second) * np.eye(3) - second
 
 
-def _groups(
+def searched_state(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
     solver: eigen.DirectSolver, sector: Sector | None, report: Report, pressed: Array | None = None,
+) -> dict[int, Searched]:  # fmt: skip
+    """Nodal diameter -> certified modes of one state; pressed: centre of mass of a free body under its bolts."""
+    if sector is not None:
+        return sector.searched(model, settings, state, speed, motions, rows, report)
+    pencil = make_pencil(model, state.K, solver)
+    if pressed is not None:
+        pencil, motions = pressed_modes(model, state, pencil, pressed)
+    return {0: searched(model, settings, pencil, speed, motions, rows, report)}
+
+
+def _groups(
+    model: BodyModel, settings: BodySettings, state: StaticState, speed: float, rows: BodyRows,
+    found: Mapping[int, Searched], report: Report,
 ) -> dict[int, ModalGroup]:  # fmt: skip
-    """Nodal diameter -> group of one state; pressed: centre of mass of a free body under its bolts."""
-    if sector is None:
-        pencil = make_pencil(model, state.K, solver)
-        if pressed is not None:
-            pencil, motions = pressed_modes(model, state, pencil, pressed)
-        solved = {0: solution(model, settings, pencil, speed, motions, rows, report)}
-    else:
-        solved = sector.solutions(model, settings, state, speed, motions, rows, report)
-    return {k: assemble_group(model, settings, state, speed, rows, s, k, report) for k, s in solved.items()}
+    """Nodal diameter -> group of one state."""
+    if settings.reduction != "eigenmodes":
+        report(f"reduction: {settings.reduction}")
+    reduced = {k: reduced_solution(model, settings, s, rows) for k, s in found.items()}
+    return {k: assemble_group(model, settings, state, speed, rows, s, k, report) for k, s in reduced.items()}
 
 
 def assemble_group(

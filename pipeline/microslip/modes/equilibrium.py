@@ -14,12 +14,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
-from ..eigen import DirectSolver, Unstable
+from ..eigen import DirectSolver, Unstable, symmetric_product
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import (
     displacement_gradient,
+    engineering,
     green_strain,
     internal_force,
     mass,
@@ -29,6 +30,7 @@ from ..fem.operators import (
     stress_stiffness,
     tangent,
     tangent_tensor,
+    tangent_tensor_slope,
 )
 from .closing import Closing
 
@@ -182,25 +184,47 @@ def stiffness_slope(
 ) -> tuple[Array, Array]:
     """(n, 3) du/dOmega^2 and (p, 3, 3) dK/dOmega^2 along the equilibria through a nonlinear state without contacts.
 
-    K du = M P (x + u), from the balance of forces. The tangent of a St Venant-Kirchhoff body is quadratic in u, so its
-    central difference along du is its derivative, whatever the step.
+    K du = M P (x + u), from the balance of forces; dK is the derivative of the tangent along du.
 
     Args:
-        fresh: the solver is as Newton left it, factorised within its last step of K; else it is factorised here.
+        fresh: the solver is as Newton left it, factorised within its last steps of K; else it is factorised here.
     """
     free, n = model.free, model.d.mesh.n_points
+    K = free.matrix(state.K if model.spin_softening else state.K + softening(model, speed))
     if not (fresh and state.iterations):
-        K = state.K if model.spin_softening else state.K + softening(model, speed)
-        solver.factorise(free.matrix(K))
-    force = centrifugal_force(model, 1.0, state.u).reshape(-1)
-    du = free.expand(solver.solve(free.restrict(force)), n).reshape(n, 3)
-    step = 0.01 * float(np.ptp(model.d.mesh.points, axis=0).max()) / max(float(np.abs(du).max()), 1e-300)
-    ends = []
-    for sign in (1, -1):
-        H = [displacement_gradient(b, state.u + sign * step * du) for b in model.d.blocks]
-        ends.append(_tangent(model, H, stress_of(model, [green_strain(h) for h in H])))
-    slope = (ends[0] - ends[1]) / (2 * step)
+        solver.factorise(K)
+    force = free.restrict(centrifugal_force(model, 1.0, state.u).reshape(-1))
+    du = free.expand(_refined(solver, symmetric_product(K), force), n).reshape(n, 3)
+    slope = _tangent_slope(model, state, du)
     return du, slope + softening(model, 1.0) if model.spin_softening else slope
+
+
+def _refined(solver: DirectSolver, K: Callable[[Array], Array], force: Array) -> Array:
+    """Solution of K x = force with the factors of a matrix close to K."""
+    x = solver.solve(force)
+    for _ in range(20):
+        step = solver.solve(force - K(x))
+        x = x + step
+        if np.abs(step).max() <= 1e-9 * np.abs(x).max():
+            break
+    return x
+
+
+def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
+    """(p, 3, 3) derivative of the tangent along du (n, 3), m: that of A = F C F^T + S, with dS = C : sym(F^T dH)."""
+    H = state.H or [np.zeros((*b.dx.shape, 3, 3)) for b in model.d.blocks]
+    factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
+    A = []
+    for b, m, f, h in zip(model.d.blocks, model.materials, factor, H, strict=True):
+        dH = displacement_gradient(b, du)
+        strain = engineering(_symmetric_part(np.swapaxes(np.eye(3) + h, -1, -2) @ dH))
+        stress = strain @ m.elasticity.T
+        A.append(tangent_tensor_slope(m.elasticity, f, h, dH, stress if f is None else stress * f[..., None]))
+    return tangent(model.d, A)
+
+
+def _symmetric_part(E: Array) -> Array:
+    return 0.5 * (E + np.swapaxes(E, -1, -2))
 
 
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
@@ -239,10 +263,11 @@ def _newton(
 def _newton_at(
     model: BodyModel, speed: float, level: float, solver: DirectSolver, start: StaticState | None
 ) -> StaticState:
-    """Newton at a share `level` of all loads. Ends when a step is below 1e-9 of u, or small and no longer falling.
+    """Newton at a share `level` of all loads, until steps are below 1e-9 of u, or small and no longer falling.
 
-    A millionth of the body stands for u where less moves: heated between walls a body does not move at all. With
-    contacts the pressures must stand too.
+    Small steps that fall tenfold are taken with the factors at hand, but for contacts. A millionth of the body stands
+    for u where less moves: heated between walls a body does not move at all. With contacts the pressures must stand
+    too.
     """
     n, free = model.d.mesh.n_points, model.free
     omega = speed * np.sqrt(level)
@@ -257,17 +282,19 @@ def _newton_at(
     for _ in range(60 if model.contacts else 25):
         H = [displacement_gradient(b, u) for b in model.d.blocks]
         stress = stress_of(model, [green_strain(h) for h in H])
-        K = _tangent(model, H, stress)
         closing.move(points + u, steps[-1] if steps else np.inf)
         if _stands(steps) and closing.settled:
             whole = isinstance(free, FreeUpper)  # else a sector, whose neighbours count by nodal diameter (`sector`)
+            K = _tangent(model, H, stress)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)
         outer = closing.with_forces(level * model.dead_load + centrifugal_force(model, omega, u))
         residual = free.restrict((outer - internal_force(model.d, stress, H)).reshape(-1))
-        solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
-        if (negative := solver.negative()) and len(steps) > 3:
-            raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
+        if model.contacts or not _factors_serve(steps):
+            K = _tangent(model, H, stress)
+            solver.factorise(free.matrix(closing.stiffened(K + soft, model.d.pattern)))
+            if (negative := solver.negative()) and len(steps) > 3:
+                raise Unstable(negative)  # perhaps only on the way: smaller load steps will tell
         unknowns = solver.solve(residual)
         change = free.expand(unknowns, n).reshape(n, 3)
         steps.append(float(np.abs(change).max() / max(np.abs(u + change).max(), 1e-6 * size)))
@@ -278,8 +305,16 @@ def _newton_at(
 
 
 def _stands(steps: list[float]) -> bool:
+    """A step is below 1e-9 of u, the next one would be though it fell no faster than the last, or rounding rules."""
     falling = len(steps) < 2 or steps[-1] <= 0.3 * steps[-2]
-    return bool(steps) and (steps[-1] < 1e-9 or (steps[-1] < 1e-5 and not falling))
+    if falling:
+        return bool(steps) and (steps[-1] < 1e-9 or (len(steps) > 1 and steps[-1] ** 2 < 1e-9 * steps[-2]))
+    return steps[-1] < 1e-5
+
+
+def _factors_serve(steps: list[float]) -> bool:
+    """Whether the next step may be taken with the factors of the last one: it was small, and they serve it well."""
+    return bool(steps) and steps[-1] < 1e-3 and (len(steps) < 2 or steps[-1] <= 0.1 * steps[-2])
 
 
 def _unstable(speed: float, count: int) -> str:

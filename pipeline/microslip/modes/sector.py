@@ -30,7 +30,7 @@ from ..fem.discretise import Discretisation
 from .body_rows import BodyRows
 from .boundary import refuse_uncyclic, require_face
 from .equilibrium import BodyModel, StaticState
-from .solution import Report, Solution, certified, reduced_solution, search
+from .solution import Report, Searched, certified, search
 from .spectrum import pencil_parts
 
 MatVec = Callable[[Array], Array]
@@ -61,13 +61,13 @@ class Sector:
     static: CyclicUpper
     condensed: Condensed
 
-    def solutions(
+    def searched(
         self, model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array,
         rows: BodyRows, report: Report,
-    ) -> dict[int, Solution]:  # fmt: skip
-        """Nodal diameter -> its modes, static answers and reduced coordinates.
+    ) -> dict[int, Searched]:  # fmt: skip
+        """Nodal diameter -> its modes and static answers.
 
-        All are searched on one factorisation of the interior, then certified, then reduced.
+        All are searched on one factorisation of the interior, then certified.
 
         Raises:
             UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
@@ -86,9 +86,7 @@ class Sector:
         if settings.modes.certify:
             report("certifying the spectra by the inertia count")
             found = certified(found)
-        if settings.reduction != "eigenmodes":
-            report(f"reduction: {settings.reduction}")
-        return {k: reduced_solution(model, settings, s, rows) for k, s in zip(pencils, found, strict=True)}
+        return dict(zip(pencils, found, strict=True))
 
     def close(self) -> None:
         """Release memory."""

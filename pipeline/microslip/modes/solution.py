@@ -18,6 +18,7 @@ from ..mesh import longest_over_shortest
 from ..reduction import METHODS, Problem, Reduced, stuck
 from . import canonical, rigid
 from .body_rows import BodyRows
+from .common import SPARE
 from .equilibrium import BodyModel
 from .loose import refuse_loose_parts, refuse_unresolved
 from .spectrum import leading_rows, rigid_shift, static_answers
@@ -181,23 +182,40 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
 
 
-def solution(
+def searched(
     model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, motions: Array, rows: BodyRows,
-    report: Report, unknowns: Unknowns | None = None,
-) -> Solution:  # fmt: skip
-    """Modes, static answers and reduced coordinates of the stiffness about one state.
+    report: Report,
+) -> Searched:  # fmt: skip
+    """Modes and static answers of the stiffness about one state, certified if the settings want it.
 
     Raises:
         UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
     """
     report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
-    found = search(model, settings, pencil, unknowns or model.free, speed, motions, rows)
-    if settings.modes.certify:
-        report("certifying the spectrum by the inertia count")
-        found = certified([found])[0]
-    if settings.reduction != "eigenmodes":
-        report(f"reduction: {settings.reduction}")
-    return reduced_solution(model, settings, found, rows)
+    found = search(model, settings, pencil, model.free, speed, motions, rows)
+    if not settings.modes.certify:
+        return found
+    report("certifying the spectrum by the inertia count")
+    return certified([found])[0]
+
+
+def with_spares(settings: BodySettings) -> BodySettings:
+    """The same, asking for a few modes more: one that comes down into the band at another speed is then known."""
+    return settings.model_copy(
+        update={"modes": settings.modes.model_copy(update={"count": settings.modes.count + SPARE})}
+    )
+
+
+def without_spares(s: Searched, count: int) -> Searched:
+    """The first `count` modes, and those of a cluster that begins among them: as complete as all of them are."""
+    keep, gap = eigen.first_gap(s.found.values, count)
+    if not keep:
+        return s
+    fewer = replace(
+        s.found, values=s.found.values[:keep], vectors=s.found.vectors[:, :keep], upper_shift=0.5 * sum(gap), gap=gap,
+        backward_error=s.found.backward_error[:keep],
+    )  # fmt: skip
+    return replace(s, found=fewer)
 
 
 def held_compliance(T: Array, reduced: Reduced, labels: tuple[str, ...] = ()) -> Array:

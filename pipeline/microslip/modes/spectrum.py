@@ -47,12 +47,8 @@ def pencil_parts(free: FreeUpper, M: Array, K: Array) -> PencilParts:
         data += K_upper.data
         return sp.csr_matrix((data, K_upper.indices, K_upper.indptr), shape=K_upper.shape)
 
-    return PencilParts(shifted, _symmetric(K_upper), _symmetric(M_upper), _norm(K_upper), _norm(M_upper))
-
-
-def _symmetric(upper: sp.csr_matrix) -> Callable[[Array], Array]:
-    diagonal, lower = upper.diagonal(), upper.T
-    return lambda x: upper @ x + lower @ x - (diagonal * x.T).T
+    K_product, M_product = eigen.symmetric_product(K_upper), eigen.symmetric_product(M_upper)
+    return PencilParts(shifted, K_product, M_product, _norm(K_upper), _norm(M_upper))
 
 
 def _mass_product(model: BodyModel) -> Callable[[Array], Array]:
