@@ -572,7 +572,7 @@ def speeds() -> None:
     rows = [
         [solved, known, held, f"{r.total_error.max():.0e}", f"{max(errors):.0e}", r.samples[0].n_modes],
     ]
-    head = ["modes solved for at rpm", "stiffness from", "held out", "error stated", "largest of 24", "coordinates"]
+    head = ["modes from rpm", "stiffness from", "held out", "error stated", "largest of 24", "coordinates"]
     fill("speeds.md", "range", table(head, rows))
 
 

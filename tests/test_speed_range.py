@@ -15,7 +15,19 @@ from microslip.body import Rotation
 from microslip.campbell import track_basis
 from microslip.data import ModalBasis, UserError
 from microslip.modes import modal_basis
-from microslip.modes.common import Interpolant, Settled, Solved, common_coordinates, hermite, lagrange, variable
+from microslip.modes.common import (
+    Interpolant,
+    Settled,
+    Solved,
+    beyond,
+    bordered,
+    common_coordinates,
+    hermite,
+    lagrange,
+    projected,
+    refined,
+    variable,
+)
 from microslip.modes.equilibrium import equilibrium, stiffness_slope
 from microslip.speed_range import basis_at, dense_pencil, frequencies_over, group_at
 
@@ -164,6 +176,50 @@ def test_a_mode_that_the_samples_do_not_know_is_noticed() -> None:
     np.testing.assert_allclose(np.linalg.eigvalsh(K)[:3], np.linalg.eigvalsh(stiffness(dive))[:3], rtol=3e-4)
 
 
+def held_out(seed: int, noise: float) -> tuple[Settled, np.ndarray, np.ndarray]:
+    """A complex Hermitian body, its eigenvalues, and coordinates near its seven lowest modes."""
+    K = random_hermitian(60, seed, 1.0, 1e4)
+    values, Q = np.linalg.eigh(K)
+    rng = np.random.default_rng(seed)
+    near = Q[:, :7] + noise * (rng.normal(size=(60, 7)) + 1j * rng.normal(size=(60, 7))) / np.sqrt(120)
+    return Settled(50.0, dense_pencil(K), None), values, np.linalg.qr(near)[0]
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-3, 3e-2])
+def test_refined_modes_are_those_of_the_speed(noise: float) -> None:
+    """From good, fair and poor coordinates: frequencies within the tolerance, modes to its root."""
+    held, values, V = held_out(11, noise)
+    found = refined(held, V, projected(held.pencil.K, V), 3, 1e-5)
+    assert found is not None and found.shapes.shape == (60, 7)
+    np.testing.assert_allclose(found.frequencies, np.sqrt(values[:3]), rtol=1e-5)
+    X = found.shapes[:, :3]
+    np.testing.assert_allclose(X.conj().T @ X, np.eye(3), atol=1e-10)
+    residual = held.pencil.K(X) - X * found.frequencies**2
+    assert np.linalg.norm(residual, axis=0).max() < 0.1 * values[0]
+
+
+def test_a_mode_outside_the_coordinates_is_counted() -> None:
+    """V orthogonal to the second mode, in exact invariance: no residual points to it, the inertia count does."""
+    held, values, _ = held_out(12, 0.0)
+    Q = np.linalg.eigh(held.pencil.K(np.eye(60)))[1]
+    V = np.delete(Q[:, :8], 1, axis=1)
+    assert refined(held, V, projected(held.pencil.K, V), 3, 1e-5) is None
+
+
+def test_widening_borders_what_is_projected() -> None:
+    """K_r on [V, W] from K_r on V; W orthonormal, orthogonal to V, and nothing of it lost but what V holds."""
+    held, _, V = held_out(13, 0.3)
+    rng = np.random.default_rng(5)
+    more = np.hstack([rng.normal(size=(60, 3)), V[:, :2] + 1e-9 * rng.normal(size=(60, 2))])
+    W = beyond(V, more / np.linalg.norm(more, axis=0), held.pencil.M)
+    assert W.shape == (60, 3)
+    both = np.hstack([V, W])
+    np.testing.assert_allclose(both.conj().T @ both, np.eye(10), atol=1e-12)
+    K_r = bordered(projected(held.pencil.K, V), held.pencil.K, V, W)
+    np.testing.assert_allclose(K_r, projected(held.pencil.K, both), atol=1e-9)
+    assert np.linalg.norm(more - both @ (both.conj().T @ more), axis=0).max() < 1e-7
+
+
 # bodies ------------------------------------------------------------------------------------------------------------
 
 
@@ -238,6 +294,40 @@ def test_modes_veer_inside_the_range() -> None:
     rpm = 250.0 * at
     true = modal_basis(mesh, body(**what, rotation={"speeds_rpm": [rpm]})).groups[0, 0]
     np.testing.assert_allclose(group_at(basis, rpm).omega, true.omega[:5], rtol=2 * r.tolerance)
+
+
+def test_the_group_at_an_end_is_that_without_a_range() -> None:
+    """An end that is a station too is solved for once, with modes to spare for the range: they are left out again."""
+    got, true = ranged(reduction="rubin").groups[0, 0], solved(0.0, reduction="rubin")
+    assert got.checks["certified"] == true.checks["certified"] == 1
+    assert got.checks["count_below_upper_shift"] == true.checks["count_below_upper_shift"]
+    assert got.checks["upper_shift_hz"] == pytest.approx(true.checks["upper_shift_hz"], rel=1e-6)
+    np.testing.assert_allclose(got.omega, true.omega, rtol=1e-7)
+    tip = [g.interfaces["tip"].rows for g in (got, true)]
+    np.testing.assert_allclose(*tip, atol=1e-6 * np.abs(tip[1]).max())
+
+
+@pytest.mark.parametrize("rpm", [4000.0, 16000.0])
+def test_factors_kept_lead_newton_to_the_same_equilibrium(rpm: float, monkeypatch) -> None:
+    """From a neighbouring state: with a factorisation in every step, and with those that serve more than one."""
+    from test_rotation import model_of
+
+    from microslip.modes import equilibrium as newton
+
+    model, solver = model_of(BLADE, body(supports=[{"face": "z0"}])), eigen.new_solver("superlu")
+    near = equilibrium(model, 0.99 * rpm * np.pi / 30, "nonlinear", solver)
+    counts, states = [], []
+    for rule in (newton._factors_serve, lambda steps: False):
+        monkeypatch.setattr(newton, "_factors_serve", rule)
+        made: list[int] = []
+        factorise = solver.factorise
+        monkeypatch.setattr(solver, "factorise", lambda K, f=factorise, made=made: (made.append(1), f(K))[1])
+        states.append(equilibrium(model, rpm * np.pi / 30, "nonlinear", solver, near))
+        monkeypatch.setattr(solver, "factorise", factorise)
+        counts.append(len(made))
+    assert counts[0] < counts[1]
+    assert np.abs(states[0].u - states[1].u).max() < 3e-9 * np.abs(states[1].u).max()
+    assert np.abs(states[0].K - states[1].K).max() < 1e-8 * np.abs(states[1].K).max()
 
 
 @pytest.mark.parametrize(("reduction", "compliance"), [("macneal", 1e-6), ("eigenmodes", 2e-3)])
@@ -351,7 +441,7 @@ def test_the_command_line_reads_any_speed_of_the_range(tmp_path, capsys) -> None
     write_basis(file, ranged())
     assert main(["info", str(file)]) == 0
     said = capsys.readouterr().out
-    assert "one basis of" in said and "held out" in said and "modes solved for at 0, " in said
+    assert "one basis of" in said and "held out" in said and "modes taken from 0, " in said
     assert main(["info", str(file), "--rpm", "9000"]) == 0
     said = capsys.readouterr().out
     assert f"{group_at(ranged(), 9000.0).frequency[0]:.6g} Hz" in said

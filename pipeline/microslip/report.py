@@ -391,7 +391,7 @@ def range_sentence(harmonic: int, r: SpeedRange) -> str:
     which = f"Nodal diameter {harmonic}: between" if harmonic else "Between"
     return (
         f"{which} {low:.6g} and {high:.6g} rpm one basis of {r.samples[0].n_modes} coordinates serves at every speed: "
-        f"modes solved for at {int(r.solved.sum())} speeds, stiffness from {int((~r.held).sum())}; at {held} rpm, "
+        f"modes from {int(r.solved.sum())} speeds, stiffness from {int((~r.held).sum())}; at {held} rpm, "
         f"which were held out, its frequencies err by {r.total_error.max():.1e} at most."
     )
 

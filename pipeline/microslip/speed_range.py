@@ -49,7 +49,7 @@ def group_at(basis: ModalBasis, rpm: float, harmonic: int = 0) -> ModalGroup:
     low, high = r.speeds[[0, -1]]
     if not low * (1 - 1e-9) <= speed <= high * (1 + 1e-9):
         raise UserError(
-            f"{rpm:g} rpm is outside the speed range of '{basis.name}', {low * 30 / np.pi:.6g} to "
+            f"{rpm:.10g} rpm is outside the speed range of '{basis.name}', {low * 30 / np.pi:.6g} to "
             f"{high * 30 / np.pi:.6g} rpm; ask for a speed inside, or widen rotation.range_rpm and make the modes anew"
         )
     at = _Evaluated(basis, r, float(np.clip(speed, low, high)))

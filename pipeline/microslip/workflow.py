@@ -800,7 +800,7 @@ def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
     lines = [
         f"{rpm.replace(', ', ' to ')} rpm, nodal diameter {harmonic}: one basis of {r.samples[0].n_modes} coordinates "
         f"for {r.count} modes",
-        f"  modes solved for at {solved} rpm; stiffness taken from {known} rpm",
+        f"  modes taken from {solved} rpm, stiffness from {known} rpm",
     ]
     held = zip(r.held_out * 30 / np.pi, r.interpolation_error, r.projection_error, r.total_error, strict=True)
     lines += [
