@@ -126,7 +126,7 @@ def test_a_map_is_its_lines_together() -> None:
 @pytest.mark.parametrize("separator", [" ", "\t", ",", ";", " ; "])
 def test_columns_units_and_headings_are_read(tmp_path, separator) -> None:
     rows = "\n".join(f"{0.01 * i}{separator}{(-1) ** i * 2.5}" for i in range(20))
-    path = written(tmp_path, f"# disc, ground\nx in mm{separator}z in um\n\n{rows}\n")
+    path = written(tmp_path, f"# disc, ground\nx{separator}z\n\n{rows}\n")
     profile = read_profile(path, ("mm", "um"), None)
     assert np.allclose(profile.x, 1e-5 * np.arange(20)) and np.allclose(np.abs(profile.z), 2.5 * UM)
     assert np.ptp(read_profile(path, "um", None).x) == pytest.approx(0.19 * UM)
@@ -139,15 +139,14 @@ def lines(change: dict[int, str], count: int = 12) -> str:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (lines({3: "3 nan"}), r"line 3, z: nan is not a finite number"),
-        (lines({1: "nan 3"}), r"line 1, x: nan is not a finite number"),
-        (lines({4: "4 abc"}), r"line 4, z: 'abc' is not a number"),
-        (lines({5: "2 1"}), r"line 5, x: 2 does not lie behind 4; sort"),
-        (lines({5: "4 1"}), r"line 5, x: 4 does not lie behind 4"),
-        (lines({6: "6"}), r"line 6: 1 columns"),
-        (lines({6: "6,0 1,5"}), r"line 6: 4 columns.*decimal points"),
+        (lines({3: "3 nan"}), r"line 3: z is no finite number"),
+        (lines({1: "nan 3"}), r"line 1: x is no finite number"),
+        (lines({4: "4 abc"}), r"line 4: column 2: 'abc' is no number"),
+        (lines({5: "2 1"}), r"line 5: x = 2 does not lie behind 4; sort"),
+        (lines({5: "4 1"}), r"line 5: x = 4 does not lie behind 4"),
+        (lines({6: "6"}), r"line 6: column 2: there is none"),
         (lines({}, 9), r"9 points; a profile needs ten"),
-        ("", r"0 points"),
+        ("", r"is empty"),
         ("\n".join(f"{i} 4.5" for i in range(20)), r"z is 4.5e-06 m everywhere"),
     ],
 )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
+from .curves import curve
 from .friction import Coulomb
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .law import Law
@@ -41,7 +42,7 @@ def _rough(heights: Heights) -> Example:
 
 _ROUGH = Rough(_value(2.4e8), _value(12e-6), Polynomial())
 _HYPERBOLIC = Hyperbolic(_value(2.4e8), _value(12e-6), Polynomial(), _value(120e-6))
-_MEASURED = measured([0, 2e-6, 5e-6, 9e-6, 14e-6], [0, 20, 240, 900, 2100], 2.4e8)
+_MEASURED = measured(curve([0, 2e-6, 5e-6, 9e-6, 14e-6], [0, 20, 240, 900, 2100]), 2.4e8)
 _GROUND = tabulated([0, 0.12, 0.3, 0.38, 0.55, 0.8, 0.95, 1.1], [0, 0.01, 0.12, 0.26, 0.63, 0.9, 0.98, 1])
 _COULOMB = Coulomb(_value(0.3))
 _C = _value(0.9e8)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
+from .curves import NormalCurve
 from .heights import Heights
 from .law import Array, settings
 
@@ -221,7 +220,7 @@ class Greenwood(Normal):
 class Measured(Normal):
     """A measured force over the approach: cubic between its points, C1, never falling; a line beyond the last one.
 
-    `measured` makes it of points.
+    `measured` makes it of a `curves.NormalCurve`.
 
     Attributes:
         u: (k,) m. force_at: (k,) N, from 0. slope_at: (k,) N/m, from 0. stored_at: (k,) J. nominal: stiffness of the
@@ -266,43 +265,21 @@ class Measured(Normal):
         return self.force_at[j], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
-def measured(u: ArrayLike, force: ArrayLike, nominal: float | None = None, name: str = "measured curve") -> Measured:
-    """The law through measured points, which must not fall.
-
-    Slopes of Fritsch and Carlson (harmonic means), which do not overshoot; zero at the first point, where the contact
-    opens.
+def measured(curve: NormalCurve, nominal: float | None = None) -> Measured:
+    """The law of a measured curve.
 
     Args:
-        u: (k,) approach in m, rising; at the first one the force is 0. force: (k,) N. nominal: stiffness of the full
-            area, N/m; the largest slope of the curve if not given. name: of the curve in messages.
+        nominal: stiffness of the full area, N/m; if not given the largest slope of the curve, so that the share of the
+            tangential stiffness does not pass 1.
 
     Raises:
-        UserError: fewer than three points, numbers that are not finite, u that does not rise, a force that falls or
-            does not start at 0 or is 0 throughout, a nominal stiffness that is not positive.
+        UserError: a nominal stiffness that is not positive.
     """
-    u, force = np.asarray(u, float), np.asarray(force, float)
-    _check_curve(u, force, name)
-    slope = PchipInterpolator(u, force).derivative()(u)
-    slope[0], slope[-1] = 0.0, max(slope[-1], (force[-1] - force[-2]) / (u[-1] - u[-2]))
-    h, rise = np.diff(u), np.diff(force)
-    areas = h * (force[:-1] + 0.5 * rise + h * (slope[:-1] - slope[1:]) / 12)
-    stored = np.concatenate([[0.0], np.cumsum(areas)])
+    h, rise = np.diff(curve.knots), np.diff(curve.loads)
+    middle = 1.5 * rise / h - 0.25 * (curve.slopes[:-1] + curve.slopes[1:])
     if nominal is None:
-        nominal = float(max(slope.max(), (1.5 * rise / h - 0.25 * (slope[:-1] + slope[1:])).max()))
+        nominal = float(max(curve.slopes.max(), middle.max()))
     if not nominal > 0:
-        raise UserError(f"{name}: a nominal stiffness of {nominal:g} N/m; it must be positive")
-    return Measured(*map(jnp.asarray, (u, force, slope, stored, nominal)))
-
-
-def _check_curve(u: np.ndarray, force: np.ndarray, name: str) -> None:
-    if u.ndim != 1 or u.shape != force.shape or len(u) < 3:
-        raise UserError(f"{name}: needs three or more points, as many u as forces; got {u.shape} and {force.shape}")
-    for what, values in (("u", u), ("force", force)):
-        if not np.all(np.isfinite(values)):
-            raise UserError(f"{name}: {what}[{np.argmin(np.isfinite(values))}] is not a finite number; leave it out")
-    for what, bad in (("u does not rise", np.diff(u) <= 0), ("the force falls", np.diff(force) < 0)):
-        if bad.any():
-            i = int(np.argmax(bad))
-            raise UserError(f"{name}: {what} from point {i} to point {i + 1}; average or sort the points")
-    if force[0] != 0 or force[-1] <= 0:
-        raise UserError(f"{name}: the force goes from {force[0]:g} to {force[-1]:g} N; it must rise from 0")
+        raise UserError(f"{curve.source}: a nominal stiffness of {nominal:g} N/m; it must be positive")
+    parts = (curve.knots, curve.loads, curve.slopes, curve.stored(curve.knots), nominal)
+    return Measured(*(jnp.asarray(part, dtype=float) for part in parts))

@@ -7,7 +7,6 @@ force of `heights.Tabulated` is C1 and zero at separation, as measured, without 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UserError
+from .curves import LENGTHS, read_columns
 
 if TYPE_CHECKING:
     from .heights import Tabulated
 
-UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9, "in": 0.0254}
+UNITS = LENGTHS | {"µm": 1e-6, "μm": 1e-6, "in": 0.0254}
 """m of the units of length that a profile may stand in."""
 
 SAMPLING_LENGTHS = 5
@@ -67,39 +67,40 @@ class Fit:
     residual: float
 
 
-def read_profile(path: str | Path, unit: str | tuple[str, str], level: int | None = 1) -> Profile:
-    """A profile from a file of two columns, way x and height z.
+def read_profile(
+    path: str | Path, unit: str | tuple[str, str], level: int | None = 1, columns: tuple[int | str, int | str] = (1, 2)
+) -> Profile:
+    """A profile from a file of columns, way x and height z; see `curves.read_columns`.
 
-    Columns are separated by blanks, tabs, commas or semicolons; lines that start with a letter, #, % or " before the
-    first number are a heading, empty lines are skipped. Any other file name than .txt, .csv, .dat, .asc, .prf is given
-    to `read_instrument`.
+    Any other file name than .txt, .csv, .tsv, .dat, .asc, .prf or none is given to `read_instrument`.
 
     Args:
         unit: of both columns ("um"), or of x and z ("mm", "um"). level: order of the polynomial in x that is taken off
-            by least squares, see `levelled`; None leaves the heights as they are.
+            by least squares, see `levelled`; None leaves the heights as they are. columns: of x and z, counted from 1
+            or named as in the file's first line.
 
     Raises:
         UserError: a file that cannot be read, a line without two finite numbers, x that does not rise, fewer than ten
             points, heights that are all the same, an unknown unit.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".txt", ".csv", ".dat", ".asc", ".prf", ".tsv", ""):
+    if path.suffix.lower() not in (".txt", ".csv", ".tsv", ".dat", ".asc", ".prf", ""):
         return read_instrument(path, level)
     scales = _scales(unit, path)
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from None
-    rows = list(_rows(text, path))
-    numbers = np.array([row for _, row in rows]).reshape(-1, 2)
-    falls = np.flatnonzero(np.diff(numbers[:, 0]) <= 0)
+    table, lines = read_columns(path, columns)
+    bad = np.argwhere(~np.isfinite(table))
+    if len(bad):
+        i, column = bad[0]
+        raise UserError(f"{path}: line {lines[i]}: {'xz'[column]} is no finite number; correct it or take the line out")
+    x = table[:, 0]
+    falls = np.flatnonzero(np.diff(x) <= 0)
     if len(falls):
         i = falls[0] + 1
         raise UserError(
-            f"{path}: line {rows[i][0]}, x: {numbers[i, 0]:g} does not lie behind {numbers[i - 1, 0]:g}; "
+            f"{path}: line {lines[i]}: x = {x[i]:g} does not lie behind {x[i - 1]:g}; "
             "sort the lines by x and leave doubled ones out"
         )
-    return levelled(_checked(Profile(numbers[:, 0] * scales[0], numbers[:, 1] * scales[1], str(path))), level)
+    return levelled(_checked(Profile(x * scales[0], table[:, 1] * scales[1], str(path))), level)
 
 
 def _scales(unit: str | tuple[str, str], path: Path) -> tuple[float, float]:
@@ -110,37 +111,6 @@ def _scales(unit: str | tuple[str, str], path: Path) -> tuple[float, float]:
     if len(names) != 2:
         raise UserError(f"{path}: units of x and z are two names; got {len(names)}")
     return UNITS[names[0]], UNITS[names[1]]
-
-
-def _rows(text: str, path: Path) -> list[tuple[int, tuple[float, float]]]:
-    """Line numbers and numbers of the lines that are no heading."""
-    rows: list[tuple[int, tuple[float, float]]] = []
-    for count, line in enumerate(text.splitlines(), 1):
-        fields = [f for f in re.split(r"[\s,;]+", line.strip()) if f]
-        if not fields or fields[0][0] in "#%" or (not rows and _heading(fields[0])):
-            continue
-        rows.append((count, _pair(fields, f"{path}: line {count}")))
-    return rows
-
-
-def _heading(field: str) -> bool:
-    return bool(re.match(r'["A-Za-z\[]', field)) and field.lower() not in ("nan", "inf", "infinity")
-
-
-def _pair(fields: list[str], where: str) -> tuple[float, float]:
-    if len(fields) != 2:
-        hint = "; write decimal points, not commas" if len(fields) == 4 else ""
-        raise UserError(f"{where}: {len(fields)} columns; a profile has two, x and z{hint}")
-    values = []
-    for what, field in zip("xz", fields, strict=True):
-        try:
-            value = float(field)
-        except ValueError:
-            raise UserError(f"{where}, {what}: {field!r} is not a number") from None
-        if not np.isfinite(value):
-            raise UserError(f"{where}, {what}: {field} is not a finite number; leave the line out")
-        values.append(value)
-    return values[0], values[1]
 
 
 def _checked(profile: Profile) -> Profile:
