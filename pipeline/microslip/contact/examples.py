@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import jax.numpy as jnp
+import numpy as np
 
 from .curves import curve
 from .friction import Coulomb
@@ -12,6 +13,7 @@ from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, ta
 from .law import Law
 from .normal import Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
+from .wear import course
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ EXAMPLES: dict[str, Example] = {
     "exponential heights, cut": _rough(Cut(Exponential(_value(4.0)))),
     "Gaussian heights, cut": _rough(Cut(Gaussian(_value(0.5), _value(0.22)))),
     "tabulated heights": _rough(_GROUND),
+    "worn heights": _rough(course(_GROUND, 0.1, np.array([1.5])).heights()),
     "hyperbolic point": Example(PointContact(_HYPERBOLIC, _COULOMB, _C), 1.2e-5, 8e-6),
     "potential point": Example(
         PointContact(Potential(_value(2e3), _value(12e-6), _value(2.5)), _COULOMB, _C), 1.2e-5, 8e-6
