@@ -825,11 +825,12 @@ def own() -> None:
     folder = BUILD / "own"
     folder.mkdir(parents=True, exist_ok=True)
     shown = play("your_own_model.md", folder)
-    commands = {"info": "info", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
+    commands = {"import": "import bracket", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
     for name, command in ((n, f"$ microslip {c}") for n, c in commands.items()):
         part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
         fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
     basis = read_basis(folder / "build" / "bracket" / "basis.h5")
+    save(from_file(folder / "bracket" / "surfaces.png"), "bracket_surfaces")
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")

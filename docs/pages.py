@@ -190,7 +190,9 @@ MEANING: dict[str, tuple[str, str]] = {
     "interfaces.role": ("", "see [conventions](conventions.md#frames)"),
     "interfaces.partner": ("", "name of the interface it faces"),
     "interfaces.sector_shift": ("", "where the partner is: next blade 1, previous -1, else 0"),
-    "interfaces.t2": ("", "direction whose projection on the patch becomes t2"),
+    "interfaces.t2": (
+        "", "direction whose projection on the patch becomes t2; if not given z, or y where the patch lies across z",
+    ),
     "interfaces.normal": ("", "outward normal of a list of nodes that does not tell it itself (matrices only)"),
     "interfaces.coordinates": ("", "rigid: six; characteristic: six and the softest shapes of the patch"),
     "interfaces.count": ("", "how many characteristic shapes"),

@@ -286,7 +286,8 @@ def test_table(parts: Path) -> None:
     done = python("-m", "microslip.cad", "--list", str(parts / "painted.step"), "cm")
     assert done.returncode == 0
     lines = done.stdout.splitlines()
-    assert lines[0] == "painted.step, lengths in cm"
+    assert lines[0] == "painted.step, lengths in cm: 6 x 4 x 4, from (0 0 0) to (6 4 4)"
+    assert sorted(re.findall(r"Cylinder .* radius (\S+)", done.stdout)) == ["0.4", "0.6"]  # the fillet, the hole
     assert float(re.search(r"volume (\S+),", lines[1])[1]) == pytest.approx(BRACKET * 1e-3, rel=1e-5)
     assert lines[9].split() == ["7", "Plane", "2.4", "6", "2", "0.3", "1", "0", "0", "face_7"]
     assert lines[3].split()[-2:] == ["255,0,0", "face_1"] and len(lines) == 13

@@ -117,6 +117,12 @@ def test_closure_presses_a_face_step_by_step(folder: Path, capsys: pytest.Captur
         assert reason in said(capsys)[1]
 
 
+def test_the_folder_of_a_modal_file_does_for_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "build/box", "-q"]) == 0
+    assert main(["export", "build/box", "--to", "mat"]) == 0 and (folder / "build/box/basis.mat").is_file()
+    assert main(["compare", "build/box", "build/box/basis.h5"]) == 0 and "1.0000" in said(capsys)[0]
+
+
 def test_check_info_and_export_of_a_modal_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = "build/box/basis.h5"
     assert main(["check", file]) == 0
@@ -159,6 +165,11 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
     assert main(["init", "blade", "mine"]) == 0 and (folder / "mine" / "body.toml").is_file()
     said(capsys)
     before = (folder / "blade" / "body.toml").read_bytes()
+    (folder / "my part").mkdir()
+    (folder / "my part" / "part.step").write_text("mine")  # a folder that holds the part already
+    assert main(["init", "own", "my part"]) == 0 and "microslip run 'my part'" in said(capsys)[0]
+    assert (folder / "my part" / "part.step").read_text() == "mine"
+    assert main(["init", "own", "my part"]) == 2 and "my part/body.toml: is there already" in said(capsys)[1]
     assert main(["init", "blade"]) == 2
     assert "is there already" in said(capsys)[1] and (folder / "blade" / "body.toml").read_bytes() == before
 
@@ -228,7 +239,10 @@ MISTAKES = [
     (["run", "box/case.toml", "--set", "monitor=top", "-q"], "no monitor 'top'; it has tip"),
     (["run", "stray.toml"], "no body.toml of a body 'nobody'"),
     (["check", "gone.h5"], "gone.h5"),
-    (["check", "empty"], "empty"),
+    (["check", "empty"], "empty: is a folder without a modal file"),
+    (["check", "box"], "box: holds a body, not its modal file; give build/NAME/basis.h5"),
+    (["modes", "meshes/box.msh"], "is no body.toml; make one around it with: microslip import meshes/box.msh"),
+    (["modes", "box", "--set", "material.from=mesh"], "density, young, poisson cannot stand beside from"),
     (["check", "bad.toml"], "bad.toml"),
     (["check", "zero.h5"], "zero.h5"),
     (["check", "other.h5"], "other.h5"),

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
+import subprocess
+import sys
+
 import decks
 import meshes
 import numpy as np
@@ -85,3 +89,85 @@ def test_what_cannot_be_imported_is_refused(tmp_path, monkeypatch, capsys, words
     scipy.io.mmwrite("K.mtx", np.eye(3))
     assert main(["import", *words]) == 2
     assert text in capsys.readouterr().err
+
+
+DRAW = """
+import gmsh
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+occ = gmsh.model.occ
+occ.cut([(3, occ.addBox(0, 0, 0, 40, 20, 10))], [(3, occ.addCylinder(10, 10, -1, 0, 0, 12, 4))])
+occ.synchronize()
+gmsh.write("Teil 1 ü.step")
+gmsh.finalize()
+"""
+
+
+@pytest.fixture
+def step_file(tmp_path, monkeypatch):
+    """A block with a bore, in a file whose name has a blank and an umlaut."""
+    if importlib.util.find_spec("gmsh") is None:
+        pytest.skip("gmsh is not installed")
+    monkeypatch.chdir(tmp_path)
+    subprocess.run([sys.executable, "-c", DRAW], check=True, capture_output=True)
+    return tmp_path / "Teil 1 ü.step"
+
+
+def test_a_cad_file_runs_at_once_and_then_with_its_lines_uncommented(step_file, capsys):
+    assert main(["import", step_file.name, "block"]) == 0
+    out = capsys.readouterr().out
+    assert "40 x 20 x 10, from (0 0 0) to (40 20 10)" in out and "radius 4" in out and "microslip run block" in out
+    assert main(["modes", "block", "-q"]) == 0
+    group = read_basis("build/block/basis.h5").groups[0, 0]
+    assert group.kind[:7] == ("rigid",) * 6 + ("normal",)
+    body = step_file.parent / "block" / "body.toml"
+    text = body.read_text(encoding="utf-8").replace("free = true", "# free = true", 1)
+    head, choices = text.split("# Name those you need", 1)
+    lines = [line[1:] if line.startswith("#") else line for line in choices.splitlines()[1:]]
+    body.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    assert main(["modes", "block", "-q", "--set", "mesh.size=8"]) == 0
+    group = read_basis("build/block/basis.h5").groups[0, 0]
+    assert "contact" in group.interfaces and "shaker" in group.excitations and "tip" in group.monitors
+    assert group.kind[0] == "normal"
+
+
+def test_a_cad_file_in_the_place_of_a_body_is_sent_to_import(step_file, capsys):
+    for verb in ("modes", "run", "mesh"):
+        assert main([verb, step_file.name]) == 2
+        assert f"microslip import '{step_file.name}'" in capsys.readouterr().err
+
+
+def test_a_face_that_no_rule_names_is_told_before_the_mesher_works(step_file, capsys):
+    assert main(["import", step_file.name, "block"]) == 0
+    with (step_file.parent / "block" / "body.toml").open("a") as file:
+        file.write('[[supports]]\nface = "clmp"\n[[interfaces]]\nname = "a"\nface = "b"\n')
+    assert main(["modes", "block", "--set", "free=false"]) == 2
+    said = capsys.readouterr().err
+    assert "supports.clmp.face: geometry.faces names no face 'clmp'" in said and "interfaces.a.face" in said
+    assert "meshing" not in said and not (step_file.parent / "meshes").exists()
+
+
+def test_numbers_stand_on_the_surfaces_that_are_seen(tmp_path):
+    """A box from above, right and front shows these three sides and no others; many surfaces keep their numbers."""
+    pytest.importorskip("pyvista")
+    from microslip import pictures
+    from microslip.pictures.numbered import _view
+    from microslip.pictures.scene import Stage, axes_towards, fit, quiet_vtk
+
+    if reason := pictures.can_draw():
+        pytest.skip(reason)
+    quiet_vtk()
+    corner = np.array([[x, y, z] for x in (0, 0.03) for y in (0, 0.02) for z in (0, 0.01)])
+    sides = {171: (0, 2, 3, 1), 12: (4, 5, 7, 6), 13: (0, 1, 5, 4)}
+    sides |= {140: (2, 6, 7, 3), 15: (0, 4, 6, 2), 16: (1, 3, 7, 5)}
+    triangles = np.array([t for a, b, c, d in sides.values() for t in ((a, b, c), (a, c, d))])
+    stage = Stage()
+    try:
+        camera = fit(corner, axes_towards(np.array([1.0, -1.2, 0.8])), 90_000)
+        _, told = _view(stage, camera, corner, triangles, np.repeat(list(sides), 2))
+        assert sorted(told) == [12, 13, 16]  # x high, y low, z high
+        camera = fit(corner, axes_towards(-np.array([1.0, -1.2, 0.8])), 90_000)
+        _, told = _view(stage, camera, corner, triangles, np.repeat(list(sides), 2))
+        assert sorted(told) == [15, 140, 171]
+    finally:
+        stage.close()

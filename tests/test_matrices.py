@@ -398,6 +398,50 @@ def test_a_node_with_rotations_is_an_interface_of_its_own(tmp_path):
     np.testing.assert_allclose(g.compliance.static, static, atol=1e-14)
 
 
+def beam_with_rotations(folder: Path, support: str) -> None:
+    """Six Euler beams on a line, six rows a node; the cross-section's torsion moves no node."""
+    n, length, EA, GJ, EI, rho, J = 7, 0.1, 4e7, 1e3, 2e3, 1.5, 5e-4
+    K, M = np.zeros((6 * n, 6 * n)), np.zeros((6 * n, 6 * n))
+    bar, mass = np.array([[1.0, -1], [-1, 1]]), np.array([[2.0, 1], [1, 2]]) / 6
+    for e in range(n - 1):
+        for sign, at in ((1, [1, 5, 7, 11]), (-1, [2, 4, 8, 10])):
+            a, b = sign * 6 * length, 2 * length**2
+            bend = np.array([[12, a, -12, a], [a, 2 * b, -a, b], [-12, -a, 12, -a], [a, b, -a, 2 * b]])
+            K[np.ix_(6 * e + np.array(at), 6 * e + np.array(at))] += EI / length**3 * bend
+        for k, m, first in ((EA, rho, 0), (GJ, J, 3)):
+            at = [6 * e + first, 6 * e + first + 6]
+            K[np.ix_(at, at)] += k / length * bar
+            M[np.ix_(at, at)] += m * length * mass
+    for i in range(n):
+        M[6 * i + 1, 6 * i + 1] = M[6 * i + 2, 6 * i + 2] = rho * length
+        M[6 * i + 4, 6 * i + 4] = M[6 * i + 5, 6 * i + 5] = 1e-4 * rho * length
+    M[1, 1] = M[2, 2] = M[-5, -5] = M[-4, -4] = rho * length / 2
+    nodes = [[i + 1, i * length, 0, 0] for i in range(n)]
+    scipy.io.savemat(folder / "b.mat", {"K": K, "M": M, "nodes": np.array(nodes, dtype=float)})
+    (folder / "body.toml").write_text(
+        'name = "b"\nlength_unit = "m"\n[geometry.matrices]\nstiffness = "b.mat"\nmass = "b.mat"\nnodes = "b.mat"\n'
+        f'sets = {{ root = [1] }}\n[[supports]]\nface = "root"\n{support}\n[modes]\ncount = 30\n'
+    )
+
+
+def test_a_node_held_without_its_rotations_is_told_so_about_all_three_axes(tmp_path, capsys):
+    """Nodes on a line do not move when it turns about itself: that rotation must be named all the same."""
+    beam_with_rotations(tmp_path, "")
+    assert main(["modes", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert [a for a in "xyz" if f"rotation about {a} through" in said] == list("xyz") and "rotations = true" in said
+
+
+def test_a_mode_of_rotations_alone_is_not_drawn_from_rounding(tmp_path):
+    from microslip.pictures.points import moves
+
+    beam_with_rotations(tmp_path, "rotations = true")
+    g = made(tmp_path)[0].groups[0, 0]
+    torsion = np.sqrt(1e3 / 5e-4) * np.pi / 2 / 0.6  # of a rod held at one end, rad/s
+    still = [j for j in range(g.n_modes) if not moves(g, j)]
+    assert len(still) == 6 and g.omega[still[0]] == pytest.approx(torsion, rel=0.01)
+
+
 # what is refused -----------------------------------------------------------------------------------------------------
 
 

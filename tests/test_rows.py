@@ -131,6 +131,18 @@ def test_curved_patch():
     )
 
 
+@pytest.mark.parametrize(("face", "t2"), [("x1", (0, 0, 1)), ("y0", (0, 0, 1)), ("z1", (0, 1, 0)), ("z0", (0, 1, 0))])
+def test_without_a_hint_t2_is_z_or_y_where_the_patch_lies_across_z(face, t2):
+    """The commonest contact, a flat one under a weight, needs no hint; one that is given is still refused there."""
+    mesh = brick("tetra10", (2, 2, 2), (0.1, 0.08, 0.05))
+    p = patch(mesh, face, None, "contact")
+    np.testing.assert_allclose(p.rotation[2], t2, atol=1e-12)
+    assert np.linalg.det(p.rotation) == pytest.approx(1)
+    if face[0] == "z":
+        with pytest.raises(UserError, match="along the normal"):
+            patch(mesh, face, np.array([0.0, 0, 1]), "contact")
+
+
 def test_impossible_patches_are_refused():
     mesh = brick("tetra10", (1, 1, 1))
     with pytest.raises(UserError, match="t2"):

@@ -410,14 +410,14 @@ class Bolt(Model):
 
 
 class InterfaceSettings(Model):
-    """A contact patch. t2: direction whose projection on the patch becomes the second tangent; n points outwards."""
+    """A contact patch with the frame n, t1, t2; n points outwards."""
 
     name: Name
     face: FaceName
     role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
     partner: str = ""
     sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
-    t2: Direction = (0.0, 0.0, 1.0)
+    t2: Direction | None = None
     normal: Direction | None = None
     coordinates: Literal["rigid", "characteristic"] = "rigid"
     count: Annotated[int, Field(ge=0, le=500)] = 0
@@ -749,4 +749,6 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
             f"the body is {size:g} m long; is length_unit = \"{settings.length_unit}\" right? "
             "(material.unusual = true silences warnings of this kind)"
         )
+    if settings.mesh.size is not None and settings.mesh.size > size:
+        found.append(f"mesh.size = {settings.mesh.size:g} m is more than the body's {size:g} m; is it in length_unit?")
     return [] if m.unusual else found

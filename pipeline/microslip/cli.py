@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+import shlex
 import shutil
 import sys
 from collections.abc import Iterable
@@ -68,18 +69,20 @@ def init(name: str, folder: Path | None = None, /) -> None:
     if name not in [*known, *more]:
         raise UserError(f"init {name}: there is no such body; choose one of {', '.join([*known, *more])}")
     target = folder or Path(name)
-    if target.exists() and any(target.iterdir() if target.is_dir() else [target]):
-        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    files = _to_copy(name)
+    there = [p for p in (target / copy for _, copy in files) if p.exists()] if target.is_dir() else [target]
+    if target.exists() and there:
+        raise UserError(f"{there[0]}: is there already; give another folder as second argument (nothing was changed)")
     try:
         target.mkdir(parents=True, exist_ok=True)
-        for source, copy in _to_copy(name):
+        for source, copy in files:
             shutil.copyfile(source, target / copy)
             if copy.endswith(".toml") and name != "sample":  # whose modal file bears its name
                 _rename(target / copy, target.resolve().name)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
     file, verb = _MADE.get(name, ("body.toml", "run"))
-    print(f"{target}: ready. Look at {target / file}, then: microslip {verb} {target}")
+    print(f"{target}: ready. Look at {target / file}, then: microslip {verb} {shlex.quote(str(target))}")
 
 
 _MADE = {"three-masses": ("system.toml", "run"), "sample": ("case.toml", "respond")}
@@ -232,6 +235,7 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     from .basis.checks import worst_of_each
     from .ring import ring_checks
 
+    file = _modal_file(file)
     basis = read_basis(file)
     findings = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in findings if not c.passed]
@@ -245,11 +249,11 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
 
 @app.command(name="import")
 def import_(file: Path, folder: Path | None = None, /, *, unit: str = "mm") -> None:
-    """Make a body.toml around another program's mesh or matrices, or a modal file from measured modes.
+    """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
 
     Args:
-        file: a mesh (.inp, .cdb, .bdf, .med, .unv, .msh), a stiffness matrix (.mtx, .mat, .h5, .op4, .pch, .sti), or
-            modes of a test (.uff, .unv with data set 55).
+        file: a CAD file (.step, .stp, .brep, .iges), a mesh (.inp, .cdb, .bdf, .med, .unv, .msh), a stiffness matrix
+            (.mtx, .mat, .h5, .op4, .pch, .sti), or modes of a test (.uff, .unv with data set 55).
         folder: of the new body.toml or basis.h5; one of the file's name if not given.
         unit: of its lengths, where the file does not tell.
     """
@@ -277,6 +281,7 @@ def export(
     from .exchange import WRITERS, writer
     from .exchange.choice import select
 
+    file = _modal_file(file)
     if to not in WRITERS:
         raise UserError(f"export --to {to}: unknown format; choose one of {', '.join(sorted(WRITERS))}")
     if ring:
@@ -318,7 +323,7 @@ def compare(
 
     if not 0 <= least <= 1:
         raise UserError(f"compare --least {least:g}: a MAC lies between 0 and 1; choose a number there")
-    bodies = (read_basis(first), read_basis(second))
+    bodies = (read_basis(_modal_file(first)), read_basis(_modal_file(second)))
     seen = on_common_points(*bodies)
     found = compare_groups(*seen, (speed, nodal_diameter), distance, least)
     _say("\n".join(pair_table(found)), quiet)
@@ -349,6 +354,7 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     from .campbell import engine_orders
     from .report import write_report
 
+    file = _modal_file(file)
     basis = read_basis(file)
     page = output or file.with_name("report.html")
     with progress(f"report of {basis.name}", quiet) as tell:
@@ -361,18 +367,20 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
 
 @app.command
 def info(
-    file: Path, /, *, unit: str = "mm", speed: int | None = None, nodal_diameter: int | None = None,
-    rpm: float | None = None,
+    file: Path, /, *, output: Output = None, unit: str = "mm", speed: int | None = None,
+    nodal_diameter: int | None = None, rpm: float | None = None,
 ) -> None:  # fmt: skip
-    """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), or a body.toml.
+    """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), matrices, or a body.toml.
 
     Args:
-        file: basis.h5, a mesh, a STEP or BREP file, or a body.toml.
+        file: basis.h5, a mesh, a STEP or BREP file, matrices, or a body.toml.
+        output: of a CAD file: a picture (.png) of its surfaces with their numbers.
         unit: unit of length of a mesh or CAD file.
         speed: of a modal file: this one of its speeds only, counted from 0.
         nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: what it holds at this speed.
     """
+    from .importing import CAD, MATRICES, cad_table
     from .mesh import UNITS
 
     if not file.exists():
@@ -388,15 +396,23 @@ def info(
         basis = read_basis(file)
         basis = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
         print("\n".join(basis_summary(basis)))
-    elif suffix in (".step", ".stp", ".brep", ".iges", ".igs"):
-        _cad_info(file, unit)
+    elif suffix in CAD:
+        text, reason = cad_table(file, unit, output)
+        print(text)
+        _warn([f"no picture of the surfaces: {reason}"] if reason else [])
+        if output is not None and not reason:
+            print(output)
     elif suffix == ".toml" or file.is_dir():
         from .workflow import open_job
 
         job = open_job(file)
         s = job.settings
-        print(f"{s.name}: {s.description}\nmesh {job.mesh_file}\nmodal file {job.basis_file}")
+        print(f"{s.name}{': ' * bool(s.description)}{s.description}\nmesh {job.mesh_file}\nmodal file {job.basis_file}")
         print(f"case {job.case_file or 'none: the chain ends at the report'}")
+    elif suffix in MATRICES:
+        from .exchange.matrices import matrix_names
+
+        print(f"{file}: matrices {_words(matrix_names(file))}")
     else:
         from .mesh import mesh_problems, read_mesh
 
@@ -411,23 +427,24 @@ def info(
             raise UserError("\n".join(f"{file}: {e}" for e in errors))
 
 
+def _modal_file(path: Path) -> Path:
+    """The modal file in a folder of products, or the file itself.
+
+    Raises:
+        UserError: another folder.
+    """
+    if not path.is_dir() or (path / "basis.h5").is_file():
+        return path / "basis.h5" if path.is_dir() else path
+    if (path / "body.toml").is_file():
+        raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which "
+                        f"microslip modes {shlex.quote(str(path))} makes")  # fmt: skip
+    raise UserError(f"{path}: is a folder without a modal file basis.h5; correct the path")
+
+
 def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
     from .speed_range import basis_at
 
     return basis_at(basis, rpm)
-
-
-def _cad_info(file: Path, unit: str) -> None:
-    import subprocess
-
-    done = subprocess.run(
-        [sys.executable, "-m", "microslip.cad", "--list", str(file), unit], capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])},
-    )  # fmt: skip
-    if done.returncode:
-        lines = done.stderr.strip().splitlines() or ["no message"]
-        raise UserError(lines[-1])
-    print(done.stdout, end="")
 
 
 def _say(text: object, quiet: bool) -> None:
@@ -452,7 +469,7 @@ def main(words: list[str] | None = None) -> int:
         sys.stdout.flush()
         return 0
     except CycloptsError as error:
-        return _fail(f"{str(error).rstrip('.')}; see microslip --help", 2)
+        return _fail(f"{str(error).rstrip('., ')}; see microslip --help", 2)
     except UserError as error:
         return _fail(str(error), 2)
     except NotConverged as error:

@@ -1,10 +1,14 @@
-"""From another program's file to a body folder: what the file holds becomes a body.toml that runs as it stands."""
+"""From a CAD file or another program's file to a body folder: a body.toml that runs as it stands."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
+import shlex
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +22,7 @@ from .units import SYSTEMS, usual_system
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
 _MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
+CAD = (".step", ".stp", ".brep", ".iges", ".igs")
 
 
 @dataclass(frozen=True)
@@ -29,11 +34,11 @@ class Imported:
 
 
 def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
-    """Write a body.toml around a mesh or matrices; nothing is copied, the file is named where it lies.
+    """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
-        file: a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new body.toml; by
-            default one of the file's name here. unit: of its lengths.
+        file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
+            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -42,17 +47,19 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     if not file.is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
-    name = re.sub(r"[^A-Za-z0-9_.-]", "-", file.stem).lstrip("-._")[:64] or "part"
+    stem = (folder.resolve().name if folder else "") or file.stem
+    name = re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
     if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     if target.exists():
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
-    made = _matrices if file.suffix.lower() in MATRICES else _mesh
+    kind = file.suffix.lower()
+    made = _matrices if kind in MATRICES else _cad if kind in CAD else _mesh
     lines, told = made(file, target.parent, unit)
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
-    last = f"{target}: ready. Add supports, interfaces and loads, then: microslip modes {target.parent}"
+    last = f"{target}: ready. Add supports, interfaces and loads, then: microslip run {shlex.quote(str(target.parent))}"
     return Imported(target, (*told, last))
 
 
@@ -89,6 +96,67 @@ def _sets(mesh: Mesh) -> list[str]:
     return lines
 
 
+def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
+    """Solids and numbered surfaces of a CAD file, read in a process of its own.
+
+    Args:
+        picture: where to draw the surfaces with their numbers.
+
+    Returns:
+        The table, and why there is no picture if one was asked for and could not be drawn.
+
+    Raises:
+        UserError: what the CAD kernel says.
+    """
+    package = Path(__file__).parent
+    paths = [str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    with tempfile.TemporaryDirectory() as scratch:
+        triangles = Path(scratch) / "triangles.npz"
+        words = [sys.executable, "-m", "microslip.cad", "--list", str(file), unit]
+        done = subprocess.run(
+            [*words, str(triangles)] if picture else words, capture_output=True, text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        )  # fmt: skip
+        if done.returncode:
+            raise UserError((done.stderr.strip().splitlines() or [f"{file}: cannot be read"])[-1])
+        return done.stdout.strip(), "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)
+
+
+def _draw(triangles: Path, title: str, picture: Path) -> str:
+    """Draw numbered surfaces; why not, if that fails."""
+    from .pictures import can_draw
+
+    if reason := can_draw():
+        return reason
+    import numpy as np
+
+    from .pictures.numbered import surfaces_picture
+
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    with np.load(triangles) as data:
+        surfaces_picture(data["points"], data["triangles"], data["surface"], title, picture)
+    return ""
+
+
+def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    picture = folder / "surfaces.png"
+    text, reason = cad_table(file, unit, picture)
+    told = [text, f"warning: no picture of the surfaces: {reason}" if reason else f"{picture}: the surfaces, numbered"]
+    lines = ["free = true               # nothing is held yet", "", "[geometry]", f"cad = {_beside(file, folder)}", ""]
+    lines += ["# The surfaces of the file" + (":" if reason else f", shown in {picture.name}:")]
+    lines += [f"# {line}" for line in text.splitlines()[1:]]
+    lines += ["# Name those you need, each by one of surfaces, label, colour, box:"]
+    lines += ["#[[geometry.faces]]", '#name = "clamp"', "#surfaces = [1]"]
+    lines += ["#[[geometry.faces]]", '#name = "contact"', "#surfaces = [2]", ""]
+    lines += ["[mesh]", "#size = 5.0               # a fifteenth of the diagonal if not given", ""]
+    lines += ['[material]', 'name = "steel"', "density = 7850.0          # kg/m3", "young = 2.1e11            # Pa"]
+    lines += ["poisson = 0.3", "", "#[[supports]]             # then remove free = true at the top", '#face = "clamp"']
+    lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', '#face = "contact"']
+    lines += ["#[[excitations]]          # a force of 1 N", '#name = "shaker"', "#point = [0.0, 0.0, 0.0]"]
+    lines += ["#direction = [1.0, 0.0, 0.0]", "#[[monitors]]", '#name = "tip"', "#point = [0.0, 0.0, 0.0]"]
+    return [*lines, *_END], told
+
+
 _END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
 
 
@@ -115,6 +183,7 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
         told.append("warning: no material was taken from the file; body.toml says steel")
     if mesh.temperature is not None:
         lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
+        told.append("temperatures: used only once [temperature] of body.toml is uncommented")
     return [*lines, *_sets(mesh), *_END], told
 
 

@@ -57,11 +57,18 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
         by_key.setdefault(key, []).append((place, error))
     known = {key: _known_keys(model, key[:-1]) for key in by_key}
     meant = set()
+    other_way: dict[tuple[Any, ...], list[str]] = {}
     for key, found in by_key.items():
         if found[0][1]["type"] == "extra_forbidden":
+            if key[-1] in known[key]:  # of the other way to write this table
+                other_way.setdefault(key[:-1], []).append(str(key[-1]))
+                continue
             close = difflib.get_close_matches(str(key[-1]), known[key], 1)
             meant |= {(*key[:-1], *close)}
             yield f"{_written(key, raw)}: unknown key; {_hint(key, close, known[key], model)}"
+    for table, odd in other_way.items():
+        rest = ", ".join(k for k in _at(raw, table) if k not in odd)
+        yield f"{_written(table, raw)}: {', '.join(odd)} cannot stand beside {rest}; keep one of the two ways"
     for key, found in by_key.items():
         if found[0][1]["type"] != "extra_forbidden" and not (found[0][1]["type"] == "missing" and key in meant):
             yield _sentence(key, found, raw)

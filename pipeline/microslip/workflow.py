@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -46,6 +47,9 @@ from .units import SYSTEMS, usual_system
 Report = Callable[[str], None]
 PACKAGE = Path(__file__).parent
 
+_NO_SETTINGS = {
+    ".step", ".stp", ".brep", ".iges", ".igs", ".inp", ".cdb", ".msh", ".med", ".unv", ".bdf", ".mtx", ".mat",
+}  # fmt: skip
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
@@ -109,6 +113,8 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
     path = Path(path)
     if path.is_dir():
         path = path / "body.toml"
+    if path.suffix.lower() in _NO_SETTINGS and path.is_file():
+        raise UserError(f"{path}: is no body.toml; make one around it with: microslip import {shlex.quote(str(path))}")
     settings, raw = load_body(path, assignments)
     return Job(path, settings, raw, Path(root))
 
@@ -147,6 +153,8 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     if not source.is_file():
         key = "build" if geometry.build else "cad"
         raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+    if geometry.cad:
+        _refuse_unnamed_faces(job)
     inputs = {
         "geometry": job.raw["geometry"],
         "mesh": job.raw.get("mesh", {}),
@@ -163,6 +171,21 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         report(line)
     store.note_product(product, inputs)
     return product
+
+
+def _refuse_unnamed_faces(job: Job) -> None:
+    """A face of a CAD file has a name only by a rule: what asks for another is told before the mesher has worked."""
+    s = job.settings
+    names = sorted({rule.name for rule in s.geometry.faces})
+    asked = [("supports", i.face, i.face) for i in s.supports] + [("interfaces", i.name, i.face) for i in s.interfaces]
+    asked += [("excitations", i.name, i.face) for i in s.excitations if i.face is not None]
+    told = f"it names {', '.join(names) or 'none'}"
+    wrong = [
+        f"{job.path}: {table}.{label}.face: geometry.faces names no face '{face}'; {told}"
+        for table, label, face in asked if face not in names
+    ]  # fmt: skip
+    if wrong:
+        raise UserError("\n".join(wrong))
 
 
 def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:

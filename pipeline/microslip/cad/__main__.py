@@ -8,7 +8,7 @@ from pathlib import Path
 import gmsh
 
 from microslip.cad.drawing import default_size, finish, guarded, name_body, positive_size, read_settings
-from microslip.cad.faces import name_picked, table
+from microslip.cad.faces import name_picked, table, write_triangles
 from microslip.cad.solids import load
 
 
@@ -27,14 +27,21 @@ def mesh_cad(settings_file: str, out: str) -> None:
     finish(mesh, out)
 
 
+def tell(cad: str, unit: str, triangles: str = "") -> None:
+    """Print the table of a CAD file; write triangles for a picture of it if a file is named."""
+    print(table(Path(cad), unit))
+    if triangles:
+        write_triangles(triangles, unit)
+
+
 def main(arguments: list[str]) -> None:
-    """Command line: SETTINGS OUT, or --list FILE UNIT."""
-    if len(arguments) == 3 and arguments[0] == "--list":
-        guarded(lambda: print(table(Path(arguments[1]), arguments[2])), arguments[1])
+    """Command line: SETTINGS OUT, or --list FILE UNIT [TRIANGLES.npz]."""
+    if len(arguments) in (3, 4) and arguments[0] == "--list":
+        guarded(lambda: tell(*arguments[1:]), arguments[1])
     elif len(arguments) == 2:
         guarded(lambda: mesh_cad(*arguments), arguments[0])
     else:
-        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT")
+        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT [TRIANGLES.npz]")
 
 
 if __name__ == "__main__":

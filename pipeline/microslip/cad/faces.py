@@ -13,6 +13,7 @@ from microslip.cad.drawing import boundary_surfaces, name_face, surfaces_where, 
 from microslip.cad.marks import Marks, short_name
 from microslip.cad.solids import load
 from microslip.data import UserError
+from microslip.mesh import UNITS
 
 
 def name_picked(rules: Sequence[dict[str, Any]], marks: Marks) -> None:
@@ -55,10 +56,30 @@ def pick(rule: dict[str, Any], marks: Marks) -> list[int]:
 def table(path: Path, unit: str) -> str:
     """Solids and boundary surfaces of a CAD file, to choose faces from."""
     marks = load(path, unit)
-    head = f"{'surface':>7} {'kind':<21} {'area':>10}  {'centre':<32} {'normal':<20} {'colour':<12} label"
+    head = f"{'surface':>7} {'kind':<21} {'area':>10}  {'centre':<32} {'normal or radius':<20} {'colour':<12} label"
     solids = [solid_line(tag) for _, tag in gmsh.model.getEntities(3)]
     faces = [face_line(tag, *marks.get(tag, ("", None))) for tag in boundary_surfaces()]
-    return "\n".join([f"{path.name}, lengths in {unit}", *solids, head, *faces])
+    low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)).round(6)
+    size = " x ".join(numbers([v]) for v in high - low)
+    first = f"{path.name}, lengths in {unit}: {size}, from ({numbers(low)}) to ({numbers(high)})"
+    return "\n".join([first, *solids, head, *faces])
+
+
+def write_triangles(out: str, unit: str) -> None:
+    """Triangles on the boundary of the file that `table` has read, for a picture: points in m, triangles, surfaces."""
+    box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+    gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(box[1] - box[0])) / 12)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 40)
+    gmsh.model.mesh.generate(2)
+    tags, xyz, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    place[tags] = np.arange(len(tags))
+    found = [(tag, gmsh.model.mesh.getElementsByType(2, tag)[1]) for tag in boundary_surfaces()]
+    np.savez(
+        out, points=xyz.reshape(-1, 3) * UNITS[unit],
+        triangles=place[np.concatenate([nodes for _, nodes in found]).astype(np.int64)].reshape(-1, 3),
+        surface=np.concatenate([np.full(len(nodes) // 3, tag) for tag, nodes in found]),
+    )  # fmt: skip
 
 
 def solid_line(tag: int) -> str:
@@ -69,12 +90,15 @@ def solid_line(tag: int) -> str:
 
 
 def face_line(tag: int, label: str, colour: tuple[int, int, int] | None) -> str:
-    """One surface of the table; planes with their outward normal."""
+    """One surface of the table; planes with their outward normal, cylinders and spheres with their radius."""
     kind, area = gmsh.model.getType(2, tag), gmsh.model.occ.getMass(2, tag)
     normal = ""
     if kind == "Plane":
         corner = gmsh.model.getParametrizationBounds(2, tag)[0]
         normal = numbers(np.round(gmsh.model.getNormal(tag, corner), 3))
+    elif kind in ("Cylinder", "Sphere"):
+        middle = np.mean(gmsh.model.getParametrizationBounds(2, tag), axis=0)
+        normal = f"radius {1 / gmsh.model.getCurvature(2, tag, middle)[0]:.5g}"
     centre, paint = numbers(gmsh.model.occ.getCenterOfMass(2, tag)), ",".join(map(str, colour or ()))
     return f"{tag:>7} {kind:<21} {area:>10.4g}  {centre:<32} {normal:<20} {paint:<12} {label}".rstrip()
 

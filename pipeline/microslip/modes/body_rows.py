@@ -88,10 +88,11 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
 def _interface_patch(mesh: Mesh, item: InterfaceSettings) -> Patch:
     """Of a face by its area; of a list of nodes, where the body has no elements, evenly."""
     require_face(mesh, item.face, f"interfaces.{item.name}.face", points_suffice=not mesh.cells)
+    t2 = None if item.t2 is None else np.array(item.t2)
     if item.face in mesh.faces:
-        return patch(mesh, item.face, np.array(item.t2), item.name)
+        return patch(mesh, item.face, t2, item.name)
     normal = None if item.normal is None else np.array(item.normal)
-    return node_patch(mesh, item.face, np.array(item.t2), normal, item.name)
+    return node_patch(mesh, item.face, t2, normal, item.name)
 
 
 def _place(mesh: Mesh, locator: Locator | NodeLocator, item: Excitation | Monitor, key: str) -> Location:

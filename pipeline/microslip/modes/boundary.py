@@ -56,15 +56,23 @@ def known_materials(mesh: Mesh, settings: BodySettings) -> tuple[Material, ...]:
     return mesh.materials
 
 
-def check_held(mesh: Mesh, settings: BodySettings, centre: Array, motions: Array) -> None:
+def check_held(
+    mesh: Mesh, settings: BodySettings, centre: Array, motions: Array, coefficients: Array | None = None
+) -> None:
+    """Refuse a body that floats and does not say so, and one that says so and is held.
+
+    Args:
+        motions, coefficients: see `rigid.describe`; coefficients are given where nodes have rotations.
+    """
     found = motions.shape[1]
     if settings.free and not found:
         raise UserError("free: true, but the supports hold the body wholly; remove one of them")
     if found and not settings.free:
-        names = "; ".join(rigid.describe(mesh.points, centre, motions))
+        names = "; ".join(rigid.describe(mesh.points, centre, motions, coefficients))
+        turns = "" if coefficients is None else " (with rotations = true they hold the rotations of their nodes too)"
         raise UserError(
-            f"supports: nothing holds the body against {names}; add supports, or write free = true if it is meant "
-            "to float"
+            f"supports: nothing holds the body against {names}; add supports{turns}, or write free = true if it is "
+            "meant to float"
         )
     if settings.free and any(settings.rotation.speeds_rpm):
         raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")

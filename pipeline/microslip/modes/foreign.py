@@ -56,7 +56,11 @@ def foreign_basis(
         spread = np.zeros((3 * body.mesh.n_points, R.shape[1]))
         at = free[(body.component[free] >= 0) & (body.component[free] < 3)]
         spread[layout.column[at]] = R[np.isin(free, at)]
-        check_held(body.mesh, settings, centre, spread)
+        if (body.component >= 3).any():
+            middle, known = body.mesh.points.mean(axis=0), np.linalg.lstsq(motions[free], R, rcond=None)[0]
+            check_held(body.mesh, settings, middle, spread, known)
+        else:
+            check_held(body.mesh, settings, centre, spread)
         shift = _shift(body, motions, free, pencil) if R.shape[1] else 0.0
         s = _search(settings, pencil, unknowns, R, shift, rows, report)
         place = np.concatenate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.linalg import qr
 
 from ..data import Array, Indices
 
@@ -59,16 +60,22 @@ def free_motions_of_ring(
     return scaled if not len(fixed) else scaled @ null_space(np.concatenate(rows))
 
 
-def describe(points: Array, centre: Array, motions: Array) -> list[str]:
-    """Name each free rigid motion: a translation, or a rotation with its axis (screws are named as both)."""
+def describe(points: Array, centre: Array, motions: Array, coefficients: Array | None = None) -> list[str]:
+    """Name each free rigid motion: a translation, or a rotation with its axis (screws are named as both).
+
+    Args:
+        coefficients: (6, r) of the motions in `rigid_fields`, where the displacements alone do not tell them: nodes
+            on a line do not move when it turns about itself.
+    """
     fields = rigid_fields(points, centre).reshape(-1, 6)
     texts = []
-    coefficients = np.linalg.lstsq(fields, motions, rcond=None)[0] if motions.shape[1] else np.zeros((6, 0))
+    if coefficients is None:
+        coefficients = np.linalg.lstsq(fields, motions, rcond=None)[0] if motions.shape[1] else np.zeros((6, 0))
     if motions.shape[1] == 6:
         return ["all six rigid motions"]
-    for c in coefficients.T:
+    size = np.ptp(points, axis=0).max()
+    for c in _simplest(coefficients, size).T:
         t, w = c[:3], c[3:]
-        size = np.ptp(points, axis=0).max()
         if np.linalg.norm(w) * size < 1e-6 * np.linalg.norm(t):
             texts.append(f"translation along {_direction(t)}")
         else:
@@ -77,6 +84,15 @@ def describe(points: Array, centre: Array, motions: Array) -> list[str]:
             at = ", ".join(f"{v:.4g}" for v in np.where(np.abs(through) < 1e-9 * size, 0.0, through))
             texts.append(f"rotation about {_direction(axis)} through ({at}) m")
     return texts
+
+
+def _simplest(coefficients: Array, size: float) -> Array:
+    """The same motions, combined so that each alone has some component: about x and y, not about two slants."""
+    r = coefficients.shape[1]
+    if r < 2:
+        return coefficients
+    _, _, order = qr((coefficients.T * np.array([1, 1, 1, size, size, size])), mode="economic", pivoting=True)
+    return coefficients @ np.linalg.inv(coefficients[np.sort(order[:r])])
 
 
 def _direction(v: Array) -> str:

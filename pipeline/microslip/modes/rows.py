@@ -55,14 +55,15 @@ class Patch:
         return np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
 
 
-def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True) -> Patch:
+def patch(mesh: Mesh, face: str, t2: Array | None, name: str, needs_frame: bool = True) -> Patch:
     """Area-weighted, work-conjugate rigid fit of a face (Sextro Eqs. (5.1-6), (5.1-8)).
 
     The six rows minimise the area integral of |u - t - w x r|^2, so a rigid motion is reproduced exactly and
     ``B.T f`` is the linear traction field with resultant f.
 
     Args:
-        t2: direction whose projection on the face becomes the second tangent. name: for messages.
+        t2: direction whose projection on the face becomes the second tangent; None: z, or y where z is the
+            normal. name: for messages.
         needs_frame: whether a face without a mean normal (a bore) is refused; else it gets the body's axes.
 
     Raises:
@@ -80,7 +81,7 @@ def patch(mesh: Mesh, face: str, t2: Array, name: str, needs_frame: bool = True)
     return _fitted(nodes, points, vectors / areas[:, None], areas, N, rotation, closed, (name, face))
 
 
-def node_patch(mesh: Mesh, name_of_set: str, t2: Array, normal: Array | None, name: str) -> Patch:
+def node_patch(mesh: Mesh, name_of_set: str, t2: Array | None, normal: Array | None, name: str) -> Patch:
     """The evenly weighted rigid fit of a list of nodes, each with its share of the area that they span.
 
     Args:
@@ -111,7 +112,7 @@ def node_patch(mesh: Mesh, name_of_set: str, t2: Array, normal: Array | None, na
     return _fitted(points, points, normals, np.full(count, area / count), N, rotation, False, (name, name_of_set))
 
 
-def _single(mesh: Mesh, node: int, t2: Array, normal: Array | None, name: str) -> Patch:
+def _single(mesh: Mesh, node: int, t2: Array | None, normal: Array | None, name: str) -> Patch:
     """A patch of one node, of unit weight; its rows are those of the node itself and are put in by the caller."""
     if normal is None:
         raise UserError(f"interfaces.{name}.normal: a single node does not tell which way is outwards; give normal")
@@ -172,10 +173,12 @@ def _outline(nodes: Array, rotation: Array) -> Array:
     return nodes[hull[sharp]]
 
 
-def _frame(normal: Array, t2: Array, areas: Array, name: str) -> Array:
+def _frame(normal: Array, t2: Array | None, areas: Array, name: str) -> Array:
     if np.linalg.norm(normal) <= 1e-6 * areas.sum():
         raise UserError(f"interface '{name}': the face closes on itself and has no mean normal; split it")
     n = normal / np.linalg.norm(normal)
+    if t2 is None:
+        t2 = np.eye(3)[1 if np.linalg.norm(n[:2]) < 1e-3 else 2]
     t2 = np.asarray(t2, dtype=float)
     flat = t2 - n * (n @ t2)
     if np.linalg.norm(flat) < 1e-3 * np.linalg.norm(t2):

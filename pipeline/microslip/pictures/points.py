@@ -27,9 +27,16 @@ def points_sheet(basis: ModalBasis, group: ModalGroup, path: Path, most: int = M
     figure = _figure(3.0 * columns, 3.1 * rows)
     for place, j in enumerate(elastic, 1):
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
-        _sketch(axes, basis.mesh.points, g.phi[:, :, j].real)
-        axes.set_title(f"{j + 1}: {g.omega[j] / 2 / np.pi:.5g} Hz", fontsize=10)
+        _sketch(axes, basis.mesh.points, g.phi[:, :, j].real if moves(g, j) else np.zeros_like(basis.mesh.points))
+        still = "" if moves(g, j) else "\nrotations alone"
+        axes.set_title(f"{j + 1}: {g.omega[j] / 2 / np.pi:.5g} Hz{still}", fontsize=10)
     return _save(figure, path)
+
+
+def moves(group: ModalGroup, mode: int) -> bool:
+    """Whether a mode displaces the nodes; that of a rod in torsion turns them only, and leaves rounding."""
+    length = np.abs(group.phi)
+    return bool(length[:, :, mode].max() > 1e-9 * length.max())
 
 
 def _sketch(axes: Any, points: Array, shape: Array) -> None:
