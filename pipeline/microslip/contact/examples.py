@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from .curves import curve
-from .friction import Coulomb
+from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSliding, characteristic, scattered
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
-from .law import Law
+from .law import Array, Law
 from .normal import Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
+from .regularised import MassContact
 from .wear import course
 
 
@@ -23,7 +24,9 @@ class Example:
     Attributes:
         law: for any number of points. normal, tangential: displacements in m at which it shows what it does.
         period: of a cycle, s. isotropic: whether turning the tangents turns the force. gap: m, beyond u_n = 0, at
-            which the contact is open for certain.
+            which the contact is open for certain. inertia: share of the largest force by which a mass may carry the
+            tangential force beyond what friction holds. jumps: whether friction falls with the speed, so that the force
+            jumps in time and depends on rounding where two roots meet.
     """
 
     law: Law
@@ -32,6 +35,8 @@ class Example:
     period: float = 0.01
     isotropic: bool = True
     gap: float = 0.0
+    inertia: float = 0.0
+    jumps: bool = False
 
 
 def _value(number: float) -> jnp.ndarray:
@@ -48,6 +53,12 @@ _MEASURED = measured(curve([0, 2e-6, 5e-6, 9e-6, 14e-6], [0, 20, 240, 900, 2100]
 _GROUND = tabulated([0, 0.12, 0.3, 0.38, 0.55, 0.8, 0.95, 1.1], [0, 0.01, 0.12, 0.26, 0.63, 0.9, 0.98, 1])
 _COULOMB = Coulomb(_value(0.3))
 _C = _value(0.9e8)
+
+
+def _point(friction: Friction, stiffness_2: Array | None = None) -> Example:
+    law = PointContact(_ROUGH, friction, _C, stiffness_2)
+    return Example(law, 1.2e-5, 8e-6, isotropic=stiffness_2 is None, jumps=not isinstance(friction, Scattered))
+
 
 EXAMPLES: dict[str, Example] = {
     "smooth point": Example(PointContact(Penalty(_value(2.4e8)), _COULOMB, _C), 1e-5, 1e-5),
@@ -66,4 +77,12 @@ EXAMPLES: dict[str, Example] = {
     ),
     "measured point": Example(PointContact(_MEASURED, _COULOMB, _C), 1.2e-5, 8e-6),
     "rough point, damped": Example(PointContact(_ROUGH, _COULOMB, _C, None, _value(2e-4)), 1.2e-5, 8e-6),
+    "point, static and sliding": _point(StaticSliding(_value(0.4), _value(0.3))),
+    "point, falling": _point(Falling(_value(0.3), _value(5.0))),
+    "point, heated": _point(Heated(_value(0.3), _value(1e-6), _value(900.0), _value(4e-6)), stiffness_2=_value(0.4e8)),
+    "point, measured": _point(characteristic(np.array([1e-4, 1e-3, 1e-2]), np.array([0.4, 0.3, 0.25]))),
+    "point, scattered": _point(scattered(_COULOMB, 0.1, 2e-3)),
+    "point with mass": Example(
+        MassContact(_ROUGH, _COULOMB, _C, None, _value(1e-6), _value(1e-5), _value(1e6)), 1.2e-5, 8e-6, inertia=0.02
+    ),
 }

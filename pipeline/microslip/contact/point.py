@@ -18,12 +18,13 @@ from .normal import Normal
 
 
 class PointState(NamedTuple):
-    """State of n points: u_t (2, n) m, elastic force (2, n) N, share (n,) of the stiffness, slip (2, n) m."""
+    """State of n points: u_t (2, n) m, elastic force (2, n) N, share (n,), slip (2, n) m, time (n,) s."""
 
     tangential: Array
     elastic: Array
     share: Array
     slipped: Array
+    time: Array
 
 
 @settings
@@ -49,7 +50,7 @@ class PointContact(Law):
     damping: Array | None = None
 
     def init(self, n: int) -> PointState:
-        return PointState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n), jnp.zeros((2, n)))
+        return PointState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n), jnp.zeros((2, n)), jnp.zeros(n))
 
     def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
         approach, tangential = u.T[0], u.T[1:]
@@ -59,15 +60,17 @@ class PointContact(Law):
         relaxed = state.elastic * jnp.minimum(ratio(share, state.share), 1.0)
         stiffness = springs if self.damping is None else springs * (1 + self.damping / dt)
         trial = relaxed + stiffness * (tangential - state.tangential)
-        theta = self._kept(trial, stiffness, pressed, dt)
+        time = state.time + dt
+        theta = self._kept(trial, stiffness, pressed, dt, time)
         force = trial * _weight(theta, self._relative(stiffness))
         stretched = ratio(force - relaxed, stiffness)
         elastic = force if self.damping is None else relaxed + springs * stretched
         slipped = state.slipped + jnp.where(share > 0, tangential - state.tangential - stretched, 0.0)
-        return jnp.concatenate([pressed[None], force]).T, PointState(tangential, elastic, share, slipped)
+        after = PointState(tangential, elastic, share, slipped, time)
+        return jnp.concatenate([pressed[None], force]).T, after
 
     def limit(self, force: Array, state: PointState) -> Array:
-        return self.friction.coefficient(jnp.zeros(len(force))) * force[:, 0]
+        return self.friction.coefficient(jnp.zeros(len(force)), force[:, 0], state.time) * force[:, 0]
 
     def slip(self, state: PointState) -> Array:
         return state.slipped.T
@@ -93,13 +96,13 @@ class PointContact(Law):
             return None
         return ratio(stiffness, jnp.max(stiffness, axis=0), 1.0)
 
-    def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float) -> Array:
+    def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float, time: Array) -> Array:
         """(n,) theta of `_weight` at which the force has come down to what friction can hold: 1 sticks."""
         tried = norm(trial)
         if self.stiffness_2 is None and self.friction.constant:
-            held = self.friction.coefficient(tried) * pressed
+            held = self.friction.coefficient(tried, pressed, time) * pressed
             return jnp.where(tried > held, ratio(held, tried), 1.0)
-        return _slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt)
+        return _slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
 
 
 def _weight(theta: Array, relative: Array | None) -> Array:
@@ -113,29 +116,30 @@ def _weight(theta: Array, relative: Array | None) -> Array:
 
 
 def _slide(
-    trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float
-) -> Array:
-    """theta where friction holds what is left: a search without derivatives, then one Newton step, whose derivative
-    is that of the solution (implicit function theorem)."""
+    trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float,
+    time: Array,
+) -> Array:  # fmt: skip
+    """theta where friction holds what is left: found without derivatives, which the implicit function theorem adds."""
     largest = jnp.max(stiffness, axis=0)
 
     def excess(theta: Array) -> Array:
         force = norm(trial * _weight(theta, relative))
         slip = ratio((1 - theta) * force, theta * largest)
-        return force - friction.coefficient(slip / dt) * pressed
+        return force - friction.coefficient(slip / dt, pressed, time) * pressed
 
     sticks = excess(jnp.ones(trial.shape[1])) <= 0
     if friction.constant:
-        theta = _secular(trial, relative, friction.coefficient(largest) * pressed)
+        theta = _secular(trial, relative, friction.coefficient(largest, pressed, time) * pressed)
     else:
         theta = _halved(excess, trial.shape[1])
     theta = jax.lax.stop_gradient(theta)
     value, slope = jax.jvp(excess, (theta,), (jnp.ones(trial.shape[1]),))
-    theta = theta - jnp.where(slope > 0, value / jnp.where(slope > 0, jax.lax.stop_gradient(slope), 1.0), 0.0)
+    slope = jnp.where(slope > 0, jax.lax.stop_gradient(slope), jnp.inf)
+    theta = theta - (value - jax.lax.stop_gradient(value)) / slope
     return jnp.where(sticks, 1.0, jnp.clip(theta, 0.0, 1.0))
 
 
-_STEPS = 40  # halvings of the interval of theta; the Newton step after them squares what is left
+_STEPS = 50  # halvings of the interval of theta
 _NEWTON = 8  # steps of an iteration that is exact for equal stiffness; enough for stiffnesses of a ratio of 1e-4
 
 

@@ -332,7 +332,7 @@ def run_in(
     time = np.asarray(time, float)
     if not force > 0 or not speed >= 0 or len(time) == 0 or time[0] != 0 or np.any(np.diff(time) < 0):
         raise UserError("wear: needs a positive force, a speed of 0 or more, and times that rise from 0")
-    power = float(friction.coefficient(jnp.asarray([speed]))[0]) * force * speed
+    power = float(friction.coefficient(jnp.asarray([speed]), jnp.asarray([force]))[0]) * force * speed
     tables = [as_table(normal.heights)]
     for dt in np.diff(time):
         law = worn_law(
