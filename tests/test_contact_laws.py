@@ -78,10 +78,11 @@ def test_friction_stays_in_its_cone(example, seed) -> None:
 @TRIES
 @given(seed=st.integers(0, 10**6), lift=st.sampled_from([0.5, 1.0, 3.0]))
 def test_a_closed_cycle_gives_no_energy(example, seed, lift) -> None:
-    """Also where the normal load varies while the contact sticks. The sum's own error is of second order."""
-    u = path(seed, example, lift=lift)
+    """Also where the normal load varies while the contact sticks. The sum's own error is of second order in the step:
+    (2 pi 3 / 1024)^2 / 12 = 3e-5 for the third harmonic."""
+    u = path(seed, example, lift=lift, samples=4 * SAMPLES)
     given_back, size = work(np.array(FORCES(example.law, u, example.period, 2)[0]), np.array(u))
-    error = 1e-3 if example.jumps else 2e-5  # the trapezoidal rule is of first order where the force jumps
+    error = 1e-3 if example.jumps else 5e-5  # the trapezoidal rule is of first order where the force jumps
     assert np.all(given_back >= -error * size)
 
 
