@@ -737,7 +737,7 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
 
 def test_joined_bodies_are_those_with_a_link_between_them():
     """Two unlike blocks, whose patches of 20 x 50 mm have frames of their own, against springs written down as a link:
-    k_t (b0^2 + h0^2)/12 about the normal x, k_n h0^2/12 about y, k_n b0^2/12 about z. Rounding of dense eigenvalues."""
+    k_t (b0^2 + h0^2)/12 about the normal y, k_n h0^2/12 about z, k_n b0^2/12 about x. Rounding of dense eigenvalues."""
     members = {
         "a": Body("a", 2.0, (0.0, 0.0, 0.0), (2e-3, 3e-3, 5e-3)),
         "b": Body("b", 0.7, (0.2, 0.03, 0.0), (1e-3, 4e-4, 7e-4)),
@@ -746,11 +746,11 @@ def test_joined_bodies_are_those_with_a_link_between_them():
     ground = {n: Link("ground", n, springs, at=(x, 0.02, 0.01)) for n, x in (("a", -0.1), ("b", 0.3))}
     middle = (0.1, 0.01, -0.02)
     faces = {
-        "a": Contact("face", "a", (1.0, 0, 0), (0, 0, 1.0), middle, width=0.02, height=0.05),  # t1 = y, t2 = z
-        "b": Contact("face", "b", (-1.0, 0, 0), (0, 1.0, 2.0), middle, width=0.02, height=0.05),
+        "a": Contact("face", "a", (0, 1.0, 0), (1.0, 0, 0), middle, width=0.02, height=0.05),  # t1 = z, t2 = x
+        "b": Contact("face", "b", (0, -1.0, 0), (2.0, 0, 1.0), middle, width=0.02, height=0.05),
     }
     k_n, k_t, b0, h0 = 4e6, 9e5, 0.02, 0.05
-    springs = [k_n, k_t, k_t, k_t * (b0**2 + h0**2) / 12, k_n * h0**2 / 12, k_n * b0**2 / 12]
+    springs = [k_t, k_n, k_t, k_n * b0**2 / 12, k_t * (b0**2 + h0**2) / 12, k_n * h0**2 / 12]
     whole = System("whole", list(members.values()), [*ground.values(), Link("a", "b", springs, at=middle)])
     parts = (System(n, [members[n]], [ground[n]], contacts=[faces[n]]) for n in members)
     one, two = (p.basis().groups[0, 0] for p in parts)
