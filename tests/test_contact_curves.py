@@ -79,17 +79,6 @@ def test_energy_is_the_integral_of_the_force_and_the_inverse_inverts():
         c.approach(-1.0)
 
 
-def test_cubics_are_the_curve():
-    """The plain form a compiled law takes: knots and one cubic a piece."""
-    c = sampled(9, first=0.2)
-    knots, cubics = c.cubics()
-    x = np.linspace(-0.5, 2, 301) * ROUGH
-    piece = np.searchsorted(knots, x, side="right")
-    d = x - knots[np.maximum(piece - 1, 0)]
-    value = [np.polyval(cubics[p], s) for p, s in zip(piece, d, strict=True)]
-    assert value == pytest.approx(c.force(x), abs=1e-9 * c.loads[-1])
-
-
 def test_a_curve_that_begins_under_load_is_led_to_zero_by_the_third_power():
     """What (3.3-25) says of light loads: exact for a cubic law, whose slope at the first point PCHIP meets to 1 %."""
     u = np.linspace(0.5, 1.0, 60) * 1e-5

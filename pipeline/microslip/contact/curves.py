@@ -20,7 +20,9 @@ from scipy.optimize import isotonic_regression
 
 from ..compliance import BULK_AND_SURFACE
 from ..data import Array, Indices, UserError
-from .series import INCLUDES
+from .hertz import Hertz
+from .profiles import RoundContact
+from .series import BULK, INCLUDES
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
@@ -87,16 +89,6 @@ class NormalCurve:
             raise UserError(f"force: {F.min():g} N; a contact is pressed, so the force must not be negative")
         return np.array([self._inverse(v) for v in F.ravel()]).reshape(F.shape)
 
-    def cubics(self) -> tuple[Array, Array]:
-        """(k,) knots, m, and (k + 1, 4) cubics, highest power first, for the k + 1 pieces that the knots part.
-
-        The first piece is zero; each other is in (u - its left knot); the last one is straight.
-        """
-        c = np.zeros((len(self.knots) + 1, 4))
-        c[1:-1] = self._spline.c.T
-        c[-1, 2:] = self.slopes[-1], self.loads[-1]
-        return self.knots, c
-
     @cached_property
     def _spline(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.knots, self.loads, self.slopes)
@@ -115,6 +107,21 @@ class NormalCurve:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if self._spline(middle) >= force else (middle, high)
         return float(high)
+
+
+def of_contact(contact: Hertz | RoundContact, largest: float, count: int = 81) -> NormalCurve:
+    """The curve of a point contact up to a normal force (N), with its own slopes; knots crowd where it opens.
+
+    Raises:
+        UserError: no force, or one that needs a wider profile.
+    """
+    if not 0 < largest < np.inf:
+        raise UserError(f"largest: {largest:g} N; give the largest force the curve is to reach")
+    u = float(contact.approach(largest)) * np.linspace(0, 1, count) ** 2
+    loads = contact.force(u)
+    slopes = contact.normal_stiffness(loads)
+    slopes[0] = 0.0  # of a stamp it is not, whose force then sets in within the first interval
+    return NormalCurve(u, loads, slopes, BULK, f"{type(contact).__name__} to {largest:g} N")
 
 
 def curve(

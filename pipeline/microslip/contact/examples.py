@@ -10,10 +10,14 @@ import numpy as np
 from .curves import curve
 from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSliding, characteristic, scattered
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
+from .hertz import Hertz
 from .law import Array, Law
 from .normal import Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
+from .point_laws import hertz_point, round_point
+from .profiles import Profile, RoundContact
 from .regularised import MassContact
+from .solids import Solid
 from .wear import course
 
 
@@ -52,6 +56,7 @@ _HYPERBOLIC = Hyperbolic(_value(2.4e8), _value(12e-6), Polynomial(), _value(120e
 _MEASURED = measured(curve([0, 2e-6, 5e-6, 9e-6, 14e-6], [0, 20, 240, 900, 2100]), 2.4e8)
 _GROUND = tabulated([0, 0.12, 0.3, 0.38, 0.55, 0.8, 0.95, 1.1], [0, 0.01, 0.12, 0.26, 0.63, 0.9, 0.98, 1])
 _COULOMB = Coulomb(_value(0.3))
+_STEEL = Solid(2.1e11, 0.3)
 _C = _value(0.9e8)
 
 
@@ -76,6 +81,10 @@ EXAMPLES: dict[str, Example] = {
         PointContact(Potential(_value(2e3), _value(12e-6), _value(2.5)), _COULOMB, _C), 1.2e-5, 8e-6
     ),
     "measured point": Example(PointContact(_MEASURED, _COULOMB, _C), 1.2e-5, 8e-6),
+    "Hertz point": Example(hertz_point(Hertz(_STEEL, _STEEL, 5.0, 20.0), _COULOMB), 1.2e-5, 8e-6, isotropic=False),
+    "round point": Example(
+        round_point(RoundContact(_STEEL, _STEEL, Profile.power(1.0, 1e-5, 1e-3, 0.01)), _COULOMB, 2000.0), 1.2e-5, 8e-6
+    ),
     "rough point, damped": Example(PointContact(_ROUGH, _COULOMB, _C, None, _value(2e-4)), 1.2e-5, 8e-6),
     "point, static and sliding": _point(StaticSliding(_value(0.4), _value(0.3))),
     "point, falling": _point(Falling(_value(0.3), _value(5.0))),

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from ..compliance import BULK_AND_SURFACE
 from .friction import Friction
-from .law import Array, Law, norm, ratio, root, settings
+from .law import Array, Law, norm, ratio, root, settings, static
 from .normal import Normal
 
 
@@ -40,7 +41,8 @@ class PointContact(Law):
     Attributes:
         normal: normal law. friction: characteristic. stiffness_1: tangential stiffness along t1 of the full area
             (c_R0), N/m; stiffness_2: along t2, the same if None. damping: beta, s: force per rate of the normal and
-            tangential springs (3.7-18), none if None. The normal force is cut at zero (3.7-30).
+            tangential springs (3.7-18), none if None. The normal force is cut at zero (3.7-30). includes: whose
+            compliance the stiffnesses count, one of `series.INCLUDES`.
     """
 
     normal: Normal
@@ -48,6 +50,7 @@ class PointContact(Law):
     stiffness_1: Array
     stiffness_2: Array | None = None
     damping: Array | None = None
+    includes: str = static(default=BULK_AND_SURFACE)
 
     def init(self, n: int) -> PointState:
         return PointState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n), jnp.zeros((2, n)), jnp.zeros(n))

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
 from .friction import Friction, smoothed
 from .law import Array, Law, norm, ratio, settings, static
@@ -47,7 +48,8 @@ class MassContact(Law):
     Attributes:
         normal: normal law. friction: characteristic. stiffness_1: along t1 of the full area, N/m; stiffness_2: along
             t2, the same if None. mass: m_D of the full area (3.7-7), kg. damping: beta, s. slope: k_S of the smoothing
-            (3.7-43), s/m. printed: the book's stretch.
+            (3.7-43), s/m. printed: the book's stretch. includes: whose compliance the stiffnesses count, one of
+            `series.INCLUDES`.
     """
 
     normal: Normal
@@ -58,6 +60,7 @@ class MassContact(Law):
     damping: Array
     slope: Array
     printed: bool = static(default=False)
+    includes: str = static(default=BULK_AND_SURFACE)
 
     def init(self, n: int) -> MassState:
         none = jnp.zeros((2, n))
