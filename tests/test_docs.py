@@ -218,9 +218,9 @@ def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
 
     assert pages.filled("contact_stiffness.md", "layers") == pages.table(*stiffness_study.layers())
     text = (DOCS / "contact_stiffness.md").read_text(encoding="utf-8")
-    code, printed = re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S)[0]
-    exec(compile(code, "contact_stiffness.md", "exec"), {})
-    assert capsys.readouterr().out.strip() == printed
+    for code, printed in re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S):
+        exec(compile(code, "contact_stiffness.md", "exec"), {})
+        assert capsys.readouterr().out.strip() == printed
 
 
 def test_geometry_page(tmp_path: Path) -> None:
