@@ -965,12 +965,22 @@ def stiffness_sources() -> None:
     save(drawn(study.picture(figure(10.5, 3.4), plain)), "contact_stiffness")
 
 
+def rough() -> None:
+    """Rough contacts: the laws, what a profile gives, the book's wear example."""
+    import rough_study as study
+
+    fill("contact.md", "profile", table(*study.numbers()))
+    fill("contact.md", "worn", table(*study.worn()))
+    for name, draw in (("rough_laws", study.laws), ("rough_profile", study.profile), ("wear", study.wear)):
+        save(drawn(draw(figure(10.5, 3.4), plain)), name)
+
+
 STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources,
+        stiffness_sources, rough,
     )  # fmt: skip
 }
 

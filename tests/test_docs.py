@@ -223,6 +223,21 @@ def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert capsys.readouterr().out.strip() == printed
 
 
+def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its tables made again, and what its examples print; the profile is the invented one of the table."""
+    import rough_study
+
+    assert pages.filled("contact.md", "profile") == pages.table(*rough_study.numbers())
+    assert pages.filled("contact.md", "worn") == pages.table(*rough_study.worn())
+    profile = rough_study.ground()
+    np.savetxt(tmp_path / "ground.txt", np.column_stack([1e3 * profile.x, 1e6 * profile.z]), fmt="%.6f")
+    monkeypatch.chdir(tmp_path)
+    text = (DOCS / "contact.md").read_text(encoding="utf-8")
+    for code, printed in re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S):
+        exec(compile(code, "contact.md", "exec"), {})
+        assert capsys.readouterr().out.strip() == printed
+
+
 def test_geometry_page(tmp_path: Path) -> None:
     """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
     basis = made(tmp_path, "pendulum", "modes.count=3")
