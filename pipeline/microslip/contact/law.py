@@ -2,13 +2,43 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
 import jax
 import jax.numpy as jnp
 
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
+
+
+def keep_compiled() -> Path | None:
+    """Keep compiled programs in the user's cache folder, so that the next run need not compile them again.
+
+    `$XDG_CACHE_HOME/microslip/jax`, or `~/.cache/microslip/jax`. A folder that jax was told already
+    (JAX_COMPILATION_CACHE_DIR) is left; without a place to write to, nothing is kept and nothing is said.
+    """
+    told = getattr(jax.config, "jax_compilation_cache_dir", None)
+    if told is not None:
+        return Path(told)
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base, "microslip", "jax")
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, RuntimeError):
+        return None
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    jax.config.update("jax_raise_persistent_cache_errors", False)
+    return folder
+
+
+keep_compiled()
 
 Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""
