@@ -15,6 +15,7 @@ import small
 from microslip.data import Mesh, UserError
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
 from microslip.mesh.msh import to_vtk
+from microslip.modes.boundary import require_face
 from microslip.topology import CELL_TYPES
 
 pytest.importorskip("meshio")
@@ -252,9 +253,13 @@ def test_damaged_gmsh_files(tmp_path: Path, what: str) -> None:
     assert words in refusal(written(tmp_path, text))
 
 
-def test_a_facet_that_is_not_on_the_surface_is_refused(tmp_path: Path) -> None:
+def test_a_set_with_a_facet_inside_the_volume_is_no_face(tmp_path: Path) -> None:
     text = TET.replace("2 11 12 13 15 16 17", "2 11 12 16 15 16 17")
-    assert "1 of 1 facets of the set 'foot' are not on the surface" in refusal(written(tmp_path, text))
+    mesh = read_mesh(written(tmp_path, text), "m")
+    assert "foot" not in mesh.faces and mesh.inner["foot"] == (1, 1)
+    assert "1 of 1 facets of the set 'foot' are not on the surface" in mesh_problems(mesh)[1][0]
+    with pytest.raises(UserError, match="interfaces.a.face: 1 of 1 facets of the set 'foot' are not on the surface"):
+        require_face(mesh, "foot", "interfaces.a.face")
 
 
 # ---------------------------------------------------------------- Abaqus

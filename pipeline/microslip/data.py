@@ -69,6 +69,7 @@ class Mesh:
             material, ascending; empty unless there are materials. temperature: (n, 2) of the stress-free and of the
             actual state as the file has them, in its own unit, or None. cell_id: cell type -> (e,) the file's numbers
             of the cells, or nothing.
+        inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
     """
 
     points: Array
@@ -80,6 +81,7 @@ class Mesh:
     regions: Mapping[str, Indices] = field(default_factory=dict)
     temperature: Array | None = None
     cell_id: Mapping[str, Indices] = field(default_factory=dict)
+    inner: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def n_points(self) -> int:

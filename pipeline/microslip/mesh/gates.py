@@ -26,7 +26,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
     Errors: unconnected parts, coincident points, repeated points in a cell, inside-out cells (by their corners;
-    curved cells are examined at the quadrature points when they are assembled). Warnings: first-order cells.
+    curved cells are examined at the quadrature points when they are assembled). Warnings: first-order cells, sets
+    of facets that cannot serve as faces.
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():
@@ -53,6 +54,10 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
                 f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents "
                 "high); use second-order ones"
             )
+    warnings += [
+        f"{inside} of {count} facets of the set '{name}' are not on the surface of the volume mesh; it is no face"
+        for name, (inside, count) in mesh.inner.items()
+    ]
     pairs = _coincident(mesh.points)
     parts = part_numbers(mesh)
     if not errors and (overlapping := _overlapping(mesh)):

@@ -48,7 +48,8 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
 
     Returns:
         The mesh in metres. A named set of facets becomes a face; so does a named set of points in which whole
-        boundary facets lie (it also stays a point set). Points that no cell uses are dropped.
+        boundary facets lie (it also stays a point set). A set with facets inside the volume becomes none and stands
+        in `Mesh.inner`. Points that no cell uses are dropped.
 
     Raises:
         UserError: unreadable or truncated file, no volume cells, unsupported cells.
@@ -107,7 +108,7 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
         raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"{path}: a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, path)
+    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()})
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
@@ -210,7 +211,7 @@ def _cell_sets(raw: Any) -> dict[str, list]:
 # surface and faces ------------------------------------------------------------------------------------------------
 
 
-def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path: Path) -> Mesh:
+def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices]) -> Mesh:
     used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
     renumber = np.full(len(points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
@@ -225,21 +226,21 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], path:
     )
     boundary = boundary_facets(mesh)
     faces: dict[str, dict[str, Indices]] = {}
+    inner: dict[str, tuple[int, int]] = {}
     for name, blocks in raw.facets.items():
         face = match_facets(boundary, [renumber[b] for b in blocks])
         wanted = len({tuple(row) for b in blocks for row in np.sort(b, axis=1).tolist()})
         found = sum(map(len, face.values()))
-        if found:
-            faces[name] = face
         if found < wanted:
-            raise UserError(
-                f"{path}: {wanted - found} of {wanted} facets of the set '{name}' are not on the surface of the "
-                "volume mesh; remove the set or mesh volume and surface together"
-            )
-    for name, chosen in mesh.point_sets.items():
-        if name not in faces and (face := faces_from_points(boundary, chosen, len(mesh.points))):
+            inner[name] = (wanted - found, wanted)
+        elif found:
             faces[name] = face
-    return replace(mesh, faces=faces)
+    for name, chosen in mesh.point_sets.items():
+        if name in faces or name in inner:
+            continue
+        if face := faces_from_points(boundary, chosen, len(mesh.points)):
+            faces[name] = face
+    return replace(mesh, faces=faces, inner=inner)
 
 
 def _cell_numbers(raw: RawMesh) -> dict[str, Indices]:

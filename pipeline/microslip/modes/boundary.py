@@ -20,6 +20,12 @@ AXES = {"x": 0, "y": 1, "z": 2}
 def require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False) -> None:
     if face in mesh.faces or (points_suffice and face in mesh.point_sets):
         return
+    if face in mesh.inner:
+        inside, count = mesh.inner[face]
+        raise UserError(
+            f"{key}: {inside} of {count} facets of the set '{face}' are not on the surface of the volume mesh; "
+            "choose another face, or mesh volume and surface together"
+        )
     known = sorted(mesh.faces) + (sorted(set(mesh.point_sets) - set(mesh.faces)) if points_suffice else [])
     raise UserError(f"{key}: the mesh has no face '{face}'; its faces are {', '.join(known) or 'none'}")
 
