@@ -176,6 +176,19 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, words):
         read_curve(path)
 
 
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.integers(0, len(LINES) - 1), st.binary(max_size=6), st.integers(0, 4))
+def test_a_damaged_file_gives_a_law_or_a_sentence(tmp_path_factory, place, put, taken):
+    path = tmp_path_factory.mktemp("rig") / "rig.csv"
+    path.write_bytes(LINES.encode()[:place] + put + LINES.encode()[place + taken :])
+    try:
+        law = read_curve(path)
+    except UserError as error:
+        assert str(error).startswith(str(path))
+    else:
+        assert (np.diff(law.knots) > 0).all() and (np.diff(law.loads) >= 0).all() and np.isfinite(law.slopes).all()
+
+
 def test_wrong_requests_are_refused(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text(LINES)

@@ -758,6 +758,28 @@ def test_joined_bodies_are_those_with_a_link_between_them():
     assert found == pytest.approx(whole.basis().groups[0, 0].frequency, rel=1e-9)
 
 
+def solid_beam(tip: str, root: str):
+    """Slender (1:40), without lateral contraction."""
+    face = [{"name": "tip", "face": tip, "t2": [0.0, 0.0, 1.0], "role": "ground"}]
+    material = {**STEEL, "poisson": 0.0}
+    settings = body(material, supports=[{"face": root}], interfaces=face, modes={"count": 8})
+    return modal_basis(brick("hexahedron20", (16, 1, 1), (0.4, 0.02, 0.01)), settings).groups[0, 0]
+
+
+@pytest.mark.parametrize("k", [(8e6, 3e5), (82.5e6, 31.7e6)])
+def test_the_rig_in_solid_elements_is_the_rig_in_closed_form(k):
+    """Two solid beams, tips facing: their first and third mode are those of `two_beams` once what eight modes leave of
+    the compliance is added. 5e-4: shear and rotary inertia, (h/L)^2 = 6e-4 times a number below 1. The stiffnesses
+    identified from the closed form's frequencies follow with 1/sensitivity, which is 10 and 100 here."""
+    one, two = solid_beam("x1", "x0"), solid_beam("x0", "x1")
+    section = rectangle(0.4, 0.02, 0.01, STEEL["young"], 0.0, STEEL["density"])
+    f = two_beams(section, 0.01)(np.array(k))
+    model = joined(one, "tip", two, "tip", includes=SURFACE)
+    assert model(np.array(k))[[0, 2]] == pytest.approx(f, rel=5e-4)
+    found = identify(model, [Resonance(f[0], 1e-4 * f[0], 1), Resonance(f[1], 1e-4 * f[1], 3)])
+    assert found.stiffness == pytest.approx(k, rel=0.01)
+
+
 def test_a_nodal_diameter_is_joined_like_its_real_form():
     """Turning the phase of every mode (a complex basis of the same body) must not move a frequency."""
     g = bar("eigenmodes", 4)
