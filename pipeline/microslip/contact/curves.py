@@ -189,7 +189,12 @@ def _check(name: str, places: Indices | None, x: Array, F: Array, noise: float) 
         bad = np.flatnonzero(~np.isfinite(v))
         if len(bad):
             raise UserError(f"{name}: {_line(places, bad[0])}the {what} is no finite number; correct it or take it out")
-    bad = np.flatnonzero(np.diff(x) <= 0)
+    for what, v, most, unit in (("approach", x, 1.0, "m"), ("force", F, 1e12, "N")):
+        far = np.flatnonzero(np.abs(v) > most)
+        if len(far):
+            told = f"{_line(places, far[0])}the {what} is {v[far[0]]:g} {unit}"
+            raise UserError(f"{name}: {told}, which is no contact's; correct the unit")
+    bad = np.flatnonzero(np.diff(x) <= 1e-15)  # m: less than rounding of the file's digits, and no slope
     if len(bad):
         raise UserError(
             f"{name}: {_line(places, bad[0] + 1)}the contact does not close further ({x[bad[0]]:g} m, then "
