@@ -186,3 +186,17 @@ def test_files_of_instruments(tmp_path) -> None:
     assert "\n" not in str(caught.value)
     with pytest.raises(UserError, match="no such file"):
         read_instrument(tmp_path / "none.sur")
+
+
+@hypothesis_settings(max_examples=60, deadline=None, derandomize=True)
+@given(change=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
+def test_bytes_turned_over_end_in_a_law_or_a_sentence(tmp_path_factory, change) -> None:
+    whole = bytearray(lines({}, 40).encode())
+    for place, value in change:
+        whole[place % len(whole)] = value
+    path = tmp_path_factory.mktemp("hostile") / "ground.txt"
+    path.write_bytes(bytes(whole))
+    try:
+        assert np.all(np.isfinite(heights(read_profile(path, "um"), 1e-6).volume_at))
+    except UserError as error:
+        assert str(path) in str(error) and "\n" not in str(error)

@@ -1,5 +1,7 @@
 """Wear at constant force: the exact course against balances, closed forms and steps; the loop back into a law."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,8 +10,9 @@ from hypothesis import strategies as st
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Linear, Polynomial, as_table, summed, tabulated
-from microslip.contact.law import jnp
+from microslip.contact.law import history, jnp
 from microslip.contact.normal import Rough
+from microslip.contact.point import PointContact
 from microslip.contact.wear import (
     approach_under,
     course,
@@ -219,6 +222,30 @@ def test_points_wear_each_by_its_own_work() -> None:
     assert pressed[0] == pressed[1] > pressed[2] and pressed[0] > pressed[3]
     again = worn_law(law, energy, force, 2e-13, A)
     assert np.asarray(again.heights.x).shape == (4, 257) and np.all(np.asarray(again.heights.x)[2:] >= x[2:])
+
+
+def test_a_vibrating_contact_wears_off_its_own_dissipation() -> None:
+    """Three points slide to and fro, wear, slide again: the volume is I_W times the work of `history`, point by point.
+    With the approach held, force and work fall from block to block."""
+    approach, turns = np.array([0.6, 0.8, 1.1]) * R, 2 * np.pi * np.arange(129) / 64
+    u = np.stack(
+        [np.tile(approach, (129, 1)), 20e-6 * np.sin(turns)[:, None] * np.ones(3), np.zeros((129, 3))], axis=-1
+    )
+    law = PointContact(Rough(C, R, TABLE), Coulomb(jnp.asarray(0.3)), jnp.asarray(0.9e8))
+    normal, coefficient, blocks = Rough(C, R, TABLE), 2e-14, []
+    for _ in range(3):
+        done = history(replace(law, normal=normal), jnp.asarray(u), 1e-4)
+        energy, force = 5e3 * np.asarray(done.dissipated[-1]), np.asarray(done.force[-1, :, 0])
+        after = worn_law(normal, energy, force, coefficient, A)
+        blocks.append((energy, _mean_depth(after) - _mean_depth(normal)))
+        normal = after
+    for energy, gone in blocks:
+        assert np.all(energy > 0) and np.allclose(A * R * gone, coefficient * energy, rtol=5e-3)
+    assert np.all(np.diff([energy for energy, _ in blocks], axis=0) < 0)
+
+
+def _mean_depth(normal):
+    return np.trapezoid(np.asarray(normal.heights.x), np.asarray(normal.heights.area_at), axis=-1)
 
 
 def test_a_surface_worn_flat_is_still_a_law() -> None:

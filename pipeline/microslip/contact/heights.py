@@ -248,7 +248,10 @@ def tabulated(x: ArrayLike, area: ArrayLike, name: str = "height distribution") 
             raise UserError(f"{name}: {what}[{np.argmin(np.isfinite(values))}] is not a finite number; leave it out")
     if np.any(np.diff(x) <= 0):
         i = int(np.argmax(np.diff(x) <= 0))
-        raise UserError(f"{name}: x[{i + 1}] = {x[i + 1]:g} does not lie above x[{i}] = {x[i]:g}; sort the nodes by x")
+        raise UserError(
+            f"{name}: x[{i + 1}] = {x[i + 1]:g} does not lie above x[{i}] = {x[i]:g}; "
+            "sort the nodes, and give a jump of the area a width"
+        )
     if np.any(np.diff(area) < 0):
         i = int(np.argmax(np.diff(area) < 0))
         raise UserError(

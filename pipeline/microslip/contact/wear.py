@@ -281,7 +281,9 @@ def dimensionless_time(
 def worn_law(normal: Rough, energy: np.ndarray, force: np.ndarray, coefficient: float, area: float) -> Rough:
     """The rough law after frictional work at a normal force: a table of heights per point, of the exact course.
 
-    The approach goes on being counted from where the NEW surface began to touch: a worn one begins later.
+    The approach goes on being counted from where the NEW surface began to touch: a worn one begins later. Where the
+    force swings during the work, its mean over the sliding way stands for it, energy / (mu way); what is worn off in
+    all is the same, and steps that wear little keep the difference in shape small.
 
     Args:
         normal: new or worn. energy: (n,) J dissipated at each point. force: (n,) N at which it was; where it is 0
@@ -343,7 +345,7 @@ def run_in(
     c, R = float(normal.stiffness_0), float(normal.roughness)
     u = np.array([float(approach_under(t, force / (c * R))) for t in tables])
     share = np.array([np.interp(v, np.asarray(t.x), np.asarray(t.area_at)) for t, v in zip(tables, u, strict=True)])
-    highest = np.array([float(t.x[0]) for t in tables])
+    highest = np.array([np.asarray(t.x)[np.flatnonzero(np.asarray(t.area_at) == 0)[-1]] for t in tables])
     return RunningIn(
         time,
         approach=R * u,
