@@ -42,3 +42,20 @@ def test_every_card_comes_back_as_its_cell(tmp_path, cell_type):
     np.testing.assert_array_equal(read.cells[cell_type], mesh.cells[cell_type])
     assert discretise(read).volume == pytest.approx(discretise(mesh).volume, rel=1e-9)
     assert not mesh_problems(read)[0]
+
+
+def test_constraints_of_the_chosen_set_are_supports(tmp_path):
+    """SPC1 and SPC by set, GRID's own; SPCADD; another set, a displacement and a local system are left out."""
+    mesh = meshes.brick("hexahedron", (1, 1, 1), (0.02, 0.01, 0.03))
+    cards = ["SPC1,7,123,1,THRU,3", "SPC,8,4,1,0.0,5,2,0.1", "SPC1,9,123456,8", "SPCADD,20,7,8"]
+    lines = bulk(mesh).replace("CEND", "CEND\nSPC = 20").splitlines()
+    lines = [line for line in lines if line != "ENDDATA"] + cards + ["ENDDATA"]
+    (tmp_path / "a.bdf").write_text("\n".join(lines))
+    read = read_mesh(tmp_path / "a.bdf", "m")
+    named = {name: (directions, read.node_id[read.point_sets[name]].tolist()) for name, directions in
+             read.supports.items()}
+    assert named == {"SPC 7": ("xyz", [1, 2, 3]), "held x": ("x", [4])}
+    assert read.not_held == ("SPC 8 displaces node 5",)
+    (tmp_path / "a.bdf").write_text("\n".join(lines).replace("SPC = 20", "SUBCASE 1"))
+    read = read_mesh(tmp_path / "a.bdf", "m")
+    assert not read.supports and "several sets of SPC" in read.not_held[0]

@@ -211,3 +211,15 @@ def test_flipped_bytes_are_read_or_refused(tmp_path_factory):
             assert np.isfinite(read.points).all()
 
     flip()
+
+
+def test_displacements_that_are_zero_are_supports(tmp_path):
+    mesh = meshes.brick("hexahedron", (1, 1, 1), (0.02, 0.01, 0.03))
+    low = [int(mesh.node_id[i]) for i in mesh.face_points("z0")]
+    held = [f"D,{n:7d},{label:4},  0.000000000    ,  0.000000000" for n in low for label in ("UX", "UY", "UZ")]
+    other = next(int(i) for i in mesh.node_id if int(i) not in low)
+    held += [f"D,{other},UY, 0.0", f"D,{other},UX, 0.25", f"D,{other},TEMP, 3.0"]
+    read = read_mesh(written(tmp_path, archive(mesh, ("z0",)) + "\n".join(held) + "\n"), "mm")
+    assert dict(read.supports) == {"Z0": "xyz", "held y": "y"}
+    assert read.node_id[read.point_sets["held y"]].tolist() == [other]
+    assert read.not_held == (f"D,{other},UX prescribes a displacement",)

@@ -80,6 +80,65 @@ def test_a_surface_with_a_face_inside_matters_to_nobody_who_does_not_use_it(tmp_
     assert f"supports.CUT.face: {remark}" in capsys.readouterr().err
 
 
+def clamped():
+    """First frequencies of the beam held at its lower end by supports of body.toml, rad/s."""
+    d, held = discretise(beam()), beam().face_points("z0")
+    kept = np.setdiff1d(np.arange(3 * len(beam().points)), (3 * held[:, None] + np.arange(3)).ravel())
+    K = d.pattern.full(stiffness(d, isotropic(2.1e11, 0.3))).toarray()[np.ix_(kept, kept)]
+    M = np.kron(d.pattern.full(mass(d, 7850.0)).toarray(), np.eye(3))[np.ix_(kept, kept)]
+    return np.sqrt(1 / np.linalg.eigvals(np.linalg.solve(K, M)).real.max())
+
+
+def in_turn(numbers):
+    return [f"{n}, 1, 3" for n in numbers]
+
+
+LOWER = [decks.ids(beam())[i] for i in beam().face_points("z0")]
+HELD = {
+    "a set at once": (["*BOUNDARY", "Z0, 1, 6"], "z0 in xyz"),
+    "a set direction by direction": (["*BOUNDARY", "z0, 1, 1", "z0, 2, , 0.0", "z0, 3, 3, 0."], "z0 in xyz"),
+    "by name in a step": (["*STEP", "*STATIC", "*BOUNDARY, OP=NEW", "part-1.z0, ENCASTRE", "*END STEP"], "z0 in xyz"),
+    "node by node": (["*BOUNDARY", *in_turn(LOWER)], "z0 in xyz"),
+    "what a step takes back": (["*BOUNDARY", "NALL, 1", "*STEP", "*BOUNDARY, OP=NEW", "z0, PINNED"], "z0 in xyz"),
+}
+
+
+@pytest.mark.parametrize("case", HELD)
+def test_supports_of_a_deck_become_supports_of_the_body(tmp_path, monkeypatch, capsys, case):
+    monkeypatch.chdir(tmp_path)
+    keywords, told = HELD[case]
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section(), *keywords]
+    (tmp_path / "part.inp").write_text("\n".join(lines) + "\n")
+    assert main(["import", "part.inp", "here"]) == 0
+    assert f"supports of the file: {told}\n" in capsys.readouterr().out
+    assert main(["modes", "here", "-q"]) == 0
+    np.testing.assert_allclose(lowest(tmp_path, "here")[0], clamped(), rtol=1e-9)
+
+
+LEFT = {
+    "a plane of symmetry alone": (["*BOUNDARY", "z0, ZSYMM"], "z0 in z; they do not hold the body", '#face = "z0"'),
+    "a displacement": (["*BOUNDARY", "z0, 1, 3, 0.5"], "the line 'z0, 1, 3, 0.5' of *BOUNDARY", "free = true"),
+    "a set that is missing": (["*BOUNDARY", "z9, 1, 3"], "the node set 'z9', which is not defined", "free = true"),
+    "a node that is missing": (["*BOUNDARY", "999, 1, 3"], "node 999, which the file does not", "free = true"),
+    "a velocity": (["*BOUNDARY, TYPE=VELOCITY", "z0, 1"], "a *BOUNDARY of the kind VELOCITY", "free = true"),
+    "a local system": (["*TRANSFORM, NSET=z0", "1,0,0,0,1,0", "*BOUNDARY", "z0, 2"], "a local system", "free = true"),
+}
+
+
+@pytest.mark.parametrize("case", LEFT)
+def test_what_cannot_be_a_support_is_told_and_the_body_runs_free(tmp_path, monkeypatch, capsys, case):
+    monkeypatch.chdir(tmp_path)
+    keywords, told, written = LEFT[case]
+    lines = [*decks.mesh_lines(beam(), sets=("z0",)), *decks.MATERIAL, decks.section(), *keywords]
+    (tmp_path / "part.inp").write_text("\n".join(lines) + "\n")
+    assert main(["import", "part.inp", "here"]) == 0
+    out = capsys.readouterr().out
+    assert "warning: " in out and told in out
+    text = (tmp_path / "here" / "body.toml").read_text()
+    assert written in text and "free = true" in text and "\n[[supports]]" not in text
+    assert main(["modes", "here", "-q"]) == 0
+
+
 @pytest.mark.parametrize("suffix", ["mtx", "mat"])
 def test_matrices_run_at_once(tmp_path, monkeypatch, suffix):
     monkeypatch.chdir(tmp_path)

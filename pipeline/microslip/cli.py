@@ -421,6 +421,8 @@ def info(
         kinds = ", ".join(f"{len(c)} {t}" for t, c in grid.cells.items())
         print(f"{file}: {grid.n_points} points, {kinds}, {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} m")
         print(f"faces: {_words(grid.faces)}\npoint sets: {_words(grid.point_sets)}")
+        if grid.supports:
+            print(f"supports: {_words(f'{name} in {directions}' for name, directions in grid.supports.items())}")
         errors, warnings = mesh_problems(grid)
         _warn(warnings)
         if errors:

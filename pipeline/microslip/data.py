@@ -70,6 +70,8 @@ class Mesh:
             actual state as the file has them, in its own unit, or None. cell_id: cell type -> (e,) the file's numbers
             of the cells, or nothing.
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
+        supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
+            that are not among them, in words.
     """
 
     points: Array
@@ -82,6 +84,8 @@ class Mesh:
     temperature: Array | None = None
     cell_id: Mapping[str, Indices] = field(default_factory=dict)
     inner: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    supports: Mapping[str, str] = field(default_factory=dict)
+    not_held: tuple[str, ...] = ()
 
     @property
     def n_points(self) -> int:

@@ -12,6 +12,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from .basis import write_basis
 from .data import Mesh, UserError
 from .exchange.measured import holds_modes, read_measured
@@ -59,7 +61,8 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     lines, told = made(file, target.parent, unit)
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
-    last = f"{target}: ready. Add supports, interfaces and loads, then: microslip run {shlex.quote(str(target.parent))}"
+    missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
+    last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     return Imported(target, (*told, last))
 
 
@@ -84,16 +87,41 @@ def _beside(file: Path, folder: Path) -> str:
     return json.dumps(Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix())
 
 
-def _sets(mesh: Mesh) -> list[str]:
-    """Supports and interfaces to choose from, as comments."""
+def _sets(mesh: Mesh, held: bool = False) -> list[str]:
+    """Supports (unless those of the file are there) and interfaces to choose from, as comments."""
     names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
     if not names:
         return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
     lines = ["", "# Sets of the file: " + ", ".join(names)]
     first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
-    lines += ["#[[supports]]             # then remove free = true at the top", f"#face = {first}"]
+    if not held:
+        lines += ["#[[supports]]             # then remove free = true at the top", f"#face = {first}"]
     lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', f"#face = {first}"]
     return lines
+
+
+def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """The file's own supports, as comments where they do not hold the body, and what to say of them."""
+    told = [f"warning: not taken as a support: {text}" for text in mesh.not_held]
+    if not mesh.supports:
+        return [], told
+    lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
+    for name, directions in mesh.supports.items():
+        lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
+        lines += [f'{mark}directions = "{directions}"'] if directions != "xyz" else []
+    named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
+    if mark:
+        lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
+        return lines, [*told, f"warning: supports of the file: {named}; they do not hold the body: written as comments"]
+    return lines, [*told, f"supports of the file: {named}"]
+
+
+def _hold(mesh: Mesh) -> bool:
+    """Whether the file's supports leave no rigid motion."""
+    from .modes.rigid import free_motions
+
+    fixed = [3 * mesh.point_sets[n] + "xyz".index(c) for n, directions in mesh.supports.items() for c in directions]
+    return free_motions(mesh.points, mesh.points.mean(axis=0), np.concatenate(fixed)).shape[1] == 0
 
 
 def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
@@ -128,8 +156,6 @@ def _draw(triangles: Path, title: str, picture: Path) -> str:
 
     if reason := can_draw():
         return reason
-    import numpy as np
-
     from .pictures.numbered import surfaces_picture
 
     picture.parent.mkdir(parents=True, exist_ok=True)
@@ -171,8 +197,10 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
-    lines = ["free = true               # nothing is held yet", "", "[geometry]", f"mesh = {_beside(file, folder)}", ""]
-    lines.append("[material]")
+    held, said = _supports(mesh)
+    told += said
+    lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
+    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}", "", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
         lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
@@ -184,7 +212,7 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     if mesh.temperature is not None:
         lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
         told.append("temperatures: used only once [temperature] of body.toml is uncommented")
-    return [*lines, *_sets(mesh), *_END], told
+    return [*lines, *held, *_sets(mesh, bool(held)), *_END], told
 
 
 def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:

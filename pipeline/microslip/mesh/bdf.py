@@ -1,7 +1,7 @@
 """Reader of Nastran bulk data: grid points, solid elements, materials, sets of points, shells as faces.
 
-Written against the Quick Reference Guide: GRID, CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC1
-and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or sixteen columns or between commas.
+Written against the Quick Reference Guide: GRID, CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC,
+SPC1, SPCADD and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or sixteen columns or between commas.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ..data import Indices
 from ..elasticity import turned_strain
 from .materials import isotropic_rows
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .supports import Constraints, add_supports
 
 _BRICK20, _WEDGE15 = (*range(12), *range(16, 20), *range(12, 16)), (*range(9), *range(12, 15), *range(9, 12))
 """Places of VTK's nodes: mid-side nodes of the lower edges, the upright ones, the upper ones."""
@@ -29,7 +30,7 @@ _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
 _CORD = {"CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S"}
 _MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
-_READ = {"GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC1", *_SOLIDS, *_SHELLS, *_MATERIALS}
+_READ = {"GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", *_SOLIDS, *_SHELLS, *_MATERIALS}
 
 Cards = dict[str, list[list[str]]]
 
@@ -41,7 +42,8 @@ def read_bdf(path: Path) -> RawMesh:
         Damaged: content that is inconsistent, or whose meaning would be lost.
     """
     cards: Cards = {}
-    for card in _cards(path.read_text(encoding="latin-1")):
+    text = path.read_text(encoding="latin-1")
+    for card in _cards(text):
         cards.setdefault(card[0], []).append(card)
     raw = _grid(cards)
     numbering = Numbering(raw.node_id)
@@ -54,6 +56,7 @@ def read_bdf(path: Path) -> RawMesh:
         for card in cards.get(name, []):
             members = np.array(_listed(card, first), dtype=np.int64)
             raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
+    add_supports(raw, _constraints(cards, text), numbering)
     return raw
 
 
@@ -211,6 +214,46 @@ def _density(cards: Cards, card: list[str]) -> float | None:
     factor = next((_real(c, 2) for c in cards.get("PARAM", []) if _at(c, 1).upper() == "WTMASS"), None)
     density = _real(card, 5)
     return density if density is None or factor is None else density * factor
+
+
+def _constraints(cards: Cards, text: str) -> Constraints:
+    """Zero displacements: GRID's own, and those of the sets that the case control chooses, or of the only one."""
+    held = Constraints(turned={_whole(c, 1) for c in cards["GRID"] if _whole(c, 6, 0) != 0})
+    for card in cards["GRID"]:
+        held.hold(_whole(card, 1), _directions(_at(card, 7)))
+    chosen = _chosen(cards, text, held)
+    for card in cards.get("SPC1", []):
+        if _whole(card, 1) in chosen:
+            for node in _listed(card, 3):
+                held.hold(node, _directions(_at(card, 2)))
+    for card in cards.get("SPC", []):
+        for place in (2, 5) if _whole(card, 1) in chosen else ():
+            node, directions = _whole(card, place, 0), _directions(_at(card, place + 1))
+            if node and (_real(card, place + 2) or 0.0) != 0:
+                held.left_out.append(f"SPC {card[1]} displaces node {node}")
+            elif node:
+                held.hold(node, directions)
+    return held
+
+
+def _directions(components: str) -> str:
+    return "".join(name for name, digit in zip("xyz", "123", strict=True) if digit in components)
+
+
+def _chosen(cards: Cards, text: str, held: Constraints) -> set[int]:
+    """Numbers of the sets of constraints that hold, those that they are made of included."""
+    control = re.split(r"^\s*BEGIN\s+BULK", text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE)
+    pattern = re.compile(r"^\s*SPC\s*=\s*(\d{1,9})\b", re.IGNORECASE | re.MULTILINE)
+    named = pattern.findall(control[0]) if len(control) > 1 else []
+    every = {_whole(c, 1) for name in ("SPC", "SPC1") for c in cards.get(name, [])}
+    if not named and len(every) > 1:
+        held.left_out.append("several sets of SPC, of which the case control chooses none")
+        return set()
+    chosen = {int(n) for n in named} if named else every
+    for card in cards.get("SPCADD", []):
+        if _whole(card, 1) in chosen:
+            chosen |= set(_listed(card, 2))
+    return chosen
 
 
 def _shells(cards: Cards, raw: RawMesh, numbering: Numbering) -> None:

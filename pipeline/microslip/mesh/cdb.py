@@ -18,6 +18,7 @@ from ..data import Array, Indices
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
 """Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
@@ -52,6 +53,7 @@ class _Archive:
     reference: float | None = None
     uniform: float | None = None
     nodal: dict[int, float] = field(default_factory=dict)
+    held: Constraints = field(default_factory=Constraints)
 
 
 def read_cdb(path: Path) -> RawMesh:
@@ -114,13 +116,16 @@ def _number(text: str, what: str) -> float:
 def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     fields = _widths(lines, at, "NBLOCK")
     whole = [f for f in fields if f[2] == "i"]
-    real = [f for f in fields if f[2] == "e"][:3]
+    real = [f for f in fields if f[2] == "e"]
+    real, angles = real[:3], real[3:]
     if not whole or len(real) < 3:
         raise Damaged("NBLOCK has a format without a number and three coordinates")
     for number, line in enumerate(lines[at + 1 :], at + 1):
         if line.strip().upper().startswith("N,") or line.strip() == "-1":
             return number + 1
         archive.node_id.append(_whole(line[: whole[0][1]], "NBLOCK"))
+        if any(_number(t, "NBLOCK") for a, b, _ in angles if (t := line[a:b].strip())):
+            archive.held.turned.add(archive.node_id[-1])
         given = [line[a:b] for a, b, _ in real]
         archive.points.append([_number(t, "NBLOCK") if t.strip() else 0.0 for t in given])
     raise Damaged("NBLOCK has no end, the file is truncated")
@@ -248,7 +253,22 @@ def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
         raise Damaged("BFBLOCK with temperatures is not read; write them as BF commands (CDWRITE, UNBLOCKED)")
 
 
+def _read_displacement(archive: _Archive, words: list[str]) -> None:
+    """D, node or component, UX or UY or UZ or ALL, value."""
+    where, label, value = [*words[1:4], "", "", ""][:3]
+    directions = {"UX": "x", "UY": "y", "UZ": "z", "ALL": "xyz"}.get(label.upper(), "")
+    if not directions:
+        return
+    if value and _number(value, "D") != 0:
+        archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
+    elif where.isdecimal() and len(where) < 18:
+        archive.held.hold(int(where), directions)
+    else:
+        archive.held.left_out.append(f"D,{where},{label} names no node by its number")
+
+
 _COMMANDS = {
+    "D": _read_displacement,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
 }  # fmt: skip
@@ -281,6 +301,7 @@ def _assembled(archive: _Archive) -> RawMesh:
         if members:
             chosen = np.array(members, dtype=np.int64)
             raw.add_points(name, numbering.positions(chosen, f"the component '{name}' names"))
+    add_supports(raw, archive.held, numbering)
     raw.materials = [_material(archive, *key) for key in regions]
     _assign_temperatures(archive, raw, numbering)
     return raw

@@ -18,6 +18,7 @@ from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .supports import Constraints, add_supports
 
 _SOLIDS = {
     4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27", 6: "wedge", 15: "wedge15",
@@ -36,8 +37,13 @@ _REFUSED = {
 }  # fmt: skip
 _KEYWORDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "INSTANCE", "ASSEMBLY", "END ASSEMBLY"} | set(_REFUSED)
 _KEYWORDS |= {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "SOLID SECTION", "ORIENTATION"}
-_KEYWORDS |= {"INITIAL CONDITIONS", "TEMPERATURE"}
+_KEYWORDS |= {"INITIAL CONDITIONS", "TEMPERATURE", "BOUNDARY", "STEP", "TRANSFORM"}
 _ANYWHERE = {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "INITIAL CONDITIONS", "TEMPERATURE"}
+_ANYWHERE |= {"BOUNDARY", "STEP", "TRANSFORM"}
+_HELD = {
+    "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
+    "ZASYMM": "xy",
+}  # fmt: skip
 
 
 @dataclass
@@ -67,6 +73,11 @@ class _Deck:
     orientations: dict[str, Array | str] = field(default_factory=dict)
     sections: list[tuple[str, str, str]] = field(default_factory=list)
     temperatures: list[tuple[int, str, float]] = field(default_factory=list)
+    held: list[tuple[str, str]] = field(default_factory=list)
+    not_held: list[str] = field(default_factory=list)
+    step: int = 0
+    renewed: int = -1
+    turned: bool = False
 
 
 @dataclass
@@ -368,7 +379,48 @@ def _read_initial(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
         _read_temperature(deck, parameters, lines, column=0)
 
 
+def _read_step(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    deck.step += 1
+
+
+def _read_transform(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    deck.turned = True
+
+
+def _read_boundary(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    """Displacements that are zero. OP=NEW takes the place of all there was before the step."""
+    if parameters.get("OP", "").upper() == "NEW" and deck.renewed != deck.step:
+        deck.held, deck.not_held, deck.renewed = [], [], deck.step
+    other = {"SUBMODEL", "USER", "FIXED", "BASE NAME"} & set(parameters)
+    if other or parameters.get("TYPE", "DISPLACEMENT").upper() != "DISPLACEMENT":
+        deck.not_held.append(f"a *BOUNDARY of the kind {', '.join(other) or parameters['TYPE']}")
+        return
+    for line in lines:
+        words = [word.strip() for word in line.split(",")] + 3 * [""]
+        try:
+            directions = _HELD.get(words[1].upper()) or _zeros(words)
+            deck.held.append((words[0].strip('"'), directions))
+        except ValueError:
+            deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
+
+
+def _zeros(words: list[str]) -> str:
+    """Directions of a data line: set, first, last direction, value.
+
+    Raises:
+        ValueError: not such a line, or a displacement that is prescribed.
+    """
+    first = int(words[1])
+    last = int(words[2]) if words[2] else first
+    if first < 1 or (first <= 3 and words[3] and float(words[3]) != 0):
+        raise ValueError
+    return "xyz"[first - 1 : last]
+
+
 _READERS = {
+    "BOUNDARY": _read_boundary,
+    "STEP": _read_step,
+    "TRANSFORM": _read_transform,
     "MATERIAL": _read_material,
     "ELASTIC": _read_elastic,
     "DENSITY": _read_density,
@@ -406,6 +458,7 @@ def _assembled(deck: _Deck) -> RawMesh:
         if len(members):
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
+    add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : _CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")
     for key in deck.cell_sets:
@@ -508,6 +561,21 @@ def _assign_temperatures(deck: _Deck, raw: RawMesh, numbering: Numbering) -> Non
         else:
             raise Damaged(f"*TEMPERATURE names the node set '{word}', which is not defined")
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
+
+
+def _constraints(deck: _Deck) -> Constraints:
+    """What *BOUNDARY holds, its sets by the names they were written with."""
+    held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
+    for word, directions in deck.held:
+        tail = word.rpartition(".")[2]
+        key = next((k for k in (word.upper(), tail.upper()) if k in deck.node_sets), None)
+        if key is not None:
+            held.hold(deck.written[key], directions)
+        elif tail.isdecimal() and len(tail) < 18:
+            held.hold(int(tail), directions)
+        else:
+            held.left_out.append(f"*BOUNDARY names the node set '{word}', which is not defined")
+    return held
 
 
 def _members(deck: _Deck, key: str) -> Indices:

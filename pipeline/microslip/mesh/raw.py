@@ -51,6 +51,7 @@ class RawMesh:
         materials: those of the file, in its own units. temperature: (n, 2) stress-free and actual ones in the file's
             unit, NaN where none is given, or None.
         cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
+        supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
     """
 
     points: Array
@@ -62,6 +63,8 @@ class RawMesh:
     materials: list[DeckMaterial] = field(default_factory=list)
     temperature: Array | None = None
     cell_id: list[Indices] = field(default_factory=list)
+    supports: dict[str, str] = field(default_factory=dict)
+    not_held: list[str] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -240,7 +240,8 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices]) -> Me
             continue
         if face := faces_from_points(boundary, chosen, len(mesh.points)):
             faces[name] = face
-    return replace(mesh, faces=faces, inner=inner)
+    supports = {n: directions for n, directions in raw.supports.items() if n in mesh.point_sets}
+    return replace(mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held))
 
 
 def _cell_numbers(raw: RawMesh) -> dict[str, Indices]:
