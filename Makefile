@@ -63,10 +63,11 @@ lint: $(READY) ## ruff and mypy
 docs: $(READY) ## the studies and pictures of docs/ (minutes)
 	@$(PYTHON) docs/make_pictures.py
 
-bench: $(READY) ## timings against CalculiX and NGSolve, of rings and cyclic sectors (minutes)
+bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cyclic sectors (minutes)
 	@$(PYTHON) benchmarks/modal.py
 	@$(PYTHON) benchmarks/ring.py
 	@$(PYTHON) benchmarks/cyclic.py
+	@$(PYTHON) benchmarks/contact_points.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

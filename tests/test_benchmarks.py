@@ -40,3 +40,13 @@ def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
     dof, ring_dof, modes = (int(v) for v in done.stdout.splitlines()[-1].split("|")[1:4])
     assert ring_dof == 24 * dof and modes == 288  # 12 modes at each k, counted twice but for k = 0 and 12: 12 * 24
     assert not list(tmp_path.iterdir())
+
+
+def test_the_contact_benchmark_compares_laws_that_agree():
+    command = [sys.executable, str(ROOT / "benchmarks" / "contact_points.py"), "--quick"]
+    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stderr
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| 64 |" in line]
+    assert {r[1] for r in rows} >= {"microslip", "numpy loop"}
+    assert all(float(r[-1]) < 1e-12 for r in rows)  # the same law, three times

@@ -73,32 +73,35 @@ def _split(leaf: Array, parts: int, chunk: int) -> Array:
 
 
 def _with_derivative(law: Law, u: Array, period: Array | float, samples: int, count: int) -> tuple[Array, Array]:
-    """Tangents along every harmonic, the same for all points, pushed through the cycles together."""
-    size = u.shape[1] * u.shape[2]
+    """Marched together with the tangents of state and force along every harmonic.
 
-    def push(direction: Array) -> tuple[Array, Array]:
-        tangent = jnp.broadcast_to(direction.reshape(u.shape[1:]), u.shape)
-        return jax.jvp(lambda x: _harmonics(law, x, period, samples, count), (u,), (tangent,))
-
-    force, slope = jax.vmap(push, out_axes=(None, 0))(jnp.eye(size))
-    return force, jnp.moveaxis(slope, 0, -1).reshape(*u.shape, *u.shape[1:])
-
-
-def _harmonics(law: Law, u: Array, period: Array | float, samples: int, count: int) -> Array:
-    """(n, 3, 2 H + 1) of the last cycle."""
-    harmonics = u.shape[2] // 2
+    A harmonic of one direction moves all points alike: only (3 (2 H + 1), 3) numbers a sample, and not those of every
+    point, are handed to the tangents of `Law.step`.
+    """
+    harmonics, size = u.shape[2] // 2, u.shape[1] * u.shape[2]
     values, transform = waves(harmonics, samples)
     rates = (values - jnp.roll(values, 1, axis=0)) * (samples / period)
+    unit = jnp.eye(size).reshape(size, *u.shape[1:])
 
-    def one(state: State, row: tuple[Array, Array]) -> tuple[State, Array]:
-        force, after = law.step(u @ row[0], u @ row[1], period / samples, state)
-        return after, force
+    def one(carried: tuple[State, State], rows: tuple[Array, Array]) -> tuple[tuple[State, State], tuple[Array, Array]]:
+        state, tangents = carried
+        at = tuple(u @ row for row in rows)
 
-    def cycle(state: State, _: None) -> tuple[State, None]:
-        return jax.lax.scan(lambda s, row: (one(s, row)[0], None), state, (values, rates))[0], None
+        def push(along: State, *moved: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
+            whole = tuple(jnp.broadcast_to(m, u.shape[:2]) for m in moved)
+            return jax.jvp(lambda x, v, s: law.step(x, v, period / samples, s), (*at, state), (*whole, along))
+
+        moved = (unit @ row for row in rows)
+        (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
+        return (after, changed), (force, slope)
+
+    def cycle(carried: tuple[State, State], _: None) -> tuple[tuple[State, State], None]:
+        return jax.lax.scan(lambda c, rows: (one(c, rows)[0], None), carried, (values, rates))[0], None
 
     state = law.init(u.shape[0])
+    carried = state, jax.tree_util.tree_map(lambda leaf: jnp.zeros((size, *leaf.shape)), state)
     if count > 1:
-        state, _ = jax.lax.scan(cycle, state, None, length=count - 1)
-    _, force = jax.lax.scan(one, state, (values, rates))
-    return jnp.einsum("hs,snk->nkh", transform, force)
+        carried, _ = jax.lax.scan(cycle, carried, None, length=count - 1)
+    _, (force, slope) = jax.lax.scan(one, carried, (values, rates))
+    slopes = jnp.einsum("hs,smnk->nkhm", transform, slope)
+    return jnp.einsum("hs,snk->nkh", transform, force), slopes.reshape(*u.shape, *u.shape[1:])

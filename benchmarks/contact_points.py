@@ -1,0 +1,199 @@
+"""Force and full derivative of three-dimensional contact points, against pyHarm and a plain numpy loop, in one run.
+
+    python benchmarks/contact_points.py          # 360 points, 3 harmonics, 64 and 128 samples; growth to 1e5 points
+    python benchmarks/contact_points.py --quick  # 40 points, no growth: seconds
+
+pyHarm (an environment of its own, `sh tests/peers/setup.sh pyharm`) evaluates its elements one after the other. The
+numpy loop goes over the samples of all points at once, with the derivative written out by hand. All three march the
+same law, a penalty spring with a Coulomb cone that stays closed, and must agree: pyHarm's force jumps where a contact
+opens.
+Times are the least of some rounds; wall and CPU seconds, of all threads a program takes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from microslip.contact import EXAMPLES
+from microslip.contact.friction import Coulomb
+from microslip.contact.harmonics import force_harmonics, waves
+from microslip.contact.law import Law
+from microslip.contact.normal import Penalty
+from microslip.contact.point import PointContact
+
+ROOT = Path(__file__).resolve().parents[1]
+PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
+NORMAL, TANGENTIAL, MU, CYCLES = 2.4e8, 0.9e8, 0.3, 3
+
+
+def motion(points: int, harmonics: int, closed: bool) -> np.ndarray:
+    """(n, 3, 2 H + 1) random harmonics in m that make most points slide; ``closed`` ones never lift off."""
+    rng = np.random.default_rng(1)
+    u = rng.normal(size=(points, 3, 2 * harmonics + 1)) * 3e-6
+    u[:, 0] *= 0.2 if closed else 1.0
+    u[:, 0, 0] = 1e-5
+    if closed:
+        lowest = u[:, 0, 0] - np.sqrt(u[:, 0, 1::2] ** 2 + u[:, 0, 2::2] ** 2).sum(axis=1)
+        u[:, 0, 0] += np.maximum(0.0, 1e-6 - lowest)
+    return u
+
+
+def least(run: Callable[[], object], rounds: int) -> tuple[float, float]:
+    """Least wall seconds of some rounds, and least CPU seconds."""
+    times = []
+    for _ in range(rounds):
+        wall, cpu = time.perf_counter(), time.process_time()
+        run()
+        times.append((time.perf_counter() - wall, time.process_time() - cpu))
+    return tuple(np.min(times, axis=0))
+
+
+def ours(law: Law, u: np.ndarray, samples: int, count: int, rounds: int) -> dict:
+    x = jnp.asarray(u)
+
+    def run():
+        return jax.block_until_ready(force_harmonics(law, x, 0.01, samples=samples, count=count))
+
+    started = time.perf_counter()
+    force, slope = run()
+    compiled = time.perf_counter() - started
+    return {"force": force, "slope": slope, "time": least(run, rounds), "compiled": compiled, "cycles": count}
+
+
+def numpy_loop(u: np.ndarray, samples: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Penalty spring, Coulomb cone, radial return; tangents of all harmonics carried along by hand."""
+    n, _, size = u.shape
+    values, transform = (np.array(x) for x in waves(size // 2, samples))
+    path = np.einsum("sh,nkh->skn", values, u)
+    force, slope = np.zeros((samples, 3, n)), np.zeros((samples, 3, 3, size, n))
+    tangential, before, carried = np.zeros((2, n)), np.zeros((2, n)), np.zeros((2, 3, size, n))
+    row_before = np.zeros(size)
+    for step in range(count * samples):
+        i = step % samples
+        row = values[i]
+        normal = NORMAL * np.maximum(path[i, 0], 0.0)
+        closed = path[i, 0] > 0
+        trial = np.where(closed, tangential + TANGENTIAL * (path[i, 1:] - before), 0.0)
+        moved = carried.copy()
+        for d in (0, 1):
+            moved[d, d + 1] += TANGENTIAL * (row - row_before)[:, None]
+        moved *= closed
+        length, held = np.hypot(*trial), MU * normal
+        slides = length > held
+        safe = np.where(length > 0, length, 1.0)
+        direction = trial / safe
+        kept = np.where(slides, held / safe, 1.0)
+        along = np.einsum("dn,dkhn->khn", direction, moved)
+        turned = moved - np.where(slides, 1.0, 0.0) * direction[:, None, None] * along
+        carried = kept * turned
+        pressed = np.zeros((3, size, n))
+        pressed[0] = NORMAL * closed * row[:, None]
+        carried += np.where(slides, 1.0, 0.0) * direction[:, None, None] * MU * pressed
+        tangential, before, row_before = kept * trial, path[i, 1:], row
+        force[i] = np.vstack([normal, tangential])
+        slope[i, 0], slope[i, 1:] = pressed, carried
+    return np.einsum("hs,skn->nkh", transform, force), np.einsum("gs,skjhn->nkgjh", transform, slope)
+
+
+def pyharm(u: np.ndarray, samples: int, rounds: int, work: Path) -> dict | None:
+    if not PYHARM.is_file():
+        return None
+    np.savez(
+        work / "points.npz", u=u, samples=samples, normal=NORMAL, tangential=TANGENTIAL, mu=MU, rounds=rounds,
+        preload=NORMAL * 1e-5,
+    )  # fmt: skip
+    worker = ROOT / "benchmarks" / "pyharm_contacts.py"
+    alone = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    subprocess.run([PYHARM, worker, work / "points.npz", work / "out.npz"], check=True, env=alone, cwd=work)
+    out = np.load(work / "out.npz")
+    time_ = (out["wall"].min(), out["cpu"].min())
+    return {**out, "time": time_, "compiled": float(out["compiled"]), "cycles": int(out["cycles"])}
+
+
+def apart(a: dict, b: dict) -> float:
+    """Largest difference of force and derivative, relative to the largest entry."""
+    return max(float(np.abs(np.array(a[k]) - b[k]).max() / np.abs(np.array(b[k])).max()) for k in ("force", "slope"))
+
+
+def compared(points: int, samples: int, rounds: int, work: Path) -> list[str]:
+    u = motion(points, 3, closed=True)
+    value = jnp.asarray
+    law = PointContact(Penalty(value(NORMAL)), Coulomb(value(MU)), value(TANGENTIAL))
+    mine = ours(law, u, samples, CYCLES, rounds)
+    force, slope = numpy_loop(u, samples, CYCLES)
+    loop = {"force": force, "slope": slope, "time": least(lambda: numpy_loop(u, samples, CYCLES), max(2, rounds // 3)),
+            "compiled": 0.0, "cycles": CYCLES}  # fmt: skip
+    peer = pyharm(u, samples, max(2, rounds // 3), work)
+    rows = {"microslip": mine, "numpy loop": loop} | ({"pyHarm": peer} if peer else {})
+    lines = []
+    for name, r in rows.items():
+        wall, cpu = (1e6 * t / points for t in r["time"])
+        factor = r["time"][0] / mine["time"][0], r["time"][1] / mine["time"][1]
+        lines.append(
+            f"| {samples} | {name} | {wall:.1f} | {cpu:.1f} | {wall / r['cycles']:.1f} | {factor[0]:.1f} |"
+            f" {factor[1]:.1f} | {r['compiled']:.1f} | {apart(r, mine):.0e} |"
+        )
+    return lines
+
+
+def laws(points: int, samples: int, rounds: int) -> list[str]:
+    """Every law of the contract tests, opening and closing, two cycles."""
+    lines = []
+    for name, example in EXAMPLES.items():
+        u = motion(points, 3, closed=False) * (example.tangential / 8e-6)
+        r = ours(example.law, u, samples, 2, rounds)
+        wall, cpu = (1e6 * t / points for t in r["time"])
+        lines.append(f"| {name} | {wall:.1f} | {cpu:.1f} | {cpu / 2:.1f} | {r['compiled']:.1f} |")
+    return lines
+
+
+def growth(sizes: list[int]) -> list[str]:
+    law, lines = EXAMPLES["rough point"].law, []
+    for n in sizes:
+        u = motion(n, 3, closed=False)
+        r = ours(law, u, 64, 2, 2)
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        lines.append(f"| {n} | {r['time'][0]:.3f} | {r['time'][1]:.3f} | {1e6 * r['time'][1] / n:.1f} | {peak:.2f} |")
+    return lines
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=360)
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--quick", action="store_true", help="40 points, 64 samples, no growth")
+    arguments = parser.parse_args(argv)
+    quick = arguments.quick
+    points, rounds = (40, 2) if quick else (arguments.points, arguments.rounds)
+    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, jax {jax.__version__}, "
+          f"numpy {np.__version__}, load {os.getloadavg()[0]:.1f}\n")  # fmt: skip
+    print("| samples | program | us / point | CPU us / point | us / point and cycle | wall / microslip |"
+          " CPU / microslip | first call, s | apart |\n|--:|---|--:|--:|--:|--:|--:|--:|--:|")  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        for samples in (64,) if quick else (64, 128):
+            print("\n".join(compared(points, samples, rounds, Path(folder))), flush=True)
+    if not PYHARM.is_file():
+        print("\npyHarm is not installed: sh tests/peers/setup.sh pyharm")
+    if quick:
+        return
+    print("\n| law | us / point | CPU us / point | CPU us / point and cycle | first call, s |\n|---|--:|--:|--:|--:|")
+    print("\n".join(laws(points, 64, rounds)), flush=True)
+    print("\n| points | wall s | CPU s | CPU us / point | peak GB |\n|--:|--:|--:|--:|--:|")
+    print("\n".join(growth([100, 1000, 10_000, 100_000])))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
