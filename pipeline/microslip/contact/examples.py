@@ -9,6 +9,7 @@ import numpy as np
 
 from .curves import curve
 from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSliding, characteristic, scattered
+from .friction import Exponential as Rising
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .hertz import Hertz
 from .law import Array, Law
@@ -62,7 +63,8 @@ _C = _value(0.9e8)
 
 def _point(friction: Friction, stiffness_2: Array | None = None) -> Example:
     law = PointContact(_ROUGH, friction, _C, stiffness_2)
-    return Example(law, 1.2e-5, 8e-6, isotropic=stiffness_2 is None, jumps=not isinstance(friction, Scattered))
+    jumps = not isinstance(friction, Scattered | Rising)
+    return Example(law, 1.2e-5, 8e-6, isotropic=stiffness_2 is None, jumps=jumps)
 
 
 EXAMPLES: dict[str, Example] = {
@@ -88,6 +90,7 @@ EXAMPLES: dict[str, Example] = {
     "rough point, damped": Example(PointContact(_ROUGH, _COULOMB, _C, None, _value(2e-4)), 1.2e-5, 8e-6),
     "point, static and sliding": _point(StaticSliding(_value(0.4), _value(0.3))),
     "point, falling": _point(Falling(_value(0.3), _value(5.0))),
+    "point, rising": _point(Rising(_value(0.2), _value(0.3), _value(50.0))),
     "point, heated": _point(Heated(_value(0.3), _value(1e-6), _value(900.0), _value(4e-6)), stiffness_2=_value(0.4e8)),
     "point, measured": _point(characteristic(np.array([1e-4, 1e-3, 1e-2]), np.array([0.4, 0.3, 0.25]))),
     "point, scattered": _point(scattered(_COULOMB, 0.1, 2e-3)),

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
+from .heights import Heights
 from .law import Array, settings
 
 
@@ -31,6 +35,10 @@ class Friction:
             speed: (n,) of sliding, m/s, not negative. pressed: (n,) normal force, N. time: s.
         """
         raise NotImplementedError
+
+    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+        """(n,) largest coefficient at any speed: of a characteristic that falls from the start, that at rest."""
+        return self.coefficient(jnp.zeros_like(pressed), pressed, time)
 
 
 @settings
@@ -53,6 +61,9 @@ class StaticSliding(Friction):
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return jnp.where(speed > 0, self.sliding, self.static)
+
+    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+        return jnp.broadcast_to(jnp.maximum(self.static, self.sliding), pressed.shape)
 
 
 @settings
@@ -79,6 +90,9 @@ class Exponential(Friction):
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return (self.mu_0 - self.mu_inf) * jnp.exp(-self.rate * speed) + self.mu_inf
+
+    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+        return jnp.broadcast_to(jnp.maximum(self.mu_0, self.mu_inf), pressed.shape)
 
 
 EXPONENTIAL_44 = Exponential(
@@ -113,22 +127,26 @@ class Heated(Friction):
 
 @settings
 class Measured(Friction):
-    """A measured table of the coefficient over the speed; for rubber shifted by its temperature.
+    """A measured table of the coefficient over the speed (Fig. 1.2-1 III, 3.6-2); for rubber shifted by temperature.
 
-    Linear between the entries over the logarithm of the speed, constant outside. With a temperature the speed is
-    multiplied by the shift factor of Williams, Landel and Ferry (J. Am. Chem. Soc. 77, 1955), log10 a_T =
-    -c_1 (T - T_0) / (c_2 + T - T_0): warmer rubber at a higher speed slides as colder rubber at a lower one.
+    A cubic over the logarithm of the speed between the entries, C1 and without extremes of its own; constant outside
+    of them. With a temperature the speed is multiplied by the shift factor of Williams, Landel and Ferry (J. Am. Chem.
+    Soc. 77, 1955), log10 a_T = -c_1 (T - T_0) / (c_2 + T - T_0): warmer rubber at a higher speed slides as colder
+    rubber at a lower one. Their c_1 = 8.86 and c_2 = 101.6 K are for a reference about 50 K above the glass transition
+    (17.44 and 51.6 K for the glass transition itself).
 
     Attributes:
-        speeds: (m, 1) m/s, rising and positive. values: (m, 1). temperature, reference: K. c_1, c_2: -, K.
+        speeds: (m, 1) m/s, rising and positive. values: (m, 1). slopes: (m, 1) over the logarithm of the speed.
+        temperature, reference: K. c_1, c_2: -, K.
     """
 
     speeds: Array
     values: Array
+    slopes: Array
     temperature: Array | float = 293.15
     reference: Array | float = 293.15
-    c_1: Array | float = 17.44
-    c_2: Array | float = 51.6
+    c_1: Array | float = 8.86
+    c_2: Array | float = 101.6
 
     def shift(self) -> Array:
         """a_T: factor on the speed."""
@@ -136,31 +154,51 @@ class Measured(Friction):
         return 10.0 ** (-self.c_1 * away / (self.c_2 + away))
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
-        shifted = jnp.maximum(speed * self.shift(), self.speeds[0, 0])
-        return jnp.interp(jnp.log(shifted), jnp.log(self.speeds[:, 0]), self.values[:, 0])
+        x, y, d = jnp.log(self.speeds[:, 0]), self.values[:, 0], self.slopes[:, 0]
+        at = jnp.log(jnp.clip(speed * self.shift(), self.speeds[0, 0], self.speeds[-1, 0]))
+        i = jnp.clip(jnp.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+        h = x[i + 1] - x[i]
+        s = (at - x[i]) / h
+        rise, first, last = y[i + 1] - y[i], h * d[i], h * d[i + 1]
+        return y[i] + s * (first + s * (3 * rise - 2 * first - last + s * (first + last - 2 * rise)))
+
+    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+        return jnp.broadcast_to(jnp.max(self.values), pressed.shape)
 
 
-def characteristic(speeds: np.ndarray, values: np.ndarray, where: str = "the table", **shift: float) -> Measured:
+def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table", **shift: float) -> Measured:
     """A `Measured` characteristic from columns, checked.
 
     Args:
-        speeds: (m,) m/s. values: (m,) coefficients. where: file or key, for the sentence. shift: of `Measured`.
+        speeds: (m,) m/s. values: (m,) coefficients. where: file or key, for the sentence. shift: temperature,
+            reference, c_1, c_2 of `Measured`.
 
     Raises:
-        UserError: fewer than two entries, speeds not positive and rising, coefficients negative, or not numbers.
+        UserError: fewer than two entries, speeds not positive and rising, coefficients negative, or not numbers; a
+            temperature at which the shift has no value.
     """
-    speeds, values = np.asarray(speeds, dtype=float), np.asarray(values, dtype=float)
-    if speeds.ndim != 1 or speeds.shape != values.shape or len(speeds) < 2:
+    v, mu = np.asarray(speeds, dtype=float), np.asarray(values, dtype=float)
+    if v.ndim != 1 or v.shape != mu.shape or len(v) < 2:
         raise UserError(f"{where}: a characteristic needs two or more pairs of speed and coefficient")
-    for name, column in (("speed", speeds), ("coefficient", values)):
+    for name, column in (("speed", v), ("coefficient", mu)):
         if not np.isfinite(column).all():
             line = int(np.flatnonzero(~np.isfinite(column))[0]) + 1
             raise UserError(f"{where}: {name} {line} is not a finite number; correct or remove the pair")
-    if speeds[0] <= 0 or np.any(np.diff(speeds) <= 0):
+    if v[0] <= 0 or np.any(np.diff(v) <= 0):
         raise UserError(f"{where}: the speeds must be positive and rise; sort them and keep each once")
-    if np.any(values < 0):
-        raise UserError(f"{where}: coefficient {int(np.argmin(values)) + 1} is negative; a coefficient is not")
-    return Measured(jnp.asarray(speeds)[:, None], jnp.asarray(values)[:, None], **shift)
+    if np.any(mu < 0):
+        raise UserError(f"{where}: coefficient {int(np.argmax(mu < 0)) + 1} is negative; a coefficient is not")
+    x = np.log(v)
+    slopes = PchipInterpolator(x, mu)(x, 1)
+    slopes[[0, -1]] = 0.0  # constant outside
+    speed, value, slope = (jnp.asarray(column)[:, None] for column in (v, mu, slopes))
+    made = Measured(speed, value, slope, **shift)
+    if not (np.isfinite([*shift.values()]).all() and made.c_2 + made.temperature - made.reference > 0):
+        raise UserError(
+            f"{where}: the shift with the temperature has no value at {made.temperature:g} K; it needs more than "
+            f"{made.reference - made.c_2:g} K (reference less c_2), where rubber is glass"
+        )
+    return made
 
 
 @settings
@@ -169,35 +207,59 @@ class Scattered(Friction):
 
     xi is a stationary Gaussian process of variance one with the correlation exp(-|t| / memory), a sum of cosines
     (Shinozuka & Deodatis, Appl. Mech. Rev. 44, 1991), so that the same seed gives the same friction at the same time.
+    A coefficient that would be negative is zero.
 
     Attributes:
-        mean: characteristic. deviation: relative standard deviation. memory: s. phases: (m, 1) of the cosines, the
-            same for all points, or (m, n).
+        mean: characteristic. deviation: relative standard deviation, a number or itself a characteristic over the
+            speed. memory: s. phases: (m, 1) of the cosines, the same for all points, or (m, n); quantiles: likewise, of
+            their frequencies in the power spectrum, one in each m-th part of 0 to 1.
     """
 
     mean: Friction
-    deviation: Array
+    deviation: Array | Friction
     memory: Array
     phases: Array
+    quantiles: Array
 
     def noise(self, time: Array) -> Array:
         """xi at the times (any shape; the points last where phases differ)."""
-        m = self.phases.shape[0]
-        # equal shares of the power spectrum 1 / (1 + (omega memory)^2): the quantiles of its integral, an arctan
-        omega = jnp.tan(0.5 * jnp.pi * (jnp.arange(m) + 0.5) / m)[:, None] / self.memory
-        return jnp.sqrt(2.0 / m) * jnp.sum(jnp.cos(omega * jnp.atleast_1d(time) + self.phases), axis=0)
+        # equal shares of the power spectrum 1 / (1 + (omega memory)^2), whose integral is an arctan
+        omega = jnp.tan(0.5 * jnp.pi * self.quantiles) / self.memory
+        cosines = jnp.cos(omega * jnp.atleast_1d(time) + self.phases)
+        return jnp.sqrt(2.0 / self.phases.shape[0]) * jnp.sum(cosines, axis=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
-        factor = 1 + self.deviation * self.noise(jnp.broadcast_to(time, speed.shape))
-        return self.mean.coefficient(speed, pressed, time) * jnp.maximum(factor, 0.0)
+        deviation = self.deviation
+        share = deviation.coefficient(speed, pressed, time) if isinstance(deviation, Friction) else deviation
+        return self.mean.coefficient(speed, pressed, time) * self._factor(share, speed, time)
+
+    def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
+        share = self.deviation.highest(pressed, time) if isinstance(self.deviation, Friction) else self.deviation
+        return self.mean.highest(pressed, time) * self._factor(share, pressed, time)
+
+    def _factor(self, share: Array, like: Array, time: Array | float) -> Array:
+        return jnp.maximum(1 + share * self.noise(jnp.broadcast_to(time, like.shape)), 0.0)
 
 
 def scattered(
-    mean: Friction, deviation: float, memory: float, seed: int = 0, points: int = 1, cosines: int = 64
+    mean: Friction, deviation: float | Friction, memory: float, seed: int = 0, points: int = 1, cosines: int = 64
 ) -> Scattered:
-    """A `Scattered` characteristic of independent points with phases drawn from a seed."""
-    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (cosines, points))
-    return Scattered(mean, jnp.asarray(deviation), jnp.asarray(memory), jnp.asarray(phases))
+    """A `Scattered` characteristic of independent points, with phases and frequencies drawn from a seed.
+
+    Over all seeds the correlation is exact; the average over time of a single one is off by about 1/sqrt(cosines).
+
+    Raises:
+        UserError: a deviation that is negative or a memory that is not positive.
+    """
+    if not isinstance(deviation, Friction) and not 0 <= deviation < np.inf:
+        raise UserError(f"deviation: {deviation:g}; give a share of the mean, 0 or more")
+    if not 0 < memory < np.inf:
+        raise UserError(f"memory: {memory:g} s; give a time above 0")
+    random = np.random.default_rng(seed)
+    phases = random.uniform(0, 2 * np.pi, (cosines, points))
+    quantiles = (np.arange(cosines)[:, None] + random.uniform(0, 1, (cosines, points))) / cosines
+    share = deviation if isinstance(deviation, Friction) else jnp.asarray(float(deviation))
+    return Scattered(mean, share, jnp.asarray(float(memory)), jnp.asarray(phases), jnp.asarray(quantiles))
 
 
 # --- dry and fluid parts of a lubricated rough surface -------------------------------------------------------------
@@ -207,7 +269,7 @@ FILM = 0.01
 
 
 def lubricated(
-    density: np.ndarray, x: np.ndarray, approach: np.ndarray, speed: np.ndarray, viscosity: float, film: float = FILM
+    heights: Heights, approach: ArrayLike, speed: ArrayLike, viscosity: float, film: float = FILM
 ) -> tuple[np.ndarray, np.ndarray]:
     """Dry and fluid part of the equivalent friction coefficient over mu_0 (Sextro Eq. (3.6-21)).
 
@@ -215,18 +277,52 @@ def lubricated(
     is zero there. A smallest film thickness is introduced and divides instead: p / max(x - u, film).
 
     Args:
-        density: (m,) probability density of the heights at ``x`` (m,), lengths over R_Z, x from 0 to 1.
-        approach: (a, 1) u_x*. speed: (1, v) v_r* (3.6-22). viscosity: eta* (3.6-22). film: over R_Z.
+        heights: of the rough surface. approach: (a,) u_x*, in contact. speed: (v,) v_r* (3.6-22). viscosity: eta*
+            (3.6-22). film: over R_Z.
 
     Returns:
         (a, v) dry part, exact, and (a, v) fluid part, which depends on ``film``.
+
+    Raises:
+        UserError: an approach without contact, or a film that is not positive.
     """
-    above = np.maximum(approach[..., None] - x, 0.0)
-    force = np.trapezoid(above * density, x, axis=-1)
-    dry = np.trapezoid(above * density / (1 + speed[..., None] * above), x, axis=-1) / force
-    gap = np.maximum(x - approach[..., None], film)
-    fluid = np.trapezoid(np.where(x > approach[..., None], density / gap, 0.0), x, axis=-1)
-    return dry, viscosity * speed * fluid / force
+    u, v = np.atleast_1d(np.asarray(approach, float)), np.abs(np.atleast_1d(np.asarray(speed, float)))
+    force = np.asarray(heights.volume(jnp.asarray(u)))
+    if not film > 0:
+        raise UserError(f"film: {film:g}; a smallest film thickness above 0 is needed, the integral diverges without")
+    if not np.all(force > 0):
+        raise UserError(f"approach: {u[np.argmin(force)]:g}; the surfaces do not touch there and carry no force")
+    parts = [_parts(heights, one, v, film) for one in u]
+    dry, fluid = (np.array(part) for part in zip(*parts, strict=True))
+    return dry / force[:, None], viscosity * v * fluid[:, None] / force[:, None]
+
+
+_GAUSS = np.polynomial.legendre.leggauss(48)  # dry part: poles no nearer than 1/v* to the interval; exact to v* = 1e3
+
+
+def _parts(heights: Heights, u: float, v: np.ndarray, film: float) -> tuple[np.ndarray, float]:
+    """(v,) dry and fluid integral of (3.6-21) at the approach u, between the breaks of the heights."""
+    breaks = np.unique(np.asarray(heights.breaks(), float))
+    x, w = _panels(np.append(breaks[breaks < u], u))
+    share = (u - x) * _density(heights, x) * w
+    dry = np.sum(share / (1 + v[:, None] * (u - x)), axis=1)
+    x, w = _panels(np.clip(np.append(breaks[(breaks > u) & (breaks < u + film)], [u, u + film]), u, breaks[-1]))
+    thin = np.sum(_density(heights, x) * w) / film
+    wide = np.append(breaks[breaks > u + film], u + film)
+    x, w = _panels(np.log(wide - u))  # of a constant density the integrand is constant over the logarithm
+    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w))
+
+
+def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and weights of Gauss' rule between the edges."""
+    edges = np.unique(edges)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (1 + _GAUSS[0])).ravel(), (half * _GAUSS[1]).ravel()
+
+
+def _density(heights: Heights, x: np.ndarray) -> np.ndarray:
+    at = jnp.asarray(x)
+    return np.asarray(jax.jvp(heights.area, (at,), (jnp.ones_like(at),))[1])
 
 
 def pressure_parameter(mu_0: float, resistance: float, limit: float, pressure: float) -> float:
@@ -239,9 +335,16 @@ def smoothed(speed: Array, slope: Array | float) -> Array:
     return 2 / jnp.pi * jnp.arctan(slope * speed)
 
 
+def creep(speed: Array, slope: Array | float) -> Array:
+    """`smoothed` over the speed, and its limit at rest: the smoothed direction is this times the velocity."""
+    moves = speed > 0
+    some = jnp.where(moves, speed, 1.0)
+    return jnp.where(moves, smoothed(some, slope) / some, 2 / jnp.pi * slope)
+
+
 def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float, float]:
     """Largest value of a smoothed characteristic and its speed: it never reaches mu_0 (errata to 3.7-42/43)."""
-    speeds = jnp.logspace(-12, float(np.log10(fastest)), 4001)
+    speeds = jnp.logspace(-12, float(np.log10(fastest)), 40001)
     values = friction.coefficient(speeds, jnp.ones_like(speeds)) * smoothed(speeds, slope)
     top = int(jnp.argmax(values))
     return float(values[top]), float(speeds[top])

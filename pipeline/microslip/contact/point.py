@@ -73,7 +73,7 @@ class PointContact(Law):
         return jnp.concatenate([pressed[None], force]).T, after
 
     def limit(self, force: Array, state: PointState) -> Array:
-        return self.friction.coefficient(jnp.zeros(len(force)), force[:, 0], state.time) * force[:, 0]
+        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
 
     def slip(self, state: PointState) -> Array:
         return state.slipped.T

@@ -6,17 +6,20 @@ is smoothed by an arctan, so that P creeps where it should stick. As mass and cr
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
-from .friction import Friction, smoothed
+from .friction import Friction, creep
 from .law import Array, Law, norm, ratio, settings, static
 from .normal import Normal
 
@@ -74,7 +77,7 @@ class MassContact(Law):
         moved = tangential - state.tangential
         trial = self.mass / dt * state.velocity + springs * stretch + springs * (1 + self.damping / dt) * moved
         resistance = self.mass / dt + springs * (dt + self.damping)
-        sliding = self._velocity(trial, resistance, ratio(pressed, share), time)
+        sliding = self._velocity(trial, resistance, pressed, share, time)
         velocity = jnp.where(share > 0, sliding, moved / dt)
         growth = moved - velocity * dt
         after = stretch + growth
@@ -84,7 +87,7 @@ class MassContact(Law):
         return jnp.concatenate([pressed[None], force]).T, settled
 
     def limit(self, force: Array, state: MassState) -> Array:
-        return self.friction.coefficient(jnp.zeros(len(force)), force[:, 0], state.time) * force[:, 0]
+        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
 
     def slip(self, state: MassState) -> Array:
         return state.slipped.T
@@ -105,8 +108,7 @@ class MassContact(Law):
         renewed = 0.0 if self.printed else ratio(jnp.maximum(growth, 0.0), share)
         stretching = moving - state.velocity - renewed * state.stretch
         pull = self._springs() * (state.stretch + self.damping * (moving - state.velocity))
-        held = ratio(pressed, share) * self._friction(norm(state.velocity), pressed, state.time)
-        drag = held * ratio(state.velocity, norm(state.velocity))
+        drag = self._drag(norm(state.velocity), pressed, share, state.time) * state.velocity
         acceleration = jnp.where(share > 0, (pull - drag) / self.mass, 0.0)
         slipping = jnp.where(share > 0, state.velocity, 0.0)
         return MassState(moving, stretching, acceleration, growth, slipping, jnp.ones_like(state.time))
@@ -131,25 +133,23 @@ class MassContact(Law):
         kept = 1.0 if self.printed else jnp.minimum(ratio(state.share, share, 1.0), 1.0)
         return share, self._pressed(u, v), kept * state.stretch
 
-    def _friction(self, speed: Array, pressed: Array, time: Array) -> Array:
-        return self.friction.coefficient(speed, pressed, time) * smoothed(speed, self.slope)
+    def _drag(self, speed: Array, pressed: Array, share: Array, time: Array) -> Array:
+        """(n,) friction over the speed and the share, Ns/m."""
+        return ratio(pressed, share) * self.friction.coefficient(speed, pressed, time) * creep(speed, self.slope)
 
-    def _velocity(self, trial: Array, resistance: Array, pressure: Array, time: Array) -> Array:
-        """(2, n) velocity of P with resistance v + friction v/|v| = trial: a scalar equation for the speed."""
+    def _velocity(self, trial: Array, resistance: Array, pressed: Array, share: Array, time: Array) -> Array:
+        """(2, n) velocity of P with (resistance + drag(|v|)) v = trial: a scalar equation for the speed."""
+
+        def at(speed: Array) -> Array:
+            return trial / (resistance + self._drag(speed, pressed, share, time))
 
         def excess(speed: Array) -> Array:
-            return norm(self._at(speed, trial, resistance, pressure, time)) - speed
+            return norm(at(speed)) - speed
 
         speed = jax.lax.stop_gradient(_speed(excess, norm(trial) / jnp.min(resistance, axis=0)))
         value, slope = jax.jvp(excess, (speed,), (jnp.ones_like(speed),))
         speed = speed - value / jnp.where(slope < -1e-3, jax.lax.stop_gradient(slope), -1.0)
-        return self._at(jnp.maximum(speed, 0.0), trial, resistance, pressure, time)
-
-    def _at(self, speed: Array, trial: Array, resistance: Array, pressure: Array, time: Array) -> Array:
-        """(2, n) trial / (resistance + friction / speed)."""
-        creep = 2 / jnp.pi * self.slope * self.friction.coefficient(jnp.zeros_like(speed), pressure, time)
-        held = ratio(self._friction(speed, pressure, time), speed, 0.0)
-        return trial / (resistance + pressure * jnp.where(speed > 0, held, creep))
+        return at(jnp.maximum(speed, 0.0))
 
 
 _HALVINGS = 70  # of a logarithm: creep is ten powers of ten slower than sliding
@@ -189,12 +189,13 @@ class Course:
 
 def integrate(
     law: MassContact, motion: Callable[[Array], Array], times: np.ndarray, tolerance: float = 1e-8,
-    method: str = "Radau",
+    method: str = "LSODA",
 ) -> Course:  # fmt: skip
     """One element under a prescribed motion, by an integrator for stiff equations with the exact Jacobian.
 
     Contact opens and closes at times that the motion alone decides: they are found first, and each interval is
     integrated on its own. In an open one P moves with M; what is stretched at lift-off stays so with ``printed``.
+    What is compiled is kept for other numbers of the law and the same ``motion``.
 
     Args:
         motion: jax function of the time (s) with the displacement (3,) in m. times: (s,) rising; the element starts
@@ -204,83 +205,109 @@ def integrate(
     Raises:
         NotConverged: the integrator gave up.
     """
-    equation = _Equation(law, motion)
     times = np.asarray(times, dtype=float)
-    scale = equation.scale(times)
+    scale = _scale(motion, times)
     y, courses = np.zeros(6), []
-    for begin, end, closed in equation.intervals(times):
+    for begin, end, closed in _intervals(law, motion, times):
         inside = times[(times >= begin) & (times < end)] if end < times[-1] else times[times >= begin]
         if closed:
             if begin > times[0]:
-                y[2:4] = equation.moving(begin)[1][1:]
+                y[2:4] = _moving(motion, begin)[1][1:]
                 y[:2] *= law.printed
-            y, part = equation.solve(y, begin, end, inside, tolerance, scale, method)
+            y, part = _solve(law, motion, y, (begin, end), inside, tolerance, scale, method)
         else:
             part = np.tile(y, (len(inside), 1))
         courses.append(part)
-    told = jax.vmap(equation.told)(jnp.asarray(times), jnp.asarray(np.concatenate(courses)))
-    return Course(times, *(np.array(x) for x in told))
+    return Course(times, *map(np.array, _told(law, motion, times, np.concatenate(courses))))
 
 
-class _Equation:
-    """The differential equation of one element: y = stretch, velocity and path of P."""
+# The unknowns of one element are y = stretch, velocity and path of P. A motion is a part of the program.
 
-    def __init__(self, law: MassContact, motion: Callable[[Array], Array]) -> None:
-        self.law = law
-        self.motion = motion
-        self.moving = jax.jit(lambda t: jax.jvp(motion, (jnp.asarray(t, float),), (jnp.asarray(1.0),)))
-        self.rate = jax.jit(self._rate)
-        self.jacobian = jax.jit(jax.jacfwd(self._rate, argnums=1))
 
-    def scale(self, times: np.ndarray) -> np.ndarray:
-        """(6,) sizes of the unknowns, for the absolute tolerances."""
-        u, v = jax.vmap(self.moving)(jnp.linspace(times[0], times[-1], 1001))
-        length = float(jnp.abs(u[:, 1:] - u[0, 1:]).max()) or 1.0
-        return np.repeat([length, float(jnp.abs(v[:, 1:]).max()) or 1.0, length], 2)
+def _scale(motion: Callable[[Array], Array], times: np.ndarray) -> np.ndarray:
+    """(6,) sizes of the unknowns, for the absolute tolerances."""
+    u, v = _path(motion, np.linspace(times[0], times[-1], 1001))
+    length = float(np.abs(u[:, 1:] - u[0, 1:]).max()) or 1.0
+    return np.repeat([length, float(np.abs(v[:, 1:]).max()) or 1.0, length], 2)
 
-    def intervals(self, times: np.ndarray) -> list[tuple[float, float, bool]]:
-        """Beginning, end, and whether the contact is closed, in order."""
-        closed = jax.jit(lambda t: self.law.normal.share(self.motion(t)[:1])[0] > 0)
-        grid = np.union1d(times, np.linspace(times[0], times[-1], 8193))
-        states = np.array(jax.vmap(closed)(jnp.asarray(grid)))
-        ends = [times[0]]
-        for i in np.flatnonzero(states[1:] != states[:-1]):
-            low, high = grid[i], grid[i + 1]
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if bool(closed(middle)) == states[i] else (low, middle)
-            ends.append(high)
-        ends.append(times[-1])
-        pairs = zip(ends, ends[1:], strict=False)
-        return [(a, b, bool(closed(0.5 * (a + b)))) for a, b in pairs if b > a]
 
-    def solve(
-        self, y: np.ndarray, begin: float, end: float, inside: np.ndarray, tolerance: float, scale: np.ndarray,
-        method: str,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """y at the end of a closed interval, and (s, 6) at the times asked for."""
-        from scipy.integrate import solve_ivp
+def _intervals(
+    law: MassContact, motion: Callable[[Array], Array], times: np.ndarray
+) -> list[tuple[float, float, bool]]:
+    """Beginning, end, and whether the contact is closed, in order."""
+    grid = np.linspace(times[0], times[-1], 8193)
+    states = np.asarray(_closed(law, motion, grid))
+    ends = [grid[0]]
+    for i in np.flatnonzero(states[1:] != states[:-1]):
+        low, high = grid[i], grid[i + 1]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if _closed(law, motion, np.array([middle]))[0] == states[i] else (low, middle)
+        ends.append(high)
+    ends.append(grid[-1])
+    pairs = [(float(a), float(b)) for a, b in zip(ends, ends[1:], strict=False) if b > a]
+    return [(a, b, bool(_closed(law, motion, np.array([0.5 * (a + b)]))[0])) for a, b in pairs]
 
-        wanted = np.append(inside, end) if len(inside) == 0 or inside[-1] < end else inside
-        options: dict[str, Any] = {"method": method, "rtol": tolerance, "atol": tolerance * scale}
-        answer = solve_ivp(self.rate, (begin, end), y, t_eval=wanted, jac=self.jacobian, **options)
-        if not answer.success:
-            raise NotConverged(f"the point contact element could not be integrated: {answer.message}")
-        return answer.y[:, -1], answer.y[:, : len(inside)].T
 
-    def _state(self, t: Array, y: Array) -> tuple[Array, Array, MassState]:
-        u, v = jax.jvp(self.motion, (t,), (jnp.ones_like(t),))
-        stretch, velocity, path = y[:2, None], y[2:4, None], y[4:, None]
-        share = self.law.normal.share(u[:1])
-        velocity = jnp.where(share > 0, velocity, v[1:, None])
-        return u[None], v[None], MassState(u[1:, None], stretch, velocity, share, path, jnp.atleast_1d(t))
+def _solve(
+    law: MassContact, motion: Callable[[Array], Array], y: np.ndarray, span: tuple[float, float], inside: np.ndarray,
+    tolerance: float, scale: np.ndarray, method: str,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """y at the end of a closed interval, and (s, 6) at the times asked for."""
+    wanted = np.append(inside, span[1]) if len(inside) == 0 or inside[-1] < span[1] else inside
+    options: dict[str, Any] = {"method": method, "rtol": tolerance, "atol": tolerance * scale, "t_eval": wanted}
+    if method in ("Radau", "BDF", "LSODA"):
+        options["jac"] = lambda t, y: np.asarray(_jacobian(law, motion, t, y))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # LSODA warns of what the answer says as well
+        answer = solve_ivp(lambda t, y: np.asarray(_rate(law, motion, t, y)), span, y, **options)
+    if not answer.success:
+        raise NotConverged(f"the point contact element could not be integrated: {answer.message}")
+    return answer.y[:, -1], answer.y[:, : len(inside)].T
 
-    def _rate(self, t: Array, y: Array) -> Array:
-        change = self.law.rate(*self._state(jnp.asarray(t, float), y))
-        return jnp.concatenate([change.stretch, change.velocity, change.slipped])[:, 0]
 
-    def told(self, t: Array, y: Array) -> tuple[Array, ...]:
-        u, v, state = self._state(t, y)
-        force, change = self.law.force(u, v, state), self.law.rate(u, v, state)
-        friction = force[0, 1:] - state.share * self.law.mass * change.velocity[:, 0]
+@partial(jax.jit, static_argnums=0)
+def _moving(motion: Callable[[Array], Array], t: Array | float) -> tuple[Array, Array]:
+    """Displacement and velocity of M (3,)."""
+    t = jnp.asarray(t, float)
+    return jax.jvp(motion, (t,), (jnp.ones_like(t),))
+
+
+@partial(jax.jit, static_argnums=0)
+def _path(motion: Callable[[Array], Array], t: Array) -> tuple[Array, Array]:
+    return jax.vmap(lambda one: _moving(motion, one))(t)
+
+
+@partial(jax.jit, static_argnums=1)
+def _closed(law: MassContact, motion: Callable[[Array], Array], t: Array) -> Array:
+    return law.normal.share(jax.vmap(motion)(t)[:, 0]) > 0
+
+
+def _state(law: MassContact, motion: Callable[[Array], Array], t: Array, y: Array) -> tuple[Array, Array, MassState]:
+    u, v = _moving(motion, t)
+    stretch, velocity, path = y[:2, None], y[2:4, None], y[4:, None]
+    share = law.normal.share(u[:1])
+    velocity = jnp.where(share > 0, velocity, v[1:, None])
+    return u[None], v[None], MassState(u[1:, None], stretch, velocity, share, path, jnp.atleast_1d(t))
+
+
+@partial(jax.jit, static_argnums=1)
+def _rate(law: MassContact, motion: Callable[[Array], Array], t: Array, y: Array) -> Array:
+    change = law.rate(*_state(law, motion, t, y))
+    return jnp.concatenate([change.stretch, change.velocity, change.slipped])[:, 0]
+
+
+_jacobian = jax.jit(jax.jacfwd(_rate, argnums=3), static_argnums=1)
+
+
+@partial(jax.jit, static_argnums=1)
+def _told(law: MassContact, motion: Callable[[Array], Array], times: Array, ys: Array) -> tuple[Array, ...]:
+    """What `Course` holds, at many times."""
+
+    def one(t: Array, y: Array) -> tuple[Array, ...]:
+        u, v, state = _state(law, motion, t, y)
+        force, change = law.force(u, v, state), law.rate(u, v, state)
+        friction = force[0, 1:] - state.share * law.mass * change.velocity[:, 0]
         return u[0], force[0], state.slipped[:, 0], state.velocity[:, 0], friction
+
+    return jax.vmap(one)(times, ys)
