@@ -87,10 +87,26 @@ def test_a_closed_cycle_gives_no_energy(example, seed, lift) -> None:
 
 
 @LAWS
-def test_stuck_and_moved_under_changing_load_gives_no_energy(example) -> None:
-    """Pressed, moved, released a little, moved back, pressed again: k(u_n) u_t, as printed, gives energy here."""
-    corners = np.array([[2.0, 0, 0], [2.0, 1, 0], [0.2, 1, 0], [0.2, 0, 0], [2.0, 0, 0]])
-    corners *= [example.normal, 0.02 * example.tangential, 0.02 * example.tangential]
+def test_the_force_does_not_jump_at_separation(example) -> None:
+    """Pressed and slid, then within a thousandth of the approach from opening: next to nothing is left, and at the end
+    nothing."""
+    near = SAMPLES // 4
+    u = np.array(path(6, example))
+    u[:-near, :, 0] = np.abs(u[:-near, :, 0]) + example.normal
+    u[-near:, :, 0] = np.linspace(1e-3, -1e-3, near)[:, None] * example.normal
+    u[-near:, :, 1:] = u[-near, :, 1:]
+    force = np.abs(np.array(LIMITS(example.law, jnp.asarray(u), example.period / SAMPLES)[0]))
+    assert force[-near:].max() <= 0.01 * scale(force) and force[-1].max() == 0
+    assert force[:-near, :, 1:].max() > 0
+
+
+@LAWS
+@pytest.mark.parametrize("turn", [1, -1], ids=["out pressed", "out released"])
+def test_stuck_and_moved_under_changing_load_gives_no_energy(example, turn) -> None:
+    """Moved while pressed and back while released, and the other way round: k(u_n) u_t, as printed, gives energy where
+    it is moved out while released, pressed, and moved back."""
+    corners = np.array([[2.0, 0, 0], [2.0, 1, 0], [0.2, 1, 0], [0.2, 0, 0], [2.0, 0, 0]])[::turn]
+    corners = corners * [example.normal, 0.02 * example.tangential, 0.02 * example.tangential]
     s = np.linspace(0, 4, 1601)
     u = np.column_stack([np.interp(s, range(5), c) for c in corners.T])[1:, None]
     force = np.array(FORCES(example.law, jnp.asarray(u), example.period, 2)[0])

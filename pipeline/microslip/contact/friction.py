@@ -348,4 +348,3 @@ def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float
     values = friction.coefficient(speeds, jnp.ones_like(speeds)) * smoothed(speeds, slope)
     top = int(jnp.argmax(values))
     return float(values[top]), float(speeds[top])
-

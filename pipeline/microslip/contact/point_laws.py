@@ -83,9 +83,7 @@ def _point(
     normal: Normal, friction: Friction, tangential: tuple[float, float], includes: str
 ) -> PointContact:  # fmt: skip
     first, second = tangential
-    return PointContact(
-        normal, friction, _value(first), None if second == first else _value(second), includes=includes
-    )
+    return PointContact(normal, friction, _value(first), None if second == first else _value(second), includes=includes)
 
 
 def _value(number: float) -> Array:

@@ -1,0 +1,366 @@
+"""The massless point contact element: closed forms, friction against the slip, separation, damping, and wrong laws."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import test_contact_laws as contract
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from wrong_laws import BOX, JUMP, PRESTRESSED, PRINTED
+
+from microslip.contact.examples import EXAMPLES
+from microslip.contact.friction import Coulomb, Exponential, Falling, Heated, StaticSliding, characteristic
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import cycles, history
+from microslip.contact.normal import Penalty, Preload, Rough
+from microslip.contact.point import PointContact, PointState
+
+MU, N0, K = 0.4, 100.0, 2e7
+LIMIT = MU * N0
+TRIES = hypothesis_settings(max_examples=15)
+CYCLES = jax.jit(cycles, static_argnums=3)
+STEP = jax.jit(lambda law, u, v, dt, state: law.step(u, v, dt, state))
+
+
+def value(number):
+    return jnp.asarray(float(number))
+
+
+JENKINS = PointContact(Preload(value(N0)), Coulomb(value(MU)), value(K))
+ROUGH = Rough(value(2.4e8), value(12e-6), Polynomial())
+
+
+def tangential(*rows):
+    """(s, 1, 3) path of t1 (and t2)."""
+    rows = [*rows, *[np.zeros_like(rows[0])] * (2 - len(rows))]
+    return jnp.asarray(np.stack([np.zeros_like(rows[0]), *rows], axis=-1)[:, None])
+
+
+def polygon(corners, per_edge):
+    """Straight lines through the corners, with the corners among the samples."""
+    s = np.arange((len(corners) - 1) * per_edge + 1) / per_edge
+    return np.interp(s, np.arange(len(corners)), corners)
+
+
+# closed forms --------------------------------------------------------------------------------------------------------
+
+
+def test_jenkins_loop_has_its_corners_and_its_energy() -> None:
+    """Amplitude 3 slip limits: parallelogram of height 2 mu N and area 4 mu N (A - mu N/k); exact at any step, since
+    the samples hold all corners."""
+    slip = LIMIT / K
+    u = polygon(slip * np.array([0, 3, -3, 3, -3]), 12)
+    told = history(JENKINS, tangential(u), 1e-3)
+    force = np.asarray(told.force[:, 0, 1])
+    assert np.allclose(force[[0, 4, 8, 12]], [0, LIMIT, LIMIT, LIMIT], rtol=1e-12)
+    assert np.allclose(force[[12, 14, 16, 20, 24]], [LIMIT, 0, -LIMIT, -LIMIT, -LIMIT], rtol=1e-12, atol=1e-12 * LIMIT)
+    lost = np.asarray(told.dissipated[:, 0])
+    assert lost[12] == pytest.approx(LIMIT * 2 * slip, rel=1e-12)
+    assert lost[-1] - lost[24] == pytest.approx(4 * LIMIT * (3 - 1) * slip, rel=1e-12)
+    assert np.allclose(told.slip[[12, 24, 36], 0, 0], [2 * slip, -2 * slip, 2 * slip], rtol=1e-12)
+
+
+def test_below_the_limit_it_is_a_spring_that_loses_nothing() -> None:
+    u = polygon(0.999 * LIMIT / K * np.array([0, 1, -1, 0.3, -0.8]), 7)
+    told = history(JENKINS, tangential(u), 1e-3)
+    assert np.allclose(told.force[:, 0, 1], K * u, rtol=1e-12)
+    assert np.abs(told.dissipated).max() < 1e-14 * LIMIT**2 / K * len(u)
+    assert np.abs(told.slip).max() < 1e-15 * LIMIT / K
+
+
+def test_masing_the_way_back_is_the_first_loading_twice_as_large() -> None:
+    """F(u) = F_A - 2 f((u_A - u)/2) with f the first loading."""
+    slip = LIMIT / K
+    u = polygon(slip * np.array([0, 2.5, -2.5]), 50)
+    force = np.asarray(history(JENKINS, tangential(u), 1e-3).force[:, 0, 1])
+    first = np.minimum(K * (u[50] - u[50:]) / 2, LIMIT)
+    assert np.allclose(force[50:], force[50] - 2 * first, rtol=0, atol=1e-12 * LIMIT)
+
+
+def test_on_a_circle_the_force_lags_by_a_constant_angle_and_loses_its_sine() -> None:
+    """Radius a beyond the limit: lag arccos(mu N/(k a)), 2 pi a mu N sin(lag) a turn. Backward Euler meets both with
+    the first power of the step."""
+    a = 2 * LIMIT / K
+    lag, errors, losses = np.arccos(0.5), [], []
+    samples = (64, 256, 1024)
+    for s in samples:
+        t = 2 * np.pi * np.arange(s) / s
+        u = tangential(a * np.cos(t), a * np.sin(t))
+        force = np.asarray(CYCLES(JENKINS, u, 1.0, 3)[0][:, 0, 1:])
+        assert np.allclose(np.hypot(*force.T), LIMIT, rtol=1e-12)
+        exact = LIMIT * np.exp(1j * (t + lag))
+        errors.append(np.abs(force @ [1, 1j] - exact).max() / LIMIT)
+        losses.append(
+            abs(contract.work(force[:, None], np.asarray(u[..., 1:]))[0][0] / (2 * np.pi * a * LIMIT) - np.sin(lag))
+        )
+    orders = [np.polyfit(np.log(samples), np.log(e), 1)[0] for e in (errors, losses)]
+    assert errors[-1] < 5e-3 and orders[0] == pytest.approx(-1, abs=0.1) and orders[1] < -0.9
+
+
+def test_a_varying_normal_load_is_followed_while_sliding() -> None:
+    """Slid steadily: F = mu N(t), and what is lost is mu N times the slip."""
+    law = PointContact(Penalty(value(2.4e8)), Coulomb(value(MU)), value(K))
+    t = np.linspace(0, 2 * np.pi, 4001)
+    u = np.stack([1e-6 * (1 + 0.9 * np.sin(7 * t)), 1e-4 * t, 0 * t], axis=-1)[:, None]
+    told = history(law, jnp.asarray(u), 1e-4)
+    late = slice(1000, None)
+    assert np.allclose(told.force[late, 0, 1], MU * 2.4e8 * u[late, 0, 0], rtol=1e-12)
+    slipped, lost = np.diff(told.slip[late, 0, 0]), np.diff(told.dissipated[late, 0])
+    held = 0.5 * (told.force[1000:-1, 0, 1] + told.force[1001:, 0, 1])
+    assert slipped.min() > 0 and np.allclose(lost, held * slipped, rtol=1e-6)  # of a sum that grows to a thousand
+
+
+# friction opposes the slip -------------------------------------------------------------------------------------------
+
+
+def tried(seed, ratio, n=200):
+    """A law with two stiffnesses, states inside the cone, and a step from them."""
+    rng = np.random.default_rng(seed)
+    pressed = 10 ** rng.uniform(-2, 4, n)
+    law = PointContact(Preload(jnp.asarray(pressed)), Coulomb(value(MU)), value(K), value(ratio * K))
+    angle, size = rng.uniform(0, 2 * np.pi, n), MU * pressed * rng.uniform(0, 1, n)
+    elastic = size * np.stack([np.cos(angle), np.sin(angle)])
+    state = law.init(n)._replace(elastic=jnp.asarray(elastic), share=jnp.ones(n))
+    u = np.column_stack(
+        [np.zeros(n), rng.normal(size=(n, 2)) * (10 ** rng.uniform(-2, 6, n) * MU * pressed / K)[:, None]]
+    )
+    return law, state, u, elastic, pressed
+
+
+def slid(seed, ratio):
+    """Force and slip of that step, (2, n), and what friction holds."""
+    law, state, u, elastic, pressed = tried(seed, ratio)
+    force, after = STEP(law, jnp.asarray(u), jnp.zeros(u.shape), 1e-3, state)
+    springs = np.array([[K], [ratio * K]])
+    trial = elastic + springs * u[:, 1:].T
+    assert np.allclose(after.slipped, (trial - force[:, 1:].T) / springs, rtol=1e-9, atol=1e-12 * np.abs(u).max())
+    return trial, np.asarray(force[:, 1:]).T, (trial - np.asarray(force[:, 1:]).T) / springs, MU * pressed
+
+
+@TRIES
+@given(seed=st.integers(0, 10**6), ratio=st.sampled_from([1e-4, 0.03, 0.4, 1.0, 7.0, 1e4]))
+def test_slip_is_along_the_force_and_only_at_the_limit(seed, ratio) -> None:
+    """Karush-Kuhn-Tucker: |F| <= mu N, slip = lambda F, lambda >= 0, lambda (mu N - |F|) = 0."""
+    _, force, slip, held = slid(seed, ratio)
+    size, way = np.hypot(*force), np.hypot(*slip)
+    assert np.all(size <= held * (1 + 1e-9))
+    moving = way > 1e-9 * held / K / min(ratio, 1.0)
+    assert np.all(size[moving] >= held[moving] * (1 - 1e-8))
+    assert np.all(np.sum(force * slip, axis=0)[moving] >= (1 - 1e-6) * (size * way)[moving])
+    assert 20 < moving.sum()
+
+
+@TRIES
+@given(seed=st.integers(0, 10**6), ratio=st.sampled_from([0.03, 0.4, 7.0]))
+def test_the_force_is_the_nearest_of_the_cone_in_the_energy_of_the_springs(seed, ratio) -> None:
+    """No other force that friction can hold, of 720 around the cone, is nearer to the trial force."""
+    trial, force, _, held = slid(seed, ratio)
+    compliance = np.array([1 / K, 1 / (ratio * K)])
+    angles = np.linspace(0, 2 * np.pi, 720)
+    rim = held * np.stack([np.cos(angles), np.sin(angles)])[..., None]
+    outside = np.hypot(*trial) > held
+    there = np.einsum("i,ian->an", compliance, (rim - trial[:, None]) ** 2).min(axis=0)
+    here = compliance @ (force - trial) ** 2
+    assert np.all(here[outside] <= there[outside] * (1 + 1e-9)) and np.all(
+        here[~outside] <= 1e-20 * held[~outside] ** 2
+    )
+
+
+def test_the_radial_return_would_slip_across_the_force() -> None:
+    """Why it is not used: with k2 = k1/10, a step at 45 degrees to the axes would slip 40 degrees away from it."""
+    trial, springs = np.array([1.0, 1.0]), np.array([1.0, 0.1])
+    radial = trial / np.hypot(*trial) * 0.5
+    slip = (trial - radial) / springs
+    off = np.degrees(np.arccos(radial @ slip / np.hypot(*radial) / np.hypot(*slip)))
+    assert off == pytest.approx(39.3, abs=0.1)
+    law = PointContact(Preload(jnp.ones(200)), Coulomb(value(0.5)), value(1.0), value(0.1))
+    start = law.init(200)._replace(share=jnp.ones(200))
+    _, after = STEP(law, jnp.tile(jnp.asarray([0.0, 1.0, 10.0]), (200, 1)), jnp.zeros((200, 3)), 1.0, start)
+    way = np.asarray(after.slipped[:, 0])
+    left = trial - springs * way
+    assert np.hypot(*left) == pytest.approx(0.5, rel=1e-12)
+    assert left @ way == pytest.approx(np.hypot(*left) * np.hypot(*way), rel=1e-12)
+
+
+RATED = {
+    "coulomb": Coulomb(value(0.3)),
+    "static and sliding": StaticSliding(value(0.4), value(0.3)),
+    "falling": Falling(value(0.3), value(5.0)),
+    "falling exponentially": Exponential(value(0.4), value(0.2), value(30.0)),
+    "rising": Exponential(value(0.2), value(0.4), value(30.0)),
+    "heated": Heated(value(0.3), value(1e-6), value(900.0), value(4e-6)),
+    "measured": characteristic([1e-4, 1e-3, 1e-2], [0.4, 0.3, 0.25]),
+}
+
+
+@pytest.mark.parametrize("ratio", [None, 0.2])
+@pytest.mark.parametrize("friction", RATED.values(), ids=RATED.keys())
+def test_a_rate_dependent_step_solves_its_equation(friction, ratio) -> None:
+    """Slid: |F| = mu(slip/dt) N with the slip along F; stuck: |F| <= mu(0) N. From rest, 300 random steps."""
+    rng = np.random.default_rng(3)
+    n, dt = 300, 1e-4
+    pressed = jnp.asarray(10 ** rng.uniform(0, 3, n))
+    law = PointContact(Preload(pressed), friction, value(K), None if ratio is None else value(ratio * K))
+    state = law.init(n)._replace(share=jnp.ones(n))
+    u = np.column_stack([np.zeros(n), rng.normal(size=(n, 2)) * (10 ** rng.uniform(-2, 2, n))[:, None] * 40.0 / K])
+    force, after = STEP(law, jnp.asarray(u), jnp.zeros((n, 3)), dt, state)
+    size, slip = np.hypot(*force[:, 1:].T), np.asarray(after.slipped)
+    way = np.hypot(*slip)
+    moving = way > 1e-12 * np.abs(u).max()
+    held = np.asarray(friction.coefficient(jnp.asarray(way / dt), pressed) * pressed)
+    assert np.allclose(size[moving], held[moving], rtol=1e-7)
+    assert np.all(np.sum(slip * force[:, 1:].T, axis=0)[moving] >= (1 - 1e-9) * (size * way)[moving])
+    still = np.asarray(friction.coefficient(jnp.zeros(n), pressed) * pressed)
+    assert np.all(size[~moving] <= still[~moving] * (1 + 1e-12))
+    assert 50 < moving.sum() < 290
+
+
+# normal load ---------------------------------------------------------------------------------------------------------
+
+
+def test_without_preload_a_closed_contact_has_friction() -> None:
+    """Touching but unloaded at the beginning; pressed by the motion alone: F = mu N as soon as it slides."""
+    for normal in (Penalty(value(2.4e8)), ROUGH):
+        law = PointContact(normal, Coulomb(value(MU)), value(K))
+        t = np.linspace(0, 1, 201)[:, None]
+        u = jnp.asarray(np.stack([1e-5 * t, 1e-3 * t, 0 * t], axis=-1))
+        told = history(law, u, 1e-3)
+        assert np.allclose(told.force[1:, 0, 1], MU * told.force[1:, 0, 0], rtol=1e-12)
+        assert float(told.force[1, 0, 1]) > 0 and float(told.dissipated[-1, 0]) > 0
+
+
+def stretched(share, elastic):
+    """State of one point that has been loaded."""
+    return PointState(
+        jnp.zeros((2, 1)), jnp.asarray([[elastic], [0.0]]), jnp.asarray([share]), jnp.zeros((2, 1)), jnp.zeros(1)
+    )
+
+
+def test_area_that_is_lost_takes_its_force_with_it_and_area_that_comes_carries_nothing_yet() -> None:
+    """Half of the share: half of the force; more share: the same force, but a steeper increment."""
+    law = PointContact(ROUGH, Coulomb(value(50.0)), value(K))
+    half, whole = 0.5 * 12e-6, 12e-6
+    lifted = STEP(law, jnp.asarray([[half, 0, 0]]), jnp.zeros((1, 3)), 1.0, stretched(1.0, 10.0))[0]
+    pressed = STEP(law, jnp.asarray([[whole, 0, 0]]), jnp.zeros((1, 3)), 1.0, stretched(0.5, 10.0))[0]
+    moved = STEP(law, jnp.asarray([[whole, 1e-7, 0]]), jnp.zeros((1, 3)), 1.0, stretched(0.5, 10.0))[0]
+    assert np.allclose([lifted[0, 1], pressed[0, 1], moved[0, 1]], [5.0, 10.0, 10.0 + K * 1e-7], rtol=1e-12)
+
+
+def test_the_printed_form_gives_energy_and_this_one_does_not() -> None:
+    """Stuck, moved out by d at the share h1, pressed to h2, moved back, released: k h(u_n) u_t does the work
+    k d^2 (h1 - h2)/2 < 0. By increments the force comes back to k d (h1 - h2), and losing area leaves h1/h2 of it."""
+    h = np.asarray(ROUGH.share(jnp.asarray([0.3, 0.9]) * 12e-6))
+    d, k = 1e-7, 1e6
+    corners = np.array([[0.3, 0], [0.3, 1], [0.9, 1], [0.9, 0], [0.3, 0]]) * [12e-6, d]
+    u = np.stack([polygon(corners[:, 0], 400), polygon(corners[:, 1], 400), np.zeros(1601)], axis=-1)
+    printed = np.stack([ROUGH.force(u[:, 0]), k * ROUGH.share(u[:, 0]) * u[:, 1]], axis=-1)
+    work = np.sum(0.5 * (printed[1:] + printed[:-1]) * np.diff(u[:, :2], axis=0))
+    assert work == pytest.approx(0.5 * k * d**2 * (h[0] - h[1]), rel=1e-6) and work < 0
+    law = PointContact(ROUGH, Coulomb(value(MU)), value(k))
+    told = history(law, jnp.asarray(u)[:, None], 1e-3)
+    assert np.abs(told.slip).max() < 1e-12 * d
+    force = np.asarray(told.force[:, 0, 1])
+    done = np.append(0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(u[:, 1])))
+    lost = done - force**2 / (2 * k * np.asarray(ROUGH.share(u[:, 0])))
+    cycle = done[-1]
+    assert np.diff(lost).min() > -1e-12 * abs(work) and lost[-1] > 0.1 * abs(work)
+    assert force[-1] == pytest.approx(k * d * h[0] / h[1] * (h[0] - h[1]), rel=1e-9)  # left over, towards the new rest
+    assert cycle == pytest.approx(0.5 * k * d**2 * (h[1] - h[0]), rel=1e-9)  # what the printed form gave
+
+
+def test_force_goes_to_zero_with_the_approach() -> None:
+    """At separation of a rough contact: F_n like u^3, F_t below mu F_n; and back from zero on return."""
+    law = PointContact(ROUGH, Coulomb(value(MU)), value(K))
+    x = np.concatenate([np.linspace(1, -0.2, 1201), np.linspace(-0.2, 1, 1201)[1:]])
+    u = np.stack([12e-6 * x, 4e-6 * np.cos(9 * x), 0 * x], axis=-1)[:, None]
+    force = np.asarray(history(law, jnp.asarray(u), 1e-5).force)[:, 0]
+    assert np.abs(np.diff(force, axis=0)).max() < 0.003 * force.max() and np.all(force[x <= 0] == 0)
+    near = (x > 0) & (x < 0.1)
+    assert np.all(force[near, 0] <= 2.4e8 * 12e-6 * x[near] ** 3)
+    assert np.all(np.abs(force[:, 1]) <= MU * force[:, 0] * (1 + 1e-12))
+
+
+# damping -------------------------------------------------------------------------------------------------------------
+
+
+def test_normal_damping_is_proportional_to_the_stiffness_and_never_pulls() -> None:
+    """(3.7-30): max(0, F + beta k v)."""
+    beta = 2e-4
+    law = PointContact(ROUGH, Coulomb(value(MU)), value(K), None, value(beta))
+    rng = np.random.default_rng(0)
+    u, v = rng.uniform(-2e-6, 2e-5, 500), rng.normal(size=500) * 0.05
+    rows = np.zeros((500, 3))
+    force = STEP(
+        law, jnp.asarray(rows + [1, 0, 0] * u[:, None]), jnp.asarray(rows + [1, 0, 0] * v[:, None]), 1e-5, law.init(500)
+    )[0]
+    expected = np.asarray(ROUGH.force(u)) + beta * np.asarray(ROUGH.stiffness(u)) * v
+    assert np.allclose(force[:, 0], np.maximum(expected, 0), rtol=1e-12)
+    assert (expected < 0).sum() > 50 and np.asarray(force[:, 0]).min() == 0
+
+
+def test_where_the_damper_would_pull_friction_holds_nothing() -> None:
+    """Clipped normal force: the tangential spring relaxes through its damper, e' = -e/beta, with no force."""
+    beta, dt = 1e-3, 1e-4
+    law = PointContact(ROUGH, Coulomb(value(MU)), value(K), None, value(beta))
+    force, after = STEP(law, jnp.asarray([[6e-6, 0, 0]]), jnp.asarray([[-1.0, 0, 0]]), dt, stretched(0.5, 10.0))
+    assert np.array_equal(force, np.zeros((1, 3)))
+    assert after.elastic[0, 0] == pytest.approx(10.0 / (1 + dt / beta), rel=1e-12)
+
+
+def test_tangential_damping_adds_to_the_spring_while_it_sticks_and_not_beyond_the_cone() -> None:
+    beta, dt, d = 1e-3, 1e-4, 1e-7
+    law = PointContact(Preload(value(N0)), Coulomb(value(MU)), value(K), None, value(beta))
+    start = law.init(1)._replace(share=jnp.ones(1))
+    stuck, _ = STEP(law, jnp.asarray([[0, d, 0]]), jnp.asarray([[0, d / dt, 0]]), dt, start)
+    fast, _ = STEP(law, jnp.asarray([[0, 9 * d, 0]]), jnp.asarray([[0, 9 * d / dt, 0]]), dt, start)
+    assert stuck[0, 1] == pytest.approx(K * d + beta * K * d / dt, rel=1e-12)
+    assert fast[0, 1] == pytest.approx(LIMIT, rel=1e-12) and 9 * K * d < LIMIT
+
+
+def test_a_stuck_damped_contact_loses_the_energy_of_a_kelvin_voigt_element() -> None:
+    """pi beta k omega a^2 a cycle, by backward differences with the first power of the step."""
+    a, beta = 1e-7, 2e-2
+    law = PointContact(Preload(value(N0)), Coulomb(value(MU)), value(K), None, value(beta))
+    errors = []
+    for s in (64, 256, 1024):
+        u = tangential(a * np.cos(2 * np.pi * np.arange(s) / s))
+        force = np.asarray(CYCLES(law, u, 1.0, 3)[0])
+        errors.append(contract.work(force, np.asarray(u))[0][0] / (np.pi * beta * K * 2 * np.pi * a**2) - 1)
+    assert abs(errors[-1]) < 1e-4 and all(abs(a) > 3 * abs(b) for a, b in zip(errors, errors[1:], strict=False))
+
+
+# wrong laws are caught -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("test", "wrong"),
+    [
+        (contract.test_friction_stays_in_its_cone, BOX),
+        (contract.test_the_force_does_not_jump_at_separation, JUMP),
+        (contract.test_dissipated_energy_grows, PRESTRESSED),
+        (contract.test_the_force_does_not_jump_at_separation, PRESTRESSED),
+        (lambda example: contract.test_stuck_and_moved_under_changing_load_gives_no_energy(example, -1), PRINTED),
+    ],
+    ids=["box", "jump", "no preload: energy", "no preload: force", "printed"],
+)
+def test_the_contract_catches_a_wrong_law(test, wrong) -> None:
+    """A box for a cone, a jump at separation, no friction without preload, the printed stiffness."""
+    with pytest.raises(AssertionError):
+        test(example=wrong)
+
+
+@pytest.mark.parametrize("wrong", [BOX, PRESTRESSED, PRINTED], ids=["box", "no preload", "printed"])
+def test_wrong_laws_are_wrong_in_one_thing_only(wrong) -> None:
+    """Open they carry nothing, as the right one: it is not for some other reason that they are caught."""
+    contract.test_an_open_contact_carries_nothing(example=wrong)
+    contract.test_every_point_is_on_its_own(example=wrong)
+
+
+def test_leaving_the_mistake_out_the_same_example_passes() -> None:
+    right = dataclasses.replace(BOX, law=EXAMPLES["rough point"].law)
+    contract.test_the_force_does_not_jump_at_separation(right)
+    contract.test_dissipated_energy_grows(right)
