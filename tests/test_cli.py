@@ -431,6 +431,20 @@ def test_progress_on_a_terminal_keeps_steps_and_warnings(monkeypatch: pytest.Mon
     assert "ok" in shown and "\x1b" in shown
 
 
+def test_progress_in_a_log_shows_small_steps_only_after_silence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    from microslip import progress
+
+    with progress.progress("run box") as report:
+        report("eigenmodes")
+        report("4 of 80 vectors")
+        monkeypatch.setattr(progress, "SILENCE", 0.0)
+        report("8 of 80 vectors")
+    shown = capsys.readouterr().err
+    assert "eigenmodes" in shown and "8 of 80" in shown and "4 of 80" not in shown
+
+
 def test_every_verb_is_documented() -> None:
     for verb in app:
         if not verb.startswith("-"):

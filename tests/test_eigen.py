@@ -119,6 +119,17 @@ def test_superlu_counts_by_qdldl_when_it_exchanged_rows():
 
 
 @pytest.mark.skipif(len(BACKENDS) < 2, reason="only one direct solver here")
+def test_the_search_tells_how_far_it_is():
+    """A line a block, in the form that moves the bar."""
+    pencil, _ = pencil_of(brick("tetra10", (3, 3, 6), (0.01, 0.012, 0.05)), body(**CLAMPED))
+    told = []
+    pencil.tell = told.append
+    eigen.search(pencil, 6)
+    steps = [int(text.split(" of ")[0]) for text in told]
+    limit = {int(text.split()[2]) for text in told}
+    assert len(steps) > 1 and (np.diff(steps) == 4).all() and len(limit) == 1 and steps[-1] <= limit.pop()
+
+
 def test_backends_agree():
     results = [the_modes(BLOCK, **CLAMPED, modes={"count": 10, "solver": name}) for name in BACKENDS]
     a, b = results

@@ -15,8 +15,9 @@ def progress(title: str, quiet: bool = False) -> Iterator[Report]:
     """Yield a function that is told, in words, what begins now.
 
     On a terminal a bar shows the present step and its time, and finished steps stay above it; when the output is a
-    file or a pipe each step is one plain line. ``300 of 600 frequencies`` moves the bar of the present step, and a
-    text that begins with ``warning:`` stays on the screen.
+    file or a pipe each step is one plain line. ``300 of 600 frequencies`` moves the bar of the present step (in a file
+    it is a line if nothing was said for `SILENCE` seconds), and a text that begins with ``warning:`` stays on the
+    screen.
     """
     if quiet:
         yield lambda _: None
@@ -24,9 +25,25 @@ def progress(title: str, quiet: bool = False) -> Iterator[Report]:
         with _bar(title) as report:
             yield report
     else:
-        began = time.perf_counter()
         print(title, file=sys.stderr, flush=True)
-        yield lambda text: print(f"  {time.perf_counter() - began:6.1f} s  {text}", file=sys.stderr, flush=True)
+        yield _lines()
+
+
+SILENCE = 5.0
+"""s after which even small steps are worth a line in a log."""
+
+
+def _lines() -> Report:
+    began = last = time.perf_counter()
+
+    def report(text: str) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        if _fraction(text)[0] is None or now - last > SILENCE:
+            last = now
+            print(f"  {now - began:6.1f} s  {text}", file=sys.stderr, flush=True)
+
+    return report
 
 
 @contextlib.contextmanager

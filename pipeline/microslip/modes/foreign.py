@@ -337,6 +337,7 @@ def _search(
     report: Report,
 ) -> Searched:  # fmt: skip
     report(f"eigenmodes: {pencil.n} free rows, solver {pencil.solver.name}")
+    pencil.tell = report
     if not pencil.n:
         raise UserError("supports: every row of the matrices is held; remove one")
     R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R

@@ -81,6 +81,7 @@ class Sector:
         found = []
         for k, pencil in pencils.items():
             report(f"eigenmodes: nodal diameter {k}")
+            pencil.tell = report
             unknowns = HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
             found.append(search(model, settings, pencil, unknowns, speed, motions, rows, f"nodal diameter {k}"))
         if settings.modes.certify:

@@ -192,6 +192,7 @@ def searched(
         UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
     """
     report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
+    pencil.tell = report
     found = search(model, settings, pencil, model.free, speed, motions, rows)
     if not settings.modes.certify:
         return found
