@@ -159,7 +159,8 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
     Args:
         path: a body.toml, a system.toml, the folder that holds it, or a case.toml.
     """
-    from .workflow import is_case, open_job, run_body, run_case_file, run_system, system_file
+    from .basis import read_basis
+    from .workflow import frequency_lines, is_case, open_job, run_body, run_case_file, run_system, system_file
 
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
@@ -171,6 +172,7 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
         job = open_job(path, list(set_))
         with progress(f"run {job.settings.name}", quiet) as report:
             page, converged = run_body(job, force, report)
+        _say("\n".join(frequency_lines(read_basis(job.basis_file))), quiet)
     _say(page, quiet)
     if not converged:
         raise NotConverged("some points of the response did not converge; they are marked in response.csv")

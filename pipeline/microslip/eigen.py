@@ -256,7 +256,7 @@ class Pencil:
     solver: DirectSolver
     solves: int = 0
     dtype: Any = float
-    tell: Callable[[str], None] = lambda _: None  # noqa: E731
+    tell: Callable[[str], None] = lambda _: None
 
     def solve(self, b: Array) -> Array:
         """Solve with the matrix that was factorised last, counting."""

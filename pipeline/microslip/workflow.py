@@ -837,8 +837,19 @@ MOST_COLUMNS = 10
 """Frequencies shown of each nodal diameter on the terminal."""
 
 
-def _hertz_line(frequency: Array) -> str:
-    return "".join(f"{f:10.5g}" for f in frequency[:MOST_COLUMNS])
+def _hertz_line(frequency: Array, most: int = MOST_COLUMNS) -> str:
+    return "".join(f"{f:10.5g}" for f in frequency[:most])
+
+
+def frequency_lines(basis: ModalBasis, columns: int = 5, rows: int = 15) -> list[str]:
+    """The first frequencies of each speed and nodal diameter, a line each, in few lines for the terminal."""
+    table = [
+        f"{g.speed * 30 / np.pi:8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  "
+        f"{_hertz_line(eigenmodes(g).frequency, columns)}  Hz{f'  of {g.n_modes}' if g.n_modes > columns else ''}"
+        for (_, k), g in sorted(basis.groups.items())[:rows]
+    ]
+    more = len(basis.groups) - rows
+    return [*table, f"{'':8} and {more} lines more: microslip info shows them"] if more > 0 else table
 
 
 def _ring_whirl(groups: list[ModalGroup]) -> list[str]:
