@@ -61,7 +61,7 @@ def init(name: str, folder: Path | None = None, /) -> None:
 
     Args:
         name: blade, shroud, pendulum or half-pipe; `own` for a commented body.toml around your own CAD file or mesh;
-            `three-masses` for a system by hand; `sample` for a modal file with a case.
+            `three-masses` for a system by hand; `sample` for a modal file with a case; `contact` for contact laws.
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
@@ -77,7 +77,7 @@ def init(name: str, folder: Path | None = None, /) -> None:
         target.mkdir(parents=True, exist_ok=True)
         for source, copy in files:
             shutil.copyfile(source, target / copy)
-            if copy.endswith(".toml") and name != "sample":  # whose modal file bears its name
+            if copy.endswith(".toml") and name not in ("sample", "contact"):  # their products bear other names
                 _rename(target / copy, target.resolve().name)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
@@ -85,7 +85,10 @@ def init(name: str, folder: Path | None = None, /) -> None:
     print(f"{target}: ready. Look at {target / file}, then: microslip {verb} {shlex.quote(str(target))}")
 
 
-_MADE = {"three-masses": ("system.toml", "run"), "sample": ("case.toml", "respond")}
+_MADE = {
+    "three-masses": ("system.toml", "run"), "sample": ("case.toml", "respond"),
+    "contact": ("contact.toml", "contact"),
+}  # fmt: skip
 """Folders to start from that hold no body.toml: the file to look at and the verb that takes it from there."""
 
 
@@ -93,6 +96,9 @@ def _to_copy(name: str) -> list[tuple[Path, str]]:
     """Files of a body that travels with the package, and their names in the new folder."""
     if name == "own":
         return [(PACKAGE / "templates" / "own.toml", "body.toml")]
+    if name == "contact":
+        folders = (PACKAGE / "templates" / "contact", _cases() / "contact")
+        return [(f, f.name) for folder in folders for f in sorted(folder.iterdir()) if f.is_file()]
     if name in _MADE:
         folder = PACKAGE / "samples" if name == "sample" else PACKAGE / "templates" / name
         return [(f, f.name) for f in sorted(folder.iterdir()) if f.is_file()]
@@ -201,6 +207,23 @@ def closure(
     with progress(f"closure of {job.settings.name}", quiet) as report:
         found = closure_stage(job, name, low, high, points, rpm, output, report)
     _say("\n".join(map(str, found)), quiet)
+
+
+@app.command
+def contact(file: Path, /, *, output: Output = None, set_: Set = (), quiet: Quiet = False) -> None:
+    """What a contact law does: force, stiffness, loops, slip orbits, friction, microslip, wear; as PNG and CSV.
+
+    Args:
+        file: a contact.toml, or the number of one of the book's figures: 3.5-2, 3.7-7, 3.9-2 (`init contact` has all).
+        output: folder for pictures and tables; build/NAME if not given.
+    """
+    from .workflow import contact_stage
+
+    if not file.exists() and (known := _cases() / "contact" / f"fig-{file}.toml").is_file():
+        file = known
+    with progress(f"contact {file}", quiet) as report:
+        lines = contact_stage(file, list(set_), output, report)
+    _say("\n".join(lines), quiet)
 
 
 @app.command

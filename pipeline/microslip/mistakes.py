@@ -55,7 +55,7 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
         while key and isinstance(key[-1], int) and not isinstance(_at(raw, key), dict):
             key = key[:-1]
         by_key.setdefault(key, []).append((place, error))
-    known = {key: _known_keys(model, key[:-1]) for key in by_key}
+    known = {key: _known_keys(model, key[:-1], raw) for key in by_key}
     meant = set()
     other_way: dict[tuple[Any, ...], list[str]] = {}
     for key, found in by_key.items():
@@ -144,11 +144,21 @@ def _sentence(key: tuple[Any, ...], found: list[tuple[tuple[Any, ...], Any]], ra
         text = next(str(error["ctx"]["error"]) for _, error in found if error["type"] == "value_error")
         return (f"{where}: " if key else "") + text + ("" if ";" in text else "; correct it")
     place, error = _most_telling(found, value)
+    if error["type"].startswith("union_tag"):
+        return _kind_mistake(where, value, error)
     if table := _table_mistake(key, place, value, kinds):
         return f"{where}: {table}"
     given = _at(raw, place)
     entry = f"entry {place[-1] + 1} of the list " if len(place) > len(key) else ""
     return f"{where}: {entry}{_words(found, error, given)} (it is {_shown(given)}); {_remedy(error, given)}"
+
+
+def _kind_mistake(where: str, value: Any, error: Any) -> str:
+    """A table of which there are several kinds, told apart by its key `kind`."""
+    known = ", ".join(_shown(tag.strip(" '")) for tag in error.get("ctx", {}).get("expected_tags", "").split(","))
+    if error["type"] == "union_tag_not_found":
+        return f"{where}.kind: is missing; add it"
+    return f"{where}.kind: {_shown(value['kind'])} is unknown; choose one of {known}"
 
 
 def _table_mistake(key: tuple[Any, ...], place: tuple[Any, ...], value: Any, kinds: set[str]) -> str:
@@ -217,17 +227,30 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _known_keys(model: Any, place: tuple[Any, ...]) -> list[str]:
-    for step in place:
+def _known_keys(model: Any, place: tuple[Any, ...], raw: Any = None) -> list[str]:
+    for number, step in enumerate(place):
         if isinstance(step, str) and step in getattr(model, "model_fields", {}):
-            model = _model_in(model.model_fields[step].annotation) or model
+            model = _chosen(model.model_fields[step].annotation, _at(raw, place[: number + 1])) or model
     return [field.alias or name for name, field in getattr(model, "model_fields", {}).items()]
 
 
-def _model_in(annotation: Any) -> Any:
+def _chosen(annotation: Any, table: Any) -> Any:
+    """The model inside an annotation; of several the one that has the table's `kind`."""
+    models = list(_models_in(annotation))
+    kind = table.get("kind") if isinstance(table, dict) else None
+    for model in models:
+        field = model.model_fields.get("kind")
+        if kind is not None and field is not None and kind in getattr(field.annotation, "__args__", ()):
+            return model
+    return models[0] if models else None
+
+
+def _models_in(annotation: Any) -> Iterator[Any]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
+        yield annotation
     for argument in getattr(annotation, "__args__", ()):
-        if (found := _model_in(argument)) is not None:
-            return found
-    return None
+        yield from _models_in(argument)
+
+
+def _model_in(annotation: Any) -> Any:
+    return next(_models_in(annotation), None)

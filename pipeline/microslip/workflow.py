@@ -13,7 +13,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -396,6 +396,42 @@ def closure_stage(
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
     store.write_text(table, curve.table())
     return [table, closure_curve_plot(curve, f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm", picture)]
+
+
+def contact_stage(
+    path: Path, assignments: list[str], output: Path | None, report: Report = lambda _: None
+) -> list[str]:  # fmt: skip
+    """What a contact law does: tables (CSV) and pictures (PNG) in build/<name>/ or `output`.
+
+    Returns:
+        Lines to print: the short table, judgements, files.
+
+    Raises:
+        UserError, NotConverged: see `contact.study.study`; then nothing is written.
+    """
+    from .contact.study import study
+    from .pictures.contact import draw
+
+    path = path / "contact.toml" if path.is_dir() else path
+    report("laws and motions")
+    found = study(path, assignments)
+    folder = output or Path("build") / found.contact.settings.name
+    report("pictures and tables")
+    files = draw(found, folder)
+    for name, columns in found.tables.items():
+        files.append(folder / f"{name}.csv")
+        store.write_text(files[-1], _columns_csv(columns))
+    files.append(folder / "summary.csv")
+    rows = [*found.told, *(("judgement", s) for s in found.sentences)]
+    store.write_text(files[-1], "\n".join(["what,value", *(f'"{a}","{b}"' for a, b in rows)]) + "\n")
+    width = max(len(what) for what, _ in found.told)
+    lines = [f"{what:{width}}  {value}" for what, value in found.told]
+    return [*lines, *found.sentences, *map(str, sorted(files))]
+
+
+def _columns_csv(columns: Mapping[str, Array]) -> str:
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{x:.10g}" for x in row) for row in rows)]) + "\n"
 
 
 def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:
