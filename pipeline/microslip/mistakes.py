@@ -63,7 +63,7 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
             if key[-1] in known[key]:  # of the other way to write this table
                 other_way.setdefault(key[:-1], []).append(str(key[-1]))
                 continue
-            close = difflib.get_close_matches(str(key[-1]), known[key], 1)
+            close = _close(str(key[-1]), known[key])
             meant |= {(*key[:-1], *close)}
             yield f"{_written(key, raw)}: unknown key; {_hint(key, close, known[key], model)}"
     for table, odd in other_way.items():
@@ -72,6 +72,13 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
     for key, found in by_key.items():
         if found[0][1]["type"] != "extra_forbidden" and not (found[0][1]["type"] == "missing" and key in meant):
             yield _sentence(key, found, raw)
+
+
+def _close(key: str, known: list[str]) -> list[str]:
+    """The known key that may be meant, if any; R_Z for Rz too."""
+    plain = {k.replace("_", "").lower(): k for k in known}
+    same = plain.get(key.replace("_", "").lower())
+    return [same] if same else difflib.get_close_matches(key, known, 1)
 
 
 def _place(error: Any, raw: Any) -> tuple[Any, ...]:

@@ -236,9 +236,6 @@ def _mean_friction(
             what = ("speed", "coefficient")[bad[0, 1]]
             raise UserError(f"{file}: line {lines[bad[0, 0]]}: the {what} is no finite number; correct it")
         shift = {k: getattr(given, k) for k in ("temperature", "reference", "c_1", "c_2")}
-        if not given.c_2 + given.temperature - given.reference > 0:
-            raise UserError(f"{path}: friction.temperature: {given.temperature:g} K is below {given.reference:g} K by "
-                            f"c_2 = {given.c_2:g} K or more, where the shift has no meaning; correct it")  # fmt: skip
         return characteristic(table[:, 0], table[:, 1], str(file), **shift)
     assert heat is not None and area is not None
     return Heated(*map(_number, (given.mu_0, heat.resistance, heat.limit, area)))

@@ -239,8 +239,8 @@ class TableFriction(Random):
     columns: Columns = (1, 2)
     temperature: Positive = 293.15
     reference: Positive = 293.15
-    c_1: Number = 17.44
-    c_2: Positive = 51.6
+    c_1: Number = 8.86
+    c_2: Positive = 101.6
 
 
 class LubricatedFriction(Random):

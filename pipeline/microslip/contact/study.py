@@ -166,7 +166,7 @@ def _characteristic(c: Contact, working: tuple[float, float] | None, found: _Fin
     values = np.array(mean.coefficient(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))
     table = {"speed_m/s": speeds, "coefficient": values}
     if isinstance(c.friction, Scattered):
-        deviation = float(c.friction.deviation)
+        deviation = float(c.friction.deviation)  # type: ignore[arg-type]  # a number here
         table |= {"mean_less_deviation": (1 - deviation) * values, "mean_plus_deviation": (1 + deviation) * values}
     if isinstance(c.law, MassContact):
         table["smoothed"] = values * np.array(smoothed(jnp.asarray(speeds), c.law.slope))
@@ -194,12 +194,10 @@ def _lubricated(c: Contact, given: S.LubricatedFriction, found: _Findings) -> No
     """Dry and fluid part over the speed at four approaches (Fig. 3.6-5)."""
     heat = c.settings.temperature
     assert heat is not None and c.heights is not None and c.roughness is not None and c.area is not None
-    x = np.linspace(0, 1, 2001)
-    density = np.array(jax.vmap(jax.grad(lambda v: c.heights.area(v)))(jnp.asarray(x)))  # type: ignore[union-attr]
     one = given.mu_0 * heat.resistance * c.roughness * c.normal_0 / (heat.limit * c.area)  # v* per m/s (3.6-22)
     eta = c.area**2 * heat.limit / (heat.resistance * given.mu_0**2 * c.normal_0**2 * c.roughness**3) * given.viscosity
     v, approaches = np.linspace(0, 10, 201), np.array([0.4, 0.6, 0.8, 1.0])
-    dry, fluid = lubricated(density, x, approaches[:, None], v[None], eta, given.film)
+    dry, fluid = lubricated(c.heights, approaches, v, eta, given.film)
     found.tables["friction"] = {
         "approach_m": np.repeat(approaches * c.roughness, len(v)), "speed_m/s": np.tile(v / one, len(approaches)),
         "coefficient": given.mu_0 * (dry + fluid).ravel(), "dry_part": given.mu_0 * dry.ravel(),
@@ -233,7 +231,7 @@ def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -
         table[f"u_{name}_m"] = u[:, i]
     for i, name in enumerate(("n", "t1", "t2")):
         table[f"F_{name}_N"] = force[:, i]
-    point = _point(c, u, slip)
+    point = _point(c, u, force, slip, float(time[1]))
     for i, name in enumerate(("t1", "t2")):
         table |= {f"P_{name}_m": point[:, i], f"v_P_{name}_m/s": speed[:, i]}
     table["state"] = state.astype(float)
@@ -243,25 +241,32 @@ def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -
     _of_a_cycle(c, working, u, force, state, motion, found)
 
 
-def _point(c: Contact, u: np.ndarray, slip: np.ndarray) -> np.ndarray:
-    """(s, 2) place of P, m: it slides in contact, and moves with M where the contact is open (3.7-27).
+def _point(c: Contact, u: np.ndarray, force: np.ndarray, slip: np.ndarray, dt: float) -> np.ndarray:
+    """(s, 2) place of P, m: M less the stretch e of the springs (the mean over the area in contact), which follows
+    from force = share k (e + beta e'); where the contact is open the springs are released and P stands at M.
 
-    When it opens the springs are released, so that P stands at M; in the book's form the stretch stays.
+    In the book's form the stretch stays when the contact opens: P slides in contact, and moves with M in the open.
     """
-    kept = isinstance(c.law, MassContact) and c.law.printed
-    opened = np.array(c.normal.share(jnp.asarray(u[:, 0]))) <= 0
-    place = np.empty((len(u), 2))
-    place[0] = u[0, 1:] if isinstance(c.law, MassContact) else slip[0]
-    for k in range(1, len(u)):
-        moved = u[k, 1:] - u[k - 1, 1:] if opened[k] else slip[k] - slip[k - 1]
-        place[k] = u[k, 1:] if opened[k] and not kept else place[k - 1] + moved
+    share = np.array(c.normal.share(jnp.asarray(u[:, 0])))
+    assert c.stiffness is not None
+    place = np.array(u[:, 1:])
+    if isinstance(c.law, MassContact) and c.law.printed:
+        for k in range(1, len(u)):
+            place[k] = place[k - 1] + (u[k, 1:] - u[k - 1, 1:] if share[k] <= 0 else slip[k] - slip[k - 1])
+        return place
+    pull = force[:, 1:] / (np.maximum(share, 1e-300)[:, None] * np.array(c.stiffness.tangential))
+    lag = float(getattr(c.law, "damping", None) or 0.0) / dt
+    stretch = np.zeros(2)
+    for k in range(len(u)):
+        stretch = (pull[k] + lag * stretch) / (1 + lag) if share[k] > 1e-9 else np.zeros(2)
+        place[k] -= stretch
     return place
 
 
 def _path(motion: S.Motion, mean: float) -> Callable[[jax.Array], jax.Array]:
     """Displacement (3,) in m over the time in s."""
     rows = [(mean, *motion.normal[1:]), motion.t1, motion.t2]
-    most = max(map(len, rows))
+    most = max(map(len, rows)) | 1  # a missing last sine is zero
     table = jnp.array([[*row, *[0.0] * (most - len(row))] for row in rows])
     omega = 2 * np.pi * motion.frequency
 

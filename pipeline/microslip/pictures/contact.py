@@ -389,9 +389,11 @@ def yield_figure(study: Study) -> Any:
     axes.set(xlabel=f"time in {second}", ylabel=f"mean stress of the area in contact in {pascal}")
     beside = axes.twinx()
     beside.plot(time, 100 * t["share_of_yield"], "--", color=COLOURS[1], linewidth=1.5)
-    beside.axhline(100, color=COLOURS[1], linewidth=0.8)
+    top = 100 * float(t["share_of_yield"].max())
+    if top > 40:
+        beside.axhline(100, color=COLOURS[1], linewidth=0.8)
     beside.set_ylabel("share of the yield limit in %")
-    beside.set_ylim(0, max(110.0, 1.1 * 100 * float(t["share_of_yield"].max())))
+    beside.set_ylim(0, max(110.0, 1.1 * top) if top > 40 else 1.6 * top or 1.0)
     beside.spines["top"].set_visible(False)
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
