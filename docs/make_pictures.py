@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pages import HERE, body_reference, fill, play, table
+from pages import HERE, body_reference, contact_reference, fill, play, table
 
 from microslip import truncation
 from microslip.basis import read_basis
@@ -839,8 +839,9 @@ def own() -> None:
 
 
 def reference() -> None:
-    """The reference of body.toml."""
+    """The references of body.toml and contact.toml."""
     fill("body_toml.md", "body_toml", body_reference())
+    fill("contact_toml.md", "contact_toml", contact_reference())
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------
@@ -975,12 +976,21 @@ def rough() -> None:
         save(drawn(draw(figure(10.5, 3.4), plain)), name)
 
 
+def laws() -> None:
+    """Contact laws: friction characteristics, the point contact element, loops, microslip."""
+    import law_study as study
+
+    save(drawn(study.friction(figure(10.5, 3.4), plain)), "friction")
+    for name, draw in (("element", study.element), ("stick_slip", study.stick_slip), ("loops", study.loops)):
+        save(drawn(draw()), f"contact_{name}")
+
+
 STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough,
+        stiffness_sources, rough, laws,
     )  # fmt: skip
 }
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from microslip.body import BodySettings, _is_length
+from microslip.contact.settings import ContactFile
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(r"<!-- (file|run)(?: ([^\n]*?))? -->\n+```\w*\n(.*?)```", re.S)
@@ -225,17 +226,129 @@ MEANING: dict[str, tuple[str, str]] = {
 }
 
 
+MEANING_CONTACT: dict[str, tuple[str, str]] = {
+    "name": ("", "names the folder of the products, `build/NAME/`"),
+    "description": ("", ""),
+    "length_unit": ("", "unit of every length in this file; areas are its square"),
+    "stiffness.kind": ("", "its [source](contact_stiffness.md)"),
+    "stiffness.normal": ("N/m", "c_N0"),
+    "stiffness.tangential": ("N/m", "c_R0; or two, along t1 and t2"),
+    "stiffness.area": ("*²", "A_0, nominal area; needed for yield, heat, microslip and wear"),
+    "stiffness.includes": ("", "which compliance the numbers count"),
+    "stiffness.young": ("Pa", "E, of the first body"),
+    "stiffness.poisson": ("", "nu"),
+    "stiffness.shear": ("Pa", "G, if it is not E/2(1 + nu)"),
+    "stiffness.thickness": ("*", "l_0, depth of the layer"),
+    "stiffness.boundary": ("", "what holds the sides of the layer (3.1)"),
+    "stiffness.density": ("kg/m3", "for the limit of application"),
+    "stiffness.radii": ("*", "principal radii of the first body: inf is flat, negative is hollow"),
+    "stiffness.young_2": ("Pa", "of the second body; the first one's if not given"),
+    "stiffness.poisson_2": ("", "likewise"),
+    "stiffness.radii_2": ("*", "of the second body"),
+    "stiffness.angle": ("rad", "of the second body's first axis from the first one's"),
+    "stiffness.file": ("", "columns of a curve; a modal file; sought beside this one"),
+    "stiffness.columns": ("", "of displacement and force, counted from 1 or by name"),
+    "stiffness.displacement_unit": ("", "in the curve's file"),
+    "stiffness.force_unit": ("", "in the curve's file"),
+    "stiffness.gap": ("", "the displacement of the file opens the contact"),
+    "stiffness.noise": ("N", "by which the force may fall between neighbours; evened then"),
+    "stiffness.interface": ("", "name of the contact in the modal file"),
+    "stiffness.facing": ("", "the other contact of the same body that is closed at the same time"),
+    "stiffness.axis": ("", "of the ellipse, 0 or 1, whose tangential stiffness Mindlin's partial slip takes"),
+    "roughness.kind": ("", "cumulative height distribution; without [roughness] the faces are smooth"),
+    "roughness.R_Z": ("*", "highest peak to deepest valley of the heights; of a table its deepest depth if not given"),
+    "roughness.R_Z_other": ("*", "of the other face, with the polynomial's heights; the two are combined (3.3-10)"),
+    "roughness.rate": ("", "R_Z/sigma_S"),
+    "roughness.mean": ("", "over R_Z, below the highest peak"),
+    "roughness.deviation": ("", "over R_Z"),
+    "roughness.depth": ("*", "below the highest peak, rising from 0"),
+    "roughness.share": ("", "of the area that lies higher, from 0 to 1"),
+    "roughness.file": ("", "columns of depth (in length_unit) and share; a profile: way and height"),
+    "roughness.columns": ("", "counted from 1 or by name"),
+    "roughness.unit": ("", "of the heights in the profile"),
+    "roughness.way_unit": ("", "of the way; that of the heights if not given"),
+    "roughness.level": ("", "order of the polynomial that is taken off the profile, or none"),
+    "friction.kind": ("", "friction characteristic"),
+    "friction.mu": ("", "coefficient"),
+    "friction.static": ("", "coefficient at rest"),
+    "friction.sliding": ("", "coefficient of sliding"),
+    "friction.mu_0": ("", "coefficient at zero speed, cold"),
+    "friction.p_v": ("s/m", "of (3.6-15)"),
+    "friction.mu_inf": ("", "coefficient at high speed"),
+    "friction.rate": ("s/m", "lambda_e"),
+    "friction.file": ("", "columns of speed in m/s and coefficient"),
+    "friction.columns": ("", "counted from 1 or by name"),
+    "friction.temperature": ("K", "at which it slides"),
+    "friction.reference": ("K", "at which it was measured"),
+    "friction.c_1": ("", "of Williams, Landel and Ferry"),
+    "friction.c_2": ("K", "likewise"),
+    "friction.viscosity": ("Pa s", "of the fluid"),
+    "friction.film": ("", "smallest film over R_Z; the fluid part has no value without"),
+    "friction.deviation": ("", "relative standard deviation in time"),
+    "friction.memory": ("s", "correlation exp(-t/memory)"),
+    "friction.seed": ("", "of the random numbers"),
+    "element.kind": ("", "contact element"),
+    "element.damping": ("s", "beta: force per rate of the springs (3.7-18)"),
+    "element.length": ("*", "l_0: the hyperbolic law of a short layer (3.4)"),
+    "element.preload": ("N", "a constant normal force in place of a normal law"),
+    "element.mass": ("kg", "m_D, reduced mass of the full area"),
+    "element.slope": ("s/m", "k_S of the smoothed friction (3.7-43)"),
+    "element.printed": ("", "the book's stretch of the springs, which may give energy"),
+    "element.count": ("", "of strips or sliders"),
+    "element.weakest": ("", "strength of the weakest slider over that of the strongest"),
+    "element.exponent": ("", "chi of Segalman's distribution"),
+    "element.ratio": ("", "beta: stiffness of its last slider over that of all others"),
+    "motion.frequency": ("Hz", ""),
+    "motion.normal": ("*", "u_n, positive closes: mean, cos, sin, cos 2, sin 2, ..."),
+    "motion.t1": ("*", "u_t1, likewise"),
+    "motion.t2": ("*", "u_t2, likewise"),
+    "motion.normal_force": ("N", "static; instead of the mean of `normal`"),
+    "motion.drift": ("m/s", "constant speed along t1 besides"),
+    "motion.cycles": ("", "how many; the last one is drawn"),
+    "motion.samples": ("", "a cycle"),
+    "motion.amplitudes": ("*", "of the hysteresis loops along t1; about the slip limit if not given"),
+    "microslip.mu": ("", "friction coefficient, cold"),
+    "microslip.speed": ("m/s", "of loading, for the heat"),
+    "microslip.yield_shear": ("Pa", "tau_S0, shear strength, cold"),
+    "microslip.approaches": ("*", "one curve each"),
+    "microslip.normal_forces": ("N", "one curve each; instead of approaches"),
+    "microslip.displacement": ("*", "up to which it is drawn"),
+    "wear.normal_force": ("N", "constant"),
+    "wear.speed": ("m/s", "of sliding"),
+    "wear.time": ("s", ""),
+    "wear.mu": ("", "friction coefficient; that of [friction] at the speed if not given"),
+    "wear.coefficient": ("m3/J", "I_W: worn volume over frictional work"),
+    "wear.archard": ("", "K: worn volume = K force way/hardness"),
+    "wear.hardness": ("Pa", "of the softer body"),
+    "wear.energy_density": ("J/m3", "Fleischer's: frictional work over worn volume"),
+    "temperature.resistance": ("K m2/W", "k_T: rise of temperature over heat flow"),
+    "temperature.limit": ("K", "dT_E: rise at which friction and shear strength would be gone"),
+    "limits.yield_shear": ("Pa", "tau_S, yield stress in shear: half of that in tension"),
+    "limits.tolerance": ("", "error of the static stiffness that is allowed (3.2-31)"),
+    "limits.boundary": ("", "what holds the sides, for the yield check where the stiffness is not a layer's"),
+}
+
+
 def body_reference() -> str:
     """Tables of every key of body.toml, made from the models that read it.
 
     Raises:
         SystemExit: a key without a meaning here, or a meaning without a key.
     """
-    sections = list(_sections(BodySettings, "", ""))
+    return _reference(BodySettings, MEANING, "body.toml")
+
+
+def contact_reference() -> str:
+    """Tables of every key of contact.toml, likewise."""
+    return _reference(ContactFile, MEANING_CONTACT, "contact.toml")
+
+
+def _reference(model: Any, meanings: dict[str, tuple[str, str]], file: str) -> str:
+    sections = list(_sections(model, "", ""))
     known = {f"{prefix}{key}" for prefix, _, _, model in sections for key in _plain_keys(model)}
-    if wrong := sorted(known ^ set(MEANING)):
-        raise SystemExit(f"docs/pages.py: MEANING and body.toml differ in {', '.join(wrong)}")
-    return "\n\n".join(_section(*s) for s in sections)
+    if wrong := sorted(known ^ set(meanings)):
+        raise SystemExit(f"docs/pages.py: the meanings and {file} differ in {', '.join(wrong)}")
+    return "\n\n".join(_section(*s, meanings) for s in sections)
 
 
 def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, str, Any]]:
@@ -244,7 +357,12 @@ def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, s
         for number, (inner, many) in enumerate(_inner(field.annotation)):
             name = f"{prefix}{key}"
             head = f"[[{name}]]" if many else f"[{name}]"
-            yield from _sections(inner, f"{name}.", head + (", or instead" if number else ""))
+            kinds = getattr(_fields(inner).get("kind"), "annotation", None)
+            if len(_inner(field.annotation)) > 1 and kinds is not None:
+                head += " kind = " + " or ".join(f'"{kind}"' for kind in kinds.__args__)
+            elif number:
+                head += ", or instead"
+            yield from _sections(inner, f"{name}.", head)
 
 
 def _fields(model: Any) -> dict[str, Any]:
@@ -264,12 +382,12 @@ def _plain_keys(model: Any) -> list[str]:
     return [k for k, f in _fields(model).items() if not _inner(f.annotation)]
 
 
-def _section(prefix: str, title: str, text: str, model: Any) -> str:
+def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str, tuple[str, str]]) -> str:
     schema = model.model_json_schema()["properties"]
     rows = []
     for key in _plain_keys(model):
         field = _fields(model)[key]
-        unit, meaning = MEANING[f"{prefix}{key}"]
+        unit, meaning = meanings[f"{prefix}{key}"]
         if _is_length(field) and not unit.startswith("*"):
             raise SystemExit(f"docs/pages.py: {prefix}{key} is a length; mark its unit with *")
         unit = unit.replace("*", "length_unit")

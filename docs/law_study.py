@@ -1,0 +1,86 @@
+"""Pictures of docs/contact.md: friction characteristics, the point contact element, loops, microslip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from microslip.contact.friction import (
+    Coulomb,
+    Exponential,
+    Falling,
+    Friction,
+    StaticSliding,
+    characteristic,
+    scattered,
+)
+from microslip.contact.study import Study, study
+from microslip.pictures.contact import loops_figure, motion_figure
+
+ROOT = Path(__file__).parents[1]
+CASES = ROOT / "pipeline" / "cases" / "contact"
+OWN = ROOT / "pipeline" / "microslip" / "templates" / "contact"
+COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c")
+
+
+def of_figure(number: str) -> Study:
+    return study(CASES / f"fig-{number}.toml")
+
+
+def friction(fig: Any, plain: Any) -> Any:
+    """Left: by formula. Middle: rubber at three temperatures. Right: a coefficient that scatters in time."""
+    left, middle, right = fig.subplots(1, 3)
+    for axes in (left, middle, right):
+        plain(axes)
+        axes.set_ylabel("friction coefficient")
+    speed = np.linspace(0, 1, 400)
+    laws: dict[str, Friction] = {
+        "coulomb": Coulomb(0.23), "static-sliding": StaticSliding(0.3, 0.2), "falling": Falling(0.3, 4.5),
+        "exponential": Exponential(0.3, 0.15, 8.0), "exponential, rising": Exponential(0.1, 0.25, 5.0),
+    }  # fmt: skip
+    for colour, (name, law) in zip(COLOURS, laws.items(), strict=False):
+        left.plot(speed, at(law, speed), color=colour, label=name)
+        if name == "static-sliding":
+            left.plot(0, at(law, np.zeros(1)), "o", color=colour, markersize=4)
+    left.set(xlabel="speed of sliding in m/s", ylim=(0, 0.42))
+    left.legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
+    _rubber(middle)
+    law = scattered(Falling(0.28, 1 / 0.22), 0.1, 0.02, seed=1)
+    time = np.linspace(0, 1, 2000)
+    for colour, v in zip(COLOURS, (0.05, 0.2, 0.6), strict=False):
+        mu = law.coefficient(jnp.full(len(time), v), jnp.ones(len(time)), jnp.asarray(time))
+        right.plot(time, mu, color=colour, linewidth=0.9, label=f"{v:g} m/s")
+    right.set(xlabel="time in s", ylim=(0, 0.36))
+    right.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
+    return fig
+
+
+def _rubber(axes: Any) -> None:
+    rows = [line.split(",") for line in (OWN / "rubber.csv").read_text().splitlines()[2:]]
+    v, mu = np.array(rows, dtype=float).T
+    speed = np.geomspace(1e-5, 1e2, 600)
+    for colour, kelvin in zip(COLOURS, (293.0, 313.0, 333.0), strict=False):
+        law = characteristic(v, mu, temperature=kelvin, reference=293.0)
+        axes.semilogx(speed, at(law, speed), color=colour, label=f"{kelvin:g} K")
+    axes.plot(v, mu, "o", color=COLOURS[0], markersize=3.5)
+    axes.set(xlabel="speed of sliding in m/s", ylim=(0, 1.5))
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
+
+
+def at(law: Friction, speed: np.ndarray) -> np.ndarray:
+    return np.asarray(law.coefficient(jnp.asarray(speed), jnp.ones(len(speed))))
+
+
+def element() -> Any:
+    return motion_figure(of_figure("3.7-7"))
+
+
+def stick_slip() -> Any:
+    return motion_figure(of_figure("3.7-3"))
+
+
+def loops() -> Any:
+    return loops_figure(study(OWN / "contact.toml", ["motion.amplitudes=[1.0, 2.0, 4.0, 8.0]", 'name="shroud"']))
