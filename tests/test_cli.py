@@ -174,6 +174,19 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
     assert "is there already" in said(capsys)[1] and (folder / "blade" / "body.toml").read_bytes() == before
 
 
+def test_run_prints_the_first_frequencies(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("microslip.workflow.run_body", lambda job, *_: (job.build_folder / "report.html", True))
+    assert main(["run", "box"]) == 0
+    table, page = said(capsys)[0].splitlines()
+    first = read_basis(folder / "build/box/basis.h5").groups[0, 0].frequency[:5]
+    shown = table.partition("rpm")[2].partition("Hz")[0].split()
+    np.testing.assert_allclose([float(f) for f in shown], first, rtol=1e-4)  # five digits are printed
+    assert page.endswith("build/box/report.html")
+    assert main(["run", "box", "-q"]) == 0 and said(capsys) == ("", "")
+
+
 def test_run_of_a_case_and_a_response_that_does_not_converge(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,7 +30,7 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.fem.segments import clip, facet_functions, reference_nodes
 from microslip.modes import equilibrium as newton
 from microslip.modes import modal_basis
-from microslip.modes.closures import contact_curve
+from microslip.modes.closures import contact_curve, contact_pairs
 from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
 from microslip.speed_range import frequencies_over, group_at
 
@@ -527,3 +527,16 @@ def test_interference_beyond_all_measure_is_refused():
     """Half a metre pressed into blocks of 0.4 m: a sentence, not a number."""
     with pytest.raises((UserError, NotConverged), match="closures|equilibrium|unstable"):
         rest(blocks(press=0.7))
+
+
+@pytest.mark.parametrize("share, refused", [(0.04, False), (0.06, True)])
+def test_interference_is_held_against_the_body_before_anything_is_solved(share, refused):
+    """A twentieth of the body's extent is the limit, whatever the stiffness."""
+    mesh = shrouded()
+    press = share * float(np.ptp(mesh.points, axis=0).max())
+    settings = settings_of([6000.0], closures=[closure(interference=press)])
+    if not refused:
+        assert contact_pairs(mesh, settings, [settings.material.material()])[0].interference == press
+        return
+    with pytest.raises(UserError, match="closures.*interference: .* too much for a body of"):
+        contact_pairs(mesh, settings, [settings.material.material()])

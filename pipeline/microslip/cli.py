@@ -178,7 +178,8 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
         job = open_job(path, list(set_))
         with progress(f"run {job.settings.name}", quiet) as report:
             page, converged = run_body(job, force, report)
-        _say("\n".join(frequency_lines(read_basis(job.basis_file))), quiet)
+        if not quiet:
+            print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
         raise NotConverged("some points of the response did not converge; they are marked in response.csv")

@@ -36,12 +36,28 @@ def _pair(mesh: Mesh, settings: BodySettings, c: Closure, modulus: float) -> Con
     else:
         require_face(mesh, c.against, f"closures.{c.name}.against")
         other = c.against
+    _refuse_absurd(mesh, c)
     axis, about = np.array(settings.rotation.axis), np.array(settings.rotation.point)
     angle = 2 * np.pi * c.sector_shift / sector_count(settings, c) if c.sector_shift else 0.0
     return make_pair(
         mesh, c.name, c.face, other, modulus, turned(axis, angle), about, c.interference, c.penalty, c.slide,
         c.modes == "closed",
     )  # fmt: skip
+
+
+ROOM = 0.05
+"""Interference over the body's extent beyond which nothing is solved: a strain that no elastic solid survives."""
+
+
+def _refuse_absurd(mesh: Mesh, c: Closure) -> None:
+    """Before Newton tries for minutes: an interference of the size of the body, or of the face, is a wrong unit."""
+    body = float(np.ptp(mesh.points, axis=0).max())
+    face = float(np.linalg.norm(np.ptp(mesh.points[mesh.face_points(c.face)], axis=0)))
+    if c.interference > min(ROOM * body, 0.5 * face):
+        raise UserError(
+            f"closures.{c.name}.interference: {c.interference:.3g} m is too much for a body of {body:.3g} m and a face "
+            f"of {face:.3g} m; correct it (it is in length_unit)"
+        )
 
 
 def _ground(mesh: Mesh, c: Closure) -> Plane:
