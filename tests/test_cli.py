@@ -458,6 +458,21 @@ def test_progress_in_a_log_shows_small_steps_only_after_silence(
     assert "eigenmodes" in shown and "8 of 80" in shown and "4 of 80" not in shown
 
 
+@pytest.mark.parametrize("encoding, shown", [("utf-8", "2 µm ✓"), ("ascii", "2 um ?"), ("latin-1", "2 µm ?")])
+def test_a_terminal_that_cannot_show_a_letter_shows_another(
+    monkeypatch: pytest.MonkeyPatch, encoding: str, shown: str
+) -> None:
+    import io
+
+    from microslip.cli import _plain_where_needed
+
+    bytes_ = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(bytes_, encoding=encoding))
+    _plain_where_needed()
+    print("2 µm ✓", end="", flush=True)
+    assert bytes_.getvalue().decode(encoding) == shown
+
+
 def test_every_verb_is_documented() -> None:
     for verb in app:
         if not verb.startswith("-"):

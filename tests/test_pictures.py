@@ -108,7 +108,7 @@ def test_scale_bars_are_1_2_or_5(value: float, wanted: float) -> None:
 
 
 def test_lengths_have_the_unit_of_a_drawing() -> None:
-    assert [lettering.length_text(v) for v in (2.0, 0.05, 2e-5)] == ["2 m", "50 mm", "20 um"]
+    assert [lettering.length_text(v) for v in (2.0, 0.05, 2e-5)] == ["2 m", "50 mm", "20 µm"]
 
 
 # --- pictures as files ---------------------------------------------------------------------------------------------

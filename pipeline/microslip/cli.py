@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import logging
 import os
 import re
@@ -491,6 +493,7 @@ def _warn(warnings: list[str]) -> None:
 
 def main(words: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0, 1, 2 or 130, see the top of this file."""
+    _plain_where_needed()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of a home without a place for its fonts
     try:
         app(words, exit_on_error=False, print_error=False, result_action="return_value")
@@ -513,6 +516,20 @@ def main(words: list[str] | None = None) -> int:
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}; correct the path or its permissions", 2)
     except KeyboardInterrupt:
         return _fail("interrupted; finished products are kept", 130)
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join({"µ": "u"}.get(c, "?") for c in error.object[error.start : error.end]), error.end
+
+
+def _plain_where_needed() -> None:
+    """A terminal without the letter µ shows um; nothing that cannot be shown ends a run."""
+    codecs.register_error("plain", _plainly)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="plain")
 
 
 def _missing(error: ModuleNotFoundError) -> str:

@@ -551,11 +551,11 @@ def contact_sentence(name: str, c: ContactState) -> str:
     """What a closure does in the static state, in words."""
     other = "the ground" if c.against == GROUND else c.against + (" of the neighbour" if c.sector_shift else "")
     if not c.normal_force:
-        return f"contact {name}: {c.face} is open against {other}, the gap {1e6 * c.gap.min():.4g} um or wider."
+        return f"contact {name}: {c.face} is open against {other}, the gap {1e6 * c.gap.min():.4g} µm or wider."
     kept = "the modes leave it open" if c.modes == "open" else "the modes keep it closed"
     return (
         f"contact {name}: {c.face} presses {other} with {c.normal_force:.5g} N on {percent(c.closed_share)} of its "
-        f"area, at most {1e-6 * c.pressure.max():.4g} MPa (penetration left {1e6 * c.penetration:.2g} um); {kept}."
+        f"area, at most {1e-6 * c.pressure.max():.4g} MPa (penetration left {1e6 * c.penetration:.2g} µm); {kept}."
     )
 
 

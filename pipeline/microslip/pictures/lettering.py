@@ -212,4 +212,4 @@ def length_text(metres: float) -> str:
     """A length in the unit a drawing would use."""
     if metres >= 1.0:
         return f"{metres:g} m"
-    return f"{metres * 1e3:g} mm" if metres >= 1e-3 else f"{metres * 1e6:g} um"
+    return f"{metres * 1e3:g} mm" if metres >= 1e-3 else f"{metres * 1e6:g} µm"
