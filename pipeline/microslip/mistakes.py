@@ -21,7 +21,7 @@ _WORDS = {
     "string_type": 'must be text in "quotes"',
     "string_too_short": "must not be empty",
     "string_too_long": "must have at most {max_length} characters",
-    "string_pattern_mismatch": "must begin with a letter or digit and hold only letters a to z (or A to Z), digits, _ . and -",
+    "string_pattern_mismatch": "must begin with a letter or digit and hold only letters a to z, digits, _ . and -",
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must not be less than {ge:g}",
     "less_than": "must be less than {lt:g}",

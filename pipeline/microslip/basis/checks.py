@@ -148,6 +148,8 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         found += _gyroscopic_checks(g, g.gyroscopic)
     if mesh_is_sound and g.phi.shape[0] and basis.source == "elements":
         found += _shape_checks(basis, g)
+        if g.invariants is not None:
+            found += _moment_checks(basis, g, g.invariants)
     for name, item in g.interfaces.items():
         found += _interface_checks(basis, g, name, item, mesh_is_sound)
     for key in ("orthogonality", "backward_error", "mass_error"):
@@ -325,6 +327,28 @@ def _invariant_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findi
         N = np.einsum("ab,abij->ij", turn, v.shape_shape)
         found.append(("invariants: shape_shape gives N", _largest(N - g.run_up.N), 1e-9, ""))
     return found
+
+
+def _moment_checks(basis: ModalBasis, g: ModalGroup, v: Invariants) -> _Findings:
+    """The integrals of the body in its static state, about the point named, over the file's own mesh.
+
+    One mixture of all shapes stands for them: what is wrong in any of them is wrong in it.
+    """
+    w = np.cos(1.0 + np.arange(g.phi.shape[2]))
+    r, mixed = basis.mesh.points + g.u_static - v.point, g.phi @ w
+    fields = np.zeros((len(r), 3, 7), dtype=mixed.dtype)
+    fields[:, 0, :3], fields[:, 0, 3], fields[:, 0, 4:] = r, 1.0, mixed
+    gram, volume = modal_mass(basis.mesh, fields)
+    mass = np.float64(basis.mass)
+    gram = gram[:4] * (mass / np.float64(volume))
+    size = np.sqrt(np.trace(gram[:3, :3].real) / mass) + _extent(basis.mesh)
+    moving = np.sqrt(mass) * np.linalg.norm(w)
+    return [
+        ("invariants: first moment", _largest(v.first_moment - gram[:3, 3]) / (mass * size), 1e-9, ""),
+        ("invariants: second moment", _largest(v.second_moment - gram[:3, :3]) / (mass * size**2), 1e-9, ""),
+        ("invariants: shape", _largest(v.shape @ w - gram[3, 4:]) / moving, 1e-9, ""),
+        ("invariants: position_shape", _largest(v.position_shape @ w - gram[:3, 4:]) / (moving * size), 1e-9, ""),
+    ]
 
 
 def _gyroscopic_checks(g: ModalGroup, y: GyroscopicModes) -> _Findings:

@@ -91,9 +91,9 @@ def compliance_plot(basis: ModalBasis, group: ModalGroup, path: Path, most: int 
     if not panels:
         return None
     names = list(panels)[:most]
-    columns = min(len(names), 4 if len(names) > 6 else 3)
+    columns = min(len(names), 3)
     rows = math.ceil(len(names) / columns)
-    figure = _figure(max(3.6 * columns, 5.5), 0.9 + 2.9 * rows)
+    figure = _figure(max(4.8 * columns, 6.0), 0.9 + 2.9 * rows)  # the legends stand beside the panels
     table = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, name in zip(table, names, strict=False):
         _compliance_panel(axes, name, panels[name], group.n_modes)
@@ -123,7 +123,7 @@ def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count:
     axes.set_xlim(0, count + 0.6)
     axes.set_ylim(-3, 106)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(fontsize=7, loc="best", framealpha=0.8, handlelength=1.4, borderaxespad=0.8)
+    axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, handlelength=1.4)
 
 
 # --- Campbell ------------------------------------------------------------------------------------------------------

@@ -126,8 +126,11 @@ def mesh_picture(studio: Studio) -> Picture:
     names, colours = _face_colours(basis.mesh.faces)
     areas = {name: _area(studio, name) for name in names}
     paint = np.tile(np.array(GREY, dtype=np.uint8), (len(outside.triangles), 1))
+    bare = np.ones(len(outside.triangles), dtype=bool)
     for name in sorted(names, key=lambda n: -areas[n]):
-        paint[face_triangles(outside, basis.mesh, name)] = colours[name]
+        here = face_triangles(outside, basis.mesh, name)
+        paint[here], bare[here] = colours[name], False
+    unnamed = [(GREY, "no name")] if bare.any() else []
     views = []
     for axes in (studio.axes, axes_towards(-studio.axes[2])):
         camera = fit(basis.mesh.points, axes, AREA)
@@ -139,7 +142,7 @@ def mesh_picture(studio: Studio) -> Picture:
         views.append(_measured(studio.stage.shoot(camera), camera))
     both = side_by_side(views)
     unit = max(areas.values(), default=0.0)
-    entries = [(colours[n], f"{n}  {_area_text(areas[n], unit)}") for n in names] + [(GREY, "no name")]
+    entries = [(colours[n], f"{n}  {_area_text(areas[n], unit)}") for n in names] + unnamed
     cells = ", ".join(f"{len(c)} {kind}" for kind, c in basis.mesh.cells.items())
     title = f"{basis.name}: mesh and named faces"
     note = f"{basis.mesh.n_points} points, {cells}. Seen from two opposite sides."
