@@ -1,0 +1,329 @@
+"""Microslip as a law: sliders in parallel, each with its own spring, its own limit and its own memory.
+
+Some of the sliders slide while others stick, so that the tangential force bends gradually from stick to slip, and a
+cycle of any size dissipates. `Strips` are the parts of a rough surface or of a round contact, which touch one after
+the other; `Iwan` sliders share one normal force and differ in strength.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UserError
+from .friction import Coulomb
+from .heights import Heights, Tabulated, as_table
+from .law import Array, Law, ratio, root, settings
+from .normal import Normal, Preload
+from .partial_slip import NormalContact
+from .point import PointContact
+
+
+class SliderState(NamedTuple):
+    """State of m sliders at n points: u_t (2, n) m, elastic forces (m, 2, n) N, springs (m, n) N/m, slip (2, n) m."""
+
+    tangential: Array
+    elastic: Array
+    springs: Array
+    slipped: Array
+
+
+class Sliders(Law):
+    """Base: m sliders in parallel at every point, each a Coulomb cone behind an isotropic spring.
+
+    As in `point.PointContact` a spring that grows takes no force with it and one that shrinks loses its part, which
+    gives no energy; a slider whose limit falls while it sticks slides.
+    """
+
+    mu: Array
+
+    def count(self) -> int:
+        """Number of sliders."""
+        raise NotImplementedError
+
+    def local(self, approach: Array) -> tuple[Array, Array, Array]:
+        """Normal force (n,) N, tangential springs (m, n) N/m and limits (m, n) N at an approach (n,) m."""
+        raise NotImplementedError
+
+    def init(self, n: int) -> SliderState:
+        m = self.count()
+        return SliderState(jnp.zeros((2, n)), jnp.zeros((m, 2, n)), jnp.zeros((m, n)), jnp.zeros((2, n)))
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> tuple[Array, SliderState]:
+        pressed, springs, limits = self.local(u.T[0])
+        moved = u.T[1:] - state.tangential
+        relaxed = state.elastic * jnp.minimum(ratio(springs, state.springs), 1.0)[:, None]
+        trial = relaxed + springs[:, None] * moved
+        tried = root(jnp.sum(trial**2, axis=1))
+        elastic = trial * jnp.where(tried > limits, ratio(limits, tried), 1.0)[:, None]
+        slipped = state.slipped + ratio(jnp.sum(trial - elastic, axis=0), jnp.sum(springs, axis=0))
+        force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
+        return force.T, SliderState(u.T[1:], elastic, springs, slipped)
+
+    def limit(self, force: Array, state: SliderState) -> Array:
+        return self.mu * force[:, 0]
+
+    def slip(self, state: SliderState) -> Array:
+        return state.slipped.T
+
+    def stored(self, u: Array, state: SliderState) -> Array:
+        stretched = ratio(jnp.sum(state.elastic**2, axis=1), state.springs)
+        return self.pressed_energy(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
+
+    def pressed_energy(self, approach: Array) -> Array:
+        """(n,) energy of the normal springs, J."""
+        raise NotImplementedError
+
+
+@settings
+class Strips(Sliders):
+    """Strips of one contact that touch one after the other (Sextro Eqs. (5.2-33), (3.3-15), (3.3-16)).
+
+    Strip i begins to touch at the approach depth x_i. It then carries the normal force w_i c_N0 (u_n - depth x_i) and
+    friction up to mu times that, behind the spring w_i c_R0. At first loading this is 3.8-26 of the normal law that
+    the strips stand for, which is piecewise linear. `rough_strips`, `mindlin` make them.
+
+    Attributes:
+        at: (m, 1) or (m, n) x_i, rising. shares: the same shape, w_i, whose sum is 1. depth: of x = 1, m; the roughness
+            R_Z of a rough surface. stiffness_0: c_N0 of all strips, N/m. stiffness_t: c_R0 of all strips, N/m.
+        held: approach, m, that no motion changes, for a constant normal force (`under`); None: that of u.
+    """
+
+    at: Array
+    shares: Array
+    depth: Array
+    stiffness_0: Array
+    stiffness_t: Array
+    mu: Array
+    held: Array | None = None
+
+    def count(self) -> int:
+        return jnp.shape(self.at)[0]
+
+    def local(self, approach: Array) -> tuple[Array, Array, Array]:
+        overlap = self._overlap(approach)
+        pressed = self.stiffness_0 * self.shares * overlap
+        springs = jnp.where(overlap > 0, self.stiffness_t * self.shares, 0.0)
+        return jnp.sum(pressed, axis=0), springs, self.mu * pressed
+
+    def pressed_energy(self, approach: Array) -> Array:
+        if self.held is not None:
+            return self.local(approach)[0] * approach
+        return 0.5 * self.stiffness_0 * jnp.sum(self.shares * self._overlap(approach) ** 2, axis=0)
+
+    def approach(self, force: ArrayLike) -> np.ndarray:
+        """Approach (m) under a normal force (N), any shape; strips the same for all points.
+
+        Raises:
+            UserError: settings per point, or a force that does not press.
+        """
+        loads = np.asarray(force, dtype=float)
+        parts = [np.squeeze(p) for p in (self.at, self.shares, self.depth, self.stiffness_0)]
+        if parts[0].ndim > 1 or parts[2].ndim or parts[3].ndim:
+            raise UserError("strips: settings differ from point to point; solve for the approach of each point apart")
+        if not (loads > 0).all():
+            raise UserError(f"normal force: {loads.min():g} N does not press the contact; give a positive one")
+        gaps, stiffness = np.atleast_1d(parts[0]) * parts[2], np.cumsum(np.atleast_1d(parts[1])) * parts[3]
+        knots = np.concatenate([[0.0], np.cumsum(stiffness[:-1] * np.diff(gaps))])
+        i = np.searchsorted(knots, loads, side="right") - 1
+        return gaps[i] + (loads - knots[i]) / stiffness[i]
+
+    def under(self, force: ArrayLike) -> Strips:
+        """The same contact under a constant normal force (N, one or one per point), whatever the normal motion."""
+        return replace(self, held=jnp.asarray(self.approach(force)))
+
+    def _overlap(self, approach: Array) -> Array:
+        """(m, n) how far each strip is pressed, m."""
+        if self.held is not None:
+            approach = jnp.broadcast_to(self.held, jnp.shape(approach))
+        return jnp.maximum(approach - self.depth * self.at, 0.0)
+
+
+@settings
+class Iwan(Sliders):
+    """Sliders under one normal force, in parallel: Iwan's parallel-series model (J. Appl. Mech. 33, 1966).
+
+    Slider i has the share k_i of the stiffness and the share f_i of the limit mu F_N. The limits follow the normal
+    force of the moment, the springs the share of the area (3.3-40) as in `point.PointContact`, of which this is the
+    law with several sliders. `uniform` and `segalman` give the shares.
+
+    Attributes:
+        normal: normal law. mu: friction coefficient. stiffness: tangential stiffness of the full area, N/m.
+        shares: (m, 1) or (m, n) k_i, whose sum is 1. strengths: the same shape, f_i, whose sum is 1.
+    """
+
+    normal: Normal
+    mu: Array
+    stiffness: Array
+    shares: Array
+    strengths: Array
+
+    def count(self) -> int:
+        return jnp.shape(self.shares)[0]
+
+    def local(self, approach: Array) -> tuple[Array, Array, Array]:
+        pressed = self.normal.force(approach)
+        springs = self.stiffness * self.shares * self.normal.share(approach)
+        return pressed, springs, self.mu * self.strengths * pressed
+
+    def pressed_energy(self, approach: Array) -> Array:
+        return self.normal.stored(approach)
+
+
+def jenkins(stiffness: float, mu: float, normal: float | Normal) -> PointContact:
+    """One slider behind one spring. normal: a normal law, or a constant force in N; stiffness: tangential, N/m."""
+    law = normal if isinstance(normal, Normal) else Preload(jnp.asarray(normal, dtype=float))
+    return PointContact(law, Coulomb(jnp.asarray(mu, dtype=float)), jnp.asarray(stiffness, dtype=float))
+
+
+# Shares of Iwan's sliders ------------------------------------------------------------------------------------------
+
+
+def uniform(count: int, weakest: float = 0.0) -> tuple[Array, Array]:
+    """Shares and strengths (count, 1) of sliders of equal stiffness whose strengths are equally frequent.
+
+    From 0 the force of first loading is the parabola k u (1 - k u / (4 mu F_N)), and slip is complete at
+    u = 2 mu F_N / k.
+
+    Args:
+        weakest: strength of the weakest slider over that of the strongest, from 0 to below 1.
+
+    Raises:
+        UserError: no slider, or another weakest.
+    """
+    _counted(count)
+    if not 0 <= weakest < 1:
+        raise UserError(f"weakest: {weakest:g}; it must be 0 or more and below 1")
+    edges = np.linspace(weakest, 1.0, count + 1)
+    return _columns(np.full(count, 1.0), 0.5 * (edges[1:] + edges[:-1]))
+
+
+def segalman(count: int, exponent: float, ratio_last: float, smallest: float = 1e-3) -> tuple[Array, Array]:
+    """Shares and strengths (count, 1) of the distribution of D. J. Segalman (J. Appl. Mech. 72, 2005), 4 parameters.
+
+    The density of the slip displacements is R phi^chi up to phi_max, where a last slider holds the share that is left
+    over: the tangent falls there to zero from beta/(1 + beta) of the first. A cycle between +-A <= phi_max dissipates
+    4 R A^(chi + 3) / ((chi + 2) (chi + 3)), R = k (chi + 1) / ((1 + beta) phi_max^(chi + 1)). The two other parameters
+    are the stiffness k and mu F_N of `Iwan`: phi_max = (1 + beta) / (beta + (chi + 1)/(chi + 2)) mu F_N / k.
+
+    The density is cut in geometric intervals; each slider has the stiffness and the strength of its interval, so that
+    the force of first loading is exact at their ends and too large by the second order of their width between.
+
+    Args:
+        exponent: chi, above -1; measured joints lie between -1 and 0. ratio_last: beta, of the stiffness of the last
+            slider to that of all others, 0 or more. smallest: end of the first interval over phi_max; cycles smaller
+            than that dissipate nothing or too little.
+
+    Raises:
+        UserError: a parameter outside its bounds.
+    """
+    _counted(count)
+    if not (exponent > -1 and ratio_last >= 0 and 0 < smallest < 1):
+        raise UserError(
+            f"Segalman's distribution: exponent {exponent:g}, ratio {ratio_last:g}, smallest {smallest:g}; "
+            "they must lie above -1, at 0 or above, and between 0 and 1"
+        )
+    spread = count - 1 if ratio_last > 0 else count
+    if spread < 1:
+        raise UserError(f"sliders: {count}; Segalman's distribution with a last slider needs 2 or more")
+    edges = np.concatenate([[0.0], np.geomspace(smallest, 1.0, spread) if spread > 1 else [1.0]])
+    shares = np.diff(edges ** (exponent + 1))
+    displacements = np.diff(edges ** (exponent + 2)) / shares * (exponent + 1) / (exponent + 2)
+    if ratio_last > 0:
+        shares, displacements = np.append(shares, ratio_last), np.append(displacements, 1.0)
+    return _columns(shares, displacements)
+
+
+def _columns(shares: np.ndarray, displacements: np.ndarray) -> tuple[Array, Array]:
+    """Shares of the stiffness and of the strength from stiffnesses and the displacements at which sliders let go."""
+    strengths = shares * displacements
+    return tuple(jnp.asarray(part / part.sum())[:, None] for part in (shares, strengths))  # type: ignore[return-value]
+
+
+def _counted(count: int) -> None:
+    if count < 1:
+        raise UserError(f"sliders: {count}; give 1 or more")
+
+
+# Strips of contacts ------------------------------------------------------------------------------------------------
+
+
+def rough_strips(
+    stiffness_0: float, roughness: float, heights: Heights, stiffness_t: float, mu: float, count: int
+) -> Strips:
+    """The strips of a rough surface (`normal.Rough`): equal shares of its area, each at its mean height.
+
+    With the mean height the strips' normal force touches the smooth one at the limits of the heights and lies below
+    it in between, by the second order of their width; beyond the deepest height it is exact. So is 3.8-26.
+
+    Args:
+        stiffness_0: c_N0, N/m. roughness: R_Z, m. heights: from x* = 0 (`heights.Cut` makes others so).
+        stiffness_t: c_R0, N/m. mu: friction coefficient. count: of strips.
+
+    Raises:
+        UserError: a setting that is not positive, heights that lie above x* = 0.
+    """
+    _counted(count)
+    _positive(stiffness_0=stiffness_0, roughness=roughness, stiffness_t=stiffness_t, friction=mu)
+    table = as_table(heights)
+    if table.x.ndim != 1:
+        raise UserError("height distribution: one table per point; make the strips of each point apart")
+    if float(table.x[0]) < 0:
+        raise UserError("height distribution: begins below x = 0, where the contact is open; take Cut(...) of it")
+    edges = jnp.asarray(_quantiles(table, np.linspace(0, 1, count + 1)))
+    area = np.asarray(heights.area(edges))
+    within = np.diff(np.asarray(edges * heights.area(edges) - heights.volume(edges)))  # integral of x over the area
+    return _strips(within / np.diff(area), np.diff(area), roughness, stiffness_0, stiffness_t, mu)
+
+
+def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis: int = 0) -> Strips:
+    """Cattaneo's and Mindlin's partial slip under a normal load that may vary, as Mindlin and Deresiewicz have it.
+
+    With like bodies and Coulomb friction, every ring of a round contact acts like a flat punch of its own: the strips
+    of a normal law F(delta) with the stiffness dF/ddelta and one ratio k_T/k_N (Jaeger, Arch. Appl. Mech. 65, 1995;
+    Popov & Hess, method of dimensionality reduction). First loading is that of `partial_slip.PartialSlip`, mu N
+    (1 - (1 - ...)^(3/2)) of a sphere. The strips' normal law goes straight between ``count + 1`` approaches, whose
+    squares of the numbers 0..count are the scale, exact there and too large between by at most 1/(4 count^2) of the
+    force at ``deepest`` for a sphere, tangentially mu times that; beyond, it goes straight on.
+
+    Args:
+        contact: `hertz.Hertz`, `profiles.RoundContact`, or one's own, of convex force. mu: friction coefficient.
+        deepest: largest approach that is described, m. count: of strips. axis: of the elliptic contact, 0 or 1, whose
+            tangential stiffness is used for both directions.
+
+    Raises:
+        UserError: a setting that is not positive, a force that is not convex.
+    """
+    _counted(count)
+    _positive(deepest=deepest, friction=mu)
+    at = (np.arange(count + 1) / count) ** 2
+    slopes = np.diff(np.asarray(contact.force(at * deepest))) / np.diff(at * deepest)
+    rises = np.diff(slopes, prepend=0.0)
+    if not (rises > 0).all():
+        raise UserError("contact: the stiffness of its normal force does not rise with the approach; strips need that")
+    shares = rises / slopes[-1]
+    stiffness_t = slopes[-1] * contact.tangential_ratio[axis]
+    return _strips(at[:-1], shares, deepest, float(slopes[-1]), float(stiffness_t), mu)
+
+
+def _strips(at: np.ndarray, shares: np.ndarray, *numbers: float) -> Strips:
+    columns = (jnp.asarray(at)[:, None], jnp.asarray(shares)[:, None])
+    return Strips(*columns, *(jnp.asarray(x, dtype=float) for x in numbers))
+
+
+def _quantiles(table: Tabulated, areas: np.ndarray) -> np.ndarray:
+    """Approaches at which the area of a table, linear between its nodes, has these values."""
+    x, area = np.asarray(table.x), np.asarray(table.area_at)
+    i = np.clip(np.searchsorted(area, areas, side="left") - 1, 0, len(x) - 2)
+    rise = area[i + 1] - area[i]
+    return np.asarray(x[i] + (x[i + 1] - x[i]) * np.clip((areas - area[i]) / np.where(rise > 0, rise, 1.0), 0.0, 1.0))
+
+
+def _positive(**settings: float) -> None:
+    for name, value in settings.items():
+        if not 0 < value < np.inf:
+            raise UserError(f"{name}: {value:g}; it must be greater than 0")
