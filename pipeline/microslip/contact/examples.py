@@ -18,6 +18,7 @@ from .point import PointContact
 from .point_laws import hertz_point, round_point
 from .profiles import Profile, RoundContact
 from .regularised import MassContact
+from .sliders import Iwan, mindlin, rough_strips, segalman
 from .solids import Solid
 from .wear import course
 
@@ -97,4 +98,7 @@ EXAMPLES: dict[str, Example] = {
     "point with mass": Example(
         MassContact(_ROUGH, _COULOMB, _C, None, _value(1e-6), _value(1e-5), _value(1e6)), 1.2e-5, 8e-6, inertia=0.02
     ),
+    "rough strips": Example(rough_strips(2.4e8, 12e-6, Polynomial(), 0.9e8, 0.3, 6), 1.2e-5, 8e-6),
+    "Mindlin": Example(mindlin(Hertz(_STEEL, _STEEL, 20.0, 20.0), 0.3, 3e-5, 6), 1.2e-5, 8e-6),
+    "Iwan": Example(Iwan(_ROUGH, _value(0.3), _C, *segalman(5, -0.5, 0.1, 0.05)), 1.2e-5, 8e-6),
 }

@@ -19,6 +19,7 @@ NODES = 2048
 """Intervals of the slip depth in which the curve is laid out before it is refined: folds are found to 1e-6 of w."""
 
 _SPREAD = np.append(np.linspace(0.0, 1.0, NODES)[:-1], [1 - 1e-9, 1.0])  # a smooth surface jumps at its last value
+_HALVINGS = 45  # of a 2048th of the range: down to rounding
 _BLOCK = 256  # rows laid out at a time: 4 MB
 
 
@@ -103,7 +104,7 @@ class MonotoneSlip:
         w, rows, u, flat = self._rows(np.abs(np.asarray(w, dtype=float)), u)
         low, high = flat._brackets(w.ravel(), rows.ravel(), u)
         each, u = flat._picked(rows.ravel()), u[rows.ravel()]
-        for _ in range(60):
+        for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             short = each.displacement(middle, u) < w.ravel()
             low, high = np.where(short, middle, low), np.where(short, high, middle)
@@ -123,7 +124,7 @@ class MonotoneSlip:
         side = np.sign(excess(grid))
         crosses = side[1:] != side[:-1]
         low, high, side = grid[:-1][crosses], grid[1:][crosses], side[:-1][crosses]
-        for _ in range(60):
+        for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             same = np.sign(excess(middle)) == side
             low, high = np.where(same, middle, low), np.where(same, high, middle)
