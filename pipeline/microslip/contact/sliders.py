@@ -318,9 +318,11 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
     return replace(_strips(at[:-1], shares, deepest, float(slopes[-1]), float(stiffness_t), mu), includes=BULK)
 
 
-def _strips(at: np.ndarray, shares: np.ndarray, *numbers: float) -> Strips:
-    columns = (jnp.asarray(at)[:, None], jnp.asarray(shares)[:, None])
-    return Strips(*columns, *(jnp.asarray(x, dtype=float) for x in numbers))
+def _strips(
+    at: np.ndarray, shares: np.ndarray, depth: float, stiffness_0: float, stiffness_t: float, mu: float
+) -> Strips:
+    depth_, c_N0, c_R0, friction = (jnp.asarray(x, dtype=float) for x in (depth, stiffness_0, stiffness_t, mu))
+    return Strips(jnp.asarray(at)[:, None], jnp.asarray(shares)[:, None], depth_, c_N0, c_R0, friction)
 
 
 def _edges(x: np.ndarray, area: np.ndarray, count: int) -> np.ndarray:
