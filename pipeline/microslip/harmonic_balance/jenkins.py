@@ -4,7 +4,7 @@ Each contact of a body with a rigid neighbour is a linear 6 x 6 spring on the in
 tangent, a Jenkins element (a spring in series with a slider) whose first harmonic is known in closed form. The
 modal part is eliminated exactly, so the unknowns are the contact coordinates only, and the residual flexibility of
 MacNeal's method (what the kept modes leave of the static compliance) adds to theirs without new states. Rough
-surfaces, varying normal load and more harmonics belong to the later contact stages.
+surfaces, varying normal load and more harmonics are `response`'s.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from .data import Array, ComplexArray, Indices, ModalGroup
+from ..data import Array, ComplexArray, Indices, ModalGroup
 
 Report = Callable[[str], None]
 
