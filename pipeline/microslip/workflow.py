@@ -58,7 +58,8 @@ _MODES_CODE = (
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
 _CASE_CODE = (
-    "speed_range.py", "harmonic_balance", "contact", "compliance.py", "truncation.py", "case.py", "pictures/response.py",
+    "speed_range.py", "harmonic_balance", "contact", "compliance.py", "truncation.py", "case.py",
+    "pictures/response.py",
 )  # fmt: skip
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",

@@ -1,0 +1,341 @@
+"""Multi-harmonic response with contact laws: limits, closed forms, derivatives, time integration, energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from microslip.contact.friction import Coulomb, Falling
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import Law
+from microslip.contact.normal import Normal, Penalty, Preload, Rough
+from microslip.contact.point import PointContact
+from microslip.data import Compliance, Interface, ModalGroup, UserError
+from microslip.harmonic_balance import JenkinsContact, frequency_response
+from microslip.harmonic_balance.patch import Patch, equilibrium, grid, stuck_stiffness
+from microslip.harmonic_balance.reduced import stuck
+from microslip.harmonic_balance.response import HarmonicResponse, Problem, harmonic_response, of_body
+
+
+def value(number: float) -> jax.Array:
+    return jnp.asarray(number, dtype=float)
+
+
+def body(rows: np.ndarray, omega: np.ndarray, ratio: float = 0.0) -> ModalGroup:
+    """Modes whose six rows at the interface ``face`` are given."""
+    m = len(omega)
+    face = Interface(
+        np.zeros(3), np.eye(3), rows, np.zeros(m), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, m))
+    )
+    return ModalGroup(
+        speed=0.0, omega=omega, kind=("normal",) * m, damping_ratio=np.full(m, ratio), M_r=np.eye(m),
+        K_r=np.diag(omega**2), C_r=np.diag(2 * ratio * omega), G_r=np.zeros((m, m)), phi=np.zeros((0, 3, m)),
+        interfaces={"face": face}, excitations={}, monitors={}, gauges={},
+        compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
+        checks={},
+    )  # fmt: skip
+
+
+def oscillator(ratio: float = 0.02) -> ModalGroup:
+    """1 kg on 1e4 N/m that moves along t1."""
+    rows = np.zeros((6, 1))
+    rows[1] = 1.0
+    return body(rows, np.array([100.0]), ratio)
+
+
+def point(normal: Normal, stiffness: float, mu: float) -> Patch:
+    """One point contact in the middle of the patch."""
+    return Patch("face", np.zeros((1, 2)), np.ones(1), PointContact(normal, Coulomb(value(mu)), value(stiffness)))
+
+
+def rough_patch(counts: tuple[int, int], stiffness: float = 8e8, mu: float = 0.2) -> Patch:
+    """72 x 5 mm, R_Z = 12 um: numbers of the shroud of section 5.3."""
+    places, areas = grid(0.072, 0.005, counts)
+    n = len(areas)
+    normal = Rough(value(stiffness / n), value(12e-6), Polynomial())
+    return Patch("face", places, areas, PointContact(normal, Coulomb(value(mu)), value(0.1 * stiffness / n)))
+
+
+def three_dof(ratio: float = 0.02) -> ModalGroup:
+    """1 kg that moves along n, t1 and t2 with 60, 16 and 20 Hz."""
+    rows = np.vstack([np.eye(3), np.zeros((3, 3))])
+    return body(rows, 2 * np.pi * np.array([60.0, 16.0, 20.0]), ratio)
+
+
+# equilibrium -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("counts", [(1, 1), (6, 2), (24, 5)])
+def test_equilibrium_of_a_pure_approach_does_not_depend_on_the_mesh(counts: tuple[int, int]) -> None:
+    """(5.2-5) with the factor 1/(n_y n_z) of the errata: F_N = c_N0 R_Z (x^3 - x^4/2), x = u_G/R_Z below 1."""
+    u = equilibrium(rough_patch(counts), 780.0)
+    x = u[0] / 12e-6
+    assert 8e8 * 12e-6 * (x**3 - x**4 / 2) == pytest.approx(780.0, rel=1e-11)
+    np.testing.assert_allclose(u[1:], 0.0, atol=1e-15)
+
+
+def test_equilibrium_under_moments() -> None:
+    """The forces found at the equilibrium are those asked for; a linear contact tilts by M / (c h0^2 / 12)."""
+    patch = rough_patch((12, 4))
+    u = equilibrium(patch, 780.0, (0.4, -6.0))
+    approach = patch.kinematics[:, 0] @ u
+    force = np.asarray(patch.law.normal.force(jnp.asarray(approach)))
+    y, z = patch.points.T
+    np.testing.assert_allclose([force.sum(), force @ z, -force @ y], [780.0, 0.4, -6.0], rtol=1e-9)
+    linear = replace(patch, law=replace(patch.law, normal=Penalty(value(8e8 / 48))))
+    tilted = equilibrium(linear, 780.0, (0.2, 0.0))
+    assert tilted[4] == pytest.approx(0.2 / (8e8 * 0.005**2 * (1 - 1 / 4**2) / 12), rel=1e-9)
+
+
+def test_forces_that_no_contact_has_are_refused() -> None:
+    with pytest.raises(UserError, match="cannot pull"):
+        equilibrium(rough_patch((2, 2)), -1.0)
+    with pytest.raises(UserError, match="no approach"):
+        equilibrium(point(Preload(value(3.0)), 1e6, 0.2), 5.0)
+
+
+def test_stiffness_of_a_closed_sticking_patch() -> None:
+    """c_N0 h0^2/12 (1 - 1/n^2) about t1 and so on (errata to 5.2-40/41), and no coupling."""
+    patch = rough_patch((9, 4))
+    closed = replace(patch, law=replace(patch.law, normal=Penalty(value(8e8 / 36))))
+    K = stuck_stiffness(closed, np.array([1e-6, 0, 0, 0, 0, 0]))
+    b2, h2 = 0.072**2 / 12 * (1 - 1 / 81), 0.005**2 / 12 * (1 - 1 / 16)
+    expected = [8e8, 8e7, 8e7, 8e7 * (b2 + h2), 8e8 * h2, 8e8 * b2]
+    np.testing.assert_allclose(K, np.diag(expected), rtol=1e-12, atol=1e-7)
+
+
+# limits ------------------------------------------------------------------------------------------------------------
+
+
+def modes_with_rows(seed: int = 3) -> tuple[ModalGroup, np.ndarray, np.ndarray]:
+    """Five modes that move all six coordinates of the face; a force and a monitor."""
+    rng = np.random.default_rng(seed)
+    rows = rng.normal(size=(6, 5)) * np.array([1, 1, 1, 10, 10, 10])[:, None]
+    omega = 2 * np.pi * np.array([30.0, 55, 90, 170, 260])
+    return body(rows, omega, 0.003), rng.normal(size=5), rng.normal(size=5)
+
+
+def test_linear_limit_is_modal_superposition() -> None:
+    """Pressed so hard that nothing opens, held so fast that nothing slides: springs; harmonics 0, 2, 3 vanish."""
+    g, force, watched = modes_with_rows()
+    places, areas = grid(0.072, 0.005, (4, 3))
+    law = PointContact(Penalty(value(3e6 / 12)), Coulomb(value(1e6)), value(1e6 / 12))
+    patch = Patch("face", places, areas, law)
+    frequency = np.linspace(20, 300, 15)
+    problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=16)
+    r = harmonic_response(problem, frequency, np.array([1.0]))
+    K = g.K_r + g.interfaces["face"].rows.T @ problem.body.stiffness @ g.interfaces["face"].rows
+    Omega = 2 * np.pi * frequency
+    exact = [watched @ np.linalg.solve(K - w**2 * g.M_r + 1j * w * g.C_r, force) for w in Omega]
+    assert r.converged.all() and r.slipping.max() == r.open.max() == 0
+    np.testing.assert_allclose(r.monitor, exact, rtol=1e-9)
+    np.testing.assert_allclose(r.harmonics[:, [0, 2, 3]], 0, atol=1e-9 * np.abs(exact).max())
+    values = np.sqrt(np.linalg.eigvalsh(K)) / 2 / np.pi
+    np.testing.assert_allclose(stuck(problem.body), values, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scale", [0.01, 30.0])
+def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
+    """Any k on the left side gives the same response, and the same residual up to the factor (1 + D k)."""
+    g, force, watched = modes_with_rows()
+    problem = of_body(g, (rough_patch((4, 2), 8e6),), np.array([20.0]), 5 * force, watched, harmonics=1, samples=32)
+    other = replace(problem, body=replace(problem.body, stiffness=scale * problem.body.stiffness))
+    frequency = np.array([40.0, 60.0])
+    a, b = (harmonic_response(p, frequency, np.ones(1)) for p in (problem, other))
+    assert a.converged.all() and b.converged.all() and a.slipping.max() > 0
+    np.testing.assert_allclose(a.harmonics, b.harmonics, rtol=0, atol=1e-7 * np.abs(a.monitor).max())
+
+
+def test_one_harmonic_and_a_constant_force_are_the_closed_form() -> None:
+    """Against `jenkins`: the sampled force converges to the closed form with the square of the step."""
+    g, limit, kt = oscillator(), 0.6, 2e4
+    frequency = np.linspace(12, 40, 15)
+    one = np.array([1.0])
+    exact = frequency_response(g, [JenkinsContact("face", np.zeros(6), 1, kt, limit)], one, one, frequency)
+    errors = []
+    for samples in (64, 256):
+        patch = point(Preload(value(2.0)), kt, 0.3)
+        problem = of_body(g, (patch,), np.array([2.0]), one, one, harmonics=1, samples=samples)
+        r = harmonic_response(problem, frequency, np.array([limit]))
+        assert r.converged.all()
+        errors.append(float(np.abs(r.monitor - exact.monitor).max() / np.abs(exact.monitor).max()))
+    assert errors[1] < 2e-4 and errors[0] > 8 * errors[1]
+
+
+# derivatives -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rates", [False, True])
+def test_derivatives_against_differences(rates: bool) -> None:
+    """dR/dx and dR/dOmega of a slipping, partly opening patch; with friction that falls with the speed as well."""
+    g, force, watched = modes_with_rows()
+    patch = rough_patch((3, 2), 8e6)
+    if rates:
+        patch = replace(patch, law=replace(patch.law, friction=Falling(value(0.2), value(40.0))))
+    problem = of_body(g, (patch,), np.array([20.0]), 8 * force, watched, harmonics=1, samples=16, length=1e-5)
+    rng = np.random.default_rng(1)
+    Omega, x = 2 * np.pi * 47.0, 0.6 * rng.normal(size=problem.size)
+    R, J, R_Omega = problem.evaluate(x, Omega)
+    direction = rng.normal(size=problem.size)
+    h = 1e-6
+    along = (problem.evaluate(x + h * direction, Omega)[0] - problem.evaluate(x - h * direction, Omega)[0]) / (2 * h)
+    np.testing.assert_allclose(J @ direction, along, rtol=0, atol=2e-6 * np.abs(along).max())
+    h = 1e-5 * Omega
+    along = (problem.evaluate(x, Omega + h)[0] - problem.evaluate(x, Omega - h)[0]) / (2 * h)
+    np.testing.assert_allclose(R_Omega, along, rtol=0, atol=1e-6 * np.abs(along).max())
+    np.testing.assert_allclose(R, problem.at(Omega).residual(x), rtol=0, atol=1e-12 * np.abs(R).max())
+
+
+# time integration --------------------------------------------------------------------------------------------------
+
+
+def marched(
+    g: ModalGroup, law: Law, problem: Problem, force: np.ndarray, f: float, periods: int, steps: int
+) -> tuple[np.ndarray, float]:
+    """(steps, m) coordinates over the last of many periods by central differences, and the work of the last force.
+
+    The law is marched along with the motion, from rest in the preloaded state: an integrator of its own, second order
+    in the step.
+    """
+    rows = g.interfaces["face"].rows[:3]
+    Omega, m = 2 * np.pi * f, g.n_modes
+    dt = 2 * np.pi / Omega / steps
+    K, C, T = jnp.asarray(g.K_r), jnp.diag(jnp.asarray(g.C_r)), jnp.asarray(rows)
+    load, preload = jnp.asarray(force), jnp.asarray(problem.preload[:3])
+    offset = jnp.asarray(problem.offset[:3])
+
+    def one(carried: Any, i: jax.Array) -> tuple[Any, tuple[jax.Array, jax.Array]]:
+        q, before, state = carried
+        u, v = offset + T @ q, T @ (q - before) / dt
+        F, state = law.step(u[None], v[None], dt, state)
+        drive = load * jnp.cos(Omega * i * dt) - K @ q - T.T @ (F[0] - preload)
+        after = (dt**2 * drive + 2 * q - before + 0.5 * C * dt * before) / (1 + 0.5 * C * dt)
+        return (after, q, state), (q, F[0])
+
+    @jax.jit
+    def period(carried: Any, start: jax.Array) -> tuple[Any, tuple[jax.Array, jax.Array]]:
+        return jax.lax.scan(one, carried, start + jnp.arange(steps))
+
+    carried = (jnp.zeros(m), jnp.zeros(m), law.init(1))
+    for i in range(periods):
+        carried, (q, F) = period(carried, jnp.asarray(i * steps))
+    u = np.asarray(q) @ rows.T
+    closing = np.roll(np.asarray(F), -1, axis=0)
+    moved = np.roll(u, -1, axis=0) - u
+    return np.asarray(q), float(np.sum(0.5 * (np.asarray(F) + closing) * moved))
+
+
+def in_time(problem: Problem, r: HarmonicResponse, steps: int) -> np.ndarray:
+    """(steps, 6) displacement of the contact from the preloaded state over a period."""
+    t = 2 * np.pi * np.arange(steps) / steps
+    H = r.contact.shape[2] // 2
+    waves = [np.ones(steps)] + [w(h * t) for h in range(1, H + 1) for w in (np.cos, np.sin)]
+    return (r.contact[0] @ np.array(waves)).T - problem.offset
+
+
+@pytest.mark.parametrize("f", [17.0, 21.0])
+def test_jenkins_oscillator_against_time_integration(f: float) -> None:
+    """Relative 1e-4 of the amplitude over the whole period (21 harmonics; the force has a kink)."""
+    g, one = oscillator(), np.array([1.0])
+    patch = point(Preload(value(2.0)), 2e4, 0.3)
+    problem = of_body(g, (patch,), np.array([2.0]), one, one, harmonics=21, samples=2048, length=1e-4)
+    r = harmonic_response(problem, np.array([f]), np.array([0.6]))
+    q, lost = marched(g, patch.law, problem, one, f, 80, 2048)
+    u = in_time(problem, r, 2048)[:, 1]
+    assert r.converged.all() and r.slipping[0, 0] > 0.05
+    np.testing.assert_allclose(u, q[:, 0], rtol=0, atol=1e-4 * np.abs(u).max())
+    assert r.dissipated[0] == pytest.approx(lost, rel=1e-4)
+
+
+def swinging(load: tuple[float, float, float], harmonics: int, samples: int) -> tuple[Problem, HarmonicResponse]:
+    """Three directions driven at 22 Hz, 8 N of preload: normal force and both tangential ones vary."""
+    law = PointContact(Penalty(value(2e5)), Coulomb(value(0.4)), value(6e4))
+    patch = Patch("face", np.zeros((1, 2)), np.ones(1), law)
+    problem = of_body(
+        three_dof(0.03), (patch,), np.array([8.0]), np.array(load), np.array([0, 1.0, 0]), harmonics=harmonics,
+        samples=samples, cycles=3, length=1e-4,
+    )  # fmt: skip
+    return problem, harmonic_response(problem, np.array([22.0]), np.ones(1))
+
+
+@pytest.mark.parametrize(("load", "opens"), [((12.0, 4.0, 2.0), False), ((20.0, 8.0, 4.0), True)])
+def test_contact_in_space_under_a_swinging_normal_force_against_time_integration(
+    load: tuple[float, float, float], opens: bool
+) -> None:
+    """Slip in both directions, without and with lift-off: relative 1e-4 of the amplitude over the whole period.
+
+    The slider follows its direction to first order in the step, so both ways take the same step: what is compared
+    are the balance and its 21 harmonics, not the step.
+    """
+    problem, r = swinging(load, 21, 2048)
+    q, lost = marched(three_dof(0.03), problem.patches[0].law, problem, np.array(load), 22.0, 90, 2048)
+    assert r.converged.all() and r.slipping[0, 0] > 0.5 and (r.open[0, 0] > 0.3) == opens
+    np.testing.assert_allclose(in_time(problem, r, 2048)[:, :3], q, rtol=0, atol=1e-4 * np.abs(q).max())
+    assert r.dissipated[0] == pytest.approx(lost, rel=1e-4)
+
+
+def test_one_harmonic_is_not_enough() -> None:
+    """What the others are for: against 21 of them one is off by more than 10 %, three by less than half of that."""
+    amplitude = [abs(swinging((20.0, 8.0, 4.0), H, 2048)[1].monitor[0]) for H in (1, 3, 21)]
+    error = np.abs(np.array(amplitude[:2]) / amplitude[2] - 1)
+    assert error[0] > 0.1 and error[1] < 0.5 * error[0]
+
+
+def test_work_of_the_excitation_is_the_friction_along_the_slip_path() -> None:
+    """Supplied less damped, of the harmonics, against force times path slid, in time; the gap closes with the step."""
+    gaps = []
+    for samples in (512, 2048):
+        r = swinging((12.0, 4.0, 2.0), 21, samples)[1]
+        gaps.append(float(abs((r.supplied - r.damped - r.by_slip)[0] / r.by_slip[0])))
+        assert r.dissipated[0] == pytest.approx(r.by_slip[0], rel=1e-12)  # the area does not change while it slides
+    assert gaps[1] < 5e-6 and gaps[0] > 3 * gaps[1]
+
+
+# robustness --------------------------------------------------------------------------------------------------------
+
+
+def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    from microslip.harmonic_balance import response
+
+    def stubborn(at: Any, x: np.ndarray, **more: Any) -> Any:
+        found = newton(at, x, **more)
+        bad = abs(at.Omega - 2 * np.pi * 20.0) < 1e-9
+        return replace(found, status="no convergence") if bad else found
+
+    newton = response.newton
+    monkeypatch.setattr(response, "newton", stubborn)
+    one = np.array([1.0])
+    problem = of_body(oscillator(), (point(Preload(value(2.0)), 2e4, 0.3),), np.array([2.0]), one, one, harmonics=1)
+    told: list[str] = []
+    r = harmonic_response(problem, np.array([19.0, 20.0, 21.0]), one, told.append)
+    assert r.converged.tolist() == [True, False, True] and "of the load" in r.status[1]
+    assert told[1] == "2 of 3 frequencies: 20 Hz, not converged"
+
+
+def test_a_body_that_only_its_contact_holds() -> None:
+    """A mass free along n, pressed on the ground: the mean force is the preload, whatever the contact rectifies."""
+    g = body(np.vstack([np.eye(3), np.zeros((3, 3))]), np.array([0.0, 100.0, 100.0]))
+    force = np.array([6.0, 0.5, 0.0])
+    patch = Patch("face", np.zeros((1, 2)), np.ones(1), rough_patch((1, 1), 8e6).law)
+    problem = of_body(g, (patch,), np.array([8.0]), force, force, samples=128)
+    r = harmonic_response(problem, np.array([20.0, 40.0]), np.ones(1))
+    assert r.converged.all()
+    for x, f in zip(r.x, r.frequency, strict=True):
+        assert problem.at(2 * np.pi * f).force(x)[0] == pytest.approx(8.0, rel=1e-8)
+    assert np.abs(r.harmonics[:, 0]).min() > 1e-9  # the mean approach is not that of the preload
+
+
+def test_a_body_that_walks_away_is_no_solution() -> None:
+    """Free along the tangent too: normal load and friction in phase push it on, no mean holds it. No false answer."""
+    g = body(np.vstack([np.eye(3), np.zeros((3, 3))]), np.zeros(3))
+    force = np.array([6.0, 0.5, 0.0])
+    patch = Patch("face", np.zeros((1, 2)), np.ones(1), rough_patch((1, 1), 8e6).law)
+    r = harmonic_response(
+        of_body(g, (patch,), np.array([8.0]), force, force, samples=128), np.array([20.0]), np.ones(1)
+    )
+    assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
