@@ -1,8 +1,8 @@
 """Forced vibration with friction in the frequency domain (Sextro, chapter 5).
 
 `response`: any law of the contact room, any number of harmonics; `reduced` eliminates the body, `patch` has the
-kinematics of a rigid contact patch. `jenkins`: one harmonic, linear normal contact and one Jenkins element a contact, in
-closed form; the only one that needs no jax, so the names below are its own.
+kinematics of a rigid contact patch. `jenkins`: one harmonic, linear normal contact and one Jenkins element a contact,
+in closed form; the only one that needs no jax, so the names below are its own.
 """
 
 from .jenkins import FrequencyResponse as FrequencyResponse

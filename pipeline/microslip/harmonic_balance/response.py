@@ -106,12 +106,19 @@ class AtFrequency:
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
-        p, waves = self.problem, 2 * self.problem.harmonics + 1
         force, slope = self._forces(x)
+        return self._residual(x, force), self._tangent(slope), self._rate(x, force)
+
+    def tangent(self, x: Array) -> tuple[Array, Array]:
+        """(k,) R and (k, k) dR/dx."""
+        force, slope = self._forces(x)
+        return self._residual(x, force), self._tangent(slope)
+
+    def _tangent(self, slope: Array) -> Array:
+        p, waves = self.problem, 2 * self.problem.harmonics + 1
         excess = slope - np.kron(np.eye(waves), p.body.stiffness)
         unit = np.tile(p.scale, waves)
-        J = np.eye(len(x)) + self._compliant([s.compliance for s in self.seen], excess) * unit / unit[:, None]
-        return self._residual(x, force), J, self._rate(x, force)
+        return np.eye(len(unit)) + self._compliant([s.compliance for s in self.seen], excess) * unit / unit[:, None]
 
     def force(self, x: Array) -> Array:
         """(k,) harmonics of the contact forces, N and N m, ordered as x."""
@@ -215,7 +222,7 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 40) 
     Args:
         x: start. tolerance: of the largest entry of R over the largest one of x and of the reference.
     """
-    R, J, _ = at.evaluate(x)
+    R, J = at.tangent(x)
     reference = float(np.abs(at.reference).max(initial=1e-300))
     for count in range(most):
         error = float(np.abs(R).max() / np.clip(np.abs(x).max(), 1e-3 * reference, 1e3 * reference))
@@ -225,14 +232,14 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 40) 
             return Point(at.Omega, x, CONVERGED, error, count)
         step, before, share = _solved(J, -R), np.linalg.norm(R), 1.0
         trial = x + step
-        found = at.evaluate(trial)
+        found = at.tangent(trial)
         while not np.linalg.norm(found[0]) < before and share > 1e-3:
             share *= 0.5
             trial = x + share * step
             if np.linalg.norm(at.residual(trial)) < before or share <= 1e-3:
-                found = at.evaluate(trial)
+                found = at.tangent(trial)
                 break
-        x, (R, J, _) = trial, found
+        x, (R, J) = trial, found
     return Point(at.Omega, x, f"no convergence in {most} steps, |R|/|x| = {error:.1e}", error, most)
 
 
