@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
+from dataclasses import replace
 
 import decks
 import meshes
 import numpy as np
 import pytest
 import scipy.io
+import touching
 
 from microslip.basis import read_basis
 from microslip.cli import main
@@ -137,6 +139,26 @@ def test_what_cannot_be_a_support_is_told_and_the_body_runs_free(tmp_path, monke
     text = (tmp_path / "here" / "body.toml").read_text()
     assert written in text and "free = true" in text and "\n[[supports]]" not in text
     assert main(["modes", "here", "-q"]) == 0
+
+
+def test_a_deck_of_two_parts_is_refused_only_where_a_part_is_not_held(tmp_path, monkeypatch, capsys):
+    """The same beam twice, apart: with both held every frequency comes twice."""
+    monkeypatch.chdir(tmp_path)
+    lines = decks.mesh_lines(touching.together(a=beam(), b=aside()), sets=("a_z0", "b_z0"))
+    lines += [*decks.MATERIAL, decks.section(), "*BOUNDARY", "a_z0, 1, 3"]
+    (tmp_path / "one.inp").write_text("\n".join(lines) + "\n")
+    (tmp_path / "both.inp").write_text("\n".join([*lines, "b_z0, 1, 3"]) + "\n")
+    assert main(["import", "one.inp"]) == 0 and main(["import", "both.inp"]) == 0
+    assert "warning: the mesh falls into 2 parts" in capsys.readouterr().out
+    assert main(["modes", "one", "-q"]) == 2
+    assert "nothing holds the part with face 'b_z0'" in capsys.readouterr().err
+    assert main(["modes", "both", "-q"]) == 0
+    np.testing.assert_allclose(lowest(tmp_path, "both")[:2], clamped(), rtol=1e-9)
+
+
+def aside():
+    mesh = beam()
+    return replace(mesh, points=mesh.points + [0.1, 0, 0])
 
 
 @pytest.mark.parametrize("suffix", ["mtx", "mat"])

@@ -28,7 +28,7 @@ from .compliance import sentence
 from .coordinates import own_kind
 from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
 from .gyroscopic import stability_sentence
-from .mesh import UNITS, mesh_problems, read_mesh
+from .mesh import UNITS, mesh_problems, part_numbers, read_mesh
 from .quality import sentences
 from .report import contact_sentence
 from .resonances import (
@@ -246,6 +246,8 @@ def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: Non
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
     errors, warnings = mesh_problems(mesh)
+    if job.settings.cyclic is not None and part_numbers(mesh).max() > 0:
+        errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
     size = float(np.ptp(mesh.points, axis=0).max())

@@ -25,9 +25,9 @@ _NEIGHBOURS = {
 def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
-    Errors: unconnected parts, coincident points, repeated points in a cell, inside-out cells (by their corners;
-    curved cells are examined at the quadrature points when they are assembled). Warnings: first-order cells, sets
-    of facets that cannot serve as faces.
+    Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
+    examined at the quadrature points when they are assembled). Warnings: first-order cells, sets
+    of facets that cannot serve as faces, parts that share no points (`modes.loose` refuses those that nothing holds).
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():
@@ -70,9 +70,9 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
         )
     elif parts.max() > 0:
         sizes = np.bincount(parts)
-        errors.append(
+        warnings.append(
             f"the mesh falls into {len(sizes)} parts that share no points ({', '.join(map(str, sizes[:6]))} points); "
-            "join them or give each its own body"
+            "support each, press it by a closure, or join them"
         )
     return errors, warnings
 
