@@ -307,7 +307,7 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "motion.cycles": ("", "how many; the last one is drawn"),
     "motion.samples": ("", "a cycle"),
     "motion.amplitudes": ("*", "of the hysteresis loops along t1; about the slip limit if not given"),
-    "microslip.mu": ("", "friction coefficient, cold"),
+    "microslip.mu": ("", "friction coefficient, cold; that of [friction] if not given"),
     "microslip.speed": ("m/s", "of loading, for the heat"),
     "microslip.yield_shear": ("Pa", "tau_S0, shear strength, cold"),
     "microslip.approaches": ("*", "one curve each"),

@@ -24,6 +24,7 @@ from .normal import Hyperbolic, Normal, Penalty, Potential, Preload, Rough, meas
 from .point import PointContact
 from .regularised import MassContact
 from .series import BULK, ContactStiffness, of_layer, of_patch
+from .sliders import Iwan, mindlin, rough_strips, segalman, uniform
 from .solids import Solid
 
 HERTZ_DEPTH = 1e-6
@@ -262,7 +263,35 @@ def _element(c: Contact) -> Law | None:
 
 
 def _microslip(c: Contact, given: S.Element, stiffness: float) -> Law:
-    raise UserError(f'{c.path}: element.kind: "{given.kind}" is not there yet')
+    """Sliders in parallel; Coulomb's coefficient is the characteristic's (`settings` sees to that)."""
+    assert isinstance(c.settings.friction, S.CoulombFriction)
+    mu = c.settings.friction.mu
+    if isinstance(given, S.IwanElement):
+        shares = uniform(given.count, given.weakest)
+        if given.exponent is not None:
+            shares = segalman(given.count, given.exponent, given.ratio)
+        return Iwan(c.normal, _number(mu), _number(stiffness), *shares)
+    try:
+        if isinstance(given, S.MindlinElement):
+            assert c.hertz is not None and isinstance(c.settings.stiffness, S.HertzSource)
+            return mindlin(c.hertz, mu, _deepest(c), given.count, c.settings.stiffness.axis)
+        assert c.heights is not None and c.roughness is not None and isinstance(given, S.StripsElement)
+        return rough_strips(c.normal_0, c.roughness, c.heights, stiffness, mu, given.count)
+    except UserError as error:
+        raise UserError(f"{c.path}: element: {error}") from error
+
+
+def _deepest(c: Contact) -> float:
+    """Approach up to which Mindlin's strips are laid, m: a quarter beyond the motion's."""
+    assert c.hertz is not None
+    motion = c.settings.motion
+    if motion is None:
+        return 1e-5
+    mean = motion.normal[0] if motion.normal_force is None else float(c.hertz.approach(motion.normal_force))
+    deepest = 1.25 * (mean + sum(map(abs, motion.normal[1:])))
+    if not deepest > 0:
+        raise UserError("the motion never closes the contact; press it by motion.normal_force")
+    return deepest
 
 
 def _number(value: float) -> Array:

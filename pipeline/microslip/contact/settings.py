@@ -347,7 +347,7 @@ class Temperature(Model):
 class Microslip(Model):
     """First loading with shear strength and heating (3.8): tangential force over displacement."""
 
-    mu: Positive
+    mu: Positive | None = None
     speed: NotNegative = 0.0
     yield_shear: Positive | None = None
     approaches: PositiveLengths = ()
@@ -435,6 +435,8 @@ class ContactFile(Model):
         for key in ("motion", "microslip"):
             if getattr(self, key) is not None and getattr(self.stiffness, "tangential", 1.0) is None:
                 raise ValueError(f"stiffness.tangential: is missing, and [{key}] needs it; add it")
+        if self.microslip is not None and self.microslip.mu is None and not isinstance(self.friction, CoulombFriction):
+            raise ValueError('microslip.mu: is missing, and there is no friction of kind = "coulomb"; add it')
         if self.wear is not None and self.wear.mu is None and self.friction is None:
             raise ValueError("wear.mu: is missing, and there is no [friction] to take it from; add it")
         return self
@@ -443,6 +445,8 @@ class ContactFile(Model):
         kind = self.element.kind
         if kind in ("strips", "iwan", "mindlin") and not isinstance(self.friction, CoulombFriction):
             raise ValueError(f'element: kind = "{kind}" slides by Coulomb; write [friction] kind = "coulomb"')
+        if kind in ("strips", "iwan", "mindlin") and getattr(self.friction, "deviation", None):
+            raise ValueError(f'element: "{kind}" takes no friction that scatters; remove friction.deviation')
         if kind == "strips" and self.roughness is None:
             raise ValueError("element: strips are those of a rough surface; add [roughness]")
         if kind == "mindlin" and not isinstance(self.stiffness, HertzSource):

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..errors import UserError
+from . import microslip
 from . import settings as S
 from .composed import Contact, compose
 from .friction import Exponential as ExponentialFriction
@@ -70,6 +71,8 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
         _characteristic(contact, working, found)
     if contact.settings.motion is not None and contact.law is not None:
         _motion(contact, working, found)
+    if contact.settings.microslip is not None:
+        _first_loading(contact, contact.settings.microslip, found)
     if contact.settings.wear is not None:
         _wear(contact, found)
     _limits(contact, found)
@@ -343,6 +346,41 @@ def _of_a_cycle(
 
 
 _PARTLY = ("strips", "iwan", "mindlin")
+
+
+# microslip ---------------------------------------------------------------------------------------------------------
+
+
+def _first_loading(c: Contact, given: S.Microslip, found: _Findings) -> None:
+    """Tangential force over displacement (3.8), one curve an approach or a normal force."""
+    assert c.heights is not None and c.roughness is not None and c.area is not None and c.stiffness is not None
+    mu = given.mu if given.mu is not None else getattr(c.settings.friction, "mu", 0.0)
+    heat, R = c.settings.temperature, c.roughness
+    curve = microslip.of(
+        c.heights, c.normal_0, c.stiffness.tangential[0], c.area, R, mu, given.speed,
+        given.yield_shear if given.yield_shear is not None else np.inf,
+        heat.limit if heat is not None else np.inf, heat.resistance if heat is not None else 0.0, R,
+    )  # fmt: skip
+    if given.normal_forces:
+        u = np.asarray(curve.approach(np.array(given.normal_forces) / (c.normal_0 * R)))
+    else:
+        u = np.array(given.approaches or tuple(R * x for x in (0.25, 0.5, 0.75, 1.0, 1.25))) / R
+    slides = mu * c.normal_0 / c.stiffness.tangential[0]  # displacement over approach at which all of it slides, cold
+    top = given.displacement / R if given.displacement is not None else 1.25 * slides * float(u.max())
+    w = np.linspace(0.0, top, 401)
+    force, warm = (np.array([f(w, one) for one in u]) for f in (curve.force, curve.temperature))
+    loads = c.normal_0 * R * np.asarray(curve.normal_force(u))
+    table = {
+        "approach_m": np.repeat(R * u, len(w)), "normal_force_N": np.repeat(loads, len(w)),
+        "displacement_m": np.tile(R * w, len(u)), "F_t_N": mu * c.normal_0 * R * force.ravel(),
+    }  # fmt: skip
+    table["coefficient"] = table["F_t_N"] / table["normal_force_N"]
+    if heat is not None:
+        table["temperature_rise_K"] = heat.limit * warm.ravel()
+    found.tables["microslip"] = table
+    last = table["coefficient"].reshape(len(u), -1)
+    found.told.append(("equivalent friction coefficient at the end of loading", f"{last[:, -1].min():.4g} to "
+                       f"{last[:, -1].max():.4g}, at most {last.max():.4g}"))  # fmt: skip
 
 
 # wear --------------------------------------------------------------------------------------------------------------
