@@ -18,7 +18,7 @@ from microslip.contact.friction import (
     scattered,
 )
 from microslip.contact.study import Study, study
-from microslip.pictures.contact import loops_figure, motion_figure
+from microslip.pictures.contact import loops_figure, microslip_panel, motion_figure
 
 ROOT = Path(__file__).parents[1]
 CASES = ROOT / "pipeline" / "cases" / "contact"
@@ -84,3 +84,41 @@ def stick_slip() -> Any:
 
 def loops() -> Any:
     return loops_figure(study(OWN / "contact.toml", ["motion.amplitudes=[1.0, 2.0, 4.0, 8.0]", 'name="shroud"']))
+
+
+def microslip(fig: Any) -> Any:
+    """Fig. 3.8-2 a to d."""
+    for axes, letter in zip(fig.subplots(2, 2).ravel(), "abcd", strict=True):
+        found = of_figure(f"3.8-2{letter}")
+        microslip_panel(found, axes)
+        axes.set_title(f"{letter})", loc="left", fontsize=10)
+        if letter in "ac":
+            axes.get_legend().remove()
+    return fig
+
+
+ELEMENTS = {
+    "point": '{kind="massless"}', "strips of the rough surface": '{kind="strips", count=64}',
+    "Iwan, uniform": '{kind="iwan", count=64}',
+    "Segalman, chi = -0.5": '{kind="iwan", exponent=-0.5, ratio=0.2, count=64}',
+}  # fmt: skip
+AMPLITUDES = tuple(0.1 * 1.25**i for i in range(22))
+
+
+def elements(fig: Any, plain: Any) -> Any:
+    """Left: loops of one amplitude. Right: energy of a cycle over the amplitude."""
+    left, right = fig.subplots(1, 2)
+    for colour, (name, element) in zip(COLOURS, ELEMENTS.items(), strict=False):
+        sizes = f"motion.amplitudes=[3.0, {', '.join(f'{a:.4g}' for a in AMPLITUDES)}]"
+        t = study(OWN / "contact.toml", [f"element={element}", sizes, "motion.samples=1024"]).tables["loops"]
+        chosen = np.isclose(t["amplitude_m"], 3e-6) & (t["cycle"] == 1)
+        left.plot(1e6 * t["u_t1_m"][chosen], t["F_t1_N"][chosen], color=colour, label=name)
+        size, first = np.unique(t["amplitude_m"], return_index=True)
+        energy = t["dissipated_J"][first]
+        right.loglog(1e6 * size[energy > 1e-12], 1e3 * energy[energy > 1e-12], color=colour)
+    for axes in (left, right):
+        plain(axes)
+    left.set(xlabel="displacement in µm", ylabel="tangential force in N", ylim=(-330, 480))
+    left.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
+    right.set(xlabel="amplitude in µm", ylabel="energy of a cycle in mJ", ylim=(1e-5, 20))
+    return fig

@@ -983,6 +983,8 @@ def laws() -> None:
     save(drawn(study.friction(figure(10.5, 3.4), plain)), "friction")
     for name, draw in (("element", study.element), ("stick_slip", study.stick_slip), ("loops", study.loops)):
         save(drawn(draw()), f"contact_{name}")
+    save(drawn(study.microslip(figure(10.5, 6.6))), "microslip")
+    save(drawn(study.elements(figure(9.6, 3.8), plain)), "microslip_elements")
 
 
 STUDIES = {

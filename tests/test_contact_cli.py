@@ -232,6 +232,42 @@ def test_other_sources_and_heights(kind: str, tmp_path: Path) -> None:
     assert np.hypot(motion["F_t1_N"], motion["F_t2_N"]).max() <= 300 * (1 + 1e-9)
 
 
+ELEMENTS = {
+    "strips": '[element]\nkind = "strips"\ncount = 24\n',
+    "iwan": '[element]\nkind = "iwan"\n',
+    "segalman": '[element]\nkind = "iwan"\nexponent = -0.5\nratio = 0.5\n',
+    "mindlin": '[element]\nkind = "mindlin"\n',
+}
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+def test_microslip_elements(kind: str, tmp_path: Path) -> None:
+    """A loop well below the slip limit dissipates, more than with the third power; a large one is Coulomb's rim."""
+    text = re.sub(r"\[limits\].*", "", SMALL, flags=re.S).replace("[0.4, 4.0]", "[0.3, 0.6, 20.0]") + ELEMENTS[kind]
+    if kind == "mindlin":
+        text = re.sub(r"\[stiffness\].*?(?=\[friction\])", ALTERNATIVES["hertz"][0], text, flags=re.S)
+    t = study(write(tmp_path, text)).tables["loops"]
+    energy = [t["dissipated_J"][np.isclose(t["amplitude_m"], a)][0] for a in (0.3e-6, 0.6e-6)]
+    assert 0 < 4 * energy[0] < energy[1] < 300 * 4 * 0.6e-6
+    assert np.abs(t["F_t1_N"]).max() == pytest.approx(300, rel=1e-6)
+
+
+def test_first_loading_table_is_3_8_26(tmp_path: Path) -> None:
+    """Without heat and strength: mu (F_N(u) - F_N(u - c w/mu c_N0)) with (3.3-24), to full slip."""
+    text = re.sub(r"\[motion\].*", "[microslip]\nnormal_forces = [500.0, 2000.0]\n", SMALL, flags=re.S)
+    t = study(write(tmp_path, text)).tables["microslip"]
+
+    def volume(x: np.ndarray) -> np.ndarray:
+        x = np.clip(x, 0, None)
+        return np.where(x < 1, x**3 - x**4 / 2, x - 0.5)
+
+    cN, R, slope = 840e6, 12e-6, 1 / (0.3 * 2.6)
+    slid = np.minimum(slope * t["displacement_m"], t["approach_m"])
+    expected = 0.3 * cN * R * (volume(t["approach_m"] / R) - volume((t["approach_m"] - slid) / R))
+    np.testing.assert_allclose(t["F_t_N"], expected, atol=1e-6)
+    assert t["coefficient"].max() == pytest.approx(0.3, rel=1e-9)
+
+
 # mistakes ---------------------------------------------------------------------------------------------------------
 
 HEIGHTS = 'kind = "polynomial"\nR_Z = 12.0'
@@ -273,6 +309,14 @@ MISTAKES = {
         "coefficient = 1e-16", "coefficient = 1e-16\nenergy_density = 1e9", "wear: needs exactly one of coefficient",
     ),
     "two ways to press": ("t1 = [0.0, 6.0]", "normal = [5.0]", "motion: normal_force and the mean of normal"),
+    "microslip without friction": (
+        f"[friction]\n{FRICTION}", '[microslip]\n[friction]\nkind = "falling"\nmu_0 = 0.3\np_v = 1.0',
+        "microslip.mu: is missing, and there is no friction",
+    ),
+    "strips that fall": (
+        FRICTION, 'kind = "falling"\nmu_0 = 0.3\np_v = 1.0\n[element]\nkind = "strips"',
+        'element: kind = "strips" slides by Coulomb; write [friction] kind = "coulomb"',
+    ),
     "no TOML": ("[friction]", "[friction", "is not valid TOML"),
 }  # fmt: skip
 

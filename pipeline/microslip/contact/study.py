@@ -24,6 +24,7 @@ from .law import history
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
 from .regularised import MassContact, integrate
+from .sliders import Strips
 from .solids import Solid
 from .wear import course, dimensionless_time, from_archard, from_energy_density
 
@@ -87,6 +88,8 @@ def _working(c: Contact) -> tuple[float, float] | None:
     motion = c.settings.motion
     if motion is None:
         return None
+    if motion.normal_force is not None and isinstance(c.law, Strips):  # a little away from the smooth law
+        return float(c.law.approach(motion.normal_force)), motion.normal_force
     if motion.normal_force is not None:
         return approach_under(c, motion.normal_force), motion.normal_force
     return motion.normal[0], float(c.normal.force(jnp.array([motion.normal[0]]))[0])

@@ -298,28 +298,31 @@ def _fluid(axes: Axes, t: Columns) -> None:
 
 
 def microslip_figure(study: Study) -> Any:
-    """First loading: tangential force over displacement, one curve an approach or a normal force."""
-    t = study.tables["microslip"]
+    """First loading: tangential force (friction coefficient, under given normal forces) over displacement."""
     figure = _figure(7.4, 4.2)
-    axes = figure.subplots()
-    _plain(axes)
-    (w, approach), unit = _metres(t["displacement_m"], t["approach_m"])
-    force, newton = _newtons(t["F_t_N"])
-    loads, load_unit = _newtons(t["normal_force_N"])
-    values = np.unique(loads)[::-1]
-    colours = _shades(len(values))
-    given = study.contact.settings.microslip
-    pressed = given is not None and bool(given.normal_forces)
-    for colour, load in zip(colours, values, strict=True):
-        chosen = loads == load
-        at = f"$F_n$ = {_number(load, load_unit)}" if pressed else f"$u_n$ = {_number(approach[chosen][0], unit)}"
-        axes.plot(w[chosen], force[chosen], color=colour, linewidth=1.6, label=at)
-    axes.set(xlabel=f"tangential displacement in {unit}", ylabel=f"tangential force in {newton}")
-    axes.set_xlim(left=0)
-    axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    microslip_panel(study, figure.subplots())
     figure.suptitle(_title(study, "microslip, first loading"), fontweight="bold")
     return figure
+
+
+def microslip_panel(study: Study, axes: Axes) -> None:
+    """One curve an approach or a normal force."""
+    t, given = study.tables["microslip"], study.contact.settings.microslip
+    pressed = given is not None and bool(given.normal_forces)
+    _plain(axes)
+    (w,), unit = _metres(t["displacement_m"])
+    (u,), length = _metres(t["approach_m"])
+    (force, newton), (loads, load_unit) = _newtons(t["F_t_N"]), _newtons(t["normal_force_N"])
+    values = np.unique(loads)[::-1]
+    for colour, load in zip(_shades(len(values)), values, strict=True):
+        chosen = loads == load
+        at = f"$F_n$ = {_number(load, load_unit)}" if pressed else f"$u_n$ = {_number(u[chosen][0], length)}"
+        axes.plot(w[chosen], (t["coefficient"] if pressed else force)[chosen], color=colour, linewidth=1.6, label=at)
+    name = "friction coefficient $F_t/F_n$" if pressed else f"tangential force in {newton}"
+    axes.set(xlabel=f"tangential displacement in {unit}", ylabel=name)
+    axes.set_xlim(0, w.max())
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _shades(count: int) -> list[Any]:
