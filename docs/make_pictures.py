@@ -192,7 +192,7 @@ def closure() -> None:
     axes.legend(title="interference (negative: gap)", fontsize=9)
     save(drawn(fig), "closure_force")
     assert shown is not None
-    plots.closure_plot(shown, BUILD / "closure.png")
+    plots.closure_plot(replace(shown, name="shroud, interference 0.2 mm"), BUILD / "closure.png")
     save(from_file(BUILD / "closure.png"), "closure_pressure")
 
 
