@@ -183,6 +183,15 @@ def test_a_mesher_that_fails_gives_one_sentence_and_leaves_the_old_mesh(box: Pat
     assert not list((box / "meshes").glob(".*"))
 
 
+def test_a_mesher_that_may_not_be_started_is_not_told_as_a_product(
+    box: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "python").write_text("")
+    monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
+    with pytest.raises(UserError, match="python: cannot be started to draw the body .Permission denied."):
+        workflow.mesh_stage(workflow.open_job(box), force=True)
+
+
 @pytest.mark.parametrize("key", ["build", "cad", "mesh"])
 def test_a_missing_source_is_named_with_its_key(box: Path, key: str) -> None:
     edit(box / "body.toml", 'build = "build.py"', f'{key} = "gone.step"')

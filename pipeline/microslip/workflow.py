@@ -202,7 +202,12 @@ def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
         made = Path(scratch) / "mesh.msh"
         paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
-        done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+        try:
+            done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+        except OSError as error:  # not to be told as the product's: it is Python that this user may not start
+            raise UserError(
+                f"{command[0]}: cannot be started to draw the body ({error.strerror}); let this user read and run it"
+            ) from error
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
