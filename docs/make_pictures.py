@@ -987,12 +987,19 @@ def laws() -> None:
     save(drawn(study.elements(figure(9.6, 3.8), plain)), "microslip_elements")
 
 
+def microslip() -> None:
+    """Microslip: errors of the strips over their number."""
+    import microslip_study as study
+
+    fill("contact.md", "strips", table(*study.errors()))
+
+
 STUDIES = {
     f.__name__: f
     for f in (
         reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough, laws,
+        stiffness_sources, rough, laws, microslip,
     )  # fmt: skip
 }
 

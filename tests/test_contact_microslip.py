@@ -250,8 +250,10 @@ def test_mindlin_s_strips_meet_partial_slip_by_the_second_order_of_their_number(
     exact = MU * LOAD * (1 - np.maximum(1 - u / PARTIAL.full_slip, 0) ** 1.5)
     errors = [np.abs(forces(mindlin(SPHERE, MU, DEEPEST, m).under(LOAD), u) - exact).max() for m in counts]
     assert np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(-2, abs=0.25)
-    whole = MU * float(SPHERE.force(DEEPEST))
-    assert np.all(np.array(errors) < whole / (4 * np.array(counts) ** 2.0))
+    bound, delta = 3 / (8 * np.array(counts) ** 2.0) * SPHERE.force(DEEPEST), np.linspace(0, DEEPEST, 4001)
+    assert np.all(np.array(errors) < MU * bound)
+    excess = [np.array(mindlin(SPHERE, MU, DEEPEST, m).local(delta)[0]) - SPHERE.force(delta) for m in counts]
+    assert np.all(np.max(excess, axis=1) < bound) and np.min(excess) > -1e-9
     law = mindlin(SPHERE, MU, DEEPEST, 256).under(LOAD)
     way = there_and_back(0.6 * PARTIAL.full_slip)
     assert loop_work(forces(law, way), way) == pytest.approx(PARTIAL.dissipated(way.max()), rel=1e-3)

@@ -226,8 +226,10 @@ def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Its tables made again, and what its examples print; the profile is the invented one of the table."""
+    import microslip_study
     import rough_study
 
+    assert pages.filled("contact.md", "strips") == pages.table(*microslip_study.errors())
     assert pages.filled("contact.md", "profile") == pages.table(*rough_study.numbers())
     assert pages.filled("contact.md", "worn") == pages.table(*rough_study.worn())
     profile = rough_study.ground()

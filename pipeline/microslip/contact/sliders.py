@@ -294,9 +294,9 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
     With like bodies and Coulomb friction, every ring of a round contact acts like a flat punch of its own: the strips
     of a normal law F(delta) with the stiffness dF/ddelta and one ratio k_T/k_N (Jaeger, Arch. Appl. Mech. 65, 1995;
     Popov & Hess, method of dimensionality reduction). First loading is that of `partial_slip.PartialSlip`, mu N
-    (1 - (1 - ...)^(3/2)) of a sphere. The strips' normal law goes straight between ``count + 1`` approaches, whose
-    squares of the numbers 0..count are the scale, exact there and too large between by at most 1/(4 count^2) of the
-    force at ``deepest`` for a sphere, tangentially mu times that; beyond, it goes straight on.
+    (1 - (1 - ...)^(3/2)) of a sphere. The strips' normal law goes straight between the approaches (i/count)^2 of the
+    deepest, exact there and too large between, for a sphere by at most 3/(8 count^2) of the force at the deepest;
+    the tangential force is off by at most mu times that. Beyond the deepest it goes straight on.
 
     Args:
         contact: `hertz.Hertz`, `profiles.RoundContact`, or one's own, of convex force. mu: friction coefficient.
