@@ -183,8 +183,11 @@ def main(argv: list[str] | None = None) -> None:
     points, rounds = (40, 2) if quick else (arguments.points, arguments.rounds)
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, jax {jax.__version__}, "
           f"numpy {np.__version__}, load {os.getloadavg()[0]:.1f}\n")  # fmt: skip
-    print("| samples | program | us / point | CPU us / point | CPU us / point and cycle |"
-          " wall / microslip's (three, two cycles) | CPU / microslip's | first call, s | apart |\n|--:|---|--:|--:|--:|--:|--:|--:|--:|")  # fmt: skip
+    heads = [
+        "samples", "program", "us / point", "CPU us / point", "CPU us / point and cycle", "wall / microslip (3, 2 cycles)",
+        "CPU / microslip (3, 2 cycles)", "first call, s", "apart",
+    ]  # fmt: skip
+    print(f"| {' | '.join(heads)} |\n|--:|---|" + "--:|" * (len(heads) - 2))
     with tempfile.TemporaryDirectory() as folder:
         for samples in (64,) if quick else (64, 128):
             print("\n".join(compared(points, samples, rounds, Path(folder))), flush=True)
