@@ -184,8 +184,8 @@ def main(argv: list[str] | None = None) -> None:
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, jax {jax.__version__}, "
           f"numpy {np.__version__}, load {os.getloadavg()[0]:.1f}\n")  # fmt: skip
     heads = [
-        "samples", "program", "us / point", "CPU us / point", "CPU us / point and cycle", "wall / microslip (3, 2 cycles)",
-        "CPU / microslip (3, 2 cycles)", "first call, s", "apart",
+        "samples", "program", "us / point", "CPU us / point", "CPU us / point and cycle",
+        "wall / microslip (3, 2 cycles)", "CPU / microslip (3, 2 cycles)", "first call, s", "apart",
     ]  # fmt: skip
     print(f"| {' | '.join(heads)} |\n|--:|---|" + "--:|" * (len(heads) - 2))
     with tempfile.TemporaryDirectory() as folder:

@@ -102,3 +102,14 @@ def test_harmonics_are_those_of_the_marched_cycle() -> None:
     expected = jnp.einsum("hs,snk->nkh", transform, force)
     found = force_harmonics(ROUGH.law, u, ROUGH.period)[0]
     assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(force).max())
+
+
+def test_cycles_go_on_until_the_sliders_have_settled() -> None:
+    """Under a swinging normal load sliders creep: two cycles are not enough, and the end of the creep is noticed."""
+    smooth = EXAMPLES["smooth point"]
+    u = some(40, example=smooth).at[:, 0].multiply(0.3).at[:, 0, 0].set(smooth.normal)
+    long = force_harmonics(smooth.law, u, smooth.period, count=60)
+    ended = force_harmonics(smooth.law, u, smooth.period, count=60, settled=1e-6)
+    short = force_harmonics(smooth.law, u, smooth.period)
+    largest = np.abs(long[0]).max()
+    assert np.abs(ended[0] - long[0]).max() < 1e-4 * largest < np.abs(short[0] - long[0]).max()

@@ -7,6 +7,7 @@ displacement harmonics of that point alone, and contracted with the kinematics o
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -36,20 +37,26 @@ def waves(harmonics: int, samples: int) -> tuple[Array, Array]:
 
 @partial(jax.jit, static_argnames=("samples", "count", "chunk"))
 def force_harmonics(
-    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK
-) -> tuple[Array, Array]:
+    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
+    settled: Array | float = 0.0,
+) -> tuple[Array, Array]:  # fmt: skip
     """Harmonics of the force in the last of ``count`` cycles, and their derivative.
+
+    A point that slides all the way both ways has forgotten its beginning after one cycle. Where the normal load swings
+    a point may creep for many cycles until it shakes down: ask for more, and let ``settled`` end them.
 
     Args:
         u: (n, 3, 2 H + 1) displacement: mean, cos, sin, cos 2, sin 2, ... in m. period: s. samples: a cycle.
-        chunk: points at a time; the cost is linear in the number of points whatever it is.
+        count: of cycles at most. chunk: points at a time; the cost is linear in the number of points whatever it is.
+        settled: the cycles end when no point of a chunk ends one with a force that differs from the one before by
+            more than this share of the chunk's largest; 0 marches all of them.
 
     Returns:
         (n, 3, 2 H + 1) force in N and (n, 3, 2 H + 1, 3, 2 H + 1) its derivative in N/m.
     """
     n = u.shape[0]
     if n <= chunk:
-        return _with_derivative(law, u, period, samples, count)
+        return _with_derivative(law, u, period, samples, count, settled)
     parts = -(-n // chunk)
     filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
     leaves, tree = jax.tree_util.tree_flatten(law)
@@ -59,7 +66,7 @@ def force_harmonics(
     def one(part: tuple[list[Array], Array]) -> tuple[Array, Array]:
         per_point = iter(part[0])
         mixed = [next(per_point) if mine else leaf for leaf, mine in zip(leaves, own, strict=True)]
-        return _with_derivative(jax.tree_util.tree_unflatten(tree, mixed), part[1], period, samples, count)
+        return _with_derivative(jax.tree_util.tree_unflatten(tree, mixed), part[1], period, samples, count, settled)
 
     force, slope = jax.lax.map(one, (split, filled))
     return force.reshape(-1, *u.shape[1:])[:n], slope.reshape(-1, *slope.shape[2:])[:n]
@@ -72,7 +79,18 @@ def _split(leaf: Array, parts: int, chunk: int) -> Array:
     return jnp.moveaxis(whole, -2, 0)
 
 
-def _with_derivative(law: Law, u: Array, period: Array | float, samples: int, count: int) -> tuple[Array, Array]:
+class _Running(NamedTuple):
+    """State and tangents at the end of a cycle, force there (n, 3), its change over the cycle, cycles done."""
+
+    carried: tuple[State, State]
+    force: Array
+    change: Array
+    done: Array
+
+
+def _with_derivative(
+    law: Law, u: Array, period: Array | float, samples: int, count: int, settled: Array | float
+) -> tuple[Array, Array]:
     """Marched together with the tangents of state and force along every harmonic.
 
     A harmonic of one direction moves all points alike: only (3 (2 H + 1), 3) numbers a sample, and not those of every
@@ -95,13 +113,19 @@ def _with_derivative(law: Law, u: Array, period: Array | float, samples: int, co
         (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
         return (after, changed), (force, slope)
 
-    def cycle(carried: tuple[State, State], _: None) -> tuple[tuple[State, State], None]:
-        return jax.lax.scan(lambda c, rows: (one(c, rows)[0], None), carried, (values, rates))[0], None
+    def cycle(running: _Running) -> _Running:
+        first = jax.tree_util.tree_map(lambda row: row[:-1], (values, rates))
+        carried, _ = jax.lax.scan(lambda c, rows: (one(c, rows)[0], None), running.carried, first)
+        carried, (force, _) = one(carried, (values[-1], rates[-1]))
+        return _Running(carried, force, jnp.abs(force - running.force).max(), running.done + 1)
+
+    def unsettled(running: _Running) -> Array:
+        return (running.done < count - 1) & (running.change > settled * jnp.abs(running.force).max())
 
     state = law.init(u.shape[0])
     carried = state, jax.tree_util.tree_map(lambda leaf: jnp.zeros((size, *leaf.shape)), state)
-    if count > 1:
-        carried, _ = jax.lax.scan(cycle, carried, None, length=count - 1)
+    running = _Running(carried, jnp.zeros(u.shape[:2]), jnp.asarray(jnp.inf), jnp.asarray(0))
+    carried = jax.lax.while_loop(unsettled, cycle, running).carried if count > 1 else carried
     _, (force, slope) = jax.lax.scan(one, carried, (values, rates))
     slopes = jnp.einsum("hs,smnk->nkhm", transform, slope)
     return jnp.einsum("hs,snk->nkh", transform, force), slopes.reshape(*u.shape, *u.shape[1:])
