@@ -303,6 +303,10 @@ MISTAKES = {
     "NaN in heights": (HEIGHTS, 'kind = "table"\nfile = "nan.txt"', "nan.txt: line 7: the share is no finite number"),
     "NaN in friction": (FRICTION, 'kind = "table"\nfile = "nan.txt"', "nan.txt: line 7: the coefficient is no finite"),
     "no such file": (HEIGHTS, 'kind = "profile"\nfile = "none.txt"', "roughness.file: there is no file"),
+    "no modal file": (
+        SMALL[SMALL.index('kind = "layer"') : SMALL.index("[roughness]")],
+        'kind = "basis"\nfile = "none.h5"\ninterface = "left"\n', "contact.toml: stiffness.file: there is no file",
+    ),
     "no [temperature]": (FRICTION, 'kind = "heated"\nmu_0 = 0.3', 'friction: kind = "heated" needs the heat of'),
     "no friction": (f"[friction]\n{FRICTION}\n", "", "motion: a contact that moves needs its friction"),
     "wear by two numbers": (

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..basis import read_basis
-from ..errors import UserError
+from ..data import ModalBasis, UserError
 from ..mesh import UNITS
 from . import friction as friction_laws
 from . import settings as S
@@ -100,9 +100,10 @@ def _source(settings: S.ContactFile, path: Path) -> _Source:
         if isinstance(given, S.HertzSource):
             return _of_hertz(given)
         if isinstance(given, S.BasisSource):
-            return _of_basis(given, path)
+            return _of_basis(given, read_basis(S.beside(path, given.file, "stiffness.file")))
     except UserError as error:
-        raise UserError(f"{path}: stiffness.{error}" if not str(error).startswith(str(path)) else str(error)) from error
+        own = str(error).startswith((str(path), str(path.parent / getattr(given, "file", path.name))))
+        raise UserError(str(error) if own else f"{path}: stiffness.{error}") from error
     curve, normal = None, 0.0
     if isinstance(given, S.CurveSource):
         file = S.beside(path, given.file, "stiffness.file")
@@ -129,8 +130,7 @@ def _of_hertz(given: S.HertzSource) -> _Source:
     return _Source(normal, stiffness, None, hertz=hertz)
 
 
-def _of_basis(given: S.BasisSource, path: Path) -> _Source:
-    basis = read_basis(S.beside(path, given.file, "stiffness.file"))
+def _of_basis(given: S.BasisSource, basis: ModalBasis) -> _Source:
     group = basis.groups[0, 0]
     for key, name in (("interface", given.interface), ("facing", given.facing)):
         if name is not None and name not in group.interfaces:

@@ -140,7 +140,7 @@ class GaussianHeights(Model):
 
     kind: Literal["gaussian"]
     R_Z: PositiveLength
-    mean: Number = 0.5
+    mean: Positive = 0.5
     deviation: Positive = 20**-0.5
     R_Z_other: NotNegativeLength = 0.0
 

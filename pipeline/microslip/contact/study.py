@@ -30,6 +30,8 @@ from .wear import course, dimensionless_time, from_archard, from_energy_density
 
 Columns = dict[str, np.ndarray]
 OPEN, STICK, SLIP = 0, 1, 2
+FASTEST = 50.0
+"""m/s, up to which a characteristic is drawn."""
 CREEP = 10.0
 """A smoothed contact counts as slipping where slope times speed is more: friction has 94 % of its value there."""
 
@@ -130,7 +132,7 @@ def _normal(c: Contact, working: tuple[float, float] | None, found: _Findings) -
     if c.stiffness is not None:
         for name, k in zip(("t1", "t2"), c.stiffness.tangential, strict=True):
             table[f"tangential_stiffness_{name}_N/m"] = k * share
-    found.tables["normal"] = {**table, "area_share": share}
+    found.tables["normal"] = {**table, "area_share": share if c.heights is None else _area(c, u)}
     if working is not None:
         _at_working_point(c, working, found)
 
@@ -143,7 +145,15 @@ def _at_working_point(c: Contact, working: tuple[float, float], found: _Findings
     if c.stiffness is not None:
         found.told.append(("tangential stiffness there", _engineering(c.stiffness.tangential[0] * share, "N/m")))
     if c.roughness is not None:
-        found.told.append(("share of the area in contact there", f"{100 * share:.4g} %"))
+        touching = 100 * float(_area(c, np.array(u))[0])
+        found.told.append(("share of the area in contact there", f"{touching:.4g} %"))
+
+
+def _area(c: Contact, u: np.ndarray) -> np.ndarray:
+    """Share of the nominal area in contact at approaches (m), between 0 and 1."""
+    if c.heights is None or c.roughness is None:
+        return np.clip(np.array(c.normal.share(jnp.asarray(u))), 0.0, 1.0)
+    return np.array(c.heights.area(jnp.asarray(u / c.roughness)))
 
 
 def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, float]:
@@ -193,7 +203,7 @@ def _speeds(c: Contact, mean: Friction, pressed: float) -> np.ndarray:
         scale = float(mean.rate)
     if isinstance(mean, Heated):
         scale = float(mean.resistance * mean.mu_0 * pressed / (mean.area * mean.limit))
-    return np.linspace(0.0, 5 / scale if scale > 0 else 1.0, 301)
+    return np.linspace(0.0, min(5 / scale, FASTEST) if scale > 0 else 1.0, 301)
 
 
 def _lubricated(c: Contact, given: S.LubricatedFriction, found: _Findings) -> None:
@@ -202,7 +212,7 @@ def _lubricated(c: Contact, given: S.LubricatedFriction, found: _Findings) -> No
     assert heat is not None and c.heights is not None and c.roughness is not None and c.area is not None
     one = given.mu_0 * heat.resistance * c.roughness * c.normal_0 / (heat.limit * c.area)  # v* per m/s (3.6-22)
     eta = c.area**2 * heat.limit / (heat.resistance * given.mu_0**2 * c.normal_0**2 * c.roughness**3) * given.viscosity
-    v, approaches = np.linspace(0, 10, 201), np.array([0.4, 0.6, 0.8, 1.0])
+    v, approaches = np.linspace(0, min(10, FASTEST * one), 201), np.array([0.4, 0.6, 0.8, 1.0])
     dry, fluid = lubricated(c.heights, approaches, v, eta, given.film)
     found.tables["friction"] = {
         "approach_m": np.repeat(approaches * c.roughness, len(v)), "speed_m/s": np.tile(v / one, len(approaches)),
@@ -464,8 +474,8 @@ def _yields(c: Contact, yield_shear: float, found: _Findings) -> None:
     table, motion = found.tables["motion"], c.settings.motion
     assert motion is not None and c.area is not None
     last = slice(len(table["time_s"]) - motion.samples - 1, None)
-    share = np.array(c.normal.share(jnp.asarray(table["u_n_m"][last])))
-    area = c.area * np.minimum(np.maximum(share, 1e-12), 1.0)
+    share = _area(c, table["u_n_m"][last])
+    area = c.area * np.maximum(share, 1e-12)
     force = [np.where(share > 0, table[f"F_{name}_N"][last], 0.0) / area for name in ("n", "t1", "t2")]
     pressure, shear = np.maximum(force[0], 0.0), np.stack(force[1:], axis=1)
     layer = c.layer or Layer(Solid(2.1e11, 0.3), 1.0, c.settings.limits.boundary)

@@ -68,7 +68,7 @@ def _metres(*values: np.ndarray) -> tuple[list[np.ndarray], str]:
 
 
 def _number(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}"
+    return f"{value:.3g} {unit}" if abs(value) < 1000 else f"{value:.0f} {unit}"
 
 
 # --- normal law ----------------------------------------------------------------------------------------------------
@@ -266,8 +266,8 @@ def friction_figure(study: Study) -> Any:
     if speed[0] > 0 and speed[-1] / speed[0] > 50:
         axes.set_xscale("log")
     axes.set(xlabel="speed of sliding in m/s", ylabel="friction coefficient")
-    axes.set_ylim(0, 1.12 * float(np.max(t.get("mean_plus_deviation", t["coefficient"]))) or 1.0)
-    axes.legend(frameon=False, fontsize=8, loc="lower left" if "approach_m" not in t else "best")
+    axes.set_ylim(0, 1.05 * float(np.max(t.get("mean_plus_deviation", t["coefficient"]))) or 1.0)
+    _legend_above(axes)
     figure.suptitle(_title(study, "friction characteristic"), fontweight="bold")
     return figure
 
