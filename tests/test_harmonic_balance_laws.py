@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -10,16 +12,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from microslip.case import CaseSettings, load_case, run_case
 from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law
 from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.point import PointContact
-from microslip.data import Compliance, Interface, ModalGroup, UserError
-from microslip.harmonic_balance import JenkinsContact, frequency_response
+from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, UserError
+from microslip.harmonic_balance import JenkinsContact, frequency_response, response_table
 from microslip.harmonic_balance.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.response import HarmonicResponse, Problem, harmonic_response, of_body
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 
 def value(number: float) -> jax.Array:
@@ -339,3 +343,109 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
         of_body(g, (patch,), np.array([8.0]), force, force, samples=128), np.array([20.0]), np.ones(1)
     )
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
+
+
+# case files --------------------------------------------------------------------------------------------------------
+
+CASE = """
+name = "sled"
+body = "sled"
+excitation = "push"
+amplitude = 2.0
+monitor = "middle"
+harmonics = 2
+samples = 32
+
+[[contacts]]
+interface = "sole"
+law = "smooth"
+normal_stiffness = 3e6
+tangential_stiffness = 1e6
+friction = 0.3
+points = [4, 2]
+
+[sweep]
+start = 35.0
+stop = 200.0
+points = 25
+normal_forces = [5.0, 1e5]
+"""
+
+SECOND = """
+[[contacts]]
+interface = "sole"
+normal_stiffness = 1.0
+tangential_stiffness = 1.0
+friction = 0.1
+"""
+
+
+def sled() -> ModalBasis:
+    """A block of 2 kg on soft springs that is pushed along its sole."""
+    block = Body("block", 2.0, (0.0, 0.0, 0.0), inertia=(0.01, 0.02, 0.015))
+    legs = [Spring("ground", "block", (2e5, 2e5, 2e5, 500.0, 500.0, 500.0))]
+    sole = Contact("sole", "block", (0, 0, -1), t2=(0, 1, 0), at=(0, 0, -0.02), width=0.06, height=0.03)
+    push, middle = Force("push", "block", (1, 0.2, 0), at=(0, 0, 0.01)), Monitor("middle", "block")
+    return System("sled", [block], legs, [sole], [push], [middle], ratio=0.01).basis()
+
+
+def asked(folder: Path, *replaced: tuple[str, str]) -> CaseSettings:
+    text = CASE
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "case.toml").write_text(text)
+    return load_case(folder / "case.toml")[0]
+
+
+def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(tmp_path: Path) -> None:
+    """Pressed by 1e5 N both are the same springs; four by two points are softer in rotation by 1/16 and 1/4."""
+    result = run_case(asked(tmp_path), sled(), "case.toml")
+    linear = [('law = "smooth"\n', ""), ("points = [4, 2]\n", "")]
+    r, g = result.responses[1e5], sled().groups[0, 0]
+    assert all(one.converged.all() for one in result.responses.values()) and r.normal_swing.max() > 0
+    b2, h2 = 0.06**2 / 12 * (1 - 1 / 16), 0.03**2 / 12 * (1 - 1 / 4)
+    k = np.diag([3e6, 1e6, 1e6, 1e6 * (b2 + h2), 3e6 * h2, 3e6 * b2])
+    T, force, watched = (
+        g.interfaces["sole"].rows, 2 * g.excitations["push"].rows[0], g.monitors["middle"].rows[0]
+    )  # fmt: skip
+    K = g.K_r + T.T @ k @ T
+    exact = [
+        watched @ np.linalg.solve(K - w**2 * g.M_r + 1j * w * g.C_r, force) for w in 2 * np.pi * r.frequency
+    ]  # fmt: skip
+    np.testing.assert_allclose(r.monitor, exact, rtol=1e-8)
+    closed = run_case(asked(tmp_path, *linear), sled(), "case.toml").responses[1e5]
+    np.testing.assert_allclose(r.monitor, closed.monitor, rtol=0.05)
+
+
+def test_a_case_with_a_law_slides_and_its_table_says_how(tmp_path: Path) -> None:
+    result = run_case(asked(tmp_path), sled(), "case.toml")
+    loose = result.responses[5.0]
+    assert isinstance(loose, HarmonicResponse) and loose.slipping.max() > 0.3
+    assert np.abs(loose.monitor).max() < np.abs(result.responses[1e5].monitor).max()
+    lines = response_table({5.0: loose}).splitlines()
+    head = lines[0].split(",")
+    table = dict(zip(head, np.array([line.split(",") for line in lines[1:]], dtype=float).T, strict=True))
+    np.testing.assert_allclose(table["slipping_FN_5_N"], loose.slipping[:, 0], rtol=1e-8)
+    np.testing.assert_allclose(table["amplitude_2_m_FN_5_N"], np.abs(loose.harmonics[:, 2]), rtol=1e-8)
+    top = int(np.abs(loose.monitor).argmax())
+    found = dict(result.resonances[5.0])
+    assert max(found.values()) >= np.abs(loose.monitor[top])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('law = "smooth"', 'law = "rough"', "roughness (R_Z in m) belongs to"),
+        ('law = "smooth"', 'law = "smooth"\nroughness = 1e-5', "roughness (R_Z in m) belongs to"),
+        ('law = "smooth"\n', "", "points belong to law"),
+        ("samples = 32", "samples = 8\n", "are too few for"),
+        ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
+        ("points = [4, 2]", "points = [4, 0]", "points"),
+        ("[sweep]", SECOND + "\n[sweep]", "cannot stand beside others"),
+    ],
+)  # fmt: skip
+def test_mistakes_in_a_case_with_laws(tmp_path: Path, old: str, new: str, told: str) -> None:
+    more = [("harmonics = 2", "harmonics = 3")] if "samples" in old else []
+    with pytest.raises(UserError, match=re.escape(told)):
+        asked(tmp_path, (old, new), *more)

@@ -1,7 +1,7 @@
 """case.toml: an assembly of bodies and what is asked of it, and how it is run.
 
-So far one body whose interfaces meet rigid neighbours through a linear spring and a Jenkins element; the
-harmonic-balance stage grows it.
+So far one body whose interfaces meet rigid neighbours: through a linear spring and a Jenkins element in closed form, or
+through point contacts with a law of the contact room.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -36,12 +36,22 @@ from .harmonic_balance import (
 )
 from .speed_range import basis_at
 
+if TYPE_CHECKING:
+    from .harmonic_balance.patch import Patch
+
+
+Count = Annotated[int, Field(ge=1, le=1000)]
+
 
 class ContactSettings(Model):
     """A contact of one interface with a rigid neighbour. Stiffnesses in N/m for the whole patch (book: c_N0, c_R0).
 
     width (along t1) and height (along t2) in m are the patch's own if not given. includes: which compliance the
     stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
+
+    law: ``jenkins``, linear springs and one Jenkins element along `slides_along` in closed form, one harmonic; or point
+    contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough`` (3.3, with
+    `roughness` R_Z in m). points: how many along t1 and t2.
     """
 
     interface: Name
@@ -52,6 +62,17 @@ class ContactSettings(Model):
     friction: NotNegative
     slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
+    law: Literal["jenkins", "smooth", "rough"] = "jenkins"
+    roughness: Positive | None = None
+    points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
+
+    @model_validator(mode="after")
+    def _belongs_to_the_law(self) -> ContactSettings:
+        if (self.law == "rough") != (self.roughness is not None):
+            raise ValueError('roughness (R_Z in m) belongs to law = "rough": give both or neither')
+        if self.law == "jenkins" and self.points is not None:
+            raise ValueError('points belong to law = "smooth" or "rough"; the closed form needs none')
+        return self
 
 
 class Sweep(Model):
@@ -72,7 +93,10 @@ class Sweep(Model):
 
 
 class CaseSettings(Model):
-    """A whole case.toml."""
+    """A whole case.toml.
+
+    harmonics, samples (of a cycle), cycles (marched until the last one counts): of contacts with a law.
+    """
 
     name: Name
     description: str = ""
@@ -83,8 +107,27 @@ class CaseSettings(Model):
     amplitude: Number = 1.0
     monitor: Name
     direction: Literal["x", "y", "z"] = "x"
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 3
+    samples: Annotated[int, Field(ge=8, le=100000)] = 64
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 2
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> CaseSettings:
+        if len({c.law == "jenkins" for c in self.contacts}) > 1:
+            raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')
+        if self.samples < 4 * self.harmonics:
+            raise ValueError(
+                f"samples: {self.samples} are too few for {self.harmonics} harmonics; take at least "
+                f"{4 * self.harmonics}, better {16 * self.harmonics}"
+            )
+        return self
+
+    @property
+    def has_laws(self) -> bool:
+        """Whether the contacts are points with a law, and not the closed form."""
+        return any(c.law != "jenkins" for c in self.contacts)
 
 
 @dataclass(frozen=True)
@@ -150,22 +193,110 @@ def run_case(
     residual = _residual(group, settings, label, basis.reduction, beside)
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
-    responses, resonances = {}, {}
-    for normal in forces:
-        report(f"friction response at a normal force of {normal:g} N")
-        pressed = [_contact(c, normal, s) for c, s in zip(contacts, springs, strict=True)]
-
-        def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
-            return frequency_response(group, pressed, force, watch, at, residual=residual, amplitude=settings.amplitude)
-
-        responses[normal] = respond(frequency)
-        resonances[normal] = refined_peaks(responses[normal], respond)
+    asked = _Asked(group, settings, contacts, springs, force, watch, residual, frequency)
+    answer = _by_laws if settings.has_laws else _in_closed_form
+    responses, resonances, stuck, remarks = answer(asked, forces, report)
     free = frequency_response(group, [], force, watch, frequency)
-    closed = [_contact(c, max(forces), s) for c, s in zip(contacts, springs, strict=True)]
-    stuck = stuck_frequencies(group, closed, residual)
-    remarks = counted + _between(settings, group) + _lift_off(responses) + _too_coarse(group, settings)
+    remarks = counted + _between(settings, group) + remarks + _too_coarse(group, settings)
     remarks += _not_converged(responses)
     return CaseResult(settings, responses, free, stuck, resonances, group.speed, tuple(remarks))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A case with its names looked up: sized contacts, springs along n, t1, t2, modal force and row, Hz."""
+
+    group: ModalGroup
+    settings: CaseSettings
+    contacts: list[ContactSettings]
+    springs: list[Springs]
+    force: Array
+    watch: Array
+    residual: Residual | None
+    frequency: Array
+
+
+_Answer = tuple[dict[float, FrequencyResponse], dict[float, list[tuple[float, float]]], Array, list[str]]
+
+
+def _in_closed_form(asked: _Asked, forces: tuple[float, ...], report: Callable[[str], None]) -> _Answer:
+    """Responses and resonances by normal force, sticking frequencies, remarks: one harmonic, Jenkins elements."""
+    responses: dict[float, FrequencyResponse] = {}
+    resonances = {}
+    a, amplitude = asked, asked.settings.amplitude
+    for normal in forces:
+        report(f"friction response at a normal force of {normal:g} N")
+        pressed = [_contact(c, normal, s) for c, s in zip(a.contacts, a.springs, strict=True)]
+
+        def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
+            return frequency_response(a.group, pressed, a.force, a.watch, at, residual=a.residual, amplitude=amplitude)
+
+        responses[normal] = respond(a.frequency)
+        resonances[normal] = refined_peaks(responses[normal], respond)
+    closed = [_contact(c, max(forces), s) for c, s in zip(a.contacts, a.springs, strict=True)]
+    stuck = stuck_frequencies(a.group, closed, a.residual)
+    return responses, resonances, stuck, _lift_off(responses)
+
+
+def _by_laws(asked: _Asked, forces: tuple[float, ...], report: Callable[[str], None]) -> _Answer:
+    """The same with the laws of the contact room and as many harmonics as the case asks for."""
+    from .harmonic_balance import response
+    from .harmonic_balance.reduced import stuck
+
+    a, s = asked, asked.settings
+    patches = tuple(_patch(c, k) for c, k in zip(a.contacts, a.springs, strict=True))
+    fine = {"harmonics": s.harmonics, "samples": s.samples, "cycles": s.cycles, "length": _moves_by(a, max(forces))}
+    responses: dict[float, FrequencyResponse] = {}
+    resonances, frequencies, remarks = {}, np.zeros(0), []
+    for normal in forces:
+        report(f"friction response at a normal force of {normal:g} N")
+        problem = response.of_body(
+            a.group, patches, np.full(len(patches), normal), a.force, a.watch, s.amplitude, a.residual, **fine
+        )
+        limits = np.array([c.friction * normal for c in a.contacts])
+        found = response.harmonic_response(problem, a.frequency, limits, report)
+        responses[normal], resonances[normal] = found, response.refined_peaks(problem, found)
+        remarks += _not_periodic(normal, found.unsteady, s.cycles)
+        if normal == max(forces):
+            frequencies = stuck(problem.body)
+    return responses, resonances, frequencies, remarks
+
+
+def _patch(c: ContactSettings, springs: Springs) -> Patch:
+    """The point contacts of a patch, its stiffnesses shared out evenly (Sextro Eq. (5.2-34))."""
+    import jax.numpy as jnp
+
+    from .contact.friction import Coulomb
+    from .contact.heights import Polynomial
+    from .contact.point_laws import rough_point, smooth_point
+    from .contact.series import ContactStiffness
+    from .harmonic_balance.patch import Patch, grid
+
+    asked = c.points or (24, 5)
+    counts = (asked[0] if c.width else 1, asked[1] if c.height else 1)
+    places, areas = grid(c.width or 0.0, c.height or 0.0, counts)
+    n, t1, t2 = (k / len(areas) for k in springs)
+    stiffness = ContactStiffness(n, (t1, t2), c.includes or BULK_AND_SURFACE, "case.toml")
+    friction = Coulomb(jnp.asarray(c.friction, dtype=float))
+    if c.law == "smooth":
+        return Patch(c.interface, places, areas, smooth_point(stiffness, friction))
+    return Patch(c.interface, places, areas, rough_point(stiffness, c.roughness or 0.0, Polynomial(), friction))
+
+
+def _moves_by(asked: _Asked, normal: float) -> float:
+    """About how far the contacts move before they slide, m: the unit of the unknowns."""
+    found = [c.friction * normal / k[1] for c, k in zip(asked.contacts, asked.springs, strict=True)]
+    return max(*found, 1e-9)
+
+
+def _not_periodic(normal: float, unsteady: Array, cycles: int) -> list[str]:
+    worst = float(unsteady.max(initial=0.0))
+    if worst < 1e-3:
+        return []
+    return [
+        f"At F_N = {normal:g} N the sliders were not periodic after {cycles} cycles: contact forces change by up to "
+        f"{100 * worst:.2g} % in the next one; raise cycles."
+    ]
 
 
 Springs = tuple[float, float, float]

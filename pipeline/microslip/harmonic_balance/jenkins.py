@@ -72,6 +72,15 @@ class FrequencyResponse:
     limit: Array
     normal_swing: Array
 
+    def columns(self) -> dict[str, Array]:
+        """What stands in a table beside the frequency, by name and unit."""
+        return {
+            "amplitude_m": np.abs(self.monitor),
+            "phase_rad": np.angle(self.monitor),
+            "dissipated_J": self.dissipated,
+            "converged": self.converged.astype(float),
+        }
+
 
 def jenkins_harmonic(amplitude: Array, stiffness: float, limit: float) -> tuple[Array, Array]:
     """Complex stiffness of a Jenkins element at an amplitude and its derivative with respect to the amplitude.
@@ -222,10 +231,11 @@ def stuck_frequencies(group: ModalGroup, contacts: list[JenkinsContact], residua
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
     """(frequency in Hz, amplitude in m) of every local maximum of the monitored amplitude among converged points."""
     a = np.abs(response.monitor)
-    return [(float(response.frequency[i]), float(a[i])) for i in _tops(response)]
+    return [(float(response.frequency[i]), float(a[i])) for i in tops(response)]
 
 
-def _tops(response: FrequencyResponse) -> Indices:
+def tops(response: FrequencyResponse) -> Indices:
+    """Points of the local maxima that `peaks` lists."""
     a, ok = np.abs(response.monitor), response.converged
     whole = ok[1:-1] & ok[:-2] & ok[2:]
     return np.flatnonzero(whole & (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
@@ -240,7 +250,7 @@ def refined_peaks(
         respond: the response at other frequencies (Hz).
     """
     found = []
-    for i in _tops(response):
+    for i in tops(response):
         low, high = (float(response.frequency[j]) for j in (i - 1, i + 1))
         for _ in range(6):  # nine points a round: the bracket shrinks four times
             r = respond(np.linspace(low, high, 9))
@@ -252,12 +262,11 @@ def refined_peaks(
 
 
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
-    """CSV text: frequency and, per normal force, amplitude, phase and dissipated energy."""
+    """CSV text: frequency and, per normal force, amplitude, phase, dissipated energy and what else a response has."""
     head, columns = ["frequency_Hz"], []
     for force, r in responses.items():
-        label = f"FN_{force:g}_N"
-        head += [f"amplitude_m_{label}", f"phase_rad_{label}", f"dissipated_J_{label}", f"converged_{label}"]
-        columns += [np.abs(r.monitor), np.angle(r.monitor), r.dissipated, r.converged.astype(float)]
+        head += [f"{name}_FN_{force:g}_N" for name in r.columns()]
+        columns += list(r.columns().values())
     first = next(iter(responses.values()))
     table = np.column_stack([first.frequency, *columns])
     lines = [",".join(head)] + [",".join(f"{v:.9g}" for v in row) for row in table]

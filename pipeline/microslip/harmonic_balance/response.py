@@ -16,10 +16,11 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 
 from ..data import Array, ComplexArray, ModalGroup
 from . import reduced
-from .jenkins import FrequencyResponse, Residual
+from .jenkins import FrequencyResponse, Residual, tops
 from .patch import Patch, equilibrium, needs_rate, rate, resultants, resultants_alone, stuck_stiffness, watch
 from .reduced import Reduced, Seen
 
@@ -317,11 +318,26 @@ class HarmonicResponse(FrequencyResponse):
     iterations: Array
     seconds: Array
 
+    def columns(self) -> dict[str, Array]:
+        more = {f"amplitude_{h}_m": np.abs(self.harmonics[:, h]) for h in range(2, self.harmonics.shape[1])}
+        return {
+            **super().columns(),
+            "mean_m": self.harmonics[:, 0].real,
+            **more,
+            "slip_dissipated_J": self.by_slip,
+            "supplied_J": self.supplied,
+            "slipping": self.slipping.mean(axis=1),
+            "open": self.open.mean(axis=1),
+            "iterations": self.iterations.astype(float),
+        }
+
 
 def sweep(
     problem: Problem, frequency: Array, report: Report = lambda _: None, start: Array | None = None
 ) -> list[Point]:
     """Solutions at frequencies (Hz) in the given order, each started from its neighbours. A failure is recorded.
+
+    What failed is tried again from the neighbour behind it, where that one has a solution.
 
     Args:
         start: (k,) where the first point starts; the sticking contact if None.
@@ -335,7 +351,27 @@ def sweep(
         point = solve(problem, 2 * np.pi * float(f), starts)
         done.append(point)
         report(f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + ("" if point.converged else ", not converged"))
+    for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
+        if not done[i].converged and done[i + 1].converged:
+            done[i] = _walked(problem, done[i + 1], done[i])
     return done
+
+
+def _walked(problem: Problem, known: Point, failed: Point) -> Point:
+    """The failed point, reached from a known one in steps of frequency that are shortened where need be."""
+    began, last, step, spent = time.perf_counter(), known, 1.0, failed.iterations
+    while step > 1 / 64:
+        Omega = last.Omega + step * (failed.Omega - known.Omega)
+        Omega = failed.Omega if abs(Omega - known.Omega) >= abs(failed.Omega - known.Omega) else Omega
+        point = newton(problem.at(Omega), last.x, most=20)
+        spent += point.iterations
+        if not point.converged:
+            step *= 0.5
+        elif Omega == failed.Omega:
+            return replace(point, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
+        else:
+            last = point
+    return replace(failed, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
 
 
 def _ahead(points: list[Point], Omega: float) -> Array:
@@ -413,3 +449,23 @@ def of_body(
         group, [p.interface for p in patches], scipy.linalg.block_diag(*stiffness), force, watched, amplitude, residual
     )
     return Problem(body, patches, np.concatenate(offset), np.concatenate(preload), **settings)
+
+
+def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
+    """(Hz, m) of every local maximum of the monitored amplitude, searched for between its neighbours on the grid.
+
+    To a millionth of the distance between the two or in twelve steps; points that do not converge count as none.
+    """
+    found = []
+    for i in tops(response):
+
+        def lowered(f: float, start: Array = response.x[i]) -> float:
+            point = solve(problem, 2 * np.pi * f, [start])
+            return -abs(_looked_at(problem, point)["monitor"]) if point.converged else 0.0
+
+        low, high = (float(response.frequency[j]) for j in (i - 1, i + 1))
+        options: Any = {"xatol": 1e-6 * (high - low), "maxiter": 12}
+        best: Any = scipy.optimize.minimize_scalar(lowered, bounds=(low, high), method="bounded", options=options)
+        top = max((float(-best.fun), float(best.x)), (float(abs(response.monitor[i])), float(response.frequency[i])))
+        found.append((top[1], top[0]))
+    return found
