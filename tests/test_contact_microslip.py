@@ -163,6 +163,16 @@ def test_iwan_with_one_slider_is_the_point_contact():
     assert np.allclose(MARCH(one, u), MARCH(jenkins(K_T, MU, normal), u), rtol=0, atol=1e-9)
 
 
+def test_iwan_with_one_slider_and_two_stiffnesses_is_that_point_contact():
+    normal = Penalty(jnp.asarray(K_N))
+    one = Iwan(normal, jnp.asarray(MU), jnp.asarray(K_T), *uniform(1), jnp.asarray(0.4))
+    t = np.linspace(0, 12, 300)
+    u = jnp.asarray(np.column_stack([3e-6 * np.cos(1.7 * t), 4e-6 * np.sin(t), 5e-6 * np.cos(t)])[:, None])
+    point = replace(jenkins(K_T, MU, normal), stiffness_2=jnp.asarray(0.4 * K_T))
+    assert np.allclose(MARCH(one, u), MARCH(point, u), rtol=0, atol=1e-7)
+    assert np.allclose(history(one, u, 1e-4).slip, history(point, u, 1e-4).slip, rtol=0, atol=1e-14)
+
+
 # Strips of a rough surface -----------------------------------------------------------------------------------------
 
 
@@ -314,6 +324,19 @@ def test_more_normal_force_before_more_tangential_meets_jaeger_s_superposition()
         F(second) - F(second - depth - before),
     )
     assert np.allclose(force[3:], MU * exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_elliptic_contact_slips_along_both_axes_as_partial_slip_does(axis):
+    """t1 lies along the axis asked for; across it the other tangential stiffness acts."""
+    contact, N = Hertz(Solid(2.1e11, 0.3), Solid(2.1e11, 0.3), 5.0, 40.0), 100.0
+    law = mindlin(contact, MU, 1.2 * float(contact.approach(N)), 200, axis).under(N)
+    for column, along_axis in ((1, axis), (2, 1 - axis)):
+        closed = PartialSlip(contact, N, MU, along_axis)
+        way = np.zeros((40, 1, 3))
+        way[:, 0, column] = np.linspace(0, 1.2, 40) * closed.full_slip
+        force = np.array(MARCH(law, jnp.asarray(way)))[:, 0, column]
+        assert np.abs(force - closed.force(way[:, 0, column])).max() < 1e-4 * MU * N
 
 
 def test_mindlin_unloads_normally_without_energy():

@@ -100,5 +100,8 @@ EXAMPLES: dict[str, Example] = {
     ),
     "rough strips": Example(rough_strips(2.4e8, 12e-6, Polynomial(), 0.9e8, 0.3, 6), 1.2e-5, 8e-6),
     "Mindlin": Example(mindlin(Hertz(_STEEL, _STEEL, 20.0, 20.0), 0.3, 3e-5, 6), 1.2e-5, 8e-6),
+    "Mindlin, two stiffnesses": Example(
+        mindlin(Hertz(_STEEL, _STEEL, 5.0, 20.0), 0.3, 3e-5, 4), 1.2e-5, 8e-6, isotropic=False
+    ),
     "Iwan": Example(Iwan(_ROUGH, _value(0.3), _C, *segalman(5, -0.5, 0.1, 0.05)), 1.2e-5, 8e-6),
 }

@@ -65,7 +65,7 @@ class PointContact(Law):
         trial = relaxed + stiffness * (tangential - state.tangential)
         time = state.time + dt
         theta = self._kept(trial, stiffness, pressed, dt, time)
-        force = trial * _weight(theta, self._relative(stiffness))
+        force = trial * weight(theta, self._relative(stiffness))
         stretched = ratio(force - relaxed, stiffness)
         elastic = force if self.damping is None else relaxed + springs * stretched
         slipped = state.slipped + jnp.where(share > 0, tangential - state.tangential - stretched, 0.0)
@@ -100,15 +100,15 @@ class PointContact(Law):
         return ratio(stiffness, jnp.max(stiffness, axis=0), 1.0)
 
     def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float, time: Array) -> Array:
-        """(n,) theta of `_weight` at which the force has come down to what friction can hold: 1 sticks."""
+        """(n,) theta of `weight` at which the force has come down to what friction can hold: 1 sticks."""
         tried = norm(trial)
         if self.stiffness_2 is None and self.friction.constant:
             held = self.friction.coefficient(tried, pressed, time) * pressed
             return jnp.where(tried > held, ratio(held, tried), 1.0)
-        return _slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
+        return slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
 
 
-def _weight(theta: Array, relative: Array | None) -> Array:
+def weight(theta: Array, relative: Array | None) -> Array:
     """Share of the trial force that is left, per direction: theta / (theta + (1 - theta) k / k_max).
 
     Friction that opposes the slip asks for force = trial - k slip with slip = lambda force (lambda >= 0): the force
@@ -118,7 +118,7 @@ def _weight(theta: Array, relative: Array | None) -> Array:
     return theta if relative is None else ratio(theta, theta + (1 - theta) * relative)
 
 
-def _slide(
+def slide(
     trial: Array, stiffness: Array, relative: Array | None, friction: Friction, pressed: Array, dt: Array | float,
     time: Array,
 ) -> Array:  # fmt: skip
@@ -126,7 +126,7 @@ def _slide(
     largest = jnp.max(stiffness, axis=0)
 
     def excess(theta: Array) -> Array:
-        force = norm(trial * _weight(theta, relative))
+        force = norm(trial * weight(theta, relative))
         slip = ratio((1 - theta) * force, theta * largest)
         return force - friction.coefficient(slip / dt, pressed, time) * pressed
 

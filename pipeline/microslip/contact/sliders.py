@@ -21,7 +21,7 @@ from .heights import Heights, as_table
 from .law import Array, Law, ratio, root, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
-from .point import PointContact
+from .point import PointContact, slide, weight
 from .series import BULK
 
 
@@ -35,20 +35,21 @@ class SliderState(NamedTuple):
 
 
 class Sliders(Law):
-    """Base: m sliders in parallel at every point, each a Coulomb cone behind an isotropic spring.
+    """Base: m sliders in parallel at every point, each a Coulomb cone behind a spring.
 
     As in `point.PointContact` a spring that grows takes no force with it and one that shrinks loses its part, which
     gives no energy; a slider whose limit falls while it sticks slides.
     """
 
     mu: Array
+    stiffness_ratio: Array | None
 
     def count(self) -> int:
         """Number of sliders."""
         raise NotImplementedError
 
     def local(self, approach: Array) -> tuple[Array, Array, Array]:
-        """Normal force (n,) N, tangential springs (m, n) N/m and limits (m, n) N at an approach (n,) m."""
+        """Normal force (n,) N, springs along t1 (m, n) N/m and limits (m, n) N at an approach (n,) m."""
         raise NotImplementedError
 
     def init(self, n: int) -> SliderState:
@@ -59,10 +60,10 @@ class Sliders(Law):
         pressed, springs, limits = self.local(u.T[0])
         moved = u.T[1:] - state.tangential
         relaxed = state.elastic * jnp.minimum(ratio(springs, state.springs), 1.0)[:, None]
-        trial = relaxed + springs[:, None] * moved
-        tried = root(jnp.sum(trial**2, axis=1))
-        elastic = trial * jnp.where(tried > limits, ratio(limits, tried), 1.0)[:, None]
-        slipped = state.slipped + ratio(jnp.sum(trial - elastic, axis=0), jnp.sum(springs, axis=0))
+        both = self._both(springs)
+        trial = relaxed + both * moved
+        elastic = _held(trial, limits) if self.stiffness_ratio is None else _held_of_two(trial, both, limits)
+        slipped = state.slipped + ratio(jnp.sum(trial - elastic, axis=0), jnp.sum(both, axis=0))
         force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
         return force.T, SliderState(u.T[1:], elastic, springs, slipped)
 
@@ -73,12 +74,33 @@ class Sliders(Law):
         return state.slipped.T
 
     def stored(self, u: Array, state: SliderState) -> Array:
-        stretched = ratio(jnp.sum(state.elastic**2, axis=1), state.springs)
-        return self.pressed_energy(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
+        stretched = ratio(state.elastic**2, self._both(state.springs))
+        return self.pressed_energy(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=(0, 1))
 
     def pressed_energy(self, approach: Array) -> Array:
         """(n,) energy of the normal springs, J."""
         raise NotImplementedError
+
+    def _both(self, springs: Array) -> Array:
+        """(m, 2, n) springs along t1 and t2, N/m; (m, 1, n) if they are the same."""
+        if self.stiffness_ratio is None:
+            return springs[:, None]
+        return jnp.stack([springs, springs * self.stiffness_ratio], axis=1)
+
+
+def _held(trial: Array, limits: Array) -> Array:
+    """(m, 2, n) what friction holds of the trial forces: the radial return, the closest point for equal springs."""
+    tried = root(jnp.sum(trial**2, axis=1))
+    return trial * jnp.where(tried > limits, ratio(limits, tried), 1.0)[:, None]
+
+
+def _held_of_two(trial: Array, stiffness: Array, limits: Array) -> Array:
+    """The same for unequal springs (m, 2, n), with friction that opposes the slip (`point.weight`)."""
+    forces, springs = (jnp.moveaxis(part, 1, 0).reshape(2, -1) for part in (trial, stiffness))
+    relative, flat = ratio(springs, jnp.max(springs, axis=0), 1.0), limits.reshape(-1)
+    theta = slide(forces, springs, relative, Coulomb(jnp.ones(())), flat, 1.0, jnp.zeros(()))
+    kept = (forces * weight(theta, relative)).reshape(2, *limits.shape)
+    return jnp.moveaxis(kept, 0, 1)
 
 
 @settings
@@ -91,9 +113,11 @@ class Strips(Sliders):
 
     Attributes:
         at: (m, 1) or (m, n) x_i, rising. shares: the same shape, w_i, whose sum is 1. depth: of x = 1, m; the roughness
-            R_Z of a rough surface. stiffness_0: c_N0 of all strips, N/m. stiffness_t: c_R0 of all strips, N/m.
-        held: approach, m, that no motion changes, for a constant normal force (`under`); None: that of u. includes:
-            whose compliance the stiffnesses count, one of `series.INCLUDES`.
+            R_Z of a rough surface. stiffness_0: c_N0 of all strips, N/m. stiffness_t: c_R0 of all strips along t1,
+            N/m.
+        held: approach, m, that no motion changes, for a constant normal force (`under`); None: that of u.
+        stiffness_ratio: tangential stiffness along t2 over that along t1; None: 1. includes: whose compliance the
+            stiffnesses count, one of `series.INCLUDES`.
     """
 
     at: Array
@@ -103,6 +127,7 @@ class Strips(Sliders):
     stiffness_t: Array
     mu: Array
     held: Array | None = None
+    stiffness_ratio: Array | None = None
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:
@@ -156,9 +181,10 @@ class Iwan(Sliders):
     law with several sliders. `uniform` and `segalman` give the shares.
 
     Attributes:
-        normal: normal law. mu: friction coefficient. stiffness: tangential stiffness of the full area, N/m.
-        shares: (m, 1) or (m, n) k_i, whose sum is 1. strengths: the same shape, f_i, whose sum is 1. includes: whose
-            compliance the stiffnesses count, one of `series.INCLUDES`.
+        normal: normal law. mu: friction coefficient. stiffness: tangential stiffness of the full area along t1, N/m.
+        shares: (m, 1) or (m, n) k_i, whose sum is 1. strengths: the same shape, f_i, whose sum is 1.
+        stiffness_ratio: of t2 over t1; None: 1. includes: whose compliance the stiffnesses count, one of
+            `series.INCLUDES`.
     """
 
     normal: Normal
@@ -166,6 +192,7 @@ class Iwan(Sliders):
     stiffness: Array
     shares: Array
     strengths: Array
+    stiffness_ratio: Array | None = None
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:
@@ -300,8 +327,8 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
 
     Args:
         contact: `hertz.Hertz`, `profiles.RoundContact`, or one's own, of convex force. mu: friction coefficient.
-        deepest: largest approach that is described, m. count: of strips. axis: of the elliptic contact, 0 or 1, whose
-            tangential stiffness is used for both directions.
+        deepest: largest approach that is described, m. count: of strips. axis: of the elliptic contact, 0 or 1, that
+            t1 lies along.
 
     Raises:
         UserError: a setting that is not positive, a force that is not convex.
@@ -315,7 +342,9 @@ def mindlin(contact: NormalContact, mu: float, deepest: float, count: int, axis:
         raise UserError("contact: the stiffness of its normal force does not rise with the approach; strips need that")
     shares = rises / slopes[-1]
     stiffness_t = slopes[-1] * contact.tangential_ratio[axis]
-    return replace(_strips(at[:-1], shares, deepest, float(slopes[-1]), float(stiffness_t), mu), includes=BULK)
+    law = _strips(at[:-1], shares, deepest, float(slopes[-1]), float(stiffness_t), mu)
+    other = contact.tangential_ratio[1 - axis] / contact.tangential_ratio[axis]
+    return replace(law, stiffness_ratio=None if other == 1 else jnp.asarray(other), includes=BULK)
 
 
 def _strips(
