@@ -254,7 +254,7 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "stiffness.noise": ("N", "by which the force may fall between neighbours; evened then"),
     "stiffness.interface": ("", "name of the contact in the modal file"),
     "stiffness.facing": ("", "the other contact of the same body that is closed at the same time"),
-    "stiffness.axis": ("", "of the ellipse, 0 or 1, whose tangential stiffness Mindlin's partial slip takes"),
+    "stiffness.axis": ("", "of the ellipse, 0 or 1, that t1 lies along"),
     "roughness.kind": ("", "cumulative height distribution; without [roughness] the faces are smooth"),
     "roughness.R_Z": ("*", "highest peak to deepest valley of the heights; of a table its deepest depth if not given"),
     "roughness.R_Z_other": ("*", "of the other face, with the polynomial's heights; the two are combined (3.3-10)"),

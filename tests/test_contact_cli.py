@@ -15,7 +15,11 @@ import pytest
 pytest.importorskip("jax")
 pytest.importorskip("matplotlib")
 
+import jax.numpy as jnp
+
 from microslip.cli import main
+from microslip.contact.composed import compose
+from microslip.contact.law import march
 from microslip.contact.settings import load_contact
 from microslip.contact.study import study
 
@@ -250,6 +254,22 @@ def test_microslip_elements(kind: str, tmp_path: Path) -> None:
     energy = [t["dissipated_J"][np.isclose(t["amplitude_m"], a)][0] for a in (0.3e-6, 0.6e-6)]
     assert 0 < 4 * energy[0] < energy[1] < 300 * 4 * 0.6e-6
     assert np.abs(t["F_t1_N"]).max() == pytest.approx(300, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["massless", "strips", "iwan", "mindlin", "mindlin, turned"])
+def test_both_tangential_stiffnesses_reach_every_element(kind: str, tmp_path: Path) -> None:
+    """Stuck, moved along t1 and t2 alike: the forces are as the stiffnesses are; of the ellipse, by its axes."""
+    source = ALTERNATIVES["hertz" if "mindlin" in kind else "given"][0] + ("axis = 1\n" if "turned" in kind else "")
+    text = re.sub(r"\[stiffness\].*?(?=\[roughness\]|\[friction\])", source, SMALL, flags=re.S)
+    text = re.sub(r"\[roughness\].*?(?=\[friction\])", "", text, flags=re.S) if "mindlin" in kind else text
+    text = re.sub(r"\[limits\].*", "", text, flags=re.S) + ELEMENTS.get(kind.split(",")[0], "")
+    path = write(tmp_path, text)
+    made = compose(load_contact(path), path)
+    u = jnp.array([[[3e-6, 0, 0]], [[3e-6, 1e-12, 1e-12]]])
+    force = np.array(march(made.law, u, 1e-4, made.law.init(1))[0])[-1, 0]
+    t1, t2 = made.stiffness.tangential
+    assert force[2] / force[1] == pytest.approx(t2 / t1, rel=1e-9)
+    assert (t2 > t1) == ("mindlin" == kind) and t1 != t2
 
 
 def test_first_loading_table_is_3_8_26(tmp_path: Path) -> None:

@@ -126,7 +126,8 @@ def _of_hertz(given: S.HertzSource) -> _Source:
     hertz = Hertz(first, second, A, B)
     normal = 1.5 * float(hertz.force(HERTZ_DEPTH)) / HERTZ_DEPTH
     x, y = hertz.tangential_ratio
-    stiffness = ContactStiffness(normal, (x * normal, y * normal), BULK, f"Hertz at {1e6 * HERTZ_DEPTH:g} um")
+    t1, t2 = (y, x) if given.axis else (x, y)
+    stiffness = ContactStiffness(normal, (t1 * normal, t2 * normal), BULK, f"Hertz at {1e6 * HERTZ_DEPTH:g} um")
     return _Source(normal, stiffness, None, hertz=hertz)
 
 
@@ -259,10 +260,10 @@ def _element(c: Contact) -> Law | None:
     if isinstance(given, S.Massless):
         damping = _number(given.damping) if given.damping else None
         return PointContact(c.normal, c.friction, _number(first), own, damping)
-    return _microslip(c, given, first)
+    return _microslip(c, given, first, None if own is None else _number(second / first))
 
 
-def _microslip(c: Contact, given: S.Element, stiffness: float) -> Law:
+def _microslip(c: Contact, given: S.Element, stiffness: float, other: Array | None) -> Law:
     """Sliders in parallel; Coulomb's coefficient is the characteristic's (`settings` sees to that)."""
     assert isinstance(c.settings.friction, S.CoulombFriction)
     mu = c.settings.friction.mu
@@ -270,13 +271,14 @@ def _microslip(c: Contact, given: S.Element, stiffness: float) -> Law:
         shares = uniform(given.count, given.weakest)
         if given.exponent is not None:
             shares = segalman(given.count, given.exponent, given.ratio)
-        return Iwan(c.normal, _number(mu), _number(stiffness), *shares)
+        return Iwan(c.normal, _number(mu), _number(stiffness), *shares, other)
     try:
         if isinstance(given, S.MindlinElement):
             assert c.hertz is not None and isinstance(c.settings.stiffness, S.HertzSource)
             return mindlin(c.hertz, mu, _deepest(c), given.count, c.settings.stiffness.axis)
         assert c.heights is not None and c.roughness is not None and isinstance(given, S.StripsElement)
-        return rough_strips(c.normal_0, c.roughness, c.heights, stiffness, mu, given.count)
+        strips = rough_strips(c.normal_0, c.roughness, c.heights, stiffness, mu, given.count)
+        return replace(strips, stiffness_ratio=other)
     except UserError as error:
         raise UserError(f"{c.path}: element: {error}") from error
 
