@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
@@ -18,7 +19,8 @@ def keep_compiled() -> Path | None:
     """Keep compiled programs in the user's cache folder, so that the next run need not compile them again.
 
     `$XDG_CACHE_HOME/microslip/jax`, or `~/.cache/microslip/jax`. A folder that jax was told already
-    (JAX_COMPILATION_CACHE_DIR) is left; without a place to write to, nothing is kept and nothing is said.
+    (JAX_COMPILATION_CACHE_DIR) is left; without a place to write to, nothing is kept and nothing is said, and a
+    damaged entry (a process killed while it wrote) is compiled again.
     """
     told = getattr(jax.config, "jax_compilation_cache_dir", None)
     if told is not None:
@@ -32,9 +34,10 @@ def keep_compiled() -> Path | None:
     except (OSError, RuntimeError):
         return None
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)  # a study has a hundred small programs
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     jax.config.update("jax_raise_persistent_cache_errors", False)
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
     return folder
 
 
