@@ -16,6 +16,7 @@ E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods, SIA
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
@@ -235,6 +236,10 @@ class _Corrected:
     contraction: float = 0.0
 
 
+def _norm(v: Array) -> float:
+    return math.sqrt(v @ v)  # numpy.linalg.norm takes ten times as long for a short vector
+
+
 def _unit(size: int) -> Array:
     e = np.zeros(size)
     e[-1] = 1.0
@@ -286,10 +291,10 @@ def _correct(scaled: _Scaled, y: Array, border: Array, value: float, settings: N
         if factors is None:
             return _resort(scaled, y, border, value, settings, iteration, "singular derivative: start elsewhere")
         dy = -_solve(factors, right)
-        sizes.append(float(np.linalg.norm(dy)))
-        if error := _small_enough(sizes, settings.tolerance * (1.0 + float(np.linalg.norm(y)))):
+        sizes.append(_norm(dy))
+        if error := _small_enough(sizes, settings.tolerance * (1.0 + _norm(y))):
             return _arrived(y + dy, factors, border, iteration, error, sizes)
-        y, R, D, falls = _damped(scaled, y, dy, rows, border, value, float(np.linalg.norm(right)), settings.halvings)
+        y, R, D, falls = _damped(scaled, y, dy, rows, border, value, _norm(right), settings.halvings)
         forced += not falls
         if forced > settings.forced:
             return _resort(scaled, y, border, value, settings, iteration, "no step reduces the residual: start nearer")
@@ -323,7 +328,7 @@ def _damped(
         share = 0.5**k
         here = y + share * dy
         R, D = scaled(here)
-        size = np.hypot(np.linalg.norm(R / rows), border @ here - value)
+        size = math.hypot(_norm(R / rows), border @ here - value)
         if size <= (1.0 - 0.1 * share) * before and np.isfinite(D).all():
             return here, R, D, True
         if size < best[0] and np.isfinite(D).all():
@@ -421,7 +426,7 @@ class _Segment:
     def border(self) -> Array:
         """A direction in which the curve advances from a to b, on both sides of a kink less than 180 degrees."""
         middle = self.ta + self.tb
-        size = float(np.linalg.norm(middle))
+        size = _norm(middle)
         return middle / size if size > 1e-3 else self.tb
 
     def guesses(self, u: float) -> list[Array]:
@@ -432,7 +437,7 @@ class _Segment:
             first = self.a + u * ahead / float(self.border @ self.ta) * self.ta
             second = self.b - (1 - u) * ahead / float(self.border @ self.tb) * self.tb
             return [first, second] if u < 0.5 else [second, first]
-        length = float(np.linalg.norm(chord))
+        length = _norm(chord)
         bend = u * (1 - u) * ((1 - u) * (self.ta * length - chord) - u * (self.tb * length - chord))
         return [self.a + u * chord + bend]
 
@@ -470,7 +475,7 @@ def _sign(value: float) -> int:
 
 def _oriented(found: _Corrected, orientation: int) -> Array:
     assert found.tangent is not None
-    return found.tangent * (orientation * found.sign / np.linalg.norm(found.tangent))
+    return found.tangent * (orientation * found.sign / _norm(found.tangent))
 
 
 def _tangent(D: Array, orientation: int) -> Array | None:
@@ -485,15 +490,15 @@ def _tangent(D: Array, orientation: int) -> Array | None:
 
 def _angle(a: Array, b: Array) -> float:
     """Between two vectors, exact for small angles too."""
-    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-    return float(2.0 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
+    a, b = a / _norm(a), b / _norm(b)
+    return 2.0 * math.atan2(_norm(a - b), _norm(a + b))
 
 
 def _tried(scaled: _Scaled, state: State, length: float, settings: Settings) -> _Trial:
     """Predict, correct, judge."""
     ahead = state.tangent
     if settings.predictor == "secant" and state.before is not None:
-        secant = (state.y - state.before) / np.linalg.norm(state.y - state.before)
+        secant = (state.y - state.before) / _norm(state.y - state.before)
         ahead = secant if _angle(secant, state.tangent) < settings.angle else ahead
     guess = state.y + length * ahead
     found = _correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton)
@@ -508,7 +513,7 @@ def _judged(state: State, found: _Corrected, length: float, settings: Settings) 
         return _Trial(True, 1.0, False, False, found.y, t, found.contraction)
     if _smooth(state.tangent, chord, -t, settings.angle):
         return _Trial(False, 0.5, True, False, found.y, -t, found.contraction)
-    if length <= settings.kink_step and chord @ t > 0 and np.linalg.norm(chord) < 10 * length:
+    if length <= settings.kink_step and chord @ t > 0 and _norm(chord) < 10 * length:
         return _Trial(True, 1.0, False, True, found.y, t, found.contraction)
     turned = max(_angle(state.tangent, t), 2 * _angle(state.tangent, chord))
     return _Trial(False, float(np.clip(settings.angle / turned, 0.1, 0.5)))
@@ -537,7 +542,7 @@ def _crossed(scaled: _Scaled, state: State, length: float, settings: Settings, f
         if (trial := _aimed(scaled, state, guess, _unit(len(guess)), length, settings)).good:
             return trial
     if state.before is not None and (chord := state.y - state.before).any():
-        chord = chord / np.linalg.norm(chord)
+        chord = chord / _norm(chord)
         if (trial := _aimed(scaled, state, state.y + length * chord, chord, length, settings)).good:
             return trial
     return failed
@@ -549,8 +554,8 @@ def _aimed(scaled: _Scaled, state: State, guess: Array, border: Array, length: f
     if not found.ok:
         return _Trial(False)
     t, chord = _oriented(found, state.orientation), found.y - state.y
-    far = np.linalg.norm(chord) > 30 * length
-    if far or not chord @ t > 0 or np.linalg.norm(chord) < 0.01 * length:
+    far = _norm(chord) > 30 * length
+    if far or not chord @ t > 0 or _norm(chord) < 0.01 * length:
         return _Trial(False)
     bends = not _smooth(state.tangent, chord, t, settings.angle)
     trial = _Trial(True, 0.5, False, bends, found.y, t, found.contraction)
@@ -566,7 +571,7 @@ def _between(scaled: _Scaled, segment: _Segment, u: float, settings: Settings) -
     value = float((1 - u) * (border @ segment.a) + u * (border @ segment.b))
     for guess in segment.guesses(u):
         found = _correct(scaled, guess, border, value, settings.newton)
-        if found.ok and np.linalg.norm(found.y - guess) <= np.linalg.norm(segment.b - segment.a):
+        if found.ok and _norm(found.y - guess) <= _norm(segment.b - segment.a):
             return found.y, _oriented(found, found.sign), found.sign, found.logdet
     return None
 
@@ -592,9 +597,10 @@ def _is_kink(scaled: _Scaled, state: State, trial: _Trial, length: float, settin
             low, before = middle, here[:2]
         else:
             high, after = middle, here[:2]
+        if _angle(before[1], after[1]) <= 0.5 * settings.angle:
+            return False  # a smooth turn
     slowest = min(float(border @ before[1]), float(border @ after[1]))
-    whole = np.linalg.norm(after[0] - before[0]) * slowest <= 2.0 * (high - low) * span
-    return bool(whole and _angle(before[1], after[1]) > 0.5 * settings.angle)
+    return _norm(after[0] - before[0]) * slowest <= 2.0 * (high - low) * span
 
 
 def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, settings: Settings) -> Array | None:
@@ -605,7 +611,7 @@ def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, s
     if length <= settings.resolution:
         return trial.y
     segment = _Segment(state.y, trial.y, state.tangent, trial.tangent, False)
-    chord = float(np.linalg.norm(trial.y - state.y))
+    chord = _norm(trial.y - state.y)
 
     def test(u: float) -> float:
         here = _between(scaled, segment, u, settings)
@@ -624,7 +630,7 @@ def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, s
     before, after = sides
     if before is None or after is None or before[2] == after[2]:
         return None
-    whole = np.linalg.norm(after[0] - before[0]) <= 3 * settings.resolution
+    whole = _norm(after[0] - before[0]) <= 3 * settings.resolution
     straight = _angle(before[1], after[1]) <= settings.angle
     return 0.5 * (before[0] + after[0]) if whole and straight else None
 
@@ -652,7 +658,7 @@ def _root(scaled: _Scaled, segment: _Segment, settings: Settings, fold: bool, va
 
     if test(0.0) * test(1.0) > 0:
         raise _Lost
-    root = float(scipy.optimize.brentq(test, 0.0, 1.0, xtol=1e-13, rtol=1e-13))
+    root = float(scipy.optimize.brentq(test, 0.0, 1.0, xtol=1e-10, rtol=1e-12))
     test(root)
     return kept[root]
 
@@ -672,7 +678,7 @@ def _at(scaled: _Scaled, segment: _Segment, lam: float, settings: Settings) -> t
     guess = segment.guesses(float((lam - segment.a[-1]) / span))[0]
     guess[-1] = lam
     found = _correct(scaled, guess, _unit(len(guess)), lam, settings.newton)
-    if found.ok and np.linalg.norm(found.y - guess) <= 0.5 * np.linalg.norm(segment.b - segment.a):
+    if found.ok and _norm(found.y - guess) <= 0.5 * _norm(segment.b - segment.a):
         t = _oriented(found, 1)
         return found.y, t if t @ segment.border > 0 else -t
     try:
@@ -730,7 +736,7 @@ def _passed(
 ) -> tuple[list[Point], float | None]:
     """Fold and targets between the last point and the new one, and the bound if it is reached."""
     pieces, found = [_Segment(state.y, trial.y, state.tangent, trial.tangent, trial.kink)], []
-    if sense != state.sense:
+    if sense != state.sense and (settings.folds or settings.targets):
         y, t = _fold(scaled, pieces[0], settings)
         pieces = [replace(pieces[0], b=y, tb=t), replace(pieces[0], a=y, ta=t)]
         if settings.folds:
@@ -747,7 +753,7 @@ def _passed(
 
 
 def _along(state: State, y: Array) -> float:
-    return state.arclength + float(np.linalg.norm(y - state.y))
+    return state.arclength + _norm(y - state.y)
 
 
 def _values(piece: _Segment, scale: float, settings: Settings) -> list[tuple[float, bool]]:
@@ -767,7 +773,7 @@ def _closed(state: State, y: Array, t: Array) -> bool:
         return False
     chord = y - state.y
     nearest = state.y + chord * (before / (before - after))
-    return bool(np.linalg.norm(nearest - state.origin) <= 0.2 * np.linalg.norm(chord))
+    return bool(_norm(nearest - state.origin) <= 0.2 * _norm(chord))
 
 
 def _next_step(state: State, trial: _Trial, length: float, settings: Settings) -> float:
