@@ -68,6 +68,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/ring.py
 	@$(PYTHON) benchmarks/cyclic.py
 	@$(PYTHON) benchmarks/contact_points.py
+	@$(PYTHON) benchmarks/duffing.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

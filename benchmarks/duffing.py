@@ -80,13 +80,12 @@ def pyharm(solver: str, harmonics: int, samples: int, rounds: int, work: Path) -
 
 def moved(problem: Duffing, curve: Branch, peer: dict) -> tuple[float, float]:
     """Largest correction of the peer's points (scaled), and how far they are from the curve's polygon (scaled)."""
-    correction = max(
-        np.abs(newton(problem, x, w).x - x).max() / problem.x_scale for x, w in zip(peer["x"], peer["omega"], strict=True)
-    )
+    points = list(zip(peer["x"], peer["omega"], strict=True))
+    correction = max(np.abs(newton(problem, x, w).x - x).max() / problem.x_scale for x, w in points)
     y = np.column_stack([curve.x / problem.x_scale, curve.lam / problem.lam_scale])
     legs = np.diff(y, axis=0)
     apart = 0.0
-    for x, w in zip(peer["x"], peer["omega"], strict=True):
+    for x, w in points:
         if w <= HIGH:
             z = np.append(x / problem.x_scale, w / problem.lam_scale)
             share = np.clip(((z - y[:-1]) * legs).sum(1) / (legs**2).sum(1), 0, 1)[:, None]
@@ -109,22 +108,25 @@ def main(argv: list[str] | None = None) -> None:
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
           f"numpy {np.__version__}, load {os.getloadavg()[0]:.1f}\n")  # fmt: skip
     folds = " and ".join(f"{p.lam:.9f}" for p in curve.of_kind("fold"))
-    evaluations = sum(p.evaluations for p in {id(s): s for s in curve.points}.values())
-    print(f"folds at {folds}; {evaluations / len(curve.points):.1f} evaluations a point\n")
+    print(f"folds at {folds}\n")
     print("| program | points | curve, CPU ms | ms / point | CPU ms / point | CPU / microslip, a point | the curve |"
           " moved | apart |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|")  # fmt: skip
     n = len(curve.points)
-    print(f"| microslip | {n} | {1e3 * cpu:.0f} | {1e3 * wall / n:.3f} | {1e3 * cpu / n:.3f} | 1.0 | 1.0 | | |", flush=True)
+    print(row("microslip", n, wall, cpu) + " 1.0 | 1.0 | | |", flush=True)
     if not PYHARM.is_file():
         print("\npyHarm is not installed: sh tests/peers/setup.sh pyharm")
         return
     with tempfile.TemporaryDirectory() as folder:
         for solver in ("NewtonRaphson", "scipyroot"):
             peer = pyharm(solver, arguments.harmonics, arguments.samples, max(1, rounds // 3), Path(folder))
-            m, theirs_wall, theirs = len(peer["omega"]), peer["wall"].min(), peer["cpu"].min()
+            m, theirs = len(peer["omega"]), peer["cpu"].min()
             correction, apart = moved(problem, curve, peer)
-            print(f"| pyHarm, {solver} | {m} | {1e3 * theirs:.0f} | {1e3 * theirs_wall / m:.3f} | {1e3 * theirs / m:.3f} |"
-                  f" {theirs / m / (cpu / n):.1f} | {theirs / cpu:.1f} | {correction:.0e} | {apart:.0e} |", flush=True)  # fmt: skip
+            ratios = f" {theirs / m / (cpu / n):.1f} | {theirs / cpu:.1f} | {correction:.0e} | {apart:.0e} |"
+            print(row(f"pyHarm, {solver}", m, peer["wall"].min(), theirs) + ratios, flush=True)
+
+
+def row(name: str, points: int, wall: float, cpu: float) -> str:
+    return f"| {name} | {points} | {1e3 * cpu:.0f} | {1e3 * wall / points:.3f} | {1e3 * cpu / points:.3f} |"
 
 
 if __name__ == "__main__":

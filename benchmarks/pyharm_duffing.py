@@ -30,7 +30,9 @@ def maestro() -> Maestro:
     analysis = {
         "study": "frf", "puls_inf": job["low"], "puls_sup": job["high"], "sign_ds": 1, "verbose": False,
         "ds0": job["step"], "ds_max": job["step_max"], "ds_min": 1e-6, "solver": job["solver"],
-    } | ({"solver_options": {"tol_residual": 1e-9, "tol_delta_x": 1e-8}} if job["solver"] == "NewtonRaphson" else {})  # fmt: skip
+    }  # fmt: skip
+    if job["solver"] == "NewtonRaphson":
+        analysis["solver_options"] = {"tol_residual": 1e-9, "tol_delta_x": 1e-8}
     return Maestro({
         "analysis": {"frf": analysis},
         "system": {"type": "Base", "nh": job["harmonics"], "nti": job["samples"], "adim": {"status": False}},

@@ -50,3 +50,15 @@ def test_the_contact_benchmark_compares_laws_that_agree():
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| 64 |" in line]
     assert {r[1] for r in rows} >= {"microslip", "numpy loop"}
     assert all(float(r[-1]) < 1e-12 for r in rows)  # the same law, three times
+
+
+def test_the_duffing_benchmark_follows_one_curve_over_both_folds():
+    command = [sys.executable, str(ROOT / "benchmarks" / "duffing.py"), "--quick"]
+    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stderr
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("folds at")]
+    upper, lower = (float(word) for word in line.split()[2::2])
+    assert abs(upper - 1.462616482) < 1e-8 and abs(lower - 1.156017684) < 1e-8  # as with 12 harmonics and 256 samples
+    peers = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| pyHarm" in line]
+    assert all(float(r[-2]) < 1e-7 and float(r[-1]) < 1e-2 for r in peers)  # its tolerance; chords of our steps

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 import scipy.linalg.lapack
@@ -222,8 +222,8 @@ class _Scaled:
 
 @dataclass(frozen=True)
 class _Corrected:
-    """A point on the curve, or the attempt: tangent (n + 1,) with border . tangent = 1, sign and logarithm of
-    det [D; border], contraction of the first two corrections."""
+    """A point on the curve, or the attempt: tangent (n + 1,) with border . tangent = 1, sign of det [D; border] and the
+    pivots it is the product of, contraction of the first two corrections."""
 
     y: Array
     ok: bool
@@ -232,7 +232,7 @@ class _Corrected:
     error: float
     tangent: Array | None = None
     sign: int = 0
-    logdet: float = -np.inf
+    pivots: Array | None = None
     contraction: float = 0.0
 
 
@@ -246,18 +246,34 @@ def _unit(size: int) -> Array:
     return e
 
 
-def _row_scales(D: Array) -> Array:
+def _weights(D: Array) -> Array:
+    """What makes every row's largest derivative 1, so that residuals of different units can be compared."""
     rows = np.abs(D).max(axis=1)
-    return np.where(rows > 0, rows, 1.0)
+    return 1.0 / np.where((rows > 0) & np.isfinite(rows), rows, 1.0)
 
 
-def _factor(D: Array, rows: Array, border: Array) -> tuple[Array, Array] | None:
-    """LU of [D / rows; border], or None if it is singular or not finite."""
-    B = np.empty((len(border), len(border)), order="F")
-    np.divide(D, rows[:, None], out=B[:-1])
+class _Place(NamedTuple):
+    """A point y with the weighted residual (R, border . y - value), its derivative B = [D; border] and its norm, which
+    is infinite if anything is not finite."""
+
+    y: Array
+    residual: Array
+    B: Array
+    size: float
+
+
+def _place(y: Array, R: Array, D: Array, weights: Array, border: Array, value: float) -> _Place:
+    residual, B = np.empty(len(y)), np.empty((len(y), len(y)), order="F")
+    np.multiply(R, weights, out=residual[:-1])
+    residual[-1] = border @ y - value
+    np.multiply(D, weights[:, None], out=B[:-1])
     B[-1] = border
-    if not np.isfinite(B).all():
-        return None
+    size = _norm(residual)
+    return _Place(y, residual, B, size if math.isfinite(size + float(B.sum())) else math.inf)
+
+
+def _factor(B: Array) -> tuple[Array, Array] | None:
+    """LU of a matrix, which is overwritten; None if it is singular."""
     lu, pivots, info = scipy.linalg.lapack.dgetrf(B, overwrite_a=1)
     return None if info else (lu, pivots)
 
@@ -266,41 +282,40 @@ def _solve(factors: tuple[Array, Array], right: Array) -> Array:
     return scipy.linalg.lapack.dgetrs(*factors, right)[0]
 
 
-def _determinant(factors: tuple[Array, Array]) -> tuple[int, float]:
-    """Sign and logarithm of the determinant."""
+def _determinant(factors: tuple[Array, Array]) -> int:
+    """Sign of the determinant."""
     lu, pivots = factors
-    diagonal = lu.diagonal()
-    negative = np.count_nonzero(diagonal < 0) + np.count_nonzero(pivots != np.arange(len(pivots)))
-    return -1 if negative % 2 else 1, float(np.log(np.abs(diagonal)).sum())
+    negative = np.count_nonzero(lu.diagonal() < 0) + np.count_nonzero(pivots != np.arange(len(pivots)))
+    return -1 if negative % 2 else 1
 
 
 def _correct(scaled: _Scaled, y: Array, border: Array, value: float, settings: NewtonSettings) -> _Corrected:
     """Solve R = 0 with border . y = value, from y.
 
-    The residual is measured with every row divided by its largest derivative at the start, so that units do not
-    matter. Near a kink the direction can be one along which the residual rises however short the step, though the
-    full step is right (the other side's derivative finishes the work): then the best of the tried steps is taken.
+    The residual is weighted by the derivatives at the start, so that units do not matter. Near a kink the direction
+    can be one along which the residual rises however short the step, though the full step is right (the other side's
+    derivative finishes the work): then the best of the tried steps is taken.
     """
     R, D = scaled(y)
-    rows = _row_scales(D) if np.isfinite(D).all() else np.ones(len(D))
+    weights = _weights(D)
+    here = _place(y, R, D, weights, border, value)
     sizes: list[float] = []
     forced = 0
     for iteration in range(1, settings.iterations + 1):
-        right = np.append(R / rows, border @ y - value)
-        factors = _factor(D, rows, border) if np.isfinite(right).all() else None
+        factors = _factor(here.B) if here.size < math.inf else None
         if factors is None:
-            return _resort(scaled, y, border, value, settings, iteration, "singular derivative: start elsewhere")
-        dy = -_solve(factors, right)
+            return _resort(scaled, here.y, border, value, settings, iteration, "singular derivative: start elsewhere")
+        dy = -_solve(factors, here.residual)
         sizes.append(_norm(dy))
-        if error := _small_enough(sizes, settings.tolerance * (1.0 + _norm(y))):
-            return _arrived(y + dy, factors, border, iteration, error, sizes)
-        y, R, D, falls = _damped(scaled, y, dy, rows, border, value, _norm(right), settings.halvings)
+        if error := _small_enough(sizes, settings.tolerance * (1.0 + _norm(here.y))):
+            return _arrived(here.y + dy, factors, iteration, error, sizes)
+        here, falls = _damped(scaled, here, dy, weights, border, value, settings.halvings)
         forced += not falls
         if forced > settings.forced:
-            return _resort(scaled, y, border, value, settings, iteration, "no step reduces the residual: start nearer")
-    return _resort(
-        scaled, y, border, value, settings, settings.iterations, "iterations used up: allow more, or start nearer"
-    )
+            status = "no step reduces the residual: start nearer"
+            return _resort(scaled, here.y, border, value, settings, iteration, status)
+    status = "iterations used up: allow more, or start nearer"
+    return _resort(scaled, here.y, border, value, settings, settings.iterations, status)
 
 
 def _small_enough(sizes: list[float], tolerance: float) -> float:
@@ -313,27 +328,26 @@ def _small_enough(sizes: list[float], tolerance: float) -> float:
     return last * contraction if contraction < 0.1 and last < 1e-3 and last * contraction <= 0.1 * tolerance else 0.0
 
 
-def _arrived(y: Array, factors: tuple[Array, Array], border: Array, n: int, error: float, sizes: list) -> _Corrected:
-    sign, logdet = _determinant(factors)
+def _arrived(y: Array, factors: tuple[Array, Array], n: int, error: float, sizes: list[float]) -> _Corrected:
     contraction = sizes[1] / sizes[0] if len(sizes) > 1 else 0.0
-    return _Corrected(y, True, CONVERGED, n, error, _solve(factors, _unit(len(y))), sign, logdet, contraction)
+    tangent = _solve(factors, _unit(len(y)))
+    return _Corrected(y, True, CONVERGED, n, error, tangent, _determinant(factors), factors[0].diagonal(), contraction)
 
 
 def _damped(
-    scaled: _Scaled, y: Array, dy: Array, rows: Array, border: Array, value: float, before: float, halvings: int
-) -> tuple[Array, Array, Array, bool]:
+    scaled: _Scaled, before: _Place, dy: Array, weights: Array, border: Array, value: float, halvings: int
+) -> tuple[_Place, bool]:
     """The first of the steps 1, 1/2, 1/4, ... that reduces the residual, else the best of them and False."""
-    best = (np.inf, y, np.full(len(rows), np.nan), np.full((len(rows), len(y)), np.nan))
+    best = before._replace(size=math.inf)
     for k in range(halvings + 1):
         share = 0.5**k
-        here = y + share * dy
-        R, D = scaled(here)
-        size = math.hypot(_norm(R / rows), border @ here - value)
-        if size <= (1.0 - 0.1 * share) * before and np.isfinite(D).all():
-            return here, R, D, True
-        if size < best[0] and np.isfinite(D).all():
-            best = (float(size), here, R, D)
-    return *best[1:], False
+        y = before.y + share * dy
+        here = _place(y, *scaled(y), weights, border, value)
+        if here.size <= (1.0 - 0.1 * share) * before.size:
+            return here, True
+        if here.size < best.size:
+            best = here
+    return best, False
 
 
 def _resort(
@@ -346,11 +360,11 @@ def _resort(
     R, D = scaled(y)
     if not (np.isfinite(R).all() and np.isfinite(D).all()):
         return failed
-    rows = _row_scales(D)
+    weights = _weights(D)
 
     def both(z: Array) -> tuple[Array, Array]:
-        R, D = scaled(z)
-        return np.append(R / rows, border @ z - value), np.vstack([D / rows[:, None], border])
+        there = _place(z, *scaled(z), weights, border, value)
+        return there.residual, there.B
 
     found = scipy.optimize.root(both, y, jac=True, method="hybr").x
     again = _correct(scaled, found, border, value, replace(settings, last_resort=False))
@@ -458,9 +472,9 @@ def advance(problem: Problem, state: State, settings: Settings) -> State:
             place = _branch_point(scaled, state, trial, length, settings)
             if place is not None:
                 return _over(scaled, state, trial, place, length, settings)
-        if trial.kink and not _is_kink(scaled, state, trial, length, settings):
-            trial = replace(trial, good=False, factor=0.5)
-        if not trial.good and length <= settings.kink_step:
+        if trial.kink:
+            trial = replace(trial, good=_is_kink(scaled, state, trial, length, settings), factor=0.5)
+        elif not trial.good and length <= settings.kink_step:
             trial = _crossed(scaled, state, length, settings, trial)
         if trial.good:
             return _taken(scaled, state, trial, length, settings)
@@ -482,10 +496,10 @@ def _tangent(D: Array, orientation: int) -> Array | None:
     """Unit null vector t of D with the sign of det [D; t] asked for; None where D has a larger null space."""
     if not np.isfinite(D).all():
         return None
-    rows = _row_scales(D)
-    t = np.linalg.svd(D / rows[:, None])[2][-1]
-    factors = _factor(D, rows, t)
-    return None if factors is None else t * (orientation * _determinant(factors)[0])
+    D = D * _weights(D)[:, None]
+    t = np.linalg.svd(D)[2][-1]
+    factors = _factor(np.asfortranarray(np.vstack([D, t])))
+    return None if factors is None else t * (orientation * _determinant(factors))
 
 
 def _angle(a: Array, b: Array) -> float:
@@ -566,13 +580,13 @@ def _aimed(scaled: _Scaled, state: State, guess: Array, border: Array, length: f
 
 
 def _between(scaled: _Scaled, segment: _Segment, u: float, settings: Settings) -> tuple | None:
-    """Point, tangent and determinant (sign, log) at the share u of a segment, or None."""
+    """Point, tangent, sign and pivots of the determinant at the share u of a segment, or None."""
     border = segment.border
     value = float((1 - u) * (border @ segment.a) + u * (border @ segment.b))
     for guess in segment.guesses(u):
         found = _correct(scaled, guess, border, value, settings.newton)
         if found.ok and _norm(found.y - guess) <= _norm(segment.b - segment.a):
-            return found.y, _oriented(found, found.sign), found.sign, found.logdet
+            return found.y, _oriented(found, found.sign), found.sign, found.pivots
     return None
 
 
@@ -617,11 +631,12 @@ def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, s
         here = _between(scaled, segment, u, settings)
         if here is None:
             raise _Lost
-        return here[2] * float(np.exp(np.clip(here[3] - reference, -600, 50)))
+        logarithm = float(np.log(np.abs(here[3])).sum())
+        reference.append(logarithm)
+        return here[2] * math.exp(min(logarithm - reference[0], 50.0))
 
+    reference: list[float] = []
     try:
-        reference = 0.0
-        reference = float(np.log(abs(test(0.0)) + 1e-300))
         root = float(scipy.optimize.brentq(test, 0.0, 1.0, xtol=0.05 * settings.resolution / chord, rtol=1e-12))
     except (_Lost, ValueError):
         return None
