@@ -55,6 +55,11 @@ def test_curve_never_falls_and_is_zero_when_open(steps, offset):
     assert (force[x <= c.separation] == 0).all() and c.force(u) == pytest.approx(F, abs=1e-9 * F[-1])
 
 
+def test_a_first_force_of_rounding_is_where_the_contact_opens():
+    c = curve([0, 1e-6, 2e-6, 3e-6, 4e-6], [1e-45, 1, 3, 7, 15])
+    assert c.separation == 0 and c.force(0.0) == 0
+
+
 def test_curve_converges_to_the_law_it_was_sampled_from():
     """The slopes of PCHIP are of second order, so the curve is of third; the end where all of the area carries is
     a kink of the second derivative, which costs nothing there since a knot stands on it."""

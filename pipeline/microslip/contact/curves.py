@@ -171,6 +171,9 @@ def _slopes(x: Array, F: Array) -> Array:
     return slope
 
 
+_CLOSE = 1e-15  # m: approaches nearer than this are one, less than rounding of a file's digits
+
+
 def _opened(x: Array, F: Array, slope: Array, includes: str, name: str) -> NormalCurve:
     """A curve that begins under load, led to zero by F_1 (1 + (u - u_1) F_1'/(3 F_1))^3."""
     if not slope[0] > 0:
@@ -179,6 +182,8 @@ def _opened(x: Array, F: Array, slope: Array, includes: str, name: str) -> Norma
             "a smaller load on"
         )
     lead = 3 * F[0] / slope[0]
+    if lead < _CLOSE:  # the first force is rounding, and the contact opens there
+        return NormalCurve(x, np.append(0.0, F[1:]), np.append(0.0, slope[1:]), includes, name)
     return NormalCurve(
         np.concatenate([[x[0] - lead], x]), np.concatenate([[0.0], F]), np.concatenate([[0.0], slope]), includes, name
     )
@@ -194,7 +199,7 @@ def _check(name: str, places: Indices | None, x: Array, F: Array, noise: float) 
         if len(far):
             told = f"{_line(places, far[0])}the {what} is {v[far[0]]:g} {unit}"
             raise UserError(f"{name}: {told}, which is no contact's; correct the unit")
-    bad = np.flatnonzero(np.diff(x) <= 1e-15)  # m: less than rounding of the file's digits, and no slope
+    bad = np.flatnonzero(np.diff(x) <= _CLOSE)
     if len(bad):
         raise UserError(
             f"{name}: {_line(places, bad[0] + 1)}the contact does not close further ({x[bad[0]]:g} m, then "
