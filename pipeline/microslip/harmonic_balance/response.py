@@ -107,15 +107,11 @@ class AtFrequency:
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
-        force, slope = self._forces(x)
-        return self._residual(x, force), self._tangent(slope), self._rate(x, force)
+        force, slope = self.forces(x)
+        return self._residual(x, force), self.jacobian(slope), self._rate(x, force)
 
-    def tangent(self, x: Array) -> tuple[Array, Array]:
-        """(k,) R and (k, k) dR/dx."""
-        force, slope = self._forces(x)
-        return self._residual(x, force), self._tangent(slope)
-
-    def _tangent(self, slope: Array) -> Array:
+    def jacobian(self, slope: Array) -> Array:
+        """(k, k) dR/dx for a derivative of the contact forces, that of `forces` or one found near by."""
         p, waves = self.problem, 2 * self.problem.harmonics + 1
         excess = slope - np.kron(np.eye(waves), p.body.stiffness)
         unit = np.tile(p.scale, waves)
@@ -130,7 +126,7 @@ class AtFrequency:
         ]
         return np.vstack([np.asarray(f) for f in parts]).T.ravel()
 
-    def _forces(self, x: Array) -> tuple[Array, Array]:
+    def forces(self, x: Array) -> tuple[Array, Array]:
         """(k,) contact forces and (k, k) their derivative with respect to the displacements, not to x."""
         p, u = self.problem, self.problem.displacement(x)
         c, waves = u.shape
@@ -199,7 +195,8 @@ class Point:
 
     Attributes:
         Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong. error: largest entry of R over the
-            largest of x. iterations: Newton steps, all attempts together. seconds: spent.
+            largest of x. iterations: Newton steps, all attempts together. seconds: spent. slope: the last derivative of
+            the contact forces, if it is kept.
     """
 
     Omega: float
@@ -208,40 +205,56 @@ class Point:
     error: float
     iterations: int
     seconds: float = 0.0
+    slope: Array | None = None
 
     @property
     def converged(self) -> bool:
         return self.status == CONVERGED
 
 
-def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 40) -> Point:
-    """Newton's method, steps halved until |R| falls.
+CONTRACTION = 0.1
+"""Share of |R| that a step may leave for the derivative to be used again: it costs as much as a dozen residuals."""
+
+
+def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Array | None = None) -> Point:
+    """Newton's method; derivatives of the forces are used again while they serve, steps halved until |R| falls.
 
     The contact forces are continuous with a piecewise continuous derivative; where a step crosses to other pieces |R|
     may rise, and the half of it need not.
 
     Args:
-        x: start. tolerance: of the largest entry of R over the largest one of x and of the reference.
+        x: start. tolerance: of the largest entry of R over that of x, which counts within 1e-3 and 1e3 of the
+            reference's.
+        slope: derivative of the forces somewhere near, to begin with.
     """
-    R, J = at.tangent(x)
-    reference = float(np.abs(at.reference).max(initial=1e-300))
+    R, fresh = at.residual(x), False
+    reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
     for count in range(most):
         error = float(np.abs(R).max() / np.clip(np.abs(x).max(), 1e-3 * reference, 1e3 * reference))
         if not np.isfinite(error):
             return Point(at.Omega, x, "not a number", error, count)
         if error <= tolerance:
-            return Point(at.Omega, x, CONVERGED, error, count)
-        step, before, share = _solved(J, -R), np.linalg.norm(R), 1.0
-        trial = x + step
-        found = at.tangent(trial)
-        while not np.linalg.norm(found[0]) < before and share > 1e-3:
-            share *= 0.5
-            trial = x + share * step
-            if np.linalg.norm(at.residual(trial)) < before or share <= 1e-3:
-                found = at.tangent(trial)
-                break
-        x, (R, J) = trial, found
+            return Point(at.Omega, x, CONVERGED, error, count, slope=slope)
+        if slope is None:
+            slope, fresh = at.forces(x)[1], True
+        step = _solved(at.jacobian(slope), -R)
+        trial, left = x + step, at.residual(x + step)
+        if np.linalg.norm(left) <= CONTRACTION * np.linalg.norm(R):
+            x, R, fresh = trial, left, False
+            continue
+        if fresh:
+            x, R = _shortened(at, x, R, step, left)
+        slope, fresh = None, False
     return Point(at.Omega, x, f"no convergence in {most} steps, |R|/|x| = {error:.1e}", error, most)
+
+
+def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) -> tuple[Array, Array]:
+    """x and R after the longest of 1, 1/2, ... 1/1024 of a step that lowers |R|, or the last of them."""
+    share = 1.0
+    while not np.linalg.norm(left) < np.linalg.norm(R) and share > 1e-3:
+        share *= 0.5
+        left = at.residual(x + share * step)
+    return x + share * step, left
 
 
 def _solved(J: Array, R: Array) -> Array:
@@ -255,11 +268,11 @@ def _solved(J: Array, R: Array) -> Array:
     return np.linalg.lstsq(J, R, rcond=1e-10)[0]
 
 
-def solve(problem: Problem, Omega: float, starts: list[Array]) -> Point:
+def solve(problem: Problem, Omega: float, starts: list[Array], slope: Array | None = None) -> Point:
     """Newton's method from one start after the other, then from the sticking contact, then by raising the load."""
     began, at, spent = time.perf_counter(), problem.at(Omega), 0
     for x in [*starts, at.reference]:
-        point = newton(at, x)
+        point = newton(at, x, slope=slope)
         spent += point.iterations
         if point.converged:
             break
@@ -279,7 +292,7 @@ def _raised(problem: Problem, Omega: float) -> Point:
             load={h: f * (share if h else 1.0) for h, f in problem.body.load.items()},
             size={h: f * (share if h else 1.0) for h, f in problem.body.size.items()},
         )
-        point = newton(replace(problem, body=body).at(Omega), x * (share / reached if reached else 1.0), most=15)
+        point = newton(replace(problem, body=body).at(Omega), x * (share / reached if reached else 1.0), most=25)
         spent += point.iterations
         if point.converged:
             x, reached, step = point.x, share, 2 * step
@@ -343,13 +356,15 @@ def sweep(
         start: (k,) where the first point starts; the sticking contact if None.
     """
     done: list[Point] = []
+    slope: Array | None = None
     for i, f in enumerate(frequency):
         good = [p for p in done[-2:] if p.converged]
         starts = [] if start is None or done else [start]
         if good:
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) == 2 else [good[-1].x]
-        point = solve(problem, 2 * np.pi * float(f), starts)
-        done.append(point)
+        point = solve(problem, 2 * np.pi * float(f), starts, slope)
+        slope = point.slope
+        done.append(replace(point, slope=None))
         report(f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + ("" if point.converged else ", not converged"))
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and done[i + 1].converged:
@@ -363,7 +378,7 @@ def _walked(problem: Problem, known: Point, failed: Point) -> Point:
     while step > 1 / 64:
         Omega = last.Omega + step * (failed.Omega - known.Omega)
         Omega = failed.Omega if abs(Omega - known.Omega) >= abs(failed.Omega - known.Omega) else Omega
-        point = newton(problem.at(Omega), last.x, most=20)
+        point = newton(problem.at(Omega), last.x, most=30)
         spent += point.iterations
         if not point.converged:
             step *= 0.5
