@@ -17,9 +17,11 @@ pytest.importorskip("matplotlib")
 
 import jax.numpy as jnp
 
+from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.contact.composed import compose
 from microslip.contact.law import march
+from microslip.contact.series import of_patch
 from microslip.contact.settings import load_contact
 from microslip.contact.study import study
 
@@ -236,6 +238,19 @@ def test_other_sources_and_heights(kind: str, tmp_path: Path) -> None:
     motion = found.tables["motion"]
     np.testing.assert_allclose(motion["F_n_N"], 1000, rtol=1e-9)
     assert np.hypot(motion["F_t1_N"], motion["F_t2_N"]).max() <= 300 * (1 + 1e-9)
+
+
+def test_stiffness_of_a_modal_file(tmp_path: Path) -> None:
+    """That of `series.of_patch`, and the patch's own area."""
+    shutil.copy(ROOT / "pipeline/microslip/samples/basis.h5", tmp_path)
+    source = '[stiffness]\nkind = "basis"\nfile = "basis.h5"\ninterface = "right"\nfacing = "left"\n'
+    text = re.sub(r"\[stiffness\].*?(?=\[friction\])", source, SMALL, flags=re.S)
+    text = re.sub(r"\[motion\].*", "", text, flags=re.S)
+    found = study(write(tmp_path, text)).contact
+    basis = read_basis(tmp_path / "basis.h5")
+    group = basis.groups[0, 0]
+    assert found.stiffness == of_patch(group, basis.reduction, "right", "left")
+    assert found.area == pytest.approx(group.interfaces["right"].areas.sum(), rel=1e-12)
 
 
 ELEMENTS = {
