@@ -987,6 +987,13 @@ def laws() -> None:
     save(drawn(study.elements(figure(9.6, 3.8), plain)), "microslip_elements")
 
 
+def continuation() -> None:
+    """Curves of solutions with kinks, folds and a narrow gap."""
+    import curve_study as study
+
+    save(drawn(study.curves(figure(10.5, 3.4), plain)), "continuation")
+
+
 def microslip() -> None:
     """Microslip: errors of the strips over their number."""
     import microslip_study as study
@@ -999,7 +1006,7 @@ STUDIES = {
     for f in (
         reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough, laws, microslip,
+        stiffness_sources, rough, laws, microslip, continuation,
     )  # fmt: skip
 }
 
