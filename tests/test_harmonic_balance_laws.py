@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from microslip import continuation
 from microslip.case import CaseSettings, load_case, run_case
 from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
@@ -22,7 +23,7 @@ from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, UserEr
 from microslip.harmonic_balance import JenkinsContact, frequency_response, response_table
 from microslip.harmonic_balance.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.harmonic_balance.reduced import stuck
-from microslip.harmonic_balance.response import HarmonicResponse, Problem, harmonic_response, of_body
+from microslip.harmonic_balance.response import HarmonicResponse, Problem, harmonic_response, newton, of_body
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 
@@ -343,6 +344,30 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
         of_body(g, (patch,), np.array([8.0]), force, force, samples=128), np.array([20.0]), np.ones(1)
     )
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
+
+
+def test_continuation_follows_a_contact_that_lifts_off_through_its_folds() -> None:
+    """A mass pressed on a spring that cannot pull softens where it lifts off: the resonance leans over, with three
+    solutions between two folds. On the curve R vanishes; at three frequencies it meets what Newton's method finds.
+
+    1024 samples: with 64 the samples that open one after the other make 22 little folds of their own.
+    """
+    g = body(np.vstack([np.eye(3), np.zeros((3, 3))])[:, :1], 2 * np.pi * np.array([30.0]), 0.03)
+    one, low, high = np.array([1.0]), 2 * np.pi * 40.0, 2 * np.pi * 100.0
+    problem = of_body(
+        g, (point(Penalty(value(2e5)), 1e5, 0.3),), np.array([8.0]), 0.8 * one, one, samples=1024, length=1e-5
+    )
+    targets = tuple(2 * np.pi * np.array([50.0, 60.0, 90.0]))
+    settings = continuation.Settings(low=low, high=high, targets=targets)
+    branch = continuation.trace(problem, problem.at(low).reference, low, settings)
+    folds = branch.of_kind("fold")
+    assert branch.lam[-1] == pytest.approx(high) and len(folds) == 2 and folds[0].lam > folds[1].lam
+    assert max(np.abs(problem.at(p.lam).residual(p.x)).max() / np.abs(p.x).max() for p in branch.points) < 1e-7
+    for target, count in zip(targets, (1, 3, 1), strict=True):
+        hits = [p.x for p in branch.of_kind("target") if p.lam == target]
+        found = newton(problem.at(target), problem.at(target).reference)
+        assert found.converged and len(hits) == count
+        assert min(np.abs(x - found.x).max() for x in hits) < 1e-7 * np.abs(found.x).max()
 
 
 # case files --------------------------------------------------------------------------------------------------------

@@ -39,6 +39,8 @@ class Problem:
         body: the reduced body; its six rows of every patch in order. patches. offset: (c,) u_G of the preloaded state.
         preload: (c,) forces there, N, N m. harmonics: H. samples: of a cycle. cycles: marched from rest at every
             evaluation, the last one counts. length: m, about what the contacts move by; only the scaling.
+        x_scale, lam_scale: what counts as a large x (1), and a large change of Omega (rad/s), where the solutions are
+            followed by `continuation`.
     """
 
     body: Reduced
@@ -49,6 +51,8 @@ class Problem:
     samples: int = 64
     cycles: int = 2
     length: float = 1e-6
+    x_scale: float = 10.0
+    lam_scale: float = 100.0
 
     @cached_property
     def scale(self) -> Array:
