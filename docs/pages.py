@@ -276,7 +276,7 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "friction.p_v": ("s/m", "of (3.6-15)"),
     "friction.mu_inf": ("", "coefficient at high speed"),
     "friction.rate": ("s/m", "lambda_e"),
-    "friction.file": ("", "columns of speed in m/s and coefficient"),
+    "friction.file": ("", "columns of speed in m/s (above 0, rising) and coefficient"),
     "friction.columns": ("", "counted from 1 or by name"),
     "friction.temperature": ("K", "at which it slides"),
     "friction.reference": ("K", "at which it was measured"),

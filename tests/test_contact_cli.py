@@ -18,7 +18,7 @@ pytest.importorskip("matplotlib")
 import jax.numpy as jnp
 
 from microslip.basis import read_basis
-from microslip.cli import main
+from microslip.cli import _figure_of_the_book, main
 from microslip.contact.composed import compose
 from microslip.contact.law import march
 from microslip.contact.series import of_patch
@@ -380,3 +380,12 @@ def test_a_missing_file_and_an_unknown_figure(tmp_path: Path, capsys: pytest.Cap
     for name in ("none.toml", "3.7-99"):
         assert main(["contact", str(tmp_path / name)]) == 2
         assert f"{tmp_path / name}: cannot be read" in capsys.readouterr().err
+    assert _figure_of_the_book(Path("fig-3.7-7")) == _figure_of_the_book(Path("3.7-7")) != Path("3.7-7")
+    assert main(["contact", "3.7-99"]) == 2
+    assert "3.7-99: there is no such figure; choose one of 3.5-2, 3.5-3" in capsys.readouterr().err
+
+
+def test_a_contact_that_never_closes_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = write(tmp_path, SMALL.replace("normal_force = 1000.0\nt1", "normal = [-60.0, 4.0]\nt1"))
+    assert main(["contact", str(file), "-o", str(tmp_path / "out")]) == 0
+    assert "never closes" in capsys.readouterr().out

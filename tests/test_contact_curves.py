@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from microslip.contact.curves import NormalCurve, curve, read_curve
+from microslip.contact.curves import NormalCurve, curve, read_columns, read_curve
 from microslip.contact.hertz import Hertz
 from microslip.contact.series import BULK
 from microslip.contact.solids import Solid
@@ -129,6 +129,20 @@ def test_files_of_every_make_read_alike(tmp_path, name):
     c = read_curve(path, gap=name == "comma")
     assert c.knots == pytest.approx(np.array([-10, -8, -6, -4, -2]) * 1e-6)
     assert c.loads == pytest.approx([0, 2, 9, 30, 70]) and c.source == str(path)
+
+
+@pytest.mark.parametrize("heading", ["Rig 7, run of May\n", "Rig\n\n", "Rig\nu;F\n", "Rig\nu;F\n[um];[N]\n"])
+def test_lines_of_heading_before_the_numbers_are_passed_over(tmp_path, heading):
+    (tmp_path / "rig.csv").write_text(heading + "0,0;0\n1,5;2\n")
+    table, places = read_columns(tmp_path / "rig.csv", ("u", "F") if "u;F" in heading else (1, 2))
+    np.testing.assert_array_equal(table, [[0, 0], [1.5, 2]])
+    assert places[0] == heading.count("\n") + 1
+
+
+def test_a_wrong_number_below_the_heading_is_no_heading(tmp_path):
+    (tmp_path / "rig.csv").write_text("u;F\n0,O;0\n1,5;2\n")
+    with pytest.raises(UserError, match="line 2: column 1: '0.O' is no number"):
+        read_columns(tmp_path / "rig.csv", (1, 2))
 
 
 def test_columns_by_name_units_and_an_opening_branch(tmp_path):

@@ -222,11 +222,23 @@ def contact(file: Path, /, *, output: Output = None, set_: Set = (), quiet: Quie
     """
     from .workflow import contact_stage
 
-    if not file.exists() and (known := _cases() / "contact" / f"fig-{file}.toml").is_file():
-        file = known
+    file = file if file.exists() else _figure_of_the_book(file)
     with progress(f"contact {file}", quiet) as report:
         lines = contact_stage(file, list(set_), output, report)
     _say("\n".join(lines), quiet)
+
+
+def _figure_of_the_book(file: Path) -> Path:
+    """The contact file of a figure by its number, 3.7-7 or fig-3.7-7; any other name as it is.
+
+    Raises:
+        UserError: a number that no file has.
+    """
+    known = {p.stem.removeprefix("fig-"): p for p in (_cases() / "contact").glob("fig-*.toml")}
+    number = str(file).removeprefix("fig-")
+    if re.fullmatch(r"\d\.\d+-\d+[a-z]?", number) and number not in known:
+        raise UserError(f"{file}: there is no such figure; choose one of {', '.join(sorted(known))}")
+    return known.get(number, file)
 
 
 @app.command

@@ -232,7 +232,7 @@ def read_curve(
     Comma, semicolon, tab or blanks between the columns, ``#`` before remarks.
 
     Args:
-        displacement, force: columns, counted from 1 or named as in the file's first line. length_unit: one of
+        displacement, force: columns, counted from 1 or named as in the file's heading. length_unit: one of
             `LENGTHS`. force_unit: one of `FORCES`. gap: whether the displacement opens the contact. noise: N.
 
     Raises:
@@ -252,6 +252,7 @@ def read_columns(path: Path | str, columns: tuple[int | str, ...]) -> tuple[Arra
     """(k, c) numbers of some columns of a text file, and the lines they stand in, counted from 1.
 
     A comma is a decimal point where semicolons or tabs part the columns. NaN is read as such; the callers refuse it.
+    The first line may be a heading, and so may those after it in which no column holds a number.
 
     Raises:
         UserError: no such file, no such column, a line that is short or holds no number.
@@ -262,16 +263,16 @@ def read_columns(path: Path | str, columns: tuple[int | str, ...]) -> tuple[Arra
     if not lines:
         raise UserError(f"{path}: is empty; it needs columns of numbers")
     split = _splitter([line for _, line in lines])
-    head = [] if _number(split(lines[0][1])[0]) is not None else split(lines[0][1])
-    picks = [_column(path, c, head) for c in columns]
+    heads = _headings([split(line) for _, line in lines])
+    picks = [_column(path, c, heads) for c in columns]
     rows, places = [], []
-    for i, line in lines[1:] if head else lines:
+    for i, line in lines[len(heads) :]:
         cells = split(line)
         values = [_number(cells[p]) if p < len(cells) else None for p in picks]
         for p, v in zip(picks, values, strict=True):
             if v is None:
                 held = f"'{cells[p]}' is no number" if p < len(cells) else "there is none"
-                raise UserError(f"{path}: line {i}: column {p + 1}: {held}; correct the line or take it out")
+                raise UserError(f"{path}: line {i}: column {p + 1}: {held}; correct the line or begin it with #")
         rows.append(values)
         places.append(i)
     return np.array(rows, dtype=float).reshape(-1, len(picks)), np.array(places, dtype=np.int64)
@@ -315,11 +316,21 @@ def _number(cell: str) -> float | None:
         return None
 
 
-def _column(path: Path, wanted: int | str, head: list[str]) -> int:
+def _headings(lines: list[list[str]]) -> list[list[str]]:
+    """Cells of the lines before the first number: title, names, units."""
+    if _number(lines[0][0]) is not None:
+        return []
+    numbers = (i for i, cells in enumerate(lines[1:], 1) if any(_number(c) is not None for c in cells))
+    return lines[: next(numbers, 1)]
+
+
+def _column(path: Path, wanted: int | str, heads: list[list[str]]) -> int:
     if isinstance(wanted, int):
         if wanted < 1:
             raise UserError(f"{path}: column {wanted}: columns are counted from 1")
         return wanted - 1
-    if wanted not in head:
-        raise UserError(f"{path}: column '{wanted}': the file has {', '.join(head) or 'no names'}; give a number")
-    return head.index(wanted)
+    for head in heads:
+        if wanted in head:
+            return head.index(wanted)
+    names = ", ".join(name for head in heads for name in head)
+    raise UserError(f"{path}: column '{wanted}': the file has {names or 'no names'}; give a number")

@@ -185,7 +185,10 @@ def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table
             line = int(np.flatnonzero(~np.isfinite(column))[0]) + 1
             raise UserError(f"{where}: {name} {line} is not a finite number; correct or remove the pair")
     if v[0] <= 0 or np.any(np.diff(v) <= 0):
-        raise UserError(f"{where}: the speeds must be positive and rise; sort them and keep each once")
+        raise UserError(
+            f"{where}: the speeds must be positive and rise; sort them, keep each once, and leave 0 out or give it a "
+            "small speed: the table runs over the logarithm of the speed, and below its first one the value stays"
+        )
     if np.any(mu < 0):
         raise UserError(f"{where}: coefficient {int(np.argmax(mu < 0)) + 1} is negative; a coefficient is not")
     x = np.log(v)

@@ -354,11 +354,14 @@ def _of_a_cycle(
     what = "energy dissipated in the last cycle" if not motion.drift else "work of friction in the last period"
     found.told.append((what, _engineering(_work(u[last], force[last]), "J")))
     shares = [100 * float(np.mean(state[last][1:] == s)) for s in (STICK, SLIP, OPEN)]
-    words = "stick or partly slip / slip / open" if c.settings.element.kind in _PARTLY else "stick / slip / open"
+    words = "stick or partly slip / slip / open" if c.settings.element.kind in PARTLY else "stick / slip / open"
     found.told.append((f"{words}, of the last cycle", " / ".join(f"{s:.3g} %" for s in shares)))
+    if shares[2] == 100:
+        found.sentences.append("The contact never closes in the last cycle: raise the mean of motion.normal.")
 
 
-_PARTLY = ("strips", "iwan", "mindlin")
+PARTLY = ("strips", "iwan", "mindlin")
+"""Elements of sliders in parallel, which stick while some of them slip."""
 
 
 # microslip ---------------------------------------------------------------------------------------------------------
@@ -480,7 +483,8 @@ def _yields(c: Contact, yield_shear: float, found: _Findings) -> None:
     pressure, shear = np.maximum(force[0], 0.0), np.stack(force[1:], axis=1)
     layer = c.layer or Layer(Solid(2.1e11, 0.3), 1.0, c.settings.limits.boundary)
     time = table["time_s"][last]
-    check = layer.check_yield(pressure, shear, yield_shear, names=[f"t = {t:.4g} s" for t in time])
+    names = [f"t = {t:.4g} s of the cycle" for t in time - time[0]]
+    check = layer.check_yield(pressure, shear, yield_shear, names=names)
     found.tables["yield"] = {
         "time_s": time, "pressure_Pa": pressure, "shear_t1_Pa": shear[:, 0], "shear_t2_Pa": shear[:, 1],
         "share_of_yield": check.utilisation,

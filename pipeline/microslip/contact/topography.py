@@ -77,7 +77,7 @@ def read_profile(
     Args:
         unit: of both columns ("um"), or of x and z ("mm", "um"). level: order of the polynomial in x that is taken off
             by least squares, see `levelled`; None leaves the heights as they are. columns: of x and z, counted from 1
-            or named as in the file's first line.
+            or named as in the file's heading.
 
     Raises:
         UserError: a file that cannot be read, a line without two finite numbers, x that does not rise, fewer than ten

@@ -153,6 +153,8 @@ _NAMES, _TINTS = ("n", "t1", "t2"), (COLOURS[2], COLOURS[0], COLOURS[1])
 
 def motion_figure(study: Study) -> Any:
     """As the book's Fig. 3.7-7: orbits of M and P, displacements, forces, and the force over each displacement."""
+    from ..contact.study import PARTLY
+
     t, motion = study.tables["motion"], study.contact.settings.motion
     assert motion is not None
     last = slice(None) if motion.drift else slice(len(t["time_s"]) - motion.samples - 1, None)
@@ -174,7 +176,8 @@ def motion_figure(study: Study) -> Any:
         if np.ptp(forces[i]) > 0 or i == 0:
             panels[1].plot(time, forces[i], color=_TINTS[i], linewidth=1.5, label=f"$F_{{{_NAMES[i]}}}$")
     panels[1].set(xlabel=f"time in {second}", ylabel=f"force in {newton}")
-    _shade(panels[1], time, t["state"])
+    partly = study.contact.settings.element.kind in PARTLY
+    _shade(panels[1], time, t["state"], "stick, partly slip" if partly else "stick")
     for axes in panels[:2]:
         _legend_above(axes)
     for axes, i in zip(panels[2:], moving, strict=True):
@@ -223,10 +226,10 @@ def _phase_panel(axes: Axes, t: Columns, u: list[np.ndarray], unit: str) -> None
     axes.set(xlabel=f"M less P, t1, in {unit}", ylabel="velocity of P in m/s")
 
 
-def _shade(axes: Any, time: np.ndarray, state: np.ndarray) -> None:
-    """Blue-grey where the contact sticks, white where it slips, hatched where it is open."""
+def _shade(axes: Any, time: np.ndarray, state: np.ndarray, stick: str) -> None:
+    """Blue-grey where the contact sticks, white where it slips, hatched where it is open. stick: word for the first."""
     styles: tuple[tuple[int, dict[str, Any]], ...] = (
-        (1, {"color": "#e3e8f0", "label": "stick"}),
+        (1, {"color": "#e3e8f0", "label": stick}),
         (0, {"facecolor": "none", "edgecolor": "#c9ced8", "hatch": "///", "label": "open"}),
     )
     for value, style in styles:
