@@ -49,7 +49,8 @@ def test_the_contact_benchmark_compares_laws_that_agree():
     assert done.returncode == 0, done.stderr
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| 64 |" in line]
     assert {r[1] for r in rows} >= {"microslip", "numpy loop"}
-    assert all(float(r[-1]) < 1e-12 for r in rows)  # the same law, three times
+    # the same law, three times; two cycles are fewer than the others march
+    assert all(float(r[-1]) < 1e-12 for r in rows if r[1] != "microslip, two cycles")
 
 
 def test_the_duffing_benchmark_follows_one_curve_over_both_folds():
