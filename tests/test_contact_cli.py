@@ -318,6 +318,7 @@ def table(depth: list[float], share: list[float]) -> str:
 MISTAKES = {
     "a wrong key": ("R_Z = 12.0", "Rz = 12.0", "roughness.Rz: unknown key; did you mean 'R_Z'?"),
     "a wrong table": ("[friction]", "[fricton]", "fricton: unknown key; did you mean 'friction'?"),
+    "a key of another kind": ("mu = 0.3", "mu = 0.3\np_v = 4.5", "friction.p_v: unknown key; another kind of"),
     "negative roughness": ("R_Z = 12.0", "R_Z = -12.0", "roughness.R_Z: must be greater than 0 (it is -12.0)"),
     "unknown heights": ('"polynomial"', '"parabolic"', 'roughness.kind: "parabolic" is unknown; choose one of'),
     "no kind": ('kind = "coulomb"\n', "", "friction.kind: is missing"),

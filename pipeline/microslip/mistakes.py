@@ -128,6 +128,8 @@ def _hint(key: tuple[Any, ...], close: list[str], known: list[str], model: type[
     if close:
         return f"did you mean '{close[0]}'?"
     homes = sorted(table for table, keys in _tables(model) if key[-1] in keys)
+    if len(key) == 2 and f"[{key[0]}]" in homes:
+        return f"another kind of [{key[0]}] has it; this one knows {', '.join(known)}"
     if homes:
         return f"it belongs in {' or '.join(homes)}"
     return f"known keys: {', '.join(known)}"
@@ -135,10 +137,10 @@ def _hint(key: tuple[Any, ...], close: list[str], known: list[str], model: type[
 
 def _tables(model: type[BaseModel]) -> Iterator[tuple[str, list[str]]]:
     for name, field in model.model_fields.items():
-        inner = _model_in(field.annotation)
-        if inner is not None:
+        kinds = list(_models_in(field.annotation))
+        if kinds:
             many = "tuple" in str(field.annotation)
-            yield f"[[{name}]]" if many else f"[{name}]", list(inner.model_fields)
+            yield f"[[{name}]]" if many else f"[{name}]", [key for kind in kinds for key in kind.model_fields]
 
 
 def _sentence(key: tuple[Any, ...], found: list[tuple[tuple[Any, ...], Any]], raw: Any) -> str:
@@ -257,7 +259,3 @@ def _models_in(annotation: Any) -> Iterator[Any]:
         yield annotation
     for argument in getattr(annotation, "__args__", ()):
         yield from _models_in(argument)
-
-
-def _model_in(annotation: Any) -> Any:
-    return next(_models_in(annotation), None)
