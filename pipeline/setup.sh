@@ -89,7 +89,7 @@ usable() { # a whole environment of a Python that still exists, not a link to th
     [ -f "$DONE" ] && "$INSIDE" -c 'import sys; sys.exit(sys.prefix == sys.base_prefix)' 2>/dev/null && recent "$INSIDE"
 }
 
-announce() { say "packages into $VENV: some 600 MB to download, 2.2 GB on disk, a few minutes"; }
+announce() { say "packages into $VENV: some 700 MB to download, 2.8 GB on disk, a few minutes"; }
 
 by_uv() {
     announce
