@@ -9,9 +9,11 @@ import pytest
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
 from microslip.contact.harmonics import force_harmonics, waves
+from microslip.contact.heights import tabulated
 from microslip.contact.law import cycles
 from microslip.contact.normal import Preload
 from microslip.contact.point import PointContact
+from microslip.contact.wear import worn_law
 
 ROUGH = EXAMPLES["rough point"]
 
@@ -93,6 +95,20 @@ def test_chunks_and_values_per_point_change_nothing() -> None:
     parts = force_harmonics(law, some(n), ROUGH.period, chunk=16)
     for a, b in zip(whole, parts, strict=True):
         assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+def test_tables_are_not_taken_for_values_per_point() -> None:
+    """A table of as many nodes as there are points, and one table for each point, treated in chunks."""
+    n = 50
+    x = np.linspace(0, 1, n)
+    same = tabulated(x, x**2 * (3 - 2 * x))
+    own = worn_law(ROUGH.law.normal, np.linspace(0, 2.0, n), np.full(n, 100.0), 1e-12, 1e-6).heights
+    assert same.x.shape == (n,) and own.x.shape[0] == n and own.x.ndim == 2
+    for heights in (same, own):
+        law = dataclasses.replace(ROUGH.law, normal=dataclasses.replace(ROUGH.law.normal, heights=heights))
+        whole, parts = (force_harmonics(law, some(n), ROUGH.period, chunk=c) for c in (n, 16))
+        for a, b in zip(whole, parts, strict=True):
+            assert np.allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
 def test_harmonics_are_those_of_the_marched_cycle() -> None:

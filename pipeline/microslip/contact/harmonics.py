@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .law import Array, Law, State
+from .law import Array, Law, State, point_axes
 
 CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
@@ -60,23 +60,24 @@ def force_harmonics(
     parts = -(-n // chunk)
     filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
     leaves, tree = jax.tree_util.tree_flatten(law)
-    own = [jnp.ndim(leaf) > 0 and jnp.shape(leaf)[-1] == n for leaf in leaves]
-    split = [_split(leaf, parts, chunk) for leaf, mine in zip(leaves, own, strict=True) if mine]
+    axes = point_axes(law, n)
+    split = [_split(leaf, axis, parts, chunk) for leaf, axis in zip(leaves, axes, strict=True) if axis is not None]
 
     def one(part: tuple[list[Array], Array]) -> tuple[Array, Array]:
         per_point = iter(part[0])
-        mixed = [next(per_point) if mine else leaf for leaf, mine in zip(leaves, own, strict=True)]
+        mixed = [leaf if axis is None else next(per_point) for leaf, axis in zip(leaves, axes, strict=True)]
         return _with_derivative(jax.tree_util.tree_unflatten(tree, mixed), part[1], period, samples, count, settled)
 
     force, slope = jax.lax.map(one, (split, filled))
     return force.reshape(-1, *u.shape[1:])[:n], slope.reshape(-1, *slope.shape[2:])[:n]
 
 
-def _split(leaf: Array, parts: int, chunk: int) -> Array:
-    """(..., n) in (parts, ..., chunk), filled with the last value."""
-    fill = [(0, 0)] * (jnp.ndim(leaf) - 1) + [(0, parts * chunk - leaf.shape[-1])]
-    whole = jnp.pad(leaf, fill, mode="edge").reshape(*leaf.shape[:-1], parts, chunk)
-    return jnp.moveaxis(whole, -2, 0)
+def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
+    """(parts, ...) with ``chunk`` points along the axis of each part, filled with the last one."""
+    last = jnp.moveaxis(jnp.asarray(leaf), axis, -1)
+    fill = [(0, 0)] * (last.ndim - 1) + [(0, parts * chunk - last.shape[-1])]
+    whole = jnp.moveaxis(jnp.pad(last, fill, mode="edge").reshape(*last.shape[:-1], parts, chunk), -2, 0)
+    return jnp.moveaxis(whole, -1, 1) if axis == 0 else whole
 
 
 class _Running(NamedTuple):

@@ -17,7 +17,7 @@ from jax.scipy.stats import norm as normal_distribution
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from .law import Array, settings
+from .law import Array, settings, table
 
 
 class Heights:
@@ -190,10 +190,10 @@ class Tabulated(Heights):
             energy_at: its integrals. `tabulated` makes all of them from the first two.
     """
 
-    x: Array
-    area_at: Array
-    volume_at: Array
-    energy_at: Array
+    x: Array = table()
+    area_at: Array = table()
+    volume_at: Array = table()
+    energy_at: Array = table()
 
     def area(self, x: Array) -> Array:
         start, slope, inside, _ = self._cell(x)
@@ -213,17 +213,17 @@ class Tabulated(Heights):
 
     def _cell(self, x: Array) -> tuple[Array, Array, Array, Array]:
         """Values at the beginning of the cell of x* (3, ...), slope of the area, way inside it and beyond the table."""
-        table = jnp.stack([self.area_at, self.volume_at, self.energy_at, self.x], axis=-2)
+        columns = jnp.stack([self.area_at, self.volume_at, self.energy_at, self.x], axis=-2)
         if self.x.ndim == 1:
-            return _looked_up(table, x)
-        return jax.vmap(_looked_up, in_axes=(0, -1), out_axes=-1)(table, x)  # points are the last axis
+            return _looked_up(columns, x)
+        return jax.vmap(_looked_up, in_axes=(0, -1), out_axes=-1)(columns, x)  # points are the last axis
 
 
-def _looked_up(table: Array, x: Array) -> tuple[Array, Array, Array, Array]:
+def _looked_up(columns: Array, x: Array) -> tuple[Array, Array, Array, Array]:
     """`Tabulated._cell` of one table (4, k)."""
-    nodes = table[3]
+    nodes = columns[3]
     j = jnp.clip(jnp.searchsorted(nodes, x, side="right") - 1, 0, len(nodes) - 2)
-    start, end = table[:, j], table[:, j + 1]
+    start, end = columns[:, j], columns[:, j + 1]
     width = end[3] - start[3]
     slope = jnp.where(width > 0, (end[0] - start[0]) / jnp.where(width > 0, width, 1.0), 0.0)
     return start[:3], slope, jnp.clip(x - start[3], 0.0, width), jnp.maximum(x - nodes[-1], 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
@@ -52,23 +52,43 @@ State = Any
 T = TypeVar("T")
 
 
-@dataclass_transform(frozen_default=True)
+def static(**options: Any) -> Any:
+    """A field that is part of the program and not a number: changing it compiles anew."""
+    return field(metadata={"static": True}, **options)
+
+
+def table(**options: Any) -> Any:
+    """A field that holds a table: (k,) the same for all points, or (n, k) with one for each, however long k is."""
+    return field(metadata={"table": True}, **options)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(static, table))
 def settings(cls: type[T]) -> type[T]:
     """Class decorator: a frozen dataclass that is a jax pytree. Its numbers are leaves; see `static` for the rest."""
     frozen = dataclass(frozen=True)(cls)
     return jax.tree_util.register_dataclass(frozen)
 
 
-def static(**options: Any) -> Any:
-    """A field that is part of the program and not a number: changing it compiles anew."""
-    return field(metadata={"static": True}, **options)
+def point_axes(law: Any, n: int) -> list[int | None]:
+    """The axis of n points in every leaf of a law, in the order of its leaves; None where there is one for all."""
+    if not is_dataclass(law):
+        leaves = jax.tree_util.tree_leaves(law)
+        return [-1 if jnp.ndim(x) > 0 and jnp.shape(x)[-1] == n else None for x in leaves]
+    axes: list[int | None] = []
+    for f in fields(law):
+        value = getattr(law, f.name)
+        if f.metadata.get("table") and value is not None:
+            axes.append(0 if jnp.ndim(value) > 1 else None)
+        elif not f.metadata.get("static"):
+            axes += point_axes(value, n)
+    return axes
 
 
 class Law:
     """Base of the contact laws.
 
-    A setting is one number or has the points along its last axis, in the order of the rows of ``u``; a table, the
-    same for all points, has a last axis of length one. States have the points along their last axis.
+    A setting is one number or has the points along its last axis, in the order of the rows of ``u``; a table is a
+    field of its own kind, see `table`, or has a last axis of length one. States have the points along their last axis.
 
     Frame (n, t1, t2) of the contact. ``u`` (n, 3) is the relative displacement in m, u_n > 0 closing, measured from
     the gap at which the highest asperities just touch; ``v`` (n, 3) its velocity in m/s. The force (n, 3) in N is

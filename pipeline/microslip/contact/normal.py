@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import UserError
 from .curves import NormalCurve
 from .heights import Heights
-from .law import Array, settings
+from .law import Array, settings, table
 
 
 class Normal:
@@ -227,10 +227,10 @@ class Measured(Normal):
             full area, N/m, to which the share of the tangential stiffness is related (3.3-40).
     """
 
-    u: Array
-    force_at: Array
-    slope_at: Array
-    stored_at: Array
+    u: Array = table()
+    force_at: Array = table()
+    slope_at: Array = table()
+    stored_at: Array = table()
     nominal: Array
 
     def force(self, u: Array) -> Array:
