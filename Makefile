@@ -1,7 +1,9 @@
 # The file graph: geometry/% -> meshes/%.msh -> build/%/basis.h5 -> build/%/report.html (with pipeline/cases/%.toml).
+# and pipeline/cases/<case>.toml + the modal files it names -> build/<case>/response.csv.
 # Each stage decides by the hash of its inputs whether there is work to do; make only calls it.
 
-BODIES   := blade shroud pendulum half-pipe
+BODIES   := blade shroud pendulum half-pipe rig-neighbour pin pin-blade wire wire-blade damper pit-blade
+CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipeline/cases/*.toml)))))
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
 PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile
@@ -18,11 +20,12 @@ MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved
 .DELETE_ON_ERROR:
 .SECONDARY:
 .SECONDEXPANSION:
-.PHONY: moved help setup all $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
+.PHONY: moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 	@echo "bodies:       $(BODIES)   (make blade, blade-mesh, blade-modes)"
+	@echo "cases:        $(CASES)   (their bodies as well)"
 
 setup: $(READY) ## virtual environment, locked packages, system libraries
 
@@ -30,6 +33,12 @@ $(READY): requirements.lock pyproject.toml pipeline/setup.sh $(MOVED)
 	@sh pipeline/setup.sh
 
 all: $(BODIES) ## every body to its report
+
+cases: $(CASES) ## every case that is not named like its body
+
+# Which bodies a case needs stands in its file: run reads it, and works only where a hash has changed.
+$(CASES): %: $(READY)
+	@$(RUN) run pipeline/cases/$*.toml
 
 $(BODIES): %: build/%/report.html
 $(BODIES:%=%-mesh): %-mesh: meshes/%.msh
@@ -69,6 +78,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/cyclic.py
 	@$(PYTHON) benchmarks/contact_points.py
 	@$(PYTHON) benchmarks/duffing.py
+	@$(PYTHON) benchmarks/ring_response.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

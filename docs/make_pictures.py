@@ -14,13 +14,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import damper_study
 import numpy as np
-from pages import HERE, body_reference, contact_reference, fill, play, table
+from pages import HERE, body_reference, case_reference, contact_reference, fill, play, table
 
 from microslip import truncation
 from microslip.basis import read_basis
 from microslip.campbell import track_basis
-from microslip.case import CaseSettings, _contact, _sized, load_case, run_case
+from microslip.case import CaseSettings, load_case, run_case
+from microslip.case.assemble import sized
+from microslip.case.closed_form import jenkins_contact
 from microslip.compliance import contact_share, without_bulk
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
 from microslip.harmonic_balance import peaks, stuck_frequencies
@@ -31,6 +34,7 @@ from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
 from microslip.reduction import METHODS
+from microslip.running import compare_book
 from microslip.speed_range import frequencies_over
 from microslip.workflow import closure_stage, load_mesh, mesh_stage, modes_stage, open_job
 
@@ -95,7 +99,7 @@ def percent(value: float, printed: float) -> str:
     return f"{100 * (value / printed - 1):+.2f} %"
 
 
-# the four bodies ---------------------------------------------------------------------------------------------------
+# the bodies --------------------------------------------------------------------------------------------------------
 
 
 def geometry() -> None:
@@ -112,6 +116,97 @@ def geometry() -> None:
     head = ["body", "size in mm (x, y, z)", "mass in kg", "points", "cells", "first elastic frequency in Hz"]
     fill("geometry.md", "bodies", table(head, rows))
     designs()
+
+
+COMPANIONS = {
+    "rig-neighbour": "rig-neighbour", "pin": "pin", "pin-blade": "pin-blade", "wire": "wire",
+    "wire-blade": "wire-blade", "pit-blade": "pit-blade", "damper": "damper",
+    "damper-cylinder": "damper/cylinder.toml", "damper-asymmetric": "damper/asymmetric.toml",
+}  # fmt: skip
+WARM, COOL = (236, 158, 60), (176, 186, 202)
+
+
+def meeting() -> None:
+    """The bodies made to touch others: a table of what each is, and pictures of them where they meet."""
+    rows, bodies = [], {name: made(name, path, *LIGHT) for name, path in COMPANIONS.items()}
+    for name, basis in bodies.items():
+        group = basis.groups[0, 0]
+        lowest = group.frequency[group.kind.index("normal")]
+        size = " x ".join(f"{v:.4g}" for v in np.ptp(basis.mesh.points, axis=0) * 1e3)
+        shapes = f"{group.n_modes}" + (", free" if basis.free else "")
+        rows.append([f"`{name}`", size, f"{basis.mass:.4g}", basis.mesh.n_points, shapes, f"{lowest:.5g}"])
+    head = ["body", "size in mm (x, y, z)", "mass in kg", "points", "coordinates", "first elastic frequency in Hz"]
+    fill("geometry.md", "companions", table(head, rows))
+    tiles = [
+        lettering.captioned(picture, title, size=15)
+        for title, picture in (
+            ("pin in two blade tips", pins(bodies)), ("wire through seven blades", wires(bodies)),
+        )
+    ]  # fmt: skip
+    tiles += [
+        lettering.captioned(dampers(bodies, name), name, size=15)
+        for name in ("damper", "damper-cylinder", "damper-asymmetric")
+    ]
+    save(lettering.stacked([lettering.side_by_side(tiles[:2], 30), lettering.side_by_side(tiles[2:], 20)]), "meeting")
+
+
+def placed(stage: Any, basis: ModalBasis, turn: int, blades: int, colour: Any, opacity: float = 1.0) -> np.ndarray:
+    """Put a body on the stage, turned by some pitches about the rotor axis; its points there."""
+    from microslip.pictures.scene import surface
+
+    R = turned_about_y(turn * 2 * np.pi / blades)
+    outside = surface(basis.mesh)
+    points = basis.mesh.points @ R.T
+    stage.skin(points[outside.source], outside.triangles, color=colour, opacity=opacity)
+    stage.lines(points, outside.outline, (70, 74, 84), 1.2)
+    return points
+
+
+def pins(bodies: dict[str, ModalBasis]) -> Any:
+    from microslip.pictures.scene import axes_towards, fit_tile
+
+    def draw(studio: views.Studio) -> Any:
+        studio.stage.clear()
+        for turn in (0, 1):
+            placed(studio.stage, bodies["pin-blade"], turn, 24, COOL, 0.45)
+        points = placed(studio.stage, bodies["pin"], 0, 24, WARM)
+        middle = points.mean(axis=0)
+        frame = middle + 0.075 * np.array([[-1, -1, -1.2], [1, 1, 0.6], [-1, 1, 0.6], [1, -1, -1.2]])
+        return studio.stage.shoot(fit_tile(frame, axes_towards(np.array([0.35, -1.0, 0.55])), (520, 400)))
+
+    return with_studio(bodies["pin"], draw)
+
+
+def wires(bodies: dict[str, ModalBasis]) -> Any:
+    from microslip.pictures.scene import axes_towards, fit_tile
+
+    def draw(studio: views.Studio) -> Any:
+        studio.stage.clear()
+        turns = range(-3, 4)
+        found = [placed(studio.stage, bodies["wire-blade"], turn, 28, COOL) for turn in turns]
+        found.append(placed(studio.stage, bodies["wire"], 0, 28, WARM))
+        axes = axes_towards(np.array([0.15, -1.0, 0.25]))
+        return studio.stage.shoot(fit_tile(np.vstack(found), axes, (620, 400)))
+
+    return with_studio(bodies["wire"], draw)
+
+
+def dampers(bodies: dict[str, ModalBasis], name: str) -> Any:
+    """Seen along the rotor axis, as if one looked through the blades."""
+    from microslip.pictures.scene import axes_towards, fit_tile
+
+    def draw(studio: views.Studio) -> Any:
+        studio.stage.clear()
+        for turn in (0, 1):
+            placed(studio.stage, bodies["pit-blade"], turn, 30, COOL)
+        points = placed(studio.stage, bodies[name], 0, 30, WARM)
+        out = turned_about_y(np.pi / 30) @ [0, 0, 1]
+        middle = points.mean(axis=0) + 0.002 * out
+        frame = middle + 0.02 * np.array([[-1, 0, -1], [1, 0, 1], [-1, 0, 1], [1, 0, -1]])
+        axes = axes_towards(np.array([0.0, -1.0, 0.0]), out)
+        return studio.stage.shoot(fit_tile(frame, axes, (370, 300)))
+
+    return with_studio(bodies[name], draw)
 
 
 def with_studio(basis: ModalBasis, draw: Any) -> Any:
@@ -161,6 +256,126 @@ def top_view(studio: views.Studio) -> Any:
 def turned_about_y(angle: float) -> np.ndarray:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+# dampers ---------------------------------------------------------------------------------------------------------
+
+
+def companion(name: str) -> ModalBasis:
+    return made(name, COMPANIONS[name], *LIGHT)
+
+
+def damping_element() -> None:
+    """24 blades coupled by pins: bending and torsion over frequency and normal force, engine orders, sensitivity."""
+    built = damper_study.opened("damping-element", companion)
+    frequency = np.concatenate([np.linspace(14, 40, 27), np.linspace(44, 184, 36)])
+    forces = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0, 120.0, 160.0, 240.0, 400.0, 1000.0)
+    curves = damper_study.over_forces(built, forces, frequency)
+    orders = range(1, 13)
+    by_order = {e: damper_study.of_order(built, e) for e in orders}
+    wide = np.linspace(20, 250, 93)
+    along = {e: damper_study.followed(damper_study.problem_of(b, 100.0), wide) for e, b in by_order.items()}
+    fig = figure(8.6, 6.4)
+    (a, b), (c, d) = fig.subplots(2, 2)
+    bending, torsion = damper_study.bending, damper_study.torsion
+    for axes, pick, what in ((a, bending, "bending, tip in mm"), (b, torsion, "torsion of the tip in mrad")):
+        plain(axes)
+        for force, colour in zip((30.0, 50.0, 80.0, 160.0, 1000.0), plots.COLOURS, strict=False):
+            x = curves[force]
+            axes.semilogy(x.frequency, 1e3 * np.abs(pick(x.watched)), color=colour, label=f"{force:g} N")
+        axes.set(xlabel="frequency in Hz", ylabel=what)
+    a.legend(fontsize=8, title="normal force", title_fontsize=8)
+    plain(c)
+    for pick, what, colour in ((bending, "tip in mm", "#0b4f9c"), (torsion, "torsion in mrad", "#d98410")):
+        largest = [1e3 * x.largest(pick)[1] for x in curves.values()]
+        c.loglog(forces, largest, "o-", color=colour, label=what, markersize=3)
+    c.set(xlabel="normal force in N", ylabel="largest amplitude up to 184 Hz")
+    c.legend(fontsize=8)
+    plain(d)
+    d.semilogy(orders, [1e3 * along[e].largest(damper_study.bending)[1] for e in orders], "o-", color=plots.COLOURS[0])
+    d.set(xlabel="engine order", ylabel="largest tip amplitude in mm, 100 N")
+    save(drawn(fig), "damping_element")
+    stuck = {e: damper_study.sticking(damper_study.problem_of(b, 100.0))[0] for e, b in by_order.items()}
+    rows = [[f"{e}", f"{stuck[e]:.1f}", f"{along[e].largest(damper_study.bending)[0]:.0f}",
+             f"{1e3 * along[e].largest(damper_study.bending)[1]:.4f}"] for e in orders]  # fmt: skip
+    head = ["engine order", "sticking, Hz", "resonance at 100 N, Hz", "tip, mm"]
+    fill("dampers.md", "orders", table(head, rows))
+    rows = []
+    for label, changes in (
+        ("as in the case file", ()),
+        ("friction 0.2", tuple(f"contacts.{i}.friction=0.2" for i in range(2))),
+        ("friction 0.5", tuple(f"contacts.{i}.friction=0.5" for i in range(2))),
+        ("tangential stiffness x 4", tuple(f"contacts.{i}.tangential_stiffness=68e6" for i in range(2))),
+        ("tangential stiffness / 4", tuple(f"contacts.{i}.tangential_stiffness=4.25e6" for i in range(2))),
+        ("hold 10 Hz", ("bodies.pin.hold=10.0",)), ("hold 60 Hz", ("bodies.pin.hold=60.0",)),
+        ("force 20 N", ("excitations.0.amplitude=20.0",)),
+    ):  # fmt: skip
+        found = damper_study.opened("damping-element", companion, *changes)
+        few = damper_study.over_forces(found, (40.0, 50.0, 60.0, 70.0, 80.0, 100.0, 120.0, 140.0, 180.0), frequency)
+        best = [damper_study.optimum(few, pick) for pick in (damper_study.bending, damper_study.torsion)]
+        rows.append([label, f"{best[0][0]:g}", f"{1e3 * best[0][2]:.4f}", f"{best[0][1]:.0f}", f"{best[1][0]:g}",
+                     f"{1e3 * best[1][2]:.4f}"])  # fmt: skip
+    head = ["", "best for bending, N", "tip, mm", "at Hz", "best for torsion, N", "torsion, mrad"]
+    fill("dampers.md", "element", table(head, rows))
+
+
+def damping_wire() -> None:
+    """7 of 28 blades on a wire: tip over frequency, largest amplitude over normal force, sensitivity."""
+    built = damper_study.opened("damping-wire", companion)
+    frequency = np.linspace(62, 84, 34)
+    forces = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 80.0, 120.0, 250.0, 1000.0)
+    curves = damper_study.over_forces(built, forces, frequency)
+    fig = figure(8.6, 3.6)
+    left, right = fig.subplots(1, 2)
+    plain(left)
+    for force, colour in zip((10.0, 20.0, 50.0, 120.0, 1000.0), plots.COLOURS, strict=False):
+        x = curves[force]
+        left.semilogy(x.frequency, 1e3 * np.abs(x.watched[:, 0]), color=colour, label=f"{force:g} N")
+    left.set(xlabel="frequency in Hz", ylabel="tip of blade 4 in mm")
+    left.legend(fontsize=8, title="normal force", title_fontsize=8)
+    plain(right)
+    for number, blade in enumerate((4, 1, 7)):
+        largest = [1e3 * x.largest(lambda w, n=number: w[:, n])[1] for x in curves.values()]
+        right.loglog(forces, largest, "o-", color=plots.COLOURS[number], label=f"blade {blade}", markersize=3)
+    right.set(xlabel="normal force in N", ylabel="largest tip amplitude in mm")
+    right.legend(fontsize=8)
+    save(drawn(fig), "damping_wire")
+    rows = []
+    for force, x in curves.items():
+        tips = [f"{1e3 * x.largest(lambda w, n=n: w[:, n])[1]:.3f}" for n in range(3)]
+        rows.append([f"{force:g}", f"{x.largest(damper_study.bending)[0]:.1f}", *tips])
+    fill("dampers.md", "wire", table(["normal force, N", "Hz", "blade 4, mm", "blade 1, mm", "blade 7, mm"], rows))
+
+
+def spin_pit() -> None:
+    """30 blades with underplatform dampers: strain over frequency, largest strain over mass for three shapes."""
+    frequency = np.linspace(104, 160, 57)
+    shapes, masses = damper_study.SHAPES, damper_study.MASSES
+    all_of = {s: {m: damper_study.under_platforms(s, m, companion, frequency) for m in masses} for s in shapes}
+    fig = figure(8.6, 3.6)
+    left, right = fig.subplots(1, 2)
+    plain(left)
+    for mass, colour in zip(damper_study.PRINTED, plots.COLOURS, strict=False):
+        x = all_of["cottage-roof"][mass]
+        left.semilogy(x.frequency, 1e6 * np.abs(x.watched[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
+    left.set(xlabel="frequency in Hz", ylabel="strain amplitude in 1e-6", title="cottage roof")
+    left.legend(fontsize=8)
+    plain(right)
+    for shape, colour in zip(shapes, plots.COLOURS, strict=False):
+        largest = [1e6 * x.largest(damper_study.bending)[1] for x in all_of[shape].values()]
+        right.loglog([1e3 * m for m in masses], largest, "o-", color=colour, label=shape, markersize=3)
+    right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in 1e-6")
+    right.set_xticks([16, 26, 42, 75, 117], labels=["16", "26", "42", "75", "117"], minor=False)
+    right.set_xticks([], minor=True)
+    right.legend(fontsize=8)
+    save(drawn(fig), "spin_pit")
+    rows = []
+    for shape in shapes:
+        for mass in damper_study.PRINTED:
+            f, strain = all_of[shape][mass].largest(damper_study.bending)
+            normal = damper_study.wedged(damper_study.of_mass(companion(shapes[shape]), mass), damper_study.RPM)
+            rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}"])
+    fill("dampers.md", "pit", table(["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, 1e-6"], rows))
 
 
 # static contact ----------------------------------------------------------------------------------------------------
@@ -304,12 +519,12 @@ def convergence() -> None:
 def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
     settings, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
     group = basis.groups[0, 0]
-    sized = tuple(_sized(c, group, "blade.toml") for c in settings.contacts)
-    return settings.model_copy(update={"contacts": sized, **changes})
+    own = tuple(sized(c, group.interfaces[c.interface], "blade.toml") for c in settings.contacts)
+    return settings.model_copy(update={"contacts": own, **changes})
 
 
 def stuck(group: ModalGroup, settings: CaseSettings, normal: float = 780.0) -> np.ndarray:
-    return stuck_frequencies(group, [_contact(c, normal) for c in settings.contacts])[:4]
+    return stuck_frequencies(group, [jenkins_contact(c, normal) for c in settings.contacts])[:4]
 
 
 def contact() -> None:
@@ -784,8 +999,8 @@ def sticking_force(study: Any) -> None:
         own = {"reduction": method, "modes": settings.modes.model_copy(update={"count": count})}
         groups[label] = study.modal_basis(mesh, settings.model_copy(update=own)).groups[0, 0]
     case, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
-    sized = [_sized(c, groups["reference"], "blade.toml") for c in case.contacts]
-    springs = np.concatenate([_contact(c, 780.0).stiffness for c in sized])
+    own = [sized(c, groups["reference"].interfaces[c.interface], "blade.toml") for c in case.contacts]
+    springs = np.concatenate([jenkins_contact(c, 780.0).stiffness for c in own])
     frequency = np.linspace(60, 1200, 2281)
     found = {label: np.abs(study.reduced_force(g, springs, frequency)) for label, g in groups.items()}
     places = np.linspace(0, len(frequency) - 1, 25).astype(int)
@@ -839,9 +1054,10 @@ def own() -> None:
 
 
 def reference() -> None:
-    """The references of body.toml and contact.toml."""
+    """The references of body.toml, contact.toml and case.toml."""
     fill("body_toml.md", "body_toml", body_reference())
     fill("contact_toml.md", "contact_toml", contact_reference())
+    fill("case_toml.md", "case_toml", case_reference())
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------
@@ -994,6 +1210,13 @@ def continuation() -> None:
     save(drawn(study.curves(figure(10.5, 3.4), plain)), "continuation")
 
 
+def followed() -> None:
+    """Stability at folds, a nonlinear mode and the resonances on it, an optimum."""
+    import following_study as study
+
+    save(drawn(study.three(figure(13.0, 3.9), plain)), "followed")
+
+
 def microslip() -> None:
     """Microslip: errors of the strips over their number."""
     import microslip_study as study
@@ -1001,12 +1224,115 @@ def microslip() -> None:
     fill("contact.md", "strips", table(*study.errors()))
 
 
+def book_mode() -> None:
+    """The book's contact: its figures, and what its tables know of their errors."""
+    import book_study as study
+
+    fill("book_mode.md", "errors", table(*study.errors()))
+    save(drawn(study.figures(figure(10.2, 7.4))), "book_mode")
+    basis = modes_stage(open_job(ROOT / "geometry" / "blade", ["mesh.size=12"], BUILD))[0]
+    changes = ["sweep.points=61", "contacts.0.points=[24,3]", "contacts.1.points=[24,3]", "cycles=10"]
+    case = ROOT / "pipeline" / "cases" / "blade-rough.toml"
+    found, pairs, _ = compare_book(case, basis, changes, report=print, root=BUILD)
+    fill("book_mode.md", "compared", table(*study.compared(pairs)))
+    save(from_file(found.parent / "pictures" / "book.png"), "book_compared")
+
+
+def patches() -> None:
+    """Contacts between bodies: a pin in its hole by Hertz and on springs."""
+    import patch_study as study
+
+    fill("harmonic_balance.md", "foundations", table(*study.foundations()))
+    save(drawn(study.pressures(figure(10.2, 3.6))), "contact_line")
+
+
+def results() -> None:
+    """Stresses of the test blade on a rotor, and its contacts in partial slip."""
+    import result_study as study
+
+    from microslip.assessment import draw
+    from microslip.pictures import operating
+
+    basis = made("blade-at-speed", "blade", *study.AT_SPEED)
+    found = study.assessed(basis)
+    shown = draw(found, basis, "blade at 3000 rpm", BUILD, True)
+    for title, name in (("stress at resonance", "result_stress"), ("Haigh diagram", "result_haigh")):
+        save(from_file(shown[title]), name, smooth=title == "stress at resonance")
+    basis = made("blade-rough", "blade", "mesh.size=12", *LIGHT)
+    maps = study.maps(basis, 60.0, 112.0)
+    save(from_file(operating.contact_map_plot(maps, "blade: 60 N, 112 Hz", BUILD / "maps.png")), "result_contacts")
+
+
+def ring() -> None:
+    """The 24 blades of section 5.5: modes, engine orders, normal force, stress at the foot."""
+    import ring_study as study
+
+    stress = ("output.gauss=false", "mesh.size=12")
+    basis = made("blade-stress", "blade", *stress)
+    r = study.ring(basis, study.COARSE, samples=32)
+    fig = figure(7.2, 3.6)
+    many = study.ring(made("blade-60", "blade", *LIGHT, "mesh.size=12", "modes.count=60"), study.COARSE, samples=32)
+    rows = study.modes_picture(many, fig.subplots())
+    save(drawn(fig), "ring_modes")
+    fill("ring_case.md", "modes", table(["modes", "below 200 Hz", "above"], rows))
+    for name, draw in (("ring_forces", study.forces_picture), ("ring_orders", study.orders_picture)):
+        fig = figure(10.0, 4.2)
+        axes = fig.subplots(1, 2)
+        rows = draw(r, *axes) or rows
+        save(drawn(fig), name)
+    head = ["engine order", "beta = 0: Hz", "beta = 30: Hz", "beta = 0: MPa", "beta = 30: MPa"]
+    fill("ring_case.md", "orders", table(head, rows))
+    at = ["excitations.magnet.point=[2.5,30,237.5]", "monitors.accelerometer.point=[2.5,30,237.5]"]
+    group = basis.groups[0, 0]
+    damped = replace(group, damping_ratio=2 * group.damping_ratio, C_r=2 * group.C_r)
+    other = {
+        "excited and read at 237.5 mm": made("blade-stress-237", "blade", *stress, *at),
+        "D = 0.2 %": replace(basis, groups={(0, 0): damped}),
+    }
+    head = ["change", "optimum, N", "resonance, Hz", "amplitude, um", "stress, MPa"]
+    fill("ring_case.md", "optimum", table(head, study.assumptions(r, other)))
+    rows = []
+    for size in (24, 12, 8):
+        own = replace(r, basis=made(f"blade-stress-{size}", "blade", "output.gauss=false", f"mesh.size={size}"))
+        h = study.highest(own.problem(100.0), own.basis, study.WIDE)
+        rows.append([f"{size}", f"{h.frequency:.2f}", f"{1e6 * h.amplitude:.1f}", f"{1e-6 * h.stress:.2f}"])
+    head = ["element size, mm", "resonance at 100 N, Hz", "amplitude, um", "stress, MPa"]
+    fill("ring_case.md", "mesh", table(head, rows))
+
+
+def bolted_pipes() -> None:
+    """The half pipes of section 5.7: bending and torsion over the tangential stiffness, fit and prediction."""
+    import bolted_study as study
+
+    basis = made("half-pipe-bolted", "half-pipe", *LIGHT, "mesh.size=16")
+    fill("bolted_pipes.md", "stiffness", table(
+        ["tangential stiffness, N/m", "bending, Hz", "torsion, Hz"],
+        study.table_of(basis, (1e5, 1e6, 1e7, 1e8, 1e9, 1e11)),
+    ))  # fmt: skip
+    rich = made("half-pipe-rubin", "half-pipe", *LIGHT, "mesh.size=16", 'reduction="rubin"', "modes.count=30")
+    rows = []
+    for k in (5e7, 2e8, 1e9):
+        truth = study.joined(rich, k)
+        (bending, _), (torsion, _) = truth.of("bending"), truth.of("torsion")
+        own, found = study.fitted(basis, bending)
+        away = percent(found.of("torsion")[0], torsion)
+        rows.append([f"{k:.3g}", f"{bending:.1f}", f"{own:.3g}", f"{torsion:.1f}", away])
+    head = ["stiffness, N/m", "bending, Hz", "fitted, N/m", "torsion, Hz", "predicted"]
+    fill("bolted_pipes.md", "fit", table(head, rows))
+    fig = figure(10.0, 4.2)
+    study.picture(basis, *fig.subplots(1, 2))
+    save(drawn(fig), "bolted_pipes")
+
+
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, closure, closed, contact_stiffness, bolts, contact, convergence, sensitivity, arrangement2,
+        reference, geometry, meeting, damping_element, damping_wire, spin_pit, closure, closed, contact_stiffness,
+        bolts, contact, convergence, sensitivity,
+        arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough, laws, microslip, continuation,
+        stiffness_sources, rough, laws, microslip, continuation, followed, book_mode, patches, results,
+        ring, bolted_pipes,
     )  # fmt: skip
 }
 

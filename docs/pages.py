@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from microslip.body import BodySettings, _is_length
+from microslip.case.settings import CaseSettings
 from microslip.contact.settings import ContactFile
 
 HERE = Path(__file__).parent
@@ -203,6 +204,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "excitations.face": ("", "or the face over which it is spread"),
     "excitations.direction": ("", "of the force; its length does not matter"),
     "excitations.pressure": ("", "a unit pressure (1 Pa) on the face instead"),
+    "excitations.centrifugal": ("", "the centrifugal force on the whole body per (rad/s)^2 about the [rotation] axis"),
     "monitors.name": ("", ""),
     "monitors.point": ("*", "where displacements are read"),
     "monitors.node": ("", "or the number of a node in the mesh file"),
@@ -329,6 +331,128 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
 }
 
 
+MEANING_CASE: dict[str, tuple[str, str]] = {
+    "name": ("", "names the folder of the products, `build/NAME/`"),
+    "description": ("", "one line for the report"),
+    "body": ("", "the only body, short for one `[[bodies]]`"),
+    "speed": ("", "of the only body: which speed of its modal file, from 0"),
+    "speed_rpm": ("rpm", "or a speed of the file or of its range"),
+    "modes": ("", "how many of those that the modal file stores"),
+    "excitation": ("", "short for one `[[excitations]]`"),
+    "amplitude": ("N, Pa", "of that excitation"),
+    "monitor": ("", "short for one `[[monitors]]`"),
+    "direction": ("", "of that monitor"),
+    "mode": ("", "laws marched in time, or the [book's contact](book_mode.md)"),
+    "strips": ("", "book's mode: into how many strips a patch's roughness makes microslip; 0: none"),
+    "harmonics": ("", "H, besides the mean; `auto`: [as many as the error asks for]"
+                  "(harmonic_balance.md#what-is-followed-instead-of-swept)"),
+    "harmonics_error": ("", "of `auto`: estimated error of the resonances that is allowed, a share of the amplitude; "
+                        "0.01 if not given"),
+    "samples": ("", "of a cycle; at least four a harmonic, sixteen are better"),
+    "cycles": ("", "marched at most until the sliders are periodic"),
+    "settled": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles are "
+                "marched"),
+    "bodies.name": ("", "in this case"),
+    "bodies.body": ("", "whose modal file it is: `geometry/NAME`, a folder or a system.toml beside the case; the name "
+                    "if not given"),
+    "bodies.file": ("", "a modal file beside the case instead"),
+    "bodies.speed": ("", "which speed of the modal file, from 0"),
+    "bodies.speed_rpm": ("rpm", "or a speed of the file or of its range"),
+    "bodies.damping_ratio": ("", "instead of the file's: one, or one a mode, the last one for all that follow"),
+    "bodies.aerodynamics": ("", "a table (.csv) of [what the flow adds](excitation.md#damping) to every wave"),
+    "bodies.modes": ("", "how many of those that the modal file stores"),
+    "bodies.turn": ("degrees", "about the body's rotation axis, from where its file has it"),
+    "bodies.hold": ("Hz", "weak springs that hold a body which nothing else does: frequency of its rigid motions"),
+    "bodies.shift": ("m", "from where its file has it, after the turn"),
+    "ring.blades": ("", "N, as many as the sectors of a cyclic body"),
+    "ring.engine_order": ("", "of the swept frequency; if not given, the greatest common divisor of those that "
+                          "excitations name, or 1; negative: [round with the rotor](excitation.md#engine-orders)"),
+    "ring.rotation": ("", "`-`: the rotor turns from sector 1 to sector 0"),
+    "ring.model": ("", "one sector that stands for all, or all of them"),
+    "excitations.row": ("", "excitation of a body, `body:excitation` where there are several"),
+    "excitations.amplitude": ("N, Pa", "0-peak; of a pressure field: a factor"),
+    "excitations.phase": ("degrees", "by which it leads"),
+    "excitations.harmonic": ("", "of the swept frequency; 0: steady"),
+    "excitations.engine_order": ("", "instead of the harmonic"),
+    "excitations.steady": ("N, Pa", "steady gas load, with stimulus instead of amplitude"),
+    "excitations.stimulus": ("", "its share that vibrates"),
+    "excitations.speed_rpm": ("rpm", "of a centrifugal excitation, instead of amplitude and harmonic"),
+    "excitations.field": ("", "file of a [complex pressure field](excitation.md#pressure-fields), instead of a row"),
+    "excitations.face": ("", "where the field acts: an interface, or a face that an excitation of the body names"),
+    "excitations.length_unit": ("", "of the field's x, y, z"),
+    "excitations.time_factor": ("", "`-`: the field stands for p exp(-i Omega t)"),
+    "excitations.magnets.angles": ("degrees", "where they stand around the rotor"),
+    "excitations.magnets.force": ("N", "peak of each, or one for all"),
+    "excitations.magnets.width": ("degrees", "over which each is felt"),
+    "excitations.magnets.pulse": ("", "cos^2, or constant over the width"),
+    "excitations.magnets.place": ("degrees", "of the loaded spot of the first blade at time 0"),
+    "excitations.magnets.highest": ("", "engine order"),
+    "monitors.monitor": ("", "of a body, `body:monitor` where there are several; the first one is drawn"),
+    "monitors.direction": ("", "in body axes"),
+    "contacts.interface": ("", "of a body, `body:interface` where there are several; its frame is the contact's"),
+    "contacts.against": ("", "`ground`, or the other interface"),
+    "contacts.against_sector": ("", "of a ring: how many sectors further the other body stands"),
+    "contacts.normal_force": ("N", "where the sweep's forces are not this contact's"),
+    "contacts.interference": ("m", "or how far the faces overlap at rest; negative: a gap"),
+    "contacts.file": ("", "a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"),
+    "contacts.normal_stiffness": ("N/m", "c_N0 of the whole patch; **required** without file or young"),
+    "contacts.tangential_stiffness": ("N/m", "c_R0, likewise"),
+    "contacts.width": ("m", "b_0 along t1; the patch's own if not given"),
+    "contacts.height": ("m", "h_0 along t2, likewise"),
+    "contacts.friction": ("", "coefficient; **required** without file"),
+    "contacts.slides_along": ("", "law jenkins: where its slider is"),
+    "contacts.includes": ("", "which [compliance](contact.md) the stiffnesses count"),
+    "contacts.law": ("", "closed form of one harmonic, or points with a law; if not given, `jenkins` for one body on "
+                     "the ground, else `smooth`"),
+    "contacts.roughness": ("m", "R_Z, of law rough"),
+    "contacts.points": ("", "how many along t1 and t2"),
+    "contacts.patch": ("", "six coordinates, or points that move as the shapes of the bodies say"),
+    "contacts.curvature": ("m", "relative radii along t1 and t2, inf where it is flat"),
+    "contacts.young": ("Pa", "E of both bodies, for a curved patch, instead of the stiffnesses"),
+    "contacts.poisson": ("", "nu of both bodies"),
+    "contacts.fit": ("", "in what the springs of a curved patch agree with Hertz"),
+    "contacts.fitted_at": ("N", "at which load; the contact's own or the largest of the sweep if not given"),
+    "contacts.isotropic": ("", "geometric mean of both tangential stiffnesses of a curved patch, as the book's mode "
+                           "needs it"),
+    "sweep.start": ("Hz", "first frequency"),
+    "sweep.stop": ("Hz", "last one"),
+    "sweep.points": ("", "equally spaced"),
+    "sweep.normal_forces": ("N", "to compare, in every contact that nothing else presses; `static`: of the body's "
+                            "closures"),
+    "material_limits.fatigue_strength": ("Pa", "amplitude that is endured about a zero mean"),
+    "material_limits.tensile_strength": ("Pa", "ultimate"),
+    "material_limits.yield_strength": ("Pa", "if given, the largest stress is held against it"),
+    "material_limits.name": ("", "of the material"),
+    "orders.engine_orders": ("", "`all`: 1 to N/2"),
+    "orders.points": ("", "of the sweep that looks for the peaks; the sweep's if not given"),
+    "speeds.start_rpm": ("rpm", "first speed"),
+    "speeds.stop_rpm": ("rpm", "last one, above or below"),
+    "speeds.points": ("", "equally spaced"),
+    "speeds.normal_force": ("N", "`static`, one, or pairs [rpm, N], straight lines in the square of the speed; the "
+                            "sweep's one if not given"),
+    "ranges.damping_ratio": ("", "of all modes of all bodies"),
+    "ranges.load": ("", "factors on the loads that are not steady"),
+    "ranges.friction": ("", "coefficients of all contacts"),
+    "ranges.normal_force": ("N", "of the contacts that the sweep presses"),
+    "curve.band": ("Hz", "first and last frequency; the sweep's start and stop if not given"),
+    "curve.load": ("", "first and last factor on the loads that are not steady"),
+    "curve.normal_force": ("N", "first and last, of the contacts that the sweep presses; its smallest and largest if "
+                           "not given"),
+    "curve.frequency": ("Hz", "at which load or normal force vary; the highest resonance in the sweep's band if not "
+                        "given, at the first normal force where that varies"),
+    "curve.points": ("", "of a curve at most"),
+    "identification.ratio": ("", "c_T / c_N, kept"),
+    "identification.stiffnesses": ("N/m", "c_N of further curves in the diagram"),
+    "identification.modes": ("", "how many are drawn"),
+    "identification.fit.nodal_diameter": ("", "of the frequency that is met"),
+    "identification.fit.mode": ("", "from 1, in the order of the frequencies"),
+    "identification.fit.frequency": ("Hz", "measured"),
+    "identification.measured.nodal_diameter": ("", "of a frequency that is predicted"),
+    "identification.measured.mode": ("", "from 1"),
+    "identification.measured.frequency": ("Hz", "measured"),
+}  # fmt: skip
+
+
 def body_reference() -> str:
     """Tables of every key of body.toml, made from the models that read it.
 
@@ -341,6 +465,11 @@ def body_reference() -> str:
 def contact_reference() -> str:
     """Tables of every key of contact.toml, likewise."""
     return _reference(ContactFile, MEANING_CONTACT, "contact.toml")
+
+
+def case_reference() -> str:
+    """Tables of every key of case.toml, likewise."""
+    return _reference(CaseSettings, MEANING_CASE, "case.toml")
 
 
 def _reference(model: Any, meanings: dict[str, tuple[str, str]], file: str) -> str:

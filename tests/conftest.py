@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -18,6 +19,16 @@ settings.load_profile("microslip")
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's background job: children would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs_are_dropped() -> Iterator[None]:
+    """Compiled programs of a test file go with it: each keeps pieces of memory mapped, of which a process may have
+    65530; beyond that the compiler crashes."""
+    yield
+    if "jax" in sys.modules:
+        sys.modules["jax"].clear_caches()
+
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")
 """Why a test is skipped where another program or package is missing. With MICROSLIP_PEERS=required that fails."""

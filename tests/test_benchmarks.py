@@ -53,6 +53,17 @@ def test_the_contact_benchmark_compares_laws_that_agree():
     assert all(float(r[-1]) < 1e-12 for r in rows if r[1] != "microslip, two cycles")
 
 
+def test_the_ring_response_benchmark_sees_the_same_peak_in_all_modes():
+    command = [sys.executable, str(ROOT / "benchmarks" / "ring_response.py"), "--quick"]
+    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if line.startswith("| ")]
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
+    assert [r[0] for r in rows[1:4]] == ["book", "marched, H = 1", "marched, H = 3"]
+    assert all(r[4] == "0" and 100 < float(r[5]) < 115 for r in rows[1:])
+
+
 def test_the_duffing_benchmark_follows_one_curve_over_both_folds():
     command = [sys.executable, str(ROOT / "benchmarks" / "duffing.py"), "--quick"]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])

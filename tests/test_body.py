@@ -115,7 +115,7 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"interfaces__0__name": ".."}, "name: must begin with a letter or digit"),
     ({"interfaces__0__sector_shift": 2}, "interfaces.right.sector_shift: must be -1, 0 or 1 (it is 2)"),
     ({"interfaces__0__sector_shift": True}, "interfaces.right.sector_shift: must be a whole number, not true"),
-    ({"excitations__0__face": "tip"}, "excitations.shaker: needs exactly one of point, node and face"),
+    ({"excitations__0__face": "tip"}, "excitations.shaker: needs exactly one of point, node, face, and has point"),
     ({"excitations__0__direction": ...}, "excitations.shaker: needs a direction that is not zero"),
     ({"excitations__1__direction": [1, 0, 0]}, "excitations.gas: pressure = true needs a face and no direction"),
     ({"monitors__0__point": [1, 2]}, "monitors.tip-probe.point: must have 3 entries and has 2"),

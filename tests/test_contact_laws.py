@@ -9,7 +9,8 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from microslip.contact import EXAMPLES
-from microslip.contact.law import cycles, history, march
+from microslip.contact.law import history, march
+from microslip.contact.periodic import cycles
 
 SAMPLES = 256
 TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)

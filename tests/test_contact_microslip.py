@@ -14,10 +14,11 @@ from scipy.optimize import brentq
 
 from microslip.contact.heights import Cut, Exponential, Gaussian, Linear, Polynomial, tabulated
 from microslip.contact.hertz import Hertz
-from microslip.contact.law import cycles, history, march
+from microslip.contact.law import history, march
 from microslip.contact.microslip import MonotoneSlip, of
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.partial_slip import PartialSlip
+from microslip.contact.periodic import cycles
 from microslip.contact.sliders import Iwan, Strips, jenkins, mindlin, rough_strips, segalman, uniform
 from microslip.contact.solids import Solid
 from microslip.errors import UserError

@@ -15,8 +15,9 @@ from wrong_laws import BOX, JUMP, PRESTRESSED, PRINTED
 from microslip.contact.examples import EXAMPLES
 from microslip.contact.friction import Coulomb, Exponential, Falling, Heated, StaticSliding, characteristic
 from microslip.contact.heights import Polynomial
-from microslip.contact.law import cycles, history
+from microslip.contact.law import history
 from microslip.contact.normal import Penalty, Preload, Rough
+from microslip.contact.periodic import cycles
 from microslip.contact.point import PointContact, PointState
 
 MU, N0, K = 0.4, 100.0, 2e7

@@ -76,6 +76,7 @@ def test_references_of_settings_files_are_current() -> None:
     """`python docs/make_pictures.py reference` would change nothing."""
     assert pages.filled("body_toml.md", "body_toml") == pages.body_reference().strip()
     assert pages.filled("contact_toml.md", "contact_toml") == pages.contact_reference().strip()
+    assert pages.filled("case_toml.md", "case_toml") == pages.case_reference().strip()
 
 
 def test_python_blocks_are_python() -> None:
@@ -239,6 +240,17 @@ def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     for code, printed in re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S):
         exec(compile(code, "contact.md", "exec"), {})
         assert capsys.readouterr().out.strip() == printed
+
+
+def test_python_page(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every block of the page goes on from the one before, and prints what stands below it."""
+    names: dict[str, object] = {}
+    text = (DOCS / "python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```\n\n((?:    [^\n]*\n)+)", text, flags=re.S)
+    assert len(blocks) == text.count("```python")
+    for code, printed in blocks:
+        exec(compile(code, "python.md", "exec"), names)
+        assert [line.strip() for line in printed.splitlines()] == capsys.readouterr().out.splitlines()
 
 
 def test_geometry_page(tmp_path: Path) -> None:

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
 
 from microslip import eigen
+from microslip.canonical import clusters, signs, turn_clusters
 from microslip.data import NotConverged, UserError
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
 from microslip.mesh import read_mesh
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
-from microslip.modes.canonical import clusters, signs, turn_clusters
 from microslip.modes.equilibrium import make_model
 from microslip.modes.spectrum import make_pencil
 from microslip.reference.bars import box_frequencies
@@ -225,6 +225,12 @@ def test_too_many_values_are_refused():
     )
     with pytest.raises(NotConverged, match="only 6 exist"):
         eigen.certify(pencil, spoilt)
+
+
+def test_signs_have_magnitude_one_where_the_largest_is_nearly_tied():
+    """The lowest row rules, though another one is larger by less than a millionth."""
+    np.testing.assert_array_equal(signs(np.array([[-1.0], [1.0 + 5e-7]])), [-1.0])
+    assert abs(signs(np.array([[3j], [3.000001 + 0j]]))[0]) == pytest.approx(1.0, abs=1e-15)
 
 
 # ---------------------------------------------------------------- free bodies

@@ -89,6 +89,16 @@ def test_external_work_equals_dissipation_and_newton_converges_through_the_peak(
     assert len(peaks(response)) == 1
 
 
+def test_coordinates_and_contact_forces_balance_the_excitation():
+    """K q - Omega^2 M q + i Omega C q = f - T^T F at every frequency, and the monitor reads q."""
+    g, frequency = oscillator(ratio=0.01), np.linspace(10, 40, 31)
+    r = frequency_response(g, [contact(2e4, 0.8)], np.array([1.0]), np.array([1.0]), frequency)
+    Omega = 2 * np.pi * frequency
+    left = (1e4 - Omega**2 + 2j * 0.01 * 100 * Omega) * r.modal[:, 0]
+    np.testing.assert_allclose(left, 1.0 - r.force[:, 1], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(r.modal[:, 0], r.monitor, rtol=1e-12)
+
+
 def test_response_agrees_with_time_integration():
     """One harmonic against the marched oscillator at three frequencies: within 2 % (the force's third harmonic)."""
     m, k, kt, limit = 1.0, 1e4, 2e4, 0.6

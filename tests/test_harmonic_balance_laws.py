@@ -14,16 +14,19 @@ import pytest
 
 from microslip import continuation
 from microslip.case import CaseSettings, load_case, run_case
+from microslip.case.assemble import build
+from microslip.case.run import _not_periodic, problem_of
 from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law
 from microslip.contact.normal import Normal, Penalty, Preload, Rough
+from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
-from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, UserError
+from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, NotConverged, UserError
 from microslip.harmonic_balance import JenkinsContact, frequency_response, response_table
-from microslip.harmonic_balance.patch import Patch, equilibrium, grid, stuck_stiffness
+from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
-from microslip.harmonic_balance.response import HarmonicResponse, Problem, harmonic_response, newton, of_body
+from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response, newton, of_body
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 
@@ -84,6 +87,15 @@ def test_equilibrium_of_a_pure_approach_does_not_depend_on_the_mesh(counts: tupl
     np.testing.assert_allclose(u[1:], 0.0, atol=1e-15)
 
 
+def test_no_equilibrium_says_what_to_do() -> None:
+    """A single point beside the origin holds no moment: nothing carries a centred force."""
+    one = replace(rough_patch((1, 1)), points=np.array([[0.003, 0.002]]))
+    with pytest.raises(NotConverged, match=r"no equilibrium under 10 N was found with 1 point; raise points"):
+        equilibrium(one, 10.0)
+    with pytest.raises(NotConverged, match=r"under 10 N and moments of 1 and 0 N m .* the 1 of the mesh: refine"):
+        equilibrium(replace(one, shapes=one.kinematics), 10.0, (1.0, 0.0))
+
+
 def test_equilibrium_under_moments() -> None:
     """The forces found at the equilibrium are those asked for; a linear contact tilts by M / (c h0^2 / 12)."""
     patch = rough_patch((12, 4))
@@ -134,14 +146,14 @@ def test_linear_limit_is_modal_superposition() -> None:
     frequency = np.linspace(20, 300, 15)
     problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=16)
     r = harmonic_response(problem, frequency, np.array([1.0]))
-    K = g.K_r + g.interfaces["face"].rows.T @ problem.body.stiffness @ g.interfaces["face"].rows
+    K = g.K_r + g.interfaces["face"].rows.T @ problem.stiffness[0] @ g.interfaces["face"].rows
     Omega = 2 * np.pi * frequency
     exact = [watched @ np.linalg.solve(K - w**2 * g.M_r + 1j * w * g.C_r, force) for w in Omega]
     assert r.converged.all() and r.slipping.max() == r.open.max() == 0
     np.testing.assert_allclose(r.monitor, exact, rtol=1e-9)
     np.testing.assert_allclose(r.harmonics[:, [0, 2, 3]], 0, atol=1e-9 * np.abs(exact).max())
     values = np.sqrt(np.linalg.eigvalsh(K)) / 2 / np.pi
-    np.testing.assert_allclose(stuck(problem.body), values, rtol=1e-9)
+    np.testing.assert_allclose(stuck(problem.parts[0][0], problem.stiffness[0]), values, rtol=1e-9)
 
 
 @pytest.mark.parametrize("scale", [0.01, 30.0])
@@ -149,7 +161,7 @@ def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     """Any k on the left side gives the same response, and the same residual up to the factor (1 + D k)."""
     g, force, watched = modes_with_rows()
     problem = of_body(g, (rough_patch((4, 2), 8e6),), np.array([20.0]), 5 * force, watched, harmonics=1, samples=32)
-    other = replace(problem, body=replace(problem.body, stiffness=scale * problem.body.stiffness))
+    other = replace(problem, stiffness=(scale * problem.stiffness[0],))
     frequency = np.array([40.0, 60.0])
     a, b = (harmonic_response(p, frequency, np.ones(1)) for p in (problem, other))
     assert a.converged.all() and b.converged.all() and a.slipping.max() > 0
@@ -211,8 +223,8 @@ def marched(
     Omega, m = 2 * np.pi * f, g.n_modes
     dt = 2 * np.pi / Omega / steps
     K, C, T = jnp.asarray(g.K_r), jnp.diag(jnp.asarray(g.C_r)), jnp.asarray(rows)
-    load, preload = jnp.asarray(force), jnp.asarray(problem.preload[:3])
-    offset = jnp.asarray(problem.offset[:3])
+    load, preload = jnp.asarray(force), jnp.asarray(problem.groups[0].preload[0, :3])
+    offset = jnp.asarray(problem.groups[0].offset[0, :3])
 
     def one(carried: Any, i: jax.Array) -> tuple[Any, tuple[jax.Array, jax.Array]]:
         q, before, state = carried
@@ -240,7 +252,7 @@ def in_time(problem: Problem, r: HarmonicResponse, steps: int) -> np.ndarray:
     t = 2 * np.pi * np.arange(steps) / steps
     H = r.contact.shape[2] // 2
     waves = [np.ones(steps)] + [w(h * t) for h in range(1, H + 1) for w in (np.cos, np.sin)]
-    return (r.contact[0] @ np.array(waves)).T - problem.offset
+    return (r.contact[0] @ np.array(waves)).T - problem.groups[0].offset[0]
 
 
 @pytest.mark.parametrize("f", [17.0, 21.0])
@@ -278,7 +290,7 @@ def test_contact_in_space_under_a_swinging_normal_force_against_time_integration
     are the balance and its 21 harmonics, not the step.
     """
     problem, r = swinging(load, 21, 2048)
-    q, lost = marched(three_dof(0.03), problem.patches[0].law, problem, np.array(load), 22.0, 90, 2048)
+    q, lost = marched(three_dof(0.03), problem.assembly.contacts[0].patch.law, problem, np.array(load), 22.0, 90, 2048)
     assert r.converged.all() and r.slipping[0, 0] > 0.5 and (r.open[0, 0] > 0.3) == opens
     np.testing.assert_allclose(in_time(problem, r, 2048)[:, :3], q, rtol=0, atol=1e-4 * np.abs(q).max())
     assert r.dissipated[0] == pytest.approx(lost, rel=1e-4)
@@ -305,21 +317,21 @@ def test_work_of_the_excitation_is_the_friction_along_the_slip_path() -> None:
 
 
 def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    from microslip.harmonic_balance import response
+    from microslip.harmonic_balance import solver
 
     def stubborn(at: Any, x: np.ndarray, **more: Any) -> Any:
         found = newton(at, x, **more)
         bad = abs(at.Omega - 2 * np.pi * 20.0) < 1e-9
         return replace(found, status="no convergence") if bad else found
 
-    newton = response.newton
-    monkeypatch.setattr(response, "newton", stubborn)
+    newton = solver.newton
+    monkeypatch.setattr(solver, "newton", stubborn)
     one = np.array([1.0])
     problem = of_body(oscillator(), (point(Preload(value(2.0)), 2e4, 0.3),), np.array([2.0]), one, one, harmonics=1)
     told: list[str] = []
     r = harmonic_response(problem, np.array([19.0, 20.0, 21.0]), one, told.append)
-    assert r.converged.tolist() == [True, False, True] and "of the load" in r.status[1]
-    assert told[1] == "2 of 3 frequencies: 20 Hz, not converged"
+    assert r.converged.tolist() == [True, False, True] and "no convergence" in r.status[1]
+    assert told[2] == "3 of 3 frequencies: 21 Hz, 1 not converged"
 
 
 def test_a_body_that_only_its_contact_holds() -> None:
@@ -331,7 +343,7 @@ def test_a_body_that_only_its_contact_holds() -> None:
     r = harmonic_response(problem, np.array([20.0, 40.0]), np.ones(1))
     assert r.converged.all()
     for x, f in zip(r.x, r.frequency, strict=True):
-        assert problem.at(2 * np.pi * f).force(x)[0] == pytest.approx(8.0, rel=1e-8)
+        assert problem.at(2 * np.pi * f).force(x)[0, 0] == pytest.approx(0.0, abs=8e-8)  # beyond the preload
     assert np.abs(r.harmonics[:, 0]).min() > 1e-9  # the mean approach is not that of the preload
 
 
@@ -341,7 +353,7 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
     force = np.array([6.0, 0.5, 0.0])
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), rough_patch((1, 1), 8e6).law)
     r = harmonic_response(
-        of_body(g, (patch,), np.array([8.0]), force, force, samples=128), np.array([20.0]), np.ones(1)
+        of_body(g, (patch,), np.array([8.0]), force, force, samples=128, cycles=10), np.array([20.0]), np.ones(1)
     )
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
 
@@ -452,6 +464,21 @@ def test_a_case_with_a_law_slides_and_its_table_says_how(tmp_path: Path) -> None
     assert max(found.values()) >= np.abs(loose.monitor[top])
 
 
+def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
+    """None at all marches every cycle and finds the same; a wide share leaves its mark, and a remark says so."""
+    found = {}
+    for settled in (0.0, 1e-10, 1e-2):
+        settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nsettled = {settled}"))
+        built = build(settings, {"sled": sled()}, "case.toml")
+        problem = problem_of(built, 5.0)
+        assert getattr(problem.groups[0].model, "settled", None) == settled
+        found[settled] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
+    assert found[1e-10] == pytest.approx(found[0.0], rel=1e-8)
+    assert found[1e-2] == pytest.approx(found[0.0], rel=1e-2)
+    (remark,) = _not_periodic(5.0, np.array([4e-3]), settings)
+    assert "up to 0.4 % in the next one; lower settled." in remark
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -461,6 +488,8 @@ def test_a_case_with_a_law_slides_and_its_table_says_how(tmp_path: Path) -> None
         ("samples = 32", "samples = 8\n", "are too few for"),
         ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
         ("points = [4, 2]", "points = [4, 0]", "points"),
+        ("samples = 32", "samples = 32\nsettled = 0.1", "settled: must not be greater than 0.01"),
+        ("samples = 32", "samples = 32\nsettled = -1e-9", "settled: must not be less than 0"),
         ("[sweep]", SECOND + "\n[sweep]", "cannot stand beside others"),
     ],
 )  # fmt: skip
@@ -468,3 +497,45 @@ def test_mistakes_in_a_case_with_laws(tmp_path: Path, old: str, new: str, told: 
     more = [("harmonics = 2", "harmonics = 3")] if "samples" in old else []
     with pytest.raises(UserError, match=re.escape(told)):
         asked(tmp_path, (old, new), *more)
+
+
+CONTACT = """
+name = "sole"
+length_unit = "m"
+[stiffness]
+kind = "given"
+normal = 3e6
+tangential = 1e6
+[friction]
+kind = "coulomb"
+mu = 0.3
+"""
+
+
+def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
+    """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
+    (tmp_path / "sole.toml").write_text(CONTACT)
+    own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
+    settings = asked(tmp_path, own)
+    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path)))
+    for normal, r in by_case.responses.items():
+        np.testing.assert_allclose(by_file.responses[normal].monitor, r.monitor, rtol=1e-9)
+    assert by_case.responses[5.0].slipping.max() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('law = "smooth"', 'file = "sole.toml"', "normal_stiffness: stands in the contact file already"),
+        ("friction = 0.3\n", "", "friction: is missing; give it, or a contact file"),
+    ],
+)
+def test_a_contact_is_described_once(tmp_path: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(UserError, match=re.escape(told)):
+        asked(tmp_path, (old, new))
+
+
+def test_a_contact_file_that_is_not_there(tmp_path: Path) -> None:
+    own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
+    with pytest.raises(UserError, match="there is no file .*sole.toml"):
+        run_case(asked(tmp_path, own), sled(), tmp_path / "case.toml")

@@ -64,6 +64,19 @@ def test_named_faces_are_found_on_the_outside() -> None:
         assert 0.5 * np.linalg.norm(normals, axis=1).sum() == pytest.approx(area, rel=1e-12)
 
 
+def test_a_patch_behind_a_wall_is_seen_to_be_covered() -> None:
+    """A triangle in the plane z = 0 hides what lies behind it, not what lies before it, beside it or in it."""
+    from microslip.pictures.views import covered
+
+    wall, triangle, axes = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), np.eye(3)
+    spot = np.array([[0.2, 0.2, 0.0], [0.3, 0.3, 0.0], [2.0, 2.0, 0.0]])
+    for height, hidden in ((-0.5, True), (0.5, False), (0.0, False)):
+        assert covered(wall, triangle, spot + [0, 0, height], axes) is hidden
+    assert not covered(wall, triangle, spot + [1.0, 0, -0.5], axes)
+    assert not covered(wall, triangle, spot - [0, 0, 0.5], -axes)
+    assert not covered(wall, np.array([[0, 1, 1]]), spot - [0, 0, 0.5], axes)
+
+
 # --- camera --------------------------------------------------------------------------------------------------------
 
 

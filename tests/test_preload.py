@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
+from drawn import made
 from meshes import body, brick
-from test_bodies import made
 
 from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis

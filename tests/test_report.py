@@ -208,7 +208,7 @@ def test_a_response_is_told_whatever_it_holds(tmp_path: Path) -> None:
         "case": "blade",
         "description": "",
         "stuck_frequencies_Hz": [86.5, 121.25],
-        "resonances": [{"normal_force_N": 10.0, "frequency_Hz": 14.2, "amplitude_m": 1.5e-5}],
+        "resonances": [{"normal_force_N": 10.0, "frequency_Hz": 14.2, "amplitude_m": 1.5e-5, "stress_Pa": 3.25e6}],
         "failed_points": 0,
     }
     words = said(report_html(small.basis(), album(tmp_path, "friction response"), (), response))
@@ -216,7 +216,8 @@ def test_a_response_is_told_whatever_it_holds(tmp_path: Path) -> None:
         "stuck frequencies in Hz86.5, 121.25",
         "normal force in N",
         "frequency in Hz",
-        "1.5·10−5",
+        "amplitude in µm",
+        "14.2153.25",
         "failed points0",
     ):
         assert part in words

@@ -424,6 +424,39 @@ def test_reciprocity_and_loads():
     assert set(group.interfaces) == {"tip", "top", "z1", "x1"} and group.interfaces["z1"].role == "load"
 
 
+OFF_AXIS = {"axis": [0.0, 1.0, 0.0], "point": [-0.2, 0.0, -0.3]}
+WHOLE = {"excitations": [{"name": "spin", "centrifugal": True}]}
+
+
+def test_centrifugal_load_does_the_work_of_a_mass_at_its_centre():
+    """A free brick along the axes: m r of its centre on translations, no moment about it (no products of inertia)."""
+    group = the_group(STOCKY, free=True, rotation=OFF_AXIS, **WHOLE)
+    spin = group.excitations["spin"]
+    assert (spin.unit, spin.labels) == ("rad2/s2", ("centrifugal",))
+    np.testing.assert_allclose(spin.point, [0.05, 0.04, 0.025], atol=1e-12)
+    mass, arm = RHO * 0.1 * 0.08 * 0.05, np.array([0.25, 0.0, 0.325])
+    rigid = group.phi.reshape(-1, group.n_modes)[:, :6]
+    fields = rigid_fields(STOCKY.points, np.array([0.05, 0.04, 0.025])).reshape(-1, 6)
+    share = np.linalg.lstsq(fields, rigid, rcond=None)[0]  # of translations and turns in each rigid mode
+    np.testing.assert_allclose(spin.rows[0, :6], mass * arm @ share[:3], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("reduction", ["eigenmodes", "rubin"])
+def test_centrifugal_load_bends_as_the_slow_equilibrium_does(reduction):
+    """Compliance of monitor and load times Omega^2 is the equilibrium's displacement, but for softening, 1e-7 here."""
+    what = {**CLAMPED, "reduction": reduction, "monitors": ROWS["monitors"], **WHOLE}
+    c = the_group(STOCKY, rotation=OFF_AXIS, **what).compliance
+    rows = [c.labels.index(f"monitor:probe:u_{d}") for d in "xz"]
+    column = c.static[rows, c.labels.index("excitation:spin:centrifugal")]
+    turning = the_group(STOCKY, rotation={**OFF_AXIS, "speeds_rpm": [30.0], "prestress": "linear"}, **what)
+    np.testing.assert_allclose(np.pi**2 * column, turning.monitors["probe"].static, rtol=1e-6)
+
+
+def test_centrifugal_load_stands_alone():
+    with pytest.raises(ValueError, match="acts on the whole body"):
+        body(excitations=[{"name": "spin", "centrifugal": True, "direction": [1.0, 0.0, 0.0]}])
+
+
 def test_modal_rows_are_the_rows_times_the_shapes():
     """T of every row set is its B times phi; patch shapes are the shapes at the patch's points."""
     what = {

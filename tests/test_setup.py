@@ -283,7 +283,7 @@ def test_the_wheel_offers_its_bodies_and_meshes_them(tmp_path: Path) -> None:
         return done.stdout
 
     assert "ready" in type_("init", "blade", "mine")
-    assert sorted(p.name for p in (tmp_path / "mine").iterdir()) == ["body.toml", "build.py", "case.toml"]
+    assert {"body.toml", "build.py", "case.toml"} <= {p.name for p in (tmp_path / "mine").iterdir()}
     assert "case mine/case.toml" in type_("info", "mine")
     type_("init", "pendulum")
     coarse = ("--set", "mesh.size=20", "--set", "mesh.local.contact_tip=10", "--set", "mesh.local.contact_disc=10")
@@ -337,6 +337,19 @@ def test_make_of_a_body_is_set_up_then_mesh_then_modes_then_report(tmp_path: Pat
     assert "setup.sh" in make("-n", "test", folder=clone).splitlines()[0]
     for target in ("test-all", "lint", "docs", "bench", "clean", "all", "half-pipe", "pendulum-mesh"):
         make("-n", target, folder=clone)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_of_a_case_runs_its_file_and_one_of_a_body_is_run_with_the_body() -> None:
+    """Every file of pipeline/cases has a target of its own name, is listed by help, and says that name itself."""
+    text = make("help").split("cases:        ")[1].splitlines()[0].split("   ")[0].split()
+    cases = {p.stem: p for p in (ROOT / "pipeline/cases").glob("*.toml")}
+    bodies = {p.parent.name for p in (ROOT / "geometry").glob("*/body.toml")}
+    assert set(text) == set(cases) - bodies
+    for name, path in cases.items():
+        assert tomllib.loads(path.read_text())["name"] == name
+        step = ["run", f"geometry/{name}"] if name in bodies else ["run", f"pipeline/cases/{name}.toml"]
+        assert make("-n", name).splitlines()[-1].split()[-2:] == step
 
 
 # ---------------------------------------------------------------- .ci/run and the programs that exports are for

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from box import edit, write_box
 
-from microslip import store, workflow
+from microslip import running, store, workflow
 from microslip.basis import read_basis
 from microslip.body import load_toml
 from microslip.data import UserError
@@ -27,7 +27,7 @@ def run_chain(folder: Path, assignments: list[str] | None = None) -> set[str]:
     job = workflow.open_job(folder, assignments, root=folder)
     workflow.modes_stage(job, report=told.append)
     assert job.case_file is not None
-    workflow.response_stage(job.case_file, job.basis_file, job.build_folder, report=told.append)
+    running.response_stage(job.case_file, {job.settings.name: job.basis_file}, job.build_folder, report=told.append)
     begins = {"meshing": MESH, "assembling": BASIS, "friction response": RESPONSE}
     for product in (p for text in told for words, p in begins.items() if text.startswith(words)):
         made.add(product)
@@ -120,7 +120,7 @@ def test_what_changes_between_runs_stands_in_the_sidecar_only(box: Path) -> None
 
 def test_products_of_the_whole_chain_are_complete(box: Path) -> None:
     job = workflow.open_job(box, root=box)
-    page, converged = workflow.run_body(job)
+    page, converged = running.run_body(job)
     assert converged and page == box / "build/box/report.html"
     build = box / "build" / "box"
     text = page.read_text()
@@ -134,7 +134,7 @@ def test_products_of_the_whole_chain_are_complete(box: Path) -> None:
     if not drawn:
         pytest.skip("pictures of bodies cannot be drawn on this machine")
     told: list[str] = []
-    workflow.run_body(job, report=told.append)
+    running.run_body(job, report=told.append)
     assert len(told) == 4 and all("is up to date" in t for t in told)
     assert workflow._all_there(page)
     (build / "pictures" / "mesh.png").unlink()
@@ -145,8 +145,8 @@ def test_a_case_of_another_name_has_its_own_folder(box: Path, monkeypatch: pytes
     monkeypatch.chdir(box)
     other = box / "stiff.toml"
     other.write_text((box / "case.toml").read_text().replace('name = "box"', 'name = "stiff"', 1))
-    assert workflow.is_case(other) and not workflow.is_case(box / "body.toml")
-    product, converged = workflow.run_case_file(other)
+    assert running.is_case(other) and not running.is_case(box / "body.toml")
+    product, converged = running.run_case_file(other)
     assert converged and product == Path("build/stiff/response.csv") and product.is_file()
     assert (box / BASIS).is_file() and not (box / "build/stiff/basis.h5").exists()
 
@@ -156,9 +156,12 @@ def test_a_case_finds_its_body(box: Path, tmp_path: Path) -> None:
     far.mkdir()
     case = Path(shutil.copy(box / "case.toml", far))
     with pytest.raises(UserError, match="no body.toml of a body 'box'"):
-        workflow.find_body(case, "box", tmp_path / "nowhere")
+        running.find_body(case, "box", tmp_path / "nowhere")
     shutil.copytree(box, tmp_path / "geometry" / "box")
-    assert workflow.find_body(case, "box", tmp_path) == tmp_path / "geometry" / "box" / "body.toml"
+    assert running.find_body(case, "box", tmp_path) == tmp_path / "geometry" / "box" / "body.toml"
+    other = tmp_path / "geometry" / "box" / "other.toml"
+    other.write_text('name = "box-other"\n')
+    assert running.find_body(case, "box-other", tmp_path) == other
 
 
 @pytest.mark.parametrize(
@@ -249,7 +252,7 @@ def test_every_module_behind_a_modal_file_counts_as_its_input() -> None:
     without_numbers = {"errors", "mistakes", "store", "basis_checks"}
     listed = {p.removesuffix(".py") for p in workflow._MODES_CODE}
     assert {m.split(".")[0] for m in needed} - without_numbers <= listed
-    assert all((PACKAGE / p).exists() for p in (*workflow._MODES_CODE, *workflow._CASE_CODE, *workflow._REPORT_CODE))
+    assert all((PACKAGE / p).exists() for p in (*workflow._MODES_CODE, *running.CASE_CODE, *workflow._REPORT_CODE))
 
 
 def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:

@@ -3,6 +3,7 @@
 Axes: x circumferential (through the blade's thickness), y chord, z radial; clamped at z = 0, plate on top.
 Arrangement 1: contacts on the plate's ends at x = +-plate_circumferential / 2; bending is normal to them.
 Arrangement 2: contacts on the plate's faces at y = +-plate_chord / 2; bending is tangential to them.
+With damper_radius, a second pair of faces on the blade's two sides for a friction damper: damper_right, damper_left.
 
 The book gives no dimensions. These were fitted to its printed 14.1, 159.55 and 540.61 Hz; blade_length is the
 free blade below the plate, which adds plate_thickness on top (a blade of 475 mm with the plate in it has 14.34 Hz,
@@ -31,6 +32,9 @@ DEFAULTS = {  # mm
     "plate_thickness": 5.0,
     "contact_width": 72.0,  # tangential, horizontal
     "contact_height": 5.0,  # radial
+    "damper_radius": 0.0,  # z of the middle of the damper's faces; 0: none
+    "damper_width": 20.0,  # along the chord
+    "damper_height": 10.0,  # radial
 }
 ARRANGEMENT_2 = {"contact_width": 20.0}
 SIZE = 8.0  # mm, default element size
@@ -68,13 +72,30 @@ def settled(parameters: dict[str, Any]) -> dict[str, Any]:
     for name, limit, what in limits:
         if p[name] > limit:
             raise UserError(f"geometry.parameters.{name} = {p[name]} must not exceed {what} = {limit}")
+    refuse_damper(p)
     return p
+
+
+def refuse_damper(p: dict[str, Any]) -> None:
+    """Refuse faces of a damper that do not lie on the blade, apart from its ends."""
+    if not p["damper_radius"]:
+        return
+    ends = 2 * sum(END_LAYERS) * p["thickness"]
+    low, high = (p["damper_height"] + ends) / 2, p["blade_length"] - (p["damper_height"] + ends) / 2
+    if not low <= p["damper_radius"] <= high:
+        raise UserError(
+            f"geometry.parameters.damper_radius = {p['damper_radius']:g} must lie between {low:g} and {high:g}, or be 0"
+        )
+    if p["damper_width"] >= p["chord"]:
+        raise UserError(f"geometry.parameters.damper_width = {p['damper_width']:g} must stay below chord")
 
 
 def section(p: dict[str, Any], size: float) -> list[int]:
     """The plate's rectangle at z = blade_length, cut along blade and contacts; structured mesh."""
     x, y = [p["thickness"], p["plate_circumferential"]], [p["chord"], p["plate_chord"]]
     (y if p["arrangement"] == 1 else x).append(p["contact_width"])
+    if p["damper_radius"]:
+        y.append(p["damper_width"])
     x, y = both_signs(x), both_signs(y)
     tiles = [
         (2, gmsh.model.occ.addRectangle(x0, y0, p["blade_length"], x1 - x0, y1 - y0))
@@ -109,7 +130,9 @@ def extrude_blade_and_plate(p: dict[str, Any], base: list[int], size: float) -> 
     rim = (p["plate_thickness"] - p["contact_height"]) / 2
     tiles = [(2, tag) for tag in base]
     blade = [t for t in tiles if inside_blade(p, np.array(gmsh.model.occ.getCenterOfMass(*t)))]
-    step(blade, -p["blade_length"], blade_layers(p, size))
+    lower = blade
+    for depth, layers in blade_steps(p, size):
+        lower = step(lower, -depth, layers)
     for height in (rim, p["contact_height"], rim):
         if height > 1e-9 * p["plate_thickness"]:
             tiles = step(tiles, height, [height / (n := count(height, size))] * n)
@@ -130,6 +153,22 @@ def blade_layers(p: dict[str, Any], size: float) -> list[float]:
     return ends + [middle / layers] * layers + ends[::-1]
 
 
+def blade_steps(p: dict[str, Any], size: float) -> list[tuple[float, list[float]]]:
+    """(depth, element layers) of the steps from the plate down: one, or three with a damper's faces in the second."""
+    layers = blade_layers(p, size)
+    if not p["damper_radius"]:
+        return [(p["blade_length"], layers)]
+    top = p["blade_length"] - p["damper_radius"] - p["damper_height"] / 2
+    depths = [top, p["damper_height"], p["blade_length"] - top - p["damper_height"]]
+    ends = [fraction * p["thickness"] for fraction in END_LAYERS] if layers[0] < layers[len(layers) // 2] else []
+    found = []
+    for depth, first, last in zip(depths, (ends, [], []), ([], [], ends[::-1]), strict=True):
+        middle = depth - sum(first) - sum(last)
+        n = count(middle, size)
+        found.append((depth, [*first, *[middle / n] * n, *last]))
+    return found
+
+
 def step(tiles: Tiles, height: float, layers: list[float]) -> Tiles:
     """Extrude by `height` in layers; returns the surfaces at the far end."""
     ends = np.cumsum(layers) / np.sum(layers)
@@ -148,7 +187,13 @@ def name_surfaces(p: dict[str, Any]) -> None:
     name_face("plate_top", surfaces_where(on_plane(2, top, near)))
     for name, x in (("pressure_side", p["thickness"] / 2), ("suction_side", -p["thickness"] / 2)):
         side = on_plane(0, x, near)
-        name_face(name, [tag for tag in surfaces_where(side) if tag in surfaces_where(below(low))])
+        faces = [tag for tag in surfaces_where(side) if tag in surfaces_where(below(low))]
+        name_face(name, faces)
+        if p["damper_radius"]:
+            half = np.array([0.0, p["damper_width"], p["damper_height"]]) / 2 + near
+            middle = np.array([x, 0.0, p["damper_radius"]])
+            patch = [tag for tag in surfaces_where(within(middle, half)) if tag in faces]
+            name_face("damper_right" if x > 0 else "damper_left", patch)
     normal, reach = (0, p["plate_circumferential"]) if p["arrangement"] == 1 else (1, p["plate_chord"])
     middle = np.array([0.0, 0.0, (low + top) / 2])
     middle[normal] = reach / 2

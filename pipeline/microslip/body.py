@@ -98,6 +98,21 @@ class Model(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
+def only_one(model: Model, *keys: str, what: str = "") -> None:
+    """Refuse a section that does not give exactly one of some keys; an empty text is none.
+
+    Args:
+        what: who needs it, if the section's name does not tell.
+
+    Raises:
+        ValueError: none, or several.
+    """
+    given = [k for k in keys if getattr(model, k) not in (None, "")]
+    if len(given) != 1:
+        has, do = (" and ".join(given), "keep") if given else ("none", "give")
+        raise ValueError(f"{what}needs exactly one of {', '.join(keys)}, and has {has}; {do} one")
+
+
 GROUND = "ground"
 """Name of the rigid plane a face may press on."""
 
@@ -113,12 +128,7 @@ class FaceRule(Model):
 
     @model_validator(mode="after")
     def _one_way(self) -> FaceRule:
-        ways = [k for k in ("label", "colour", "box", "surfaces") if getattr(self, k) is not None]
-        if len(ways) != 1:
-            raise ValueError(
-                f"a face needs exactly one of label, colour, box, surfaces, and has {' and '.join(ways) or 'none'}; "
-                "keep one"
-            )
+        only_one(self, "label", "colour", "box", "surfaces", what="a face ")
         return self
 
 
@@ -155,10 +165,7 @@ class Geometry(Model):
 
     @model_validator(mode="after")
     def _one_source(self) -> Geometry:
-        sources = [k for k in ("build", "cad", "mesh", "matrices") if getattr(self, k)]
-        if len(sources) != 1:
-            given = " and ".join(sources) or "none"
-            raise ValueError(f"needs exactly one of build, cad, mesh, matrices, and has {given}; keep one")
+        only_one(self, "build", "cad", "mesh", "matrices")
         return self
 
 
@@ -432,7 +439,7 @@ class InterfaceSettings(Model):
 
 
 class Excitation(Model):
-    """Unit load: a force along `direction` (N) at a point or spread over a face, or `pressure` on a face (1 Pa)."""
+    """Unit load: a force (N) at a point or over a face, `pressure` on a face (1 Pa), or `centrifugal` (1 rad2/s2)."""
 
     name: Name
     point: Point | None = None
@@ -440,11 +447,15 @@ class Excitation(Model):
     face: FaceName | None = None
     direction: Vector | None = None
     pressure: bool = False
+    centrifugal: bool = False
 
     @model_validator(mode="after")
     def _one_kind(self) -> Excitation:
-        if [self.point, self.node, self.face].count(None) != 2:
-            raise ValueError("needs exactly one of point, node and face")
+        if self.centrifugal:
+            if any(v is not None for v in (self.point, self.node, self.face, self.direction)) or self.pressure:
+                raise ValueError("centrifugal = true acts on the whole body, about [rotation]; remove the others")
+            return self
+        only_one(self, "point", "node", "face")
         if self.pressure and (self.face is None or self.direction is not None):
             raise ValueError("pressure = true needs a face and no direction")
         if not self.pressure and (self.direction is None or not any(self.direction)):
@@ -462,8 +473,7 @@ class Monitor(Model):
 
     @model_validator(mode="after")
     def _one_place(self) -> Monitor:
-        if (self.point is None) == (self.node is None):
-            raise ValueError("needs either point or node (its number in the mesh file)")
+        only_one(self, "point", "node")
         return self
 
 
@@ -609,7 +619,7 @@ class BodySettings(Model):
             raise ValueError("material: the matrices hold the material already; remove [material]")
         needs = {
             "cyclic": self.cyclic, "closures": self.closures, "bolts": self.bolts, "loads": self.loads,
-            "gauges": self.gauges,
+            "gauges": self.gauges, "excitations.centrifugal": any(e.centrifugal for e in self.excitations),
             "rotation.range_rpm": self.rotation.range_rpm, "temperature.file": self.temperature.file,
             "temperature.uniform": self.temperature.uniform, "geometry.faces": self.geometry.faces,
             "rotation.speeds_rpm": len(self.rotation.speeds_rpm) > 1,
@@ -675,12 +685,16 @@ def _parsed(value: str) -> Any:
     return table["v"] if set(table) == {"v"} else value.strip()
 
 
+_NAMES = ("name", "face", "interface", "row", "monitor")
+"""Keys by which an entry of a list may be addressed, the first it has."""
+
+
 def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
     for number, item in enumerate(items):
-        if isinstance(item, dict) and name in (item.get("name"), item.get("face"), str(number)):
+        if isinstance(item, dict) and name in (*(item.get(k) for k in _NAMES), str(number)):
             return item
     tables = [(number, item) for number, item in enumerate(items) if isinstance(item, dict)]
-    known = [str(item.get("name") or item.get("face") or number) for number, item in tables]
+    known = [str(next((item[k] for k in _NAMES if item.get(k)), number)) for number, item in tables]
     raise UserError(f"--set {key}: {path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}")
 
 

@@ -9,10 +9,11 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -22,6 +23,7 @@ from .progress import progress
 
 if TYPE_CHECKING:
     from .data import ModalBasis
+    from .following import Case
 
 app = App(
     name="microslip",
@@ -40,8 +42,15 @@ Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, he
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
 Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
 
+Stability = Annotated[bool, Parameter(show_default=False, help="Floquet multipliers of every point as well")]
+Log = Annotated[bool, Parameter(show_default=False, help="write convergence.csv: Newton's method at every point")]
+Book = Annotated[bool, Parameter(show_default=False, help="in the book's mode too, and what that leaves out")]
 Short = Annotated[bool, Parameter(show_default=False, help="each check once, the worst speed and nodal diameter")]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
+
+Over = Annotated[
+    Literal["frequency", "load", "normal-force", "orders", "speeds", "ranges"] | None, Parameter(show_default=False)
+]
 
 PACKAGE = Path(__file__).parent
 
@@ -62,8 +71,9 @@ def init(name: str, folder: Path | None = None, /) -> None:
     """Copy a runnable body (and its case) to start from.
 
     Args:
-        name: blade, shroud, pendulum or half-pipe; `own` for a commented body.toml around your own CAD file or mesh;
-            `three-masses` for a system by hand; `sample` for a modal file with a case; `contact` for contact laws.
+        name: a body (blade, shroud, pin, ...; a wrong name lists them); `own` for a commented body.toml around your
+            own CAD file or mesh; `three-masses` for a system by hand; `sample` for a modal file with a case; `contact`
+            for contact laws.
         folder: where to; ./NAME if not given.
     """
     known = sorted(p.name for p in _bodies().iterdir() if (p / "body.toml").is_file())
@@ -168,7 +178,8 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
         path: a body.toml, a system.toml, the folder that holds it, or a case.toml.
     """
     from .basis import read_basis
-    from .workflow import frequency_lines, is_case, open_job, run_body, run_case_file, run_system, system_file
+    from .running import is_case, run_body, run_case_file, run_system
+    from .workflow import frequency_lines, open_job, system_file
 
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
@@ -243,25 +254,148 @@ def _figure_of_the_book(file: Path) -> Path:
 
 @app.command
 def respond(
-    case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
+    case: Path, basis: Path | None = None, /, *, over: Over = None, set_: Set = (), log: Log = False,
+    compare_book: Book = False, stability: Stability = False, force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Friction response of a case on a modal file that is there already; needs neither gmsh nor VTK.
 
+    Every finished point is kept; interrupted, the same command goes on where it was.
+
     Args:
         case: a case.toml, the folder that holds it, or the word sample: a blade that travels with the package.
-        basis: the modal file; basis.h5 beside the case if not given.
+        basis: the modal file of the only body; basis.h5 beside the case, or build/<body>/basis.h5, if not given.
+        over: instead of one sweep: the response followed through folds over frequency, load or normal force, as [curve]
+            in the case asks; the resonance of every engine order, the line f = e n / 60 over speeds, or the envelope
+            over ranges of damping, load and friction, as the table of that name asks.
     """
-    from .workflow import respond
+    from . import running
+    from .case.comparison import sentence
 
-    if str(case) == "sample" and not case.exists():
-        case = PACKAGE / "samples"
-    case = case / "case.toml" if case.is_dir() else case
-    file = basis or case.with_name("basis.h5")
+    case = _case_file(case)
+    if over is not None:
+        _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
+        return
     with progress(f"respond {case}", quiet) as report:
-        table, converged = respond(case, file, list(set_), force, report)
+        if compare_book:
+            table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
+        else:
+            table, converged = running.respond(case, basis, list(set_), force, report, log=log)
+        if stability:
+            from . import following
+
+            opened = _followed(case, basis, set_)
+            found = following.stabilities(opened, report)
+            report(following.unstable(found))
+            files = following.write_stabilities(found, opened)
+    for line in map(sentence, pairs if compare_book else ()):
+        _say(line, quiet)
     _say(table, quiet)
+    for file in files if stability else ():
+        _say(file, quiet)
     if not converged:
         raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+
+
+@app.command
+def identify(
+    case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:  # fmt: skip
+    """Contact stiffness from one measured frequency of a coupled ring; the other nodal diameters are predicted.
+
+    Args:
+        case: a case.toml with [identification], or the folder that holds it.
+        basis: the modal file, as for respond.
+    """
+    _survey(_case_file(case), basis, "identification", set_, force, quiet)
+
+
+def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
+    from .case.curves import OVER
+    from .surveying import survey_stage
+
+    with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
+        made, sentences, converged = survey_stage(case, basis, kind, list(set_), force, report)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not converged and kind in OVER:
+        raise NotConverged(f"some of the curves end early; {made[0]} holds what was found")
+    if not converged:
+        raise NotConverged(f"some points did not converge; they are marked in {made[0]}")
+
+
+@app.command
+def backbone(
+    case: Path, basis: Path | None = None, /, *, mode: int | None = None, low: float | None = None,
+    high: float | None = None, set_: Set = (), quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Nonlinear mode of a case: frequency and damping over the amplitude, at every normal force.
+
+    Args:
+        case: a case.toml, or the folder that holds it.
+        basis: see respond.
+        mode: number of the mode with sticking contacts, 1 the lowest; the one that answers the excitation most in the
+            band of the sweep if not given.
+        low: smallest amplitude of the first monitor, m; a thirtieth of where the contacts begin to slide if not given.
+        high: largest amplitude, m; thirty times that if not given.
+    """
+    from . import following
+
+    case = _case_file(case)
+    with progress(f"backbone {case}", quiet) as report:
+        opened = _followed(case, basis, set_)
+        found = following.backbones(opened, mode, low, high, report)
+        files = following.write_backbones(found, opened)
+    for file in files:
+        _say(file, quiet)
+    if not all(one.complete for one in found.values()):
+        raise NotConverged("some of the backbones end early; backbone.csv holds what was found")
+
+
+@app.command
+def optimum(
+    case: Path, basis: Path | None = None, /, *, over: str = "normal_force", low: float | None = None,
+    high: float | None = None, points: int = 6, set_: Set = (), quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """The normal force, or another setting, at which the highest resonance of a case is lowest: followed, not swept.
+
+    Args:
+        case: a case.toml, or the folder that holds it.
+        basis: see respond.
+        over: normal_force, a key of the contacts (friction, tangential_stiffness, ...: of all), or any key of the
+            case by its dotted name.
+        low: first value of the range that is searched; the smallest of sweep.normal_forces if not given.
+        high: last value of it; the largest of sweep.normal_forces if not given.
+        points: values through which the resonance is followed from one end to the other.
+    """
+    from . import following
+
+    case = _case_file(case)
+    with progress(f"optimum {case}", quiet) as report:
+        opened = _followed(case, basis, set_)
+        found = following.optimum_over(opened, over, low, high, points, report)
+        files = following.write_optimum(found, over, opened)
+    _say(following.told(found, over), quiet)
+    for file in files:
+        _say(file, quiet)
+    if not following.is_optimum(found):
+        raise NotConverged(following.missed(found, over))
+
+
+def _case_file(case: Path) -> Path:
+    """A case.toml, the one in a folder, or the one that travels with the package."""
+    if str(case) == "sample" and not case.exists():
+        case = PACKAGE / "samples"
+    return case / "case.toml" if case.is_dir() else case
+
+
+def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Case:
+    """A case with its modal files, for what is followed from it."""
+    from .case import load_case
+    from .following import open_case
+    from .running import existing_files
+
+    settings, _ = load_case(case, list(assignments))
+    files = existing_files(settings, case, basis, Path("."))
+    return open_case(case, files, Path("build") / settings.name, assignments)
 
 
 @app.command
@@ -527,7 +661,7 @@ def main(words: list[str] | None = None) -> int:
     except OSError as error:
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}; correct the path or its permissions", 2)
     except KeyboardInterrupt:
-        return _fail("interrupted; finished products are kept", 130)
+        return _fail("interrupted; what is finished is kept, and products and points of it are not computed again", 130)
 
 
 def _plainly(error: UnicodeError) -> tuple[str, int]:
@@ -565,8 +699,13 @@ def _fail(text: str, code: int) -> int:
 
 
 def entry() -> None:
-    """Console script."""
+    """Console script. A request to end (SIGTERM) is Ctrl-C: what is finished is kept."""
+    signal.signal(signal.SIGTERM, _ended)
     sys.exit(main())
+
+
+def _ended(*_: object) -> None:
+    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

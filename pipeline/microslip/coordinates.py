@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp
+from .data import Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp, UserError
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
@@ -58,6 +58,33 @@ def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
         stresses={k: replace(s, strain=s.strain @ V, stress=s.stress @ V) for k, s in g.stresses.items()},
         run_up=_run_up(g.run_up, V),
         invariants=_invariants(g.invariants, V),
+    )
+
+
+def first_modes(g: ModalGroup, count: int) -> ModalGroup:
+    """The same body in fewer of its normal modes; what the others held of the compliance counts as residual.
+
+    Raises:
+        UserError: more modes than there are; coordinates that are not normal modes, of which none can be left out.
+    """
+    if count > g.n_modes:
+        raise UserError(f"{count} modes are asked for, but {g.n_modes} are stored; raise modes.count of the body")
+    if g.to_diagonal is not None:
+        raise UserError(
+            "fewer modes can be taken of normal modes alone, and this reduction keeps others; lower modes.count of the "
+            "body instead"
+        )
+    if count == g.n_modes:
+        return g
+    T, labels, kind = compliance_rows(g)[:, :count], g.compliance.labels, g.kind[:count]
+    modal = held(T, labels, kind, g.K_r[:count, :count], g.omega[:count], None)
+    return replace(
+        in_coordinates(g, np.eye(g.n_modes)[:, :count]),
+        omega=g.omega[:count],
+        kind=kind,
+        damping_ratio=g.damping_ratio[:count],
+        compliance=replace(g.compliance, modal=modal),
+        gyroscopic=None,
     )
 
 

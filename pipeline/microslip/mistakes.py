@@ -116,7 +116,7 @@ def _written(place: tuple[Any, ...], raw: Any) -> str:
 
 
 def _label(items: list[Any], number: int) -> str:
-    for key in ("name", "face"):
+    for key in ("name", "face", "interface"):
         labels = [item.get(key) if isinstance(item, dict) else None for item in items]
         label = labels[number]
         if isinstance(label, str) and label and labels.count(label) == 1:

@@ -18,9 +18,11 @@ def sentences(group: ModalGroup, reduction: str) -> list[str]:
     if hertz:
         at = ", ".join(f"{f:.5g}" for f in hertz)
         off = _three(checks, "stuck_error")
-        told = f"this basis is off by {_list(off)}" if off else "this basis has no motion left"
+        told = f"this basis alone is off by {_list(off)}" if off else "this basis alone has no motion left"
         if off and len(off) < len(hertz):
             told += ", and has no further motion"
+        if not off or len(off) < len(hertz) or max(off) > 0.01:
+            told += "; what it lacks, the bulk at the contacts, a case counts with their stiffness"
         found.append(f"every contact stuck to the ground: {at} Hz; {told}")
     return [s for s in found if s]
 

@@ -652,33 +652,114 @@ def _rows(basis: ModalBasis) -> str:
     return _table(["kind", "name", "rows", "unit", "at, in mm", "mm off the body"], out)
 
 
+SHOWN = {
+    "friction response": "Amplitude over frequency for every normal force.",
+    "stress over frequency": "Largest stress amplitude of the body: von Mises stress of the alternating part.",
+    "stress over normal force": "Stress at every resonance; a ring marks a lowest one between the ends.",
+    "stress at resonance": "The resonance with the least margin, or the most stressed one where no limits are given.",
+    "Haigh diagram": "Amplitude over mean stress of every place, and what the material endures.",
+    "contacts at resonance": "What the points of the contacts do in a cycle of that resonance.",
+}
+"""Pictures of a response in their order, and what they show."""
+
+
+def response_page(summary: Mapping[str, Any], pictures: Mapping[str, Path], path: Path | str) -> None:
+    """Write a self-contained page of a case alone, complete or absent.
+
+    Args:
+        summary: see `write_report`; its remarks stand on top. pictures: name -> file. path: of the page.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    name = html.escape(str(summary.get("case", "case")))
+    told = {k: v for k, v in summary.items() if k not in ("remarks", "pictures")}
+    body = f"<h1>{name}: friction response</h1>\n{_remarks(list(summary.get('remarks', [])))}"
+    body += _response(told, _Album(pictures))
+    write_text(path, _page(f"{name}: friction response", body))
+
+
+def _page(title: str, body: str) -> str:
+    """A page of HTML. title: HTML already."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n{body}\n</body></html>\n"
+    )
+
+
+MOST_ROWS = 60
+"""Rows of a table that a page shows at once; the others unfold."""
+
+
+def survey_page(
+    title: str, sentences: Sequence[str], tables: Mapping[str, Mapping[str, Any]], pictures: Sequence[Path],
+    path: Path | str,
+) -> None:  # fmt: skip
+    """Write a self-contained page of a survey, complete or absent: what was found in words, pictures and tables.
+
+    Args:
+        tables: file name -> (column -> values).
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    album = _Album({p.name: p for p in pictures})
+    body = f"<h1>{text(title)}</h1>\n{_say(*sentences)}" if sentences else f"<h1>{text(title)}</h1>\n"
+    body += "".join(album.take(p.name) for p in pictures)
+    for name, columns in tables.items():
+        head = [text(_label(key)) for key in columns]
+        rows = [[_number(float(v), 5) for v in row] for row in zip(*columns.values(), strict=True)]
+        shown = _table(head, rows)
+        body += f"<h2>{text(name)}</h2>\n"
+        body += shown if len(rows) <= MOST_ROWS else _hidden(f"{len(rows)} rows", shown)
+    write_text(path, _page(text(title), body))
+
+
 def _response(response: Mapping[str, Any] | None, album: _Album) -> str:
-    """Everything the case tells, and every picture that no other section took."""
-    shown = ""
+    """What the case tells, its tables, and every picture that no other section took."""
+    tables, facts, words = "", list[tuple[str, str]](), ""
+    for key, value in (response or {}).items():
+        if key.endswith("sha256"):
+            continue
+        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+            tables += _rows_of(key, value)
+        elif isinstance(value, list):
+            facts.append((text(_label(key)), ", ".join(_cell(v) for v in value)))
+        elif key == "description" and value:
+            words = _say(f"{value}.", kind="plain")
+        elif value not in ("", None):
+            facts.append((text(_label(key)), _cell(value)))
+    shown = "".join(album.take(name, caption) for name, caption in SHOWN.items())
     for name in list(album.left):
         if not name.startswith(("mode_", "modes_", "animation_")):
             shown += album.take(name, name)
-    if response is None:
-        return shown
-    facts: list[tuple[str, str]] = []
-    tables = ""
-    for key, value in response.items():
-        if isinstance(value, list) and value and isinstance(value[0], Mapping):
-            head = [text(_label(k)) for k in value[0]]
-            tables += f"<h3>{text(_label(key))}</h3>\n" + _table(
-                head, [[_cell(v) for v in row.values()] for row in value]
-            )
-        elif isinstance(value, list):
-            facts.append((text(_label(key)), ", ".join(_cell(v) for v in value)))
-        elif value not in ("", None):
-            facts.append((text(_label(key)), _cell(value)))
-    return shown + _table([], facts, "words") + tables
+    failed = (response or {}).get("failed_points")
+    warning = _say(f"{failed} points did not converge; they are marked in the table.", kind="bad") if failed else ""
+    return words + warning + tables + shown + _table([], facts, "words")
+
+
+def _rows_of(key: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table of rows that have the same names; lengths and stresses in units for people."""
+    factors = {k: next((f for end, f in _FACTORS if k.endswith(end)), (1.0, k)) for k in rows[0]}
+    head = [
+        text(_label(k.removesuffix(k.rsplit("_", 1)[-1]) + unit if f != 1.0 else k)) for k, (f, unit) in factors.items()
+    ]
+    body = [
+        [_cell(v * f if f != 1.0 else v) for v, (f, _) in zip(row.values(), factors.values(), strict=True)]
+        for row in rows
+    ]
+    return f"<h3>{text(_label(key))}</h3>\n" + _table(head, body)
+
+
+_FACTORS = (("amplitude_m", (1e6, "µm")), ("_Pa", (1e-6, "MPa")))
+"""Ends of names of numbers that are shown in another unit."""
 
 
 def _label(key: str) -> str:
     """``normal_force_N`` -> ``normal force in N``."""
     words = key.split("_")
-    if len(words) > 1 and words[-1] in ("N", "Hz", "m", "mm", "s", "Pa", "rpm", "W", "J", "K"):
+    if len(words) > 1 and words[-1] in ("N", "Hz", "m", "mm", "µm", "s", "Pa", "MPa", "rpm", "W", "J", "K"):
         return " ".join(words[:-1]) + f" in {words[-1]}"
     return " ".join(words)
 

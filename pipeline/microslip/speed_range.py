@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from . import eigen
+from . import canonical, eigen
 from .coordinates import compliance_rows, in_coordinates
 from .data import (
     Array,
@@ -29,7 +29,6 @@ from .data import (
     UserError,
 )
 from .gyroscopic import gyroscopic_modes, hermitian_modes
-from .modes import canonical
 from .modes.common import Interpolant, lagrange
 from .modes.compute import modal_damping, without_massless
 from .modes.solution import held_compliance

@@ -122,8 +122,8 @@ def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
     if kind == "interface":
         turns, kinds = row.startswith("phi"), {"u": "translation", "p": "rotation", "c": "shape"}
         return f"{name} {row}", kinds[row[0]], "rad/(N m)" if turns else "m/N"
-    pressure = kind == "excitation" and group.excitations[name].unit == "Pa"
-    return f"{name} {row}", kind, "m3/Pa" if pressure else "m/N"
+    unit = group.excitations[name].unit if kind == "excitation" else "N"
+    return f"{name} {row}", kind, {"Pa": "m3/Pa", "rad2/s2": "J s4"}.get(unit, "m/N")  # work per square of the load
 
 
 def ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:

@@ -23,7 +23,6 @@ import numpy as np
 from . import __version__, store
 from .basis import read_basis, write_basis
 from .body import BodySettings, MaterialSettings, MatrixFiles, implausible, load_body, load_toml
-from .case import CaseResult, load_case, run_case
 from .compliance import sentence
 from .coordinates import own_kind
 from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
@@ -53,14 +52,11 @@ _NO_SETTINGS = {
 # Parts of the package whose change makes a product anew.
 _MESH_CODE = ("cad",)
 _MODES_CODE = (
-    "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "condensed.py", "gyroscopic.py", "basis",
-    "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "elements.py", "units.py", "hostile.py",
+    "data.py", "frames.py", "body.py", "mesh", "topology.py", "eigen.py", "canonical.py", "condensed.py",
+    "gyroscopic.py", "basis", "coordinates.py", "fem", "reduction", "modes", "elasticity.py", "elements.py",
+    "units.py", "hostile.py",
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
-_CASE_CODE = (
-    "speed_range.py", "harmonic_balance", "contact", "compliance.py", "truncation.py", "case.py",
-    "pictures/response.py",
-)  # fmt: skip
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
     "compliance.py", "quality.py", "basis/checks.py",
@@ -120,12 +116,12 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
     return Job(path, settings, raw, Path(root))
 
 
-def _code_hash(parts: tuple[str, ...]) -> str:
+def code_hash(parts: tuple[str, ...]) -> str:
     files = sorted(f for p in parts for f in ([PACKAGE / p] if p.endswith(".py") else (PACKAGE / p).rglob("*.py")))
     return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
 
 
-def _touch(product: Path) -> None:
+def touch(product: Path) -> None:
     """Tell make that a product is as new as what it was made from (others' products stay as they are)."""
     with contextlib.suppress(OSError):
         os.utime(product)
@@ -161,11 +157,11 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "mesh": job.raw.get("mesh", {}),
         "unit": job.settings.length_unit,
         "source": store.hash_file(source),
-        "code": _code_hash(_MESH_CODE),
+        "code": code_hash(_MESH_CODE),
     }
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
-        _touch(product)
+        touch(product)
         return product
     report(f"meshing {source.name}")
     for line in _run_mesher(job, source, product):
@@ -344,7 +340,7 @@ def modes_stage(
     inputs = modes_inputs(job, mesh_file) if matrices is None else matrices_inputs(job, matrices)
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
-        _touch(product)
+        touch(product)
         return product, []
     if matrices is None:
         basis, warnings = _assembled_here(job, mesh_file, report)
@@ -467,13 +463,13 @@ def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
     files = [job.folder / name for name in files_of(given)]
     if missing := [f for f in files if not f.is_file()]:
         raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
-    return {"settings": settings, "files": [store.hash_file(f) for f in files], "code": _code_hash(_FOREIGN_CODE)}
+    return {"settings": settings, "files": [store.hash_file(f) for f in files], "code": code_hash(_FOREIGN_CODE)}
 
 
 def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
-    inputs = {"settings": settings, "mesh": store.hash_file(mesh_file), "code": _code_hash(_MODES_CODE)}
+    inputs = {"settings": settings, "mesh": store.hash_file(mesh_file), "code": code_hash(_MODES_CODE)}
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
     if job.settings.temperature.file:
@@ -557,60 +553,6 @@ def nodal_temperature(job: Job, mesh: Mesh) -> Array | None:
     return np.where(np.isnan(linear), nearest, linear)
 
 
-# response --------------------------------------------------------------------------------------------------------
-
-
-def response_stage(
-    case_path: Path, basis_file: Path, folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None,
-) -> tuple[dict[str, Any], bool]:  # fmt: skip
-    """Friction frequency response of a case: CSV, PNG and a summary (JSON) in `folder`.
-
-    Returns:
-        The summary, and whether every point converged.
-    """
-    settings, raw = load_case(case_path, assignments)
-    summary_file = folder / "response.json"
-    inputs = {"case": raw, "basis": store.hash_file(basis_file), "code": _code_hash(_CASE_CODE)}
-    pictures = {"response": folder / "pictures" / "response.png"}
-    if not force and store.is_up_to_date(summary_file, inputs) and all(p.is_file() for p in pictures.values()):
-        report(f"{summary_file} is up to date")
-        _touch(summary_file)
-        summary = json.loads(summary_file.read_text())
-        return summary, summary["failed_points"] == 0
-    from .harmonic_balance import response_table
-    from .pictures.response import response_picture
-
-    result = run_case(settings, read_basis(basis_file), case_path, report)
-    store.write_text(folder / "response.csv", response_table(result.responses))
-    with store.complete_or_absent(pictures["response"]) as temporary:
-        response_picture(result, temporary)
-    for remark in result.remarks:
-        report(f"warning: {remark}")
-    summary = summarise(result)
-    store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
-    store.note_product(summary_file, inputs)
-    return summary, summary["failed_points"] == 0
-
-
-def summarise(result: CaseResult) -> dict[str, Any]:
-    """Numbers of a case for the report and the terminal."""
-    rows = []
-    for normal, peaks in result.resonances.items():
-        for frequency, amplitude in peaks:
-            rows.append({"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude})
-    failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
-    return {
-        "case": result.settings.name,
-        "description": result.settings.description,
-        "rotation_speed_rpm": result.speed * 30 / np.pi,
-        "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
-        "resonances": rows,
-        "failed_points": failed,
-        "remarks": list(result.remarks),
-    }
-
-
 # report ----------------------------------------------------------------------------------------------------------
 
 
@@ -623,17 +565,18 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
     remarks = _remarks(job)
     if response is not None:
         remarks += response.get("remarks", [])
-        response = {k: v for k, v in response.items() if k != "remarks"}
+        shown = dict(response.get("pictures", {}))
+        response = {k: v for k, v in response.items() if k not in ("remarks", "pictures")}
     inputs = {
         "basis": store.hash_file(job.basis_file),
         "response": response,
         "engine_orders": list(job.settings.rotation.engine_orders),
         "remarks": remarks,
-        "code": _code_hash(_REPORT_CODE),
+        "code": code_hash(_REPORT_CODE),
     }
     if not force and store.is_up_to_date(product, inputs) and _all_there(product):
         report(f"{product} is up to date")
-        _touch(product)
+        touch(product)
         return product
     basis = read_basis(job.basis_file)
     report("starting PyVista")
@@ -647,7 +590,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         found = resonances(basis, engine_orders)
         store.write_text(job.build_folder / "resonances.csv", resonance_csv(found))
     if response is not None:
-        drawn["friction response"] = folder / "response.png"
+        drawn |= {title: folder / name for title, name in shown.items()}
     report("writing the report")
     write_report(basis, drawn, product, remarks, response)
     if reason is None:  # else the next run tries again
@@ -670,42 +613,6 @@ def _remarks(job: Job) -> list[str]:
     return remarks
 
 
-def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> tuple[Path, bool]:
-    """The whole chain of a body, and of the case of the same name if there is one.
-
-    Returns:
-        The report's path, and whether every point of the response converged.
-    """
-    if job.case_file is not None and (named := load_case(job.case_file)[0].body) != job.settings.name:
-        raise UserError(
-            f"{job.case_file}: body: it names '{named}', but the body beside it is '{job.settings.name}'; "
-            "make them agree"
-        )
-    modes_stage(job, force=force, report=report)
-    response, converged = None, True
-    if job.case_file is not None:
-        response, converged = response_stage(job.case_file, job.basis_file, job.build_folder, None, force, report)
-    return report_stage(job, response, force, report), converged
-
-
-def run_case_file(
-    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
-) -> tuple[Path, bool]:
-    """The modal file a case needs, and the case; the products of one not named like its body have their own folder.
-
-    Returns:
-        The report's path (the table's, for a case that has its own folder), and whether every point converged.
-    """
-    case, _ = load_case(path, assignments)
-    job = open_job(find_body(path, case.body, Path(".")))
-    modes_stage(job, report=report)
-    folder = job.root / "build" / case.name
-    response, converged = response_stage(path, job.basis_file, folder, assignments, force, report)
-    if folder != job.build_folder:
-        return folder / "response.csv", converged
-    return report_stage(job, response, force, report), converged
-
-
 # systems by hand --------------------------------------------------------------------------------------------------
 
 
@@ -713,8 +620,8 @@ def system_file(path: Path) -> Path | None:
     """The system.toml that a path names: a file of masses, rigid bodies or matrices, or the folder that holds it."""
     if path.is_dir() and not (path / "body.toml").is_file():
         path = path / "system.toml"
-    if path.is_file() and path.suffix == ".toml" and {"masses", "bodies", "matrices"} & set(load_toml(path)):
-        return path
+    if path.is_file() and path.suffix == ".toml" and {"masses", "bodies", "matrices"} & set(keys := load_toml(path)):
+        return None if "sweep" in keys else path  # a case has bodies too
     return None
 
 
@@ -731,69 +638,14 @@ def system_stage(
 
     system = load_system(path, assignments)
     product = output or root / "build" / system.name / "basis.h5"
-    inputs = {"settings": dict(system.settings), "code": _code_hash(("data.py", "system.py", "basis"))}
+    inputs = {"settings": dict(system.settings), "code": code_hash(("data.py", "system/lumped.py", "basis"))}
     if not force and store.is_up_to_date(product, inputs):
         report(f"{product} is up to date")
-        _touch(product)
+        touch(product)
         return product
     write_basis(product, system_basis(path, assignments))
     store.note_product(product, inputs)
     return product
-
-
-def run_system(
-    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
-) -> tuple[Path, bool]:
-    """The modal file of a system, and the friction response of the case.toml beside it if there is one.
-
-    Returns:
-        The path of the last product, and whether every point of the response converged.
-    """
-    basis_file = system_stage(path, assignments, None, force, report)
-    case = path.parent / "case.toml"
-    return respond(case, basis_file, force=force, report=report) if case.is_file() else (basis_file, True)
-
-
-def respond(
-    case_path: Path, basis_file: Path, assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, root: Path = Path("."),
-) -> tuple[Path, bool]:  # fmt: skip
-    """Friction response of a case on a modal file that is there already: CSV, JSON, picture in build/<case>/.
-
-    Returns:
-        The path of the table, and whether every point converged.
-
-    Raises:
-        UserError: the case is about another body.
-    """
-    case, _ = load_case(case_path, assignments)
-    name = read_basis(basis_file).name
-    if case.body != name:
-        raise UserError(
-            f"{case_path}: body: it names '{case.body}', but {basis_file} holds '{name}'; make them agree"
-        )
-    folder = root / "build" / case.name
-    summary, converged = response_stage(case_path, basis_file, folder, assignments, force, report)
-    for peak in summary["resonances"]:
-        report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m")
-    return folder / "response.csv", converged
-
-
-def is_case(path: Path) -> bool:
-    """True for a case file (it names a body), False for a body file."""
-    return path.is_file() and path.suffix == ".toml" and "body" in load_toml(path)
-
-
-def find_body(case_path: Path, name: str, root: Path) -> Path:
-    """The body.toml a case refers to: beside the case, in geometry/<name>/, or a folder of that name.
-
-    Raises:
-        UserError: if there is none.
-    """
-    for place in (case_path.parent, root / "geometry" / name, root / name):
-        if (place / "body.toml").is_file() and load_toml(place / "body.toml").get("name") == name:
-            return place / "body.toml"
-    raise UserError(f"{case_path}: body: no body.toml of a body '{name}' is beside it or in {root / 'geometry' / name}")
 
 
 def whirl_rows(modes: GyroscopicModes) -> list[str]:

@@ -20,8 +20,8 @@ from microslip.contact.friction import (
     smoothed,
 )
 from microslip.contact.heights import Polynomial
-from microslip.contact.law import cycles
 from microslip.contact.normal import Rough
+from microslip.contact.periodic import cycles
 from microslip.contact.point import PointContact
 from microslip.contact.regularised import MassContact, integrate
 

@@ -22,6 +22,7 @@ from microslip.cad.drawing import (
     surfaces_where,
     warn,
 )
+from microslip.cad.strips import round_section, strip_centre
 
 __all__ = [
     "boundary_surfaces",
@@ -30,8 +31,10 @@ __all__ = [
     "name_body",
     "name_face",
     "positive_size",
+    "round_section",
     "run",
     "straighten",
+    "strip_centre",
     "surfaces_where",
     "warn",
 ]

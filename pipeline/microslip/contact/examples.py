@@ -13,9 +13,10 @@ from .friction import Exponential as Rising
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .hertz import Hertz
 from .law import Array, Law
-from .normal import Hyperbolic, Penalty, Potential, Rough, measured
+from .normal import Gapped, Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
 from .point_laws import hertz_point, round_point
+from .portion import Portion
 from .profiles import Profile, RoundContact
 from .regularised import MassContact
 from .sliders import Iwan, mindlin, rough_strips, segalman
@@ -74,6 +75,9 @@ EXAMPLES: dict[str, Example] = {
     "rough point, two stiffnesses": Example(
         PointContact(_ROUGH, _COULOMB, _C, _value(0.4e8)), 1.2e-5, 8e-6, isotropic=False
     ),
+    "portion of a rough contact": Example(
+        Portion(PointContact(_ROUGH, _COULOMB, _C), _value(0.125)), 1.2e-5, 8e-6
+    ),
     "linear heights": _rough(Linear()),
     "exponential heights, cut": _rough(Cut(Exponential(_value(4.0)))),
     "Gaussian heights, cut": _rough(Cut(Gaussian(_value(0.5), _value(0.22)))),
@@ -83,6 +87,7 @@ EXAMPLES: dict[str, Example] = {
     "potential point": Example(
         PointContact(Potential(_value(2e3), _value(12e-6), _value(2.5)), _COULOMB, _C), 1.2e-5, 8e-6
     ),
+    "gapped point": Example(PointContact(Gapped(_ROUGH, _value(2e-6)), _COULOMB, _C), 1.4e-5, 8e-6),
     "measured point": Example(PointContact(_MEASURED, _COULOMB, _C), 1.2e-5, 8e-6),
     "Hertz point": Example(hertz_point(Hertz(_STEEL, _STEEL, 5.0, 20.0), _COULOMB), 1.2e-5, 8e-6, isotropic=False),
     "round point": Example(

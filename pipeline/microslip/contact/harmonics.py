@@ -6,14 +6,15 @@ displacement harmonics of that point alone, and contracted with the kinematics o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .law import Array, Law, State, point_axes
+from .law import Array, Law, point_axes
+from .periodic import cycles, with_slopes
 
 CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
@@ -40,36 +41,60 @@ def force_harmonics(
     law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
     settled: Array | float = 0.0,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Harmonics of the force in the last of ``count`` cycles, and their derivative.
+    """Harmonics of the force in the last cycle, and their derivative.
 
-    A point that slides all the way both ways has forgotten its beginning after one cycle. Where the normal load swings
-    a point may creep for many cycles until it shakes down: ask for more, and let ``settled`` end them.
+    A point that slides all the way both ways has forgotten its beginning after one cycle. A point that slides little,
+    or whose normal load swings, may creep for many: ask for more, and let ``settled`` end them (`periodic.periodic`).
 
     Args:
         u: (n, 3, 2 H + 1) displacement: mean, cos, sin, cos 2, sin 2, ... in m. period: s. samples: a cycle.
         count: of cycles at most. chunk: points at a time; the cost is linear in the number of points whatever it is.
-        settled: the cycles end when no point of a chunk ends one with a force that differs from the one before by
-            more than this share of the chunk's largest; 0 marches all of them.
+        settled: the cycles of a chunk end when its sliders are periodic within this share of its largest force
+            (`periodic.periodic`); 0 marches all of them.
 
     Returns:
         (n, 3, 2 H + 1) force in N and (n, 3, 2 H + 1, 3, 2 H + 1) its derivative in N/m.
     """
+
+    def one(law: Law, u: Array) -> tuple[Array, Array]:
+        return _with_derivative(law, u, period, samples, count, settled)
+
+    force, slope = _chunked(one, law, u, chunk)
+    return force, slope
+
+
+@partial(jax.jit, static_argnames=("samples", "count", "chunk"))
+def force_alone(
+    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
+    settled: Array | float = 0.0,
+) -> Array:  # fmt: skip
+    """The force of `force_harmonics` without its derivative, after the same number of cycles of every chunk."""
+    values, transform = waves(u.shape[2] // 2, samples)
+
+    def one(law: Law, u: Array) -> tuple[Array]:
+        path = jnp.einsum("sh,nkh->snk", values, u)
+        return (jnp.einsum("hs,snk->nkh", transform, cycles(law, path, period, count, settled)[0]),)
+
+    return _chunked(one, law, u, chunk)[0]
+
+
+def _chunked(one: Callable[[Law, Array], tuple[Array, ...]], law: Law, u: Array, chunk: int) -> tuple[Array, ...]:
+    """What ``one`` finds for a law and displacements (n, ...), ``chunk`` points at a time."""
     n = u.shape[0]
     if n <= chunk:
-        return _with_derivative(law, u, period, samples, count, settled)
+        return one(law, u)
     parts = -(-n // chunk)
     filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
     leaves, tree = jax.tree_util.tree_flatten(law)
     axes = point_axes(law, n)
     split = [_split(leaf, axis, parts, chunk) for leaf, axis in zip(leaves, axes, strict=True) if axis is not None]
 
-    def one(part: tuple[list[Array], Array]) -> tuple[Array, Array]:
-        per_point = iter(part[0])
+    def part(given: tuple[list[Array], Array]) -> tuple[Array, ...]:
+        per_point = iter(given[0])
         mixed = [leaf if axis is None else next(per_point) for leaf, axis in zip(leaves, axes, strict=True)]
-        return _with_derivative(jax.tree_util.tree_unflatten(tree, mixed), part[1], period, samples, count, settled)
+        return one(jax.tree_util.tree_unflatten(tree, mixed), given[1])
 
-    force, slope = jax.lax.map(one, (split, filled))
-    return force.reshape(-1, *u.shape[1:])[:n], slope.reshape(-1, *slope.shape[2:])[:n]
+    return tuple(x.reshape(-1, *x.shape[2:])[:n] for x in jax.lax.map(part, (split, filled)))
 
 
 def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
@@ -80,53 +105,13 @@ def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
     return jnp.moveaxis(whole, -1, 1) if axis == 0 else whole
 
 
-class _Running(NamedTuple):
-    """State and tangents at the end of a cycle, force there (n, 3), its change over the cycle, cycles done."""
-
-    carried: tuple[State, State]
-    force: Array
-    change: Array
-    done: Array
-
-
 def _with_derivative(
     law: Law, u: Array, period: Array | float, samples: int, count: int, settled: Array | float
 ) -> tuple[Array, Array]:
-    """Marched together with the tangents of state and force along every harmonic.
-
-    A harmonic of one direction moves all points alike: only (3 (2 H + 1), 3) numbers a sample, and not those of every
-    point, are handed to the tangents of `Law.step`.
-    """
-    harmonics, size = u.shape[2] // 2, u.shape[1] * u.shape[2]
-    values, transform = waves(harmonics, samples)
-    rates = (values - jnp.roll(values, 1, axis=0)) * (samples / period)
-    unit = jnp.eye(size).reshape(size, *u.shape[1:])
-
-    def one(carried: tuple[State, State], rows: tuple[Array, Array]) -> tuple[tuple[State, State], tuple[Array, Array]]:
-        state, tangents = carried
-        at = tuple(u @ row for row in rows)
-
-        def push(along: State, *moved: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
-            whole = tuple(jnp.broadcast_to(m, u.shape[:2]) for m in moved)
-            return jax.jvp(lambda x, v, s: law.step(x, v, period / samples, s), (*at, state), (*whole, along))
-
-        moved = (unit @ row for row in rows)
-        (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
-        return (after, changed), (force, slope)
-
-    def cycle(running: _Running) -> _Running:
-        first = jax.tree_util.tree_map(lambda row: row[:-1], (values, rates))
-        carried, _ = jax.lax.scan(lambda c, rows: (one(c, rows)[0], None), running.carried, first)
-        carried, (force, _) = one(carried, (values[-1], rates[-1]))
-        return _Running(carried, force, jnp.abs(force - running.force).max(), running.done + 1)
-
-    def unsettled(running: _Running) -> Array:
-        return (running.done < count - 1) & (running.change > settled * jnp.abs(running.force).max())
-
-    state = law.init(u.shape[0])
-    carried = state, jax.tree_util.tree_map(lambda leaf: jnp.zeros((size, *leaf.shape)), state)
-    running = _Running(carried, jnp.zeros(u.shape[:2]), jnp.asarray(jnp.inf), jnp.asarray(0))
-    carried = jax.lax.while_loop(unsettled, cycle, running).carried if count > 1 else carried
-    _, (force, slope) = jax.lax.scan(one, carried, (values, rates))
-    slopes = jnp.einsum("hs,smnk->nkhm", transform, slope)
-    return jnp.einsum("hs,snk->nkh", transform, force), slopes.reshape(*u.shape, *u.shape[1:])
+    """Marched together with the tangents along every harmonic of every direction."""
+    values, transform = waves(u.shape[2] // 2, samples)
+    unit = jnp.eye(u[0].size).reshape(-1, *u.shape[1:])
+    path, moves = jnp.einsum("sh,nkh->snk", values, u), jnp.einsum("sh,mkh->smk", values, unit)
+    found, slope = with_slopes(law, path, period, count, settled, moves, transform)
+    slopes = jnp.einsum("hmnk->nkhm", slope).reshape(*u.shape, *u.shape[1:])
+    return jnp.einsum("hs,snk->nkh", transform, found.force), slopes

@@ -108,6 +108,22 @@ class Law:
         """
         raise NotImplementedError
 
+    def memory(self, force: Array, state: State) -> Array:
+        """(..., n) forces in N that come back with the cycle once it is periodic, and that the next one depends on.
+
+        All of them, however many parts a contact has; not what grows from cycle to cycle, as the path slid. The
+        default, the force (n, 3), will do where nothing else is remembered. With `recalled` it is (..., 2, n).
+        """
+        return force.T
+
+    def recalled(self, state: State, memory: Array) -> State | None:
+        """A state with another memory, linear in both; None (the default) lets `periodic` march and solve for nothing.
+
+        For laws whose next cycle depends on the last one by nothing else, with a memory (..., 2, n) of sliders that
+        each know of no other: where it ends may depend on its own beginning alone. `memory` must not need the force.
+        """
+        return None
+
     def limit(self, force: Array, state: State) -> Array:
         """(n,) largest tangential force in N that goes with a normal force; ``force`` (n, 3) N."""
         raise NotImplementedError
@@ -184,24 +200,6 @@ def history(law: Law, u: Array, dt: float | Array, state: State | None = None) -
     first = (force_0, law.slip(state), jnp.zeros(u.shape[1]))
     whole = [jnp.concatenate([f[None], r]) for f, r in zip(first, (force, slip, dissipated), strict=True)]
     return History(whole[0], whole[1], whole[2], after)
-
-
-def cycles(law: Law, u: Array, period: float | Array, count: int = 2) -> tuple[Array, State]:
-    """Forces (s, n, 3) over the last of ``count`` cycles of a periodic path u (s, n, 3), and the state at its end.
-
-    Starts unloaded. The slider states of most laws are periodic after the first cycle in which every point has
-    reached its largest slip: two cycles do, unless the normal load swings with the motion.
-    """
-    dt = period / len(u)
-    v = (u - jnp.roll(u, 1, axis=0)) / dt
-
-    def cycle(state: State, _: None) -> tuple[State, None]:
-        return march(law, u, dt, state, v)[1], None
-
-    state = law.init(u.shape[1])
-    if count > 1:
-        state, _ = jax.lax.scan(cycle, state, None, length=count - 1)
-    return march(law, u, dt, state, v)
 
 
 def root(value: Array) -> Array:

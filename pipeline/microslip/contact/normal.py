@@ -95,6 +95,26 @@ class Rough(Normal):
         return self.stiffness_0 * self.roughness**2 * self.heights.energy(u / self.roughness)
 
 
+@settings
+class Gapped(Normal):
+    """Another law that begins to touch later. gap: m, at u = 0; of a curved face one for each point."""
+
+    normal: Normal
+    gap: Array
+
+    def force(self, u: Array) -> Array:
+        return self.normal.force(u - self.gap)
+
+    def stiffness(self, u: Array) -> Array:
+        return self.normal.stiffness(u - self.gap)
+
+    def share(self, u: Array) -> Array:
+        return self.normal.share(u - self.gap)
+
+    def stored(self, u: Array) -> Array:
+        return self.normal.stored(u - self.gap)
+
+
 _GAUSS = np.polynomial.legendre.leggauss(24)  # a length of a tenth: 1e-14 of the energy
 
 

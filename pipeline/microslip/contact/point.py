@@ -72,6 +72,12 @@ class PointContact(Law):
         after = PointState(tangential, elastic, share, slipped, time)
         return jnp.concatenate([pressed[None], force]).T, after
 
+    def memory(self, force: Array, state: PointState) -> Array:
+        return state.elastic
+
+    def recalled(self, state: PointState, memory: Array) -> PointState | None:
+        return state._replace(elastic=memory) if self.friction.constant else None
+
     def limit(self, force: Array, state: PointState) -> Array:
         return self.friction.highest(force[:, 0], state.time) * force[:, 0]
 

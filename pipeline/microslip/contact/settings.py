@@ -26,6 +26,7 @@ from ..body import (
     _scaled,
     _tuple,
     load_toml,
+    only_one,
     override,
     validate,
 )
@@ -375,12 +376,7 @@ class Wear(Model):
 
     @model_validator(mode="after")
     def _one_way(self) -> Wear:
-        ways = [k for k in ("coefficient", "archard", "energy_density") if getattr(self, k) is not None]
-        if len(ways) != 1:
-            raise ValueError(
-                f"needs exactly one of coefficient, archard, energy_density, and has {' and '.join(ways) or 'none'}"
-                "; keep one"
-            )
+        only_one(self, "coefficient", "archard", "energy_density")
         if self.archard is not None and self.hardness is None:
             raise ValueError("archard needs the hardness (Pa) of the softer body; add it")
         return self

@@ -67,6 +67,12 @@ class Sliders(Law):
         force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
         return force.T, SliderState(u.T[1:], elastic, springs, slipped)
 
+    def memory(self, force: Array, state: SliderState) -> Array:
+        return state.elastic
+
+    def recalled(self, state: SliderState, memory: Array) -> SliderState:
+        return state._replace(elastic=memory)
+
     def limit(self, force: Array, state: SliderState) -> Array:
         return self.mu * force[:, 0]
 

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from ..canonical import signs
 from ..correlation import DIRECTIONS, POINT
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
 from ..mesh import UNITS
-from ..modes.canonical import signs
 from .functions import fits
 from .functions import told as functions_told
 

@@ -47,7 +47,7 @@ def write_vtu(basis: ModalBasis, path: Path | str) -> None:
         data[f"face_{name}"] = marker
     if len(basis.mesh.node_id):
         data["node"] = basis.mesh.node_id
-    _save(meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data), path)
+    save(meshio.Mesh(basis.mesh.points, cells(basis.mesh), point_data=data), path)
 
 
 def write_pvd(basis: ModalBasis, path: Path | str) -> None:
@@ -69,14 +69,14 @@ def write_pvd(basis: ModalBasis, path: Path | str) -> None:
             files[number] = path.with_name(f"{path.stem}_mode{number:03d}.vtu")
             state = (("Hz", g.frequency[j]), ("rpm", g.speed * 30 / np.pi), ("nodal_diameter", g.harmonic))
             data = _parts("shape", g.phi[:, :, j]) | {n: np.full(basis.mesh.n_points, v) for n, v in state}
-            _save(meshio.Mesh(basis.mesh.points, _cells(basis.mesh), point_data=data), files[number])
-    write_text(path, _collection(files))
+            save(meshio.Mesh(basis.mesh.points, cells(basis.mesh), point_data=data), files[number])
+    write_text(path, collection(files))
 
 
 COMMENT = f"<!--microslip: {STATEMENT}; vectors x y z; phi^H M phi = 1; stress xx yy zz xy yz xz-->"
 
 
-def _save(mesh: Any, path: Path | str) -> None:
+def save(mesh: Any, path: Path | str) -> None:
     """A meshio mesh as a VTU file; its third line says units, frame and order."""
     import meshio
 
@@ -86,7 +86,7 @@ def _save(mesh: Any, path: Path | str) -> None:
         temporary.write_bytes(re.sub(rb"<!--.*?-->", COMMENT.encode(), text, count=1))
 
 
-def _cells(mesh: Mesh) -> dict[str, Indices]:
+def cells(mesh: Mesh) -> dict[str, Indices]:
     """Cells to draw; points by themselves where a body has no others."""
     return dict(mesh.cells) or {"vertex": np.arange(mesh.n_points)[:, None]}
 
@@ -116,20 +116,20 @@ def _group_data(basis: ModalBasis, group: ModalGroup, prefix: str) -> dict[str, 
         if has_stress and stress is not None:
             data |= _parts(f"{prefix}stress_{label}", stress.stress[:, :, j])
     if group.u_static.any():
-        data[f"{prefix}u_static"] = _single(group.u_static)
+        data[f"{prefix}u_static"] = single(group.u_static)
     if has_stress and stress is not None and stress.static_stress.any():
-        data[f"{prefix}stress_static"] = _single(stress.static_stress)
+        data[f"{prefix}stress_static"] = single(stress.static_stress)
     return data
 
 
 def _parts(name: str, values: Array) -> dict[str, Any]:
     """One field, or the two of a complex one."""
     if not np.iscomplexobj(values):
-        return {name: _single(values)}
-    return {f"{name}_real": _single(values.real), f"{name}_imag": _single(values.imag)}
+        return {name: single(values)}
+    return {f"{name}_real": single(values.real), f"{name}_imag": single(values.imag)}
 
 
-def _single(values: Array) -> Any:
+def single(values: Array) -> Any:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
@@ -168,7 +168,7 @@ def write_ring(basis: ModalBasis, path: Path | str, speed: int = 0) -> Path:
         twice = multiplicity(k, basis.sectors)
         rows += [f"{g.speed * 30 / np.pi:.6g},{k},{j + 1},{f:.8g},{twice}" for j, f in enumerate(g.frequency)]
     write_text(path.with_suffix(".csv"), "\n".join(rows) + "\n")
-    write_text(path, _collection(files))
+    write_text(path, collection(files))
     return path
 
 
@@ -193,16 +193,16 @@ def _write_ring_group(basis: ModalBasis, ring: Mesh, group: ModalGroup, path: Pa
     data: dict[str, Any] = {}
     for m in range(group.n_modes):
         whole = np.concatenate([w[:, :, m] for w in waves])
-        data[f"mode_{m + 1:02d}_real"] = _single(whole.real)
-        data[f"mode_{m + 1:02d}_imag"] = _single(whole.imag)
+        data[f"mode_{m + 1:02d}_real"] = single(whole.real)
+        data[f"mode_{m + 1:02d}_imag"] = single(whole.imag)
     if group.u_static.any():
         turned = [group.u_static @ sector_rotation(basis, j).T for j in range(basis.sectors)]
-        data["u_static"] = _single(np.concatenate(turned))
+        data["u_static"] = single(np.concatenate(turned))
     sector = [np.repeat(np.arange(basis.sectors), len(c) // basis.sectors) for c in ring.cells.values()]
-    _save(meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector}), path)
+    save(meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector}), path)
 
 
-def _collection(files: Mapping[int, Path]) -> str:
+def collection(files: Mapping[int, Path]) -> str:
     """A PVD file: the nodal diameter, or the number of the mode, stands as the time."""
     sets = "".join(f'    <DataSet timestep="{k}" part="0" file="{escape(f.name)}"/>\n' for k, f in files.items())
     return (

@@ -10,7 +10,7 @@ surfaces, varying normal load and more harmonics are `response`'s.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
@@ -62,6 +62,8 @@ class FrequencyResponse:
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
         converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
             amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
+            0-peak; of the closed form alone.
     """
 
     frequency: Array
@@ -71,6 +73,8 @@ class FrequencyResponse:
     converged: Array
     limit: Array
     normal_swing: Array
+    modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     def columns(self) -> dict[str, Array]:
         """What stands in a table beside the frequency, by name and unit."""
@@ -123,6 +127,7 @@ def frequency_response(
     monitored, slips = np.zeros(points, complex), np.zeros((points, len(contacts)), complex)
     dissipated, converged = np.zeros(points), np.zeros(points, bool)
     swing = np.zeros((points, len(contacts)))
+    modal, forces = np.zeros((points, len(group.M_r)), complex), np.zeros((points, count), complex)
     u = np.zeros(count, complex)
     for i, f in enumerate(frequency):
         Omega = 2 * np.pi * f
@@ -135,13 +140,16 @@ def frequency_response(
         monitored[i] = monitor @ answer[:, 0] + residual.force_on_monitor * amplitude
         monitored[i] -= (monitor @ answer[:, 1:] + residual.contacts_on_monitor) @ (k * u)
         slips[i], swing[i] = u[slider], np.abs(springs[::6] * u[::6])
+        modal[i], forces[i] = answer[:, 0] - answer[:, 1:] @ (k * u), k * u
         dissipated[i] = np.pi * float(np.sum(k.imag * np.abs(u) ** 2))
         if not converged[i]:
             u = np.zeros(count, complex)
         if (i + 1) % max(points // 2, 1) == 0:
             report(f"{i + 1} of {points} frequencies")
     limit = np.array([c.limit for c in contacts])
-    return FrequencyResponse(frequency, monitored, slips, dissipated, converged, limit, swing)
+    return FrequencyResponse(
+        frequency, monitored, slips, dissipated, converged, limit, swing, modal=modal, force=forces
+    )
 
 
 def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:

@@ -1,15 +1,15 @@
-"""The modal part of a body eliminated exactly: what is left are the harmonics of the contact coordinates.
+"""The coordinates of the bodies eliminated exactly: what is left are the harmonics of the contact coordinates.
 
-A body with contacts to rigid ground has, in each harmonic h of the excitation,
+In each harmonic h of the excitation (`system.assembly.Linear`)
 
-    S_h q = f_h - T^T (F_h - p_h),    S_h = K - (h Omega)^2 M + i h Omega (C + G_gyro)
+    S_h q = f_h - T^H (F_h - p_h),    S_h = K - (h Omega)^2 M + i h Omega C
     d_h = T q - B (F_h - p_h) + e_h
 
 with the rows T of the contact coordinates, the contact forces F, the preload p (of harmonic 0), the static compliance
-B that the modes leave out among the contacts, and e_h what it gives under the excitation. d is the displacement from
-the preloaded state. With a stiffness k of the contacts taken into the left side, F - p = k d + g,
+B that the coordinates leave out among the contacts, and e_h what it gives under the excitation. d is the displacement
+from the preloaded state. With a stiffness k of the contacts taken into the left side, F - p = k d + g,
 
-    (S_h + T^T k' T) q = f_h - T^T (k' e_h + W g),    k' = k (1 + B k)^-1,    W = (1 + k B)^-1
+    (S_h + T^H k' T) q = f_h - T^H (k' e_h + W g),    k' = k (1 + B k)^-1,    W = (1 + k B)^-1
     d_h = d_ref,h - D_h g_h
 
 Any k gives the same answer. That of the sticking contact keeps everything finite: at resonances of the free body,
@@ -18,49 +18,25 @@ for a body that nothing but its contacts holds, and the numbers subtracted are o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, ModalGroup
-from .jenkins import Residual
-
-
-@dataclass(frozen=True)
-class Reduced:
-    """A body with c contact coordinates as seen from them.
-
-    Attributes:
-        M, K, C: (m, m); C with the gyroscopic matrix. rows: (c, m) contact coordinates T. watch: (m,) monitored row.
-        load: harmonic -> (m,) complex modal force. size: harmonic -> complex force in N that `load` stands for; what
-            the residual compliance is multiplied with.
-        residual: what the modes leave out. stiffness: (c, c) k.
-    """
-
-    M: Array
-    K: Array
-    C: Array
-    rows: Array
-    watch: Array
-    load: dict[int, ComplexArray]
-    size: dict[int, complex]
-    residual: Residual
-    stiffness: Array
-
-    @property
-    def count(self) -> int:
-        """Number of contact coordinates."""
-        return len(self.rows)
+from ..data import Array, ComplexArray
+from ..system.assembly import Linear
 
 
 @dataclass(frozen=True)
 class Seen:
-    """One harmonic of a `Reduced` body at one frequency, and its derivative with respect to Omega.
+    """One harmonic at one frequency as seen from c contact coordinates, and its derivative with respect to Omega.
 
     Attributes:
-        reference: (c,) d_ref. compliance: (c, c) D, m/N. modal: (m,) q at d_ref. modal_compliance: (m, c) what g takes
-            off q. reference_rate, compliance_rate: derivatives, s.
+        reference: (c,) d_ref, under the loads. compliance: (c, c) D, m/N. modal: (m,) q at d_ref.
+        modal_compliance: (m, c) what g takes off q. reference_rate, compliance_rate, modal_rate,
+            modal_compliance_rate: derivatives, s.
     """
 
     reference: ComplexArray
@@ -69,64 +45,175 @@ class Seen:
     modal_compliance: ComplexArray
     reference_rate: ComplexArray
     compliance_rate: ComplexArray
+    modal_rate: ComplexArray
+    modal_compliance_rate: ComplexArray
 
 
-def of_group(
-    group: ModalGroup, interfaces: list[str], stiffness: Array, force: Array, watch: Array, amplitude: float,
-    residual: Residual | None,
-) -> Reduced:  # fmt: skip
-    """The reduced body of a modal group under one harmonic force.
+def seen(part: Linear, stiffness: Array, Omega: float, harmonic: int) -> Seen:
+    """A part in one harmonic of Omega (rad/s). stiffness: (c, c) k."""
+    B, T, w = part.residual, part.rows, harmonic * Omega
+    P = np.linalg.inv(np.eye(part.count) + B @ stiffness)  # (1 + B k)^-1
+    held = stiffness @ P
+    A = part.K - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
+    driven = part.load - T.conj().T @ (held @ part.given)
+    X = np.linalg.solve(A, np.column_stack([driven, T.conj().T @ P.conj().T]))
+    slope = -2 * harmonic * w * part.M + 1j * harmonic * part.C
+    Y = -np.linalg.solve(A, slope @ X).astype(complex)
+    reference, D = P @ (T @ X[:, 0] + part.given), P @ (T @ X[:, 1:] + B)
+    rates = P @ (T @ Y)
+    return Seen(reference, D, X[:, 0], X[:, 1:], rates[:, 0], rates[:, 1:], Y[:, 0], Y[:, 1:])
 
-    Args:
-        interfaces: names, six coordinates each. stiffness: (6c, 6c) k. force: (m,) modal force of the first harmonic.
-            watch: (m,). amplitude: force in N that `force` stands for. residual: see `Reduced`; none if None.
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One part at one frequency in the harmonics 0 to H, as seen from its c contact coordinates.
+
+    Attributes: as those of `Seen`, the harmonics in front: (H + 1, c), (H + 1, c, c).
     """
-    rows = np.vstack([group.interfaces[name].rows for name in interfaces])
-    n = len(rows)
-    none = Residual(np.zeros((n, n)), np.zeros(n), np.zeros(n), 0.0)
-    load = {1: np.asarray(force, dtype=complex)}
-    C = group.C_r + group.G_r
-    return Reduced(
-        group.M_r, group.K_r, C, rows, watch, load, {1: complex(amplitude)}, residual or none, stiffness
-    )  # fmt: skip
+
+    reference: ComplexArray
+    compliance: ComplexArray
+    reference_rate: ComplexArray
+    compliance_rate: ComplexArray
 
 
-def seen(body: Reduced, Omega: float, harmonic: int) -> Seen:
-    """The body in one harmonic of Omega (rad/s)."""
-    B, k, T, w = body.residual.contacts, body.stiffness, body.rows, harmonic * Omega
-    P = np.linalg.inv(np.eye(body.count) + B @ k)  # (1 + B k)^-1
-    held = k @ P
-    size = body.size.get(harmonic, 0.0)
-    e = body.residual.force_on_contacts * size
-    A = body.K - w**2 * body.M + 1j * w * body.C + T.T @ held @ T
-    driven = body.load.get(harmonic, np.zeros(len(body.M))) - T.T @ (held @ e)
-    X = np.linalg.solve(A, np.column_stack([driven, T.T @ P.T]))
-    slope = -2 * harmonic * w * body.M + 1j * harmonic * body.C
-    Y = -np.linalg.solve(A, slope @ X)
-    reference, D = P @ (T @ X[:, 0] + e), P @ (T @ X[:, 1:] + B)
-    return Seen(reference, D, X[:, 0], X[:, 1:], P @ (T @ Y[:, 0]), P @ (T @ Y[:, 1:]))
+@dataclass(frozen=True, eq=False)
+class Poles:
+    """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part.
+
+    Attributes:
+        harmonics: (g,). values: (2m,) eigenvalues. left: (c, 2m), right: (2m, c), driven: (g, 2m) what stands on both
+            sides of 1/(s - value). static: (c, c), given: (g, c) what is added to the sums.
+    """
+
+    harmonics: Array
+    values: ComplexArray
+    left: ComplexArray
+    right: ComplexArray
+    driven: ComplexArray
+    static: ComplexArray
+    given: ComplexArray
+
+    def fill(self, view: View, Omega: float) -> None:
+        """What these harmonics are at a frequency (rad/s), into a view."""
+        h = self.harmonics
+        g = 1.0 / (1j * Omega * h[:, None] - self.values)
+        for weight, more, less in (
+            (g, self.given, (view.reference, view.compliance)),
+            (-1j * h[:, None] * g**2, 0.0, (view.reference_rate, view.compliance_rate)),
+        ):
+            less[0][h] = (weight * self.driven) @ self.left.T + more
+            less[1][h] = (self.left * weight[:, None]) @ self.right + (self.static if weight is g else 0.0)
 
 
-def monitored(body: Reduced, harmonic: int, q: ComplexArray, force: ComplexArray) -> complex:
-    """Displacement of the monitor under (c,) contact forces less the preload, amplitudes of one harmonic."""
-    r = body.residual
-    moved = r.force_on_monitor * body.size.get(harmonic, 0.0) - r.contacts_on_monitor @ force
-    return complex(body.watch @ q + moved)
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """One part in all harmonics, its coordinates eliminated: what of that does not depend on the frequency.
+
+    Attributes: parts: by harmonic. stiffness: (c, c) k.
+    """
+
+    parts: Sequence[Linear]
+    stiffness: Array
+
+    def at(self, Omega: float) -> View:
+        """As seen from the contacts at a frequency (rad/s)."""
+        if self.poles is None:
+            return self.directly(Omega)
+        H, c = len(self.parts), len(self.stiffness)
+        view = View(*[np.empty((H, c, c)[:n], complex) for n in (2, 3, 2, 3)])
+        for group in self.poles:
+            group.fill(view, Omega)
+        return view
+
+    def directly(self, Omega: float) -> View:
+        """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
+        found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
+        names = ("reference", "compliance", "reference_rate", "compliance_rate")
+        return View(*[np.array([getattr(one, name) for one in found]) for name in names])
+
+    @cached_property
+    def poles(self) -> list[Poles] | None:
+        """By equal matrices; None where the eigenvalues do not give what the equations themselves give.
+
+        So it is of a body that moves freely without its contacts feeling it, or whose eigenvectors nearly coincide.
+        """
+        same: list[list[int]] = []
+        for h, part in enumerate(self.parts):
+            for group in same:
+                if _alike(self.parts[group[0]], part):
+                    group.append(h)
+                    break
+            else:
+                same.append([h])
+        found = [self._of(group) for group in same]
+        return None if any(one is None for one in found) else [one for one in found if one is not None]
+
+    def _of(self, harmonics: list[int]) -> Poles | None:
+        part, k = self.parts[harmonics[0]], self.stiffness
+        m = len(part.M)
+        if not 0 < m <= POLES_AT_MOST:
+            return None
+        T, P = part.rows, np.linalg.inv(np.eye(part.count) + part.residual @ k)
+        held = k @ P
+        below = -np.linalg.solve(part.M, np.hstack([part.K + T.conj().T @ held @ T, part.C]))
+        values, V = np.linalg.eig(np.block([[np.zeros((m, m)), np.eye(m)], [below]]))
+        if np.abs(values).min() <= 1e-13 * np.abs(values).max():
+            return None
+        W = np.linalg.solve(V, np.vstack([np.zeros((m, m)), np.linalg.inv(part.M)]))
+        loads = [self.parts[h].load - T.conj().T @ (held @ self.parts[h].given) for h in harmonics]
+        poles = Poles(
+            np.array(harmonics), values, P @ T @ V[:m], W @ (T.conj().T @ P.conj().T), np.array(loads) @ W.T,
+            P @ part.residual, np.array([P @ self.parts[h].given for h in harmonics]),
+        )  # fmt: skip
+        return poles if self._right(poles) else None
+
+    def _right(self, poles: Poles) -> bool:
+        """Does it give what the equations give, about the geometric mean of the eigenvalues and beside the lowest one?
+
+        Beside: of one mode without damping the mean is the eigenvalue itself, where nothing is finite.
+        """
+        c, h = len(self.stiffness), int(poles.harmonics[-1])
+        sizes = np.abs(poles.values)
+        for Omega in (0.97 * np.exp(np.log(sizes).mean()), 1.01 * sizes.min()):
+            view = View(*[np.empty((len(self.parts), c, c)[:n], complex) for n in (2, 3, 2, 3)])
+            poles.fill(view, float(Omega) / max(h, 1))
+            exact = seen(self.parts[h], self.stiffness, float(Omega) / max(h, 1), h)
+            for a, b in ((view.compliance[h], exact.compliance), (view.reference[h], exact.reference)):
+                if not np.abs(a - b).max(initial=0.0) <= 1e-10 * np.abs(b).max(initial=1e-300):
+                    return False
+        return True
 
 
-def work(body: Reduced, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray) -> tuple[float, float]:
-    """Work of the excitation and loss in the body's own damping, J a cycle, in one harmonic that is not 0."""
-    load, size = body.load.get(harmonic, np.zeros(len(q))), body.size.get(harmonic, 0.0)
-    moved = load.conj() @ q - np.conj(size) * (body.residual.force_on_contacts @ force)
-    lost = np.pi * harmonic * (q.conj() @ (Omega * harmonic * body.C) @ q).real
+POLES_AT_MOST = 120
+"""Coordinates up to which eigenvalues are found: their cost grows with the cube, and is that of some frequencies."""
+
+
+def _alike(a: Linear, b: Linear) -> bool:
+    """Equal but for the loads."""
+    pairs = ((a.M, b.M), (a.K, b.K), (a.C, b.C), (a.rows, b.rows), (a.residual, b.residual))
+    return all(x is y or np.array_equal(x, y) for x, y in pairs)
+
+
+def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
+    """(w,) read-outs under (c,) contact forces less the preload and a share of the loads, of one harmonic."""
+    return part.watch @ q + share * part.watch_given - part.watch_residual @ force
+
+
+def work(
+    part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
+) -> tuple[float, float]:
+    """Work of a share of the loads and loss in the bodies' own damping, J a cycle, in one harmonic that is not 0."""
+    moved = share * (part.load.conj() @ q - part.given.conj() @ force)
+    lost = np.pi * harmonic * (q.conj() @ (Omega * harmonic * part.C) @ q).real
     return -np.pi * harmonic * float(moved.imag), float(lost)
 
 
-def stuck(body: Reduced) -> Array:
-    """(m,) eigenfrequencies in Hz with the contacts as stiff as `stiffness`, damping and gyroscopic forces left out."""
-    k = body.stiffness @ np.linalg.inv(np.eye(body.count) + body.residual.contacts @ body.stiffness)
-    K = body.K + body.rows.T @ k @ body.rows
-    values = scipy.linalg.eigh(0.5 * (K + K.T), body.M, eigvals_only=True)
+def stuck(part: Linear, stiffness: Array) -> Array:
+    """(m,) eigenfrequencies in Hz with contacts of a stiffness (c, c), damping and gyroscopic forces left out."""
+    k = stiffness @ np.linalg.inv(np.eye(part.count) + part.residual @ stiffness)
+    K = part.K + part.rows.conj().T @ k @ part.rows
+    values = scipy.linalg.eigh(0.5 * (K + K.conj().T), part.M, eigvals_only=True)
     return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
 
 

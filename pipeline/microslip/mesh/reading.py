@@ -114,7 +114,25 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
 # other formats, by meshio ----------------------------------------------------------------------------------------
 
 
+def point_data(path: Path) -> tuple[Array, dict[str, Array]]:
+    """(n, 3) points of a file in its own unit and the values that it holds at them, by name.
+
+    Raises:
+        UserError: the file cannot be read.
+    """
+    try:
+        mesh = _by_meshio(path, lambda found: found)
+    except Damaged as error:
+        raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
+    return np.asarray(mesh.points, dtype=float), {k: np.asarray(v) for k, v in mesh.point_data.items()}
+
+
 def _read_by_meshio(path: Path) -> RawMesh:
+    return _by_meshio(path, _from_meshio)
+
+
+def _by_meshio(path: Path, made: Callable[[Any], Any]) -> Any:
+    """What is made of meshio's mesh."""
     import meshio
 
     _check_sections(path)
@@ -125,7 +143,7 @@ def _read_by_meshio(path: Path) -> RawMesh:
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _from_meshio(meshio.read(path))
+            return made(meshio.read(path))
     except Damaged:
         raise
     except (Exception, SystemExit) as error:  # meshio raises whatever its parsers meet, and exits on some

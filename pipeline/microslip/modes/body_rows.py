@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,9 +11,9 @@ import scipy.sparse as sp
 from ..body import BodySettings, Excitation, InterfaceSettings, Monitor
 from ..data import INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
 from ..fem.discretise import face_blocks
-from ..fem.loads import pressure, traction
+from ..fem.loads import centrifugal, pressure, traction
 from .boundary import AXES, require_face
-from .equilibrium import StaticState
+from .equilibrium import BodyModel, StaticState
 from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows
 
 INTERFACE_LABELS = INTERFACE_ROWS
@@ -59,7 +59,10 @@ class NamedRows:
 
 
 def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
-    """Rows of all interfaces, excitations, monitors and gauges of the settings on a mesh."""
+    """Rows of all interfaces, excitations, monitors and gauges of the settings on a mesh.
+
+    Centrifugal excitations need the mass and are missing: see `with_centrifugal`.
+    """
     patches = {}
     for item in settings.interfaces:
         patches[item.name] = _interface_patch(mesh, item)
@@ -70,7 +73,7 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
                 patches[excitation.face] = _load_patch(mesh, excitation.face)
     locator = Locator(mesh) if mesh.cells else NodeLocator(mesh)
     n = mesh.n_points
-    excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations}
+    excitations = {e.name: _excitation(mesh, locator, e) for e in settings.excitations if not e.centrifugal}
     monitors, gauges = {}, {}
     for m in settings.monitors:
         place = _place(mesh, locator, m, f"monitors.{m.name}")
@@ -83,6 +86,18 @@ def body_rows(mesh: Mesh, settings: BodySettings) -> BodyRows:
         slopes = slope_rows(n, place, direction)
         gauges[g.name] = NamedRows(slopes, ("strain",), "1", place.point, place.distance, direction)
     return BodyRows(patches, excitations, monitors, gauges)
+
+
+def with_centrifugal(rows: BodyRows, model: BodyModel, settings: BodySettings) -> BodyRows:
+    """The rows with those of centrifugal excitations: forces per (rad/s)^2 on the body as drawn."""
+    if not any(e.centrifugal for e in settings.excitations):
+        return rows
+    points, M = model.d.mesh.points, model.M_full
+    force = centrifugal(M, points, model.axis, model.point).reshape(1, -1)
+    centre = (M @ points).sum(axis=0) / M.sum()
+    whole = NamedRows(sp.csr_matrix(force), ("centrifugal",), "rad2/s2", centre, 0.0)
+    every = {e.name: whole if e.centrifugal else rows.excitations[e.name] for e in settings.excitations}
+    return replace(rows, excitations=every)
 
 
 def _interface_patch(mesh: Mesh, item: InterfaceSettings) -> Patch:

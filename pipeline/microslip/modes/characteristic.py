@@ -14,11 +14,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from .. import eigen
+from .. import canonical, eigen
 from ..body import BodySettings
 from ..data import Array, Indices, Mesh, UserError
 from ..reduction.craig_bampton import static_shapes
-from . import canonical, rigid
+from . import rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
 from .rows import Patch

@@ -28,7 +28,7 @@ from ..fem.operators import per_block
 from ..gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from . import rigid
-from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows
+from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows, with_centrifugal
 from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
 from .characteristic import with_characteristic
 from .closures import ContactCurve, bolt_forces, contact_curve, contact_pairs, contact_states
@@ -125,6 +125,7 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
         d, materials_of(d, settings), free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
+    rows = with_centrifugal(rows, model, settings)
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
     mass, centre, inertia = inertia_of(d, [m.density for m in model.materials])

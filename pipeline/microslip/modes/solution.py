@@ -9,14 +9,14 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .. import eigen
+from .. import canonical, eigen
 from ..body import BodySettings
 from ..coordinates import held
 from ..data import Array, Indices, UserError
 from ..fem.discretise import FreeUpper
 from ..mesh import longest_over_shortest
 from ..reduction import METHODS, Problem, Reduced, stuck
-from . import canonical, rigid
+from . import rigid
 from .body_rows import BodyRows
 from .common import SPARE
 from .equilibrium import BodyModel

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from ..case import CaseResult
+from ..case import CaseResult, CaseSettings
+from ..data import Array
+from ..harmonic_balance import FrequencyResponse
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -16,10 +19,15 @@ def response_picture(result: CaseResult, path: Path) -> None:
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
     axes.semilogy(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
-    colours = _colours(len(result.responses))
+    colours, lifted = _colours(len(result.responses)), list[float]()
     for colour, (normal, r) in zip(colours, sorted(result.responses.items(), reverse=True), strict=True):
-        amplitude = np.where(r.converged, 1e6 * np.abs(r.monitor), np.nan)
-        axes.semilogy(r.frequency, amplitude, color=colour, lw=1.6, label=f"$F_N$ = {normal:g} N")
+        f, amplitude, lifts = _with_peaks(r, result.resonances[normal], result.lifted(normal))
+        sure = np.where(lifts, np.nan, amplitude)
+        axes.semilogy(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {normal:g} N")
+        if lifts.any():
+            beside = lifts | np.append(lifts[1:], False) | np.append(False, lifts[:-1])  # up to the line that is sure
+            axes.semilogy(f, np.where(beside, amplitude, np.nan), color=colour, lw=1.6, ls=":")
+            lifted.append(normal)
     low, high = result.free.frequency[[0, -1]]
     for f in result.stuck[(result.stuck > low) & (result.stuck < high)]:
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
@@ -29,12 +37,61 @@ def response_picture(result: CaseResult, path: Path) -> None:
         )  # fmt: skip
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
-    axes.set_ylabel(f"amplitude of {s.monitor}, {s.direction}, in µm (0-peak)")
-    axes.set_title(f"{s.name}: friction response to {s.amplitude:g} N at {s.excitation}")
+    axes.set_ylabel(f"amplitude of {_read(s)} (0-peak)")
+    to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
+    axes.set_title(f"{s.name}: friction response{to}")
     axes.set_xlim(low, high)
     axes.grid(True, which="both", alpha=0.25)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=9, title="dashed: sticking contacts", title_fontsize=8)
+    told = "dashed: sticking contacts"
+    if s.has_laws and len(result.responses) > 1:
+        told += f" at $F_N$ = {max(result.responses):g} N"
+    told += "; dotted: contacts would lift off, not valid" if lifted else ""
+    figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told, title_fontsize=8)
     figure.savefig(path, format="png")
+
+
+def _read(s: CaseSettings) -> str:
+    """The first read-out and its unit, for values times a million."""
+    first = s.watches[0]
+    if s.monitor is None and "direction" not in first.model_fields_set:  # a gauge, whose file tells the direction
+        return f"{first.monitor}, in 1e-6 or µm"
+    return f"{first.monitor}, {first.direction}, in µm"
+
+
+def comparison_picture(case: CaseSettings, marched: Mapping[str, Array], book: Mapping[str, Array], path: Path) -> None:
+    """Amplitude over frequency in both modes, a panel a normal force.
+
+    Args:
+        marched, book: normal force as text -> (2, f) Hz and m, not a number where a point did not converge.
+    """
+    from matplotlib.figure import Figure
+
+    rows = -(-len(marched) // 3)
+    columns = min(len(marched), 3)
+    figure = Figure(figsize=(4.2 * columns + 0.6, 3.2 * rows + 0.9), dpi=110, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    for axes in panels.ravel()[len(marched) :]:
+        axes.remove()
+    for axes, name in zip(panels.ravel(), marched, strict=False):
+        axes.semilogy(marched[name][0], 1e6 * marched[name][1], color="#1f4e79", lw=2.2, label="marched")
+        axes.semilogy(book[name][0], 1e6 * book[name][1], color="#d1603d", lw=1.4, ls="--", label="book")
+        axes.set_title(f"$F_N$ = {name} N", fontsize=10)
+        axes.grid(True, which="both", alpha=0.25)
+    panels[0, 0].legend(fontsize=9, title=f"marched: H = {case.harmonics}", title_fontsize=8)
+    figure.suptitle(f"{case.name}: the book's mode beside the marched laws", fontsize=11)
+    figure.supxlabel("excitation frequency in Hz", fontsize=10)
+    figure.supylabel("first harmonic of the monitor in µm (0-peak)", fontsize=10)
+    figure.savefig(path, format="png")
+
+
+def _with_peaks(
+    r: FrequencyResponse, peaks: list[tuple[float, float]], lifted: tuple[Array, Array]
+) -> tuple[Array, Array, Array]:
+    """Frequency, Hz, amplitude, µm, and lift-off at the points of a sweep and at the peaks found between them."""
+    f = np.concatenate([r.frequency, [f for f, _ in peaks]])
+    amplitude = np.concatenate([np.where(r.converged, np.abs(r.monitor), np.nan), [a for _, a in peaks]])
+    order = np.argsort(f, kind="stable")
+    return f[order], 1e6 * amplitude[order], np.concatenate(lifted)[order]
 
 
 def _colours(count: int) -> list[tuple[float, ...]]:

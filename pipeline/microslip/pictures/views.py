@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array, Interface, ModalBasis, ModalGroup
+from ..data import Array, Indices, Interface, ModalBasis, ModalGroup
 from ..modes.stress import von_mises
 from .lettering import (
     INK,
@@ -271,10 +271,14 @@ def _patch_tile(studio: Studio, name: str, item: Interface, size: tuple[int, int
     frame = np.vstack([item.points, item.origin, item.origin + 1.25 * arm * item.rotation])
     camera = fit_tile(frame, axes, size, 0.1)
     stage.clear()
-    stage.skin(studio.points, studio.outside.triangles, color=GREY)
-    nearer = 0.02 * reach * axes[2]
-    stage.lines(mesh.points + nearer, studio.outside.sides, (120, 124, 134), 1.0, opacity=0.6)
-    stage.lines(mesh.points + nearer, studio.outside.outline, (40, 44, 52), 2.0)
+    cut = covered(studio.points, studio.outside.triangles, item.points, axes)
+    limit = item.origin @ n + 0.1 * reach if cut else np.inf  # what stands in front of a hidden patch is cut away
+    behind = studio.points @ n < limit
+    stage.skin(studio.points, studio.outside.triangles[behind[studio.outside.triangles].any(axis=1)], color=GREY)
+    nearer, seen = 0.02 * reach * axes[2], mesh.points @ n < limit
+    sides, outline = (s[seen[s].any(axis=1)] for s in (studio.outside.sides, studio.outside.outline))
+    stage.lines(mesh.points + nearer, sides, (120, 124, 134), 1.0, opacity=0.6)
+    stage.lines(mesh.points + nearer, outline, (40, 44, 52), 2.0)
     stage.dots(item.points + 2 * nearer, _DOT, 5.0 if len(item.points) < 200 else 3.5)
     for axis, colour in zip(item.rotation, FRAME_COLOURS, strict=True):
         stage.arrow(item.origin + 6 * nearer, axis, arm, colour)
@@ -288,6 +292,31 @@ def _patch_tile(studio: Studio, name: str, item: Interface, size: tuple[int, int
     note = f"{role}; {len(item.areas)} points, {_area_text(area, area)}"
     draw.rectangle((0, 0, image.width - 1, image.height - 1), outline=(190, 194, 202))
     return captioned(image, name, note, 18)
+
+
+def covered(points: Array, triangles: Indices, patch: Array, axes: Array) -> bool:
+    """Whether some triangle stands between the viewer and most points of a patch.
+
+    Args:
+        points: (n, 3). triangles: (t, 3). patch: (p, 3). axes: (3, 3) right, up, towards the viewer.
+    """
+    corners, at = points[triangles] @ axes.T, patch @ axes.T
+    apart = 1e-3 * float(np.ptp(points, axis=0).max())
+    a, b, c = (corners[:, i, :2] for i in range(3))
+    twice = _cross(b - a, c - a)
+    flat = np.abs(twice) <= 1e-12 * float(np.abs(twice).max())
+    hidden = 0
+    for x in at:
+        weights = np.stack([_cross(b - x[:2], c - x[:2]), _cross(c - x[:2], a - x[:2])]) / np.where(flat, 1.0, twice)
+        inside = (weights >= 0).all(axis=0) & (weights.sum(axis=0) <= 1) & ~flat
+        depth = corners[:, 2, 2] + weights[0] * (corners[:, 0, 2] - corners[:, 2, 2])
+        depth = depth + weights[1] * (corners[:, 1, 2] - corners[:, 2, 2])
+        hidden += bool((inside & (depth > x[2] + apart)).any())
+    return 2 * hidden > len(at)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 # --- modes ---------------------------------------------------------------------------------------------------------
@@ -389,7 +418,7 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     for j in chosen:
         factor = ONE_MILLIMETRE / np.linalg.norm(group.phi[:, :, j], axis=1).max()
         shape = mode_scale(studio, group.phi[:, :, j]) * group.phi[:, :, j]
-        image = _stress_tile(studio, 1e-6 * factor * von_mises(stress.stress[:, :, j]), shape, camera, 0.75, "MPa")
+        image = stress_tile(studio, 1e-6 * factor * von_mises(stress.stress[:, :, j]), shape, camera, 0.75, "MPa")
         tiles.append(captioned(image, mode_title(group, j), size=17))
     title = f"{studio.basis.name}: stress modes{at_speed(group)}"
     note = (
@@ -399,16 +428,22 @@ def stress_sheet(studio: Studio, group: ModalGroup, count: int, camera: Camera) 
     return sheet(tiles, title, note)
 
 
-def _stress_tile(
-    studio: Studio, values: Array, shape: Array, camera: Camera, factor: float, unit: str, colours: str = STRESS_MAP
+def stress_tile(
+    studio: Studio, values: Array, shape: Array, camera: Camera, factor: float, unit: str, colours: str = STRESS_MAP,
+    mark: int | None = None,
 ) -> Picture:  # fmt: skip
-    """One deformed body coloured by nodal values (n,), with its colour bar."""
+    """One deformed body coloured by nodal values (n,), with its colour bar; a ring is drawn round the node `mark`."""
     outside = studio.outside
     seen = values[outside.source]
     top = float(np.quantile(seen, 0.998)) or 1.0
     data = _deformable(studio, colours, (0.0, top))
     studio.stage.reshape(data, outside.triangles, studio.points + shape[outside.source], seen)
-    image = scaled(studio.stage.shoot(camera), factor)
+    image = studio.stage.shoot(camera)
+    if mark is not None:
+        x, y = camera.project(studio.basis.mesh.points[mark] + shape[mark])[0]
+        for radius, colour, width in ((15, "white", 6), (14, INK, 3)):
+            pen(image).ellipse((x - radius, y - radius, x + radius, y + radius), outline=colour, width=width)
+    image = scaled(image, factor)
     peak = float(seen.max())
     return stacked(
         [image, colour_bar(_map(colours), "0", number(top), f"{unit}; largest {number(peak)} {unit}", image.width)], 4
@@ -428,9 +463,9 @@ def static_picture(studio: Studio, group: ModalGroup) -> Picture | None:
     tiles = []
     stress = group.stresses.get("nodes")
     if stress is not None and len(stress.points) == studio.basis.mesh.n_points:
-        image = _stress_tile(studio, 1e-6 * von_mises(stress.static_stress), shape, camera, 1.0, "MPa")
+        image = stress_tile(studio, 1e-6 * von_mises(stress.static_stress), shape, camera, 1.0, "MPa")
         tiles.append(captioned(image, "Equivalent stress", size=17))
-    image = _stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", DISPLACEMENT_MAP)
+    image = stress_tile(studio, 1e3 * size, shape, camera, 1.0, "mm", DISPLACEMENT_MAP)
     tiles.append(captioned(image, "Displacement", size=17))
     title = f"{studio.basis.name}: static state{at_speed(group)}"
     return captioned(

@@ -15,6 +15,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from .. import eigen
+from ..canonical import signs
 from ..data import Array, UserError
 from .problem import Problem, Reduced, diagonalised, hermitian, own_modes, without_modes
 
@@ -103,6 +104,7 @@ def fixed_interface_modes(
     stiff = 1e3 * pencil.k_norm  # what the constraint forbids lies above every frequency that is asked for
     held = replace(pencil, solver=solver, K=inside(pencil.K, stiff), M=inside(pencil.M, pencil.m_norm), solves=0)
     found = eigen.search(held, count, shift)
+    found = replace(found, vectors=found.vectors * signs(found.vectors))
     return eigen.certify(held, found, shift) if certify else found
 
 

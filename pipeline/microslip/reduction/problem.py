@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
+from ..canonical import signs
 from ..data import Array, Indices, UserError
 from ..eigen import Pencil
 
@@ -103,7 +104,9 @@ def diagonal(vectors: Array, kind: tuple[str, ...], values: Array, rigid: int) -
 
 def diagonalised(vectors: Array, kind: tuple[str, ...], M_r: Array, K_r: Array, rigid: int = 0) -> Reduced:
     """`Reduced` in physical coordinates, with the transformation to its own modes beside it."""
-    values, V = scipy.linalg.eigh(hermitian(K_r), hermitian(M_r))
+    size = 1 / np.sqrt(np.diag(M_r).real)  # coordinates of different units
+    values, V = scipy.linalg.eigh(*(hermitian(size[:, None] * A * size) for A in (K_r, M_r)))
+    V = size[:, None] * (V * signs(V))
     return Reduced(vectors, kind, M_r, K_r, frequencies(values, rigid), V)
 
 
@@ -131,6 +134,7 @@ def own_modes(pencil: Pencil, shapes: Array, smallest: float = 1e-13) -> tuple[A
     order = np.argsort(-inverse)
     inverse, V = inverse[order], V[:, order]
     Z = Y @ (V / np.sqrt(inverse))
+    Z = Z * signs(Z)
     return np.einsum("ij,ij->j", Z.conj(), K(Z)).real, Z
 
 

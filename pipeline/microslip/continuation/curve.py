@@ -1,7 +1,4 @@
-"""Newton's method, and following the solutions of R(x, lambda) = 0 along a curve: folds, branch points, kinks.
-
-Knows no mechanics. Inside, everything is scaled, y = (x / x_scale, lambda / lam_scale), so that arclength and angles
-mean something; the same curve in other units is the same sequence of points.
+"""Following the solutions of R(x, lambda) = 0 along a curve: folds, branch points, kinks.
 
 Which way is forward is decided by a determinant, not by the angle to the last tangent. Let tau be the tangent with
 v . tau = det [D; v] for every v, D = (dR/dx, dR/dlambda). Across a surface w . y = const on which a continuous R has
@@ -17,73 +14,17 @@ E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods, SIA
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal
 
 import numpy as np
-import scipy.linalg.lapack
 import scipy.optimize
 
-from .data import Array
+from ..data import Array
+from .newton import Corrected, NewtonSettings, Problem, Scaled, correct, norm, tangent, unit
 
 Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
-
-CONVERGED = "converged"
-
-
-class Problem(Protocol):
-    """R(x, lambda) = 0 for n unknowns and one parameter; R continuous, its derivatives may jump.
-
-    Attributes:
-        x_scale: what a large x is, a number or (n,), in the units of x. lam_scale: what a large change of lambda is.
-            Length along the curve is measured in these units.
-    """
-
-    @property
-    def x_scale(self) -> Array | float: ...
-
-    @property
-    def lam_scale(self) -> float: ...
-
-    def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
-        """R (n,), dR/dx (n, n) and dR/dlambda (n,) at x (n,) and lambda; not finite where R is not defined."""
-        ...
-
-
-@dataclass(frozen=True)
-class NewtonSettings:
-    """When Newton's method stops.
-
-    Attributes:
-        tolerance: error of the scaled unknowns, estimated from the last correction and its contraction.
-        iterations: at most. halvings: of a step that does not reduce the residual. forced: how often the best of the
-            tried steps is taken although none reduces the residual (kinks). last_resort: then try a trust region.
-    """
-
-    tolerance: float = 1e-10
-    iterations: int = 40
-    halvings: int = 6
-    forced: int = 3
-    last_resort: bool = True
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What Newton's method found.
-
-    Attributes:
-        x: (n,). lam: as given. converged. status: "converged", or what went wrong and what to try.
-        iterations: linear systems solved. evaluations: of R. error: estimated error of x / x_scale.
-    """
-
-    x: Array
-    lam: float
-    converged: bool
-    status: str
-    iterations: int
-    evaluations: int
-    error: float
 
 
 @dataclass(frozen=True)
@@ -186,209 +127,21 @@ class Branch:
         return [p for p in self.points if p.kind == kind]
 
 
-# Newton's method -----------------------------------------------------------------------------------------------------
-
-
-def newton(problem: Problem, x: Array, lam: float, settings: NewtonSettings | None = None) -> Solution:
-    """Solve R(x, lam) = 0 for x, from a guess (n,): steps halved until the residual falls, kinks allowed for."""
-    scaled = _Scaled(problem)
-    y = scaled.pack(x, lam)
-    found = _correct(scaled, y, _unit(len(y)), y[-1], settings or NewtonSettings())
-    return Solution(
-        found.y[:-1] * scaled.x_scale, float(lam), found.ok, found.status, found.iterations, scaled.count, found.error
-    )
-
-
-class _Scaled:
-    """The problem in scaled coordinates; counts evaluations."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self.count = problem, 0
-        self.x_scale = np.asarray(problem.x_scale, dtype=float)
-        self.lam_scale = float(problem.lam_scale)
-
-    def pack(self, x: Array, lam: float) -> Array:
-        return np.append(np.asarray(x, dtype=float) / self.x_scale, float(lam) / self.lam_scale)
-
-    def __call__(self, y: Array) -> tuple[Array, Array]:
-        """R (n,) and D = (dR/dx, dR/dlambda) (n, n + 1) with respect to y."""
-        self.count += 1
-        R, J, slope = self.problem.evaluate(y[:-1] * self.x_scale, float(y[-1]) * self.lam_scale)
-        D = np.empty((len(y) - 1, len(y)))
-        np.multiply(J, self.x_scale, out=D[:, :-1])
-        np.multiply(slope, self.lam_scale, out=D[:, -1])
-        return np.asarray(R, dtype=float), D
-
-
-@dataclass(frozen=True)
-class _Corrected:
-    """A point on the curve, or the attempt: tangent (n + 1,) with border . tangent = 1, sign of det [D; border] and the
-    pivots it is the product of, contraction of the first two corrections."""
-
-    y: Array
-    ok: bool
-    status: str
-    iterations: int
-    error: float
-    tangent: Array | None = None
-    sign: int = 0
-    pivots: Array | None = None
-    contraction: float = 0.0
-
-
-def _norm(v: Array) -> float:
-    return math.sqrt(v @ v)  # numpy.linalg.norm takes ten times as long for a short vector
-
-
-def _unit(size: int) -> Array:
-    e = np.zeros(size)
-    e[-1] = 1.0
-    return e
-
-
-def _weights(D: Array) -> Array:
-    """What makes every row's largest derivative 1, so that residuals of different units can be compared."""
-    rows = np.abs(D).max(axis=1)
-    return 1.0 / np.where((rows > 0) & np.isfinite(rows), rows, 1.0)
-
-
-class _Place(NamedTuple):
-    """A point y with the weighted residual (R, border . y - value), its derivative B = [D; border] and its norm, which
-    is infinite if anything is not finite."""
-
-    y: Array
-    residual: Array
-    B: Array
-    size: float
-
-
-def _place(y: Array, R: Array, D: Array, weights: Array, border: Array, value: float) -> _Place:
-    residual, B = np.empty(len(y)), np.empty((len(y), len(y)), order="F")
-    np.multiply(R, weights, out=residual[:-1])
-    residual[-1] = border @ y - value
-    np.multiply(D, weights[:, None], out=B[:-1])
-    B[-1] = border
-    size = _norm(residual)
-    return _Place(y, residual, B, size if math.isfinite(size + float(B.sum())) else math.inf)
-
-
-def _factor(B: Array) -> tuple[Array, Array] | None:
-    """LU of a matrix, which is overwritten; None if it is singular."""
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(B, overwrite_a=1)
-    return None if info else (lu, pivots)
-
-
-def _solve(factors: tuple[Array, Array], right: Array) -> Array:
-    return scipy.linalg.lapack.dgetrs(*factors, right)[0]
-
-
-def _determinant(factors: tuple[Array, Array]) -> int:
-    """Sign of the determinant."""
-    lu, pivots = factors
-    negative = np.count_nonzero(lu.diagonal() < 0) + np.count_nonzero(pivots != np.arange(len(pivots)))
-    return -1 if negative % 2 else 1
-
-
-def _correct(scaled: _Scaled, y: Array, border: Array, value: float, settings: NewtonSettings) -> _Corrected:
-    """Solve R = 0 with border . y = value, from y.
-
-    The residual is weighted by the derivatives at the start, so that units do not matter. Near a kink the direction
-    can be one along which the residual rises however short the step, though the full step is right (the other side's
-    derivative finishes the work): then the best of the tried steps is taken.
-    """
-    R, D = scaled(y)
-    weights = _weights(D)
-    here = _place(y, R, D, weights, border, value)
-    sizes: list[float] = []
-    forced = 0
-    for iteration in range(1, settings.iterations + 1):
-        factors = _factor(here.B) if here.size < math.inf else None
-        if factors is None:
-            return _resort(scaled, here.y, border, value, settings, iteration, "singular derivative: start elsewhere")
-        dy = -_solve(factors, here.residual)
-        sizes.append(_norm(dy))
-        if error := _small_enough(sizes, settings.tolerance * (1.0 + _norm(here.y))):
-            return _arrived(here.y + dy, factors, iteration, error, sizes)
-        here, falls = _damped(scaled, here, dy, weights, border, value, settings.halvings)
-        forced += not falls
-        if forced > settings.forced:
-            status = "no step reduces the residual: start nearer"
-            return _resort(scaled, here.y, border, value, settings, iteration, status)
-    status = "iterations used up: allow more, or start nearer"
-    return _resort(scaled, here.y, border, value, settings, settings.iterations, status)
-
-
-def _small_enough(sizes: list[float], tolerance: float) -> float:
-    """Estimated error after the last correction, 0 while it is not small enough: corrections contract at least as
-    fast as before, so the next one is at most the last times the last contraction."""
-    last = sizes[-1]
-    if last <= tolerance:
-        return max(last, 1e-300)
-    contraction = last / sizes[-2] if len(sizes) > 1 else 1.0
-    return last * contraction if contraction < 0.1 and last < 1e-3 and last * contraction <= 0.1 * tolerance else 0.0
-
-
-def _arrived(y: Array, factors: tuple[Array, Array], n: int, error: float, sizes: list[float]) -> _Corrected:
-    contraction = sizes[1] / sizes[0] if len(sizes) > 1 else 0.0
-    tangent = _solve(factors, _unit(len(y)))
-    return _Corrected(y, True, CONVERGED, n, error, tangent, _determinant(factors), factors[0].diagonal(), contraction)
-
-
-def _damped(
-    scaled: _Scaled, before: _Place, dy: Array, weights: Array, border: Array, value: float, halvings: int
-) -> tuple[_Place, bool]:
-    """The first of the steps 1, 1/2, 1/4, ... that reduces the residual, else the best of them and False."""
-    best = before._replace(size=math.inf)
-    for k in range(halvings + 1):
-        share = 0.5**k
-        y = before.y + share * dy
-        here = _place(y, *scaled(y), weights, border, value)
-        if here.size <= (1.0 - 0.1 * share) * before.size:
-            return here, True
-        if here.size < best.size:
-            best = here
-    return best, False
-
-
-def _resort(
-    scaled: _Scaled, y: Array, border: Array, value: float, settings: NewtonSettings, iterations: int, status: str
-) -> _Corrected:
-    """The trust region of MINPACK (Powell's dogleg) from where Newton's method failed, then Newton again."""
-    failed = _Corrected(y, False, status, iterations, np.inf)
-    if not settings.last_resort or not np.isfinite(y).all():
-        return failed
-    R, D = scaled(y)
-    if not (np.isfinite(R).all() and np.isfinite(D).all()):
-        return failed
-    weights = _weights(D)
-
-    def both(z: Array) -> tuple[Array, Array]:
-        there = _place(z, *scaled(z), weights, border, value)
-        return there.residual, there.B
-
-    found = scipy.optimize.root(both, y, jac=True, method="hybr").x
-    again = _correct(scaled, found, border, value, replace(settings, last_resort=False))
-    return replace(again, iterations=again.iterations + iterations) if again.ok else failed
-
-
-# following a curve ---------------------------------------------------------------------------------------------------
-
-
 def start(problem: Problem, x: Array, lam: float, settings: Settings | None = None) -> State:
     """The first point: Newton's method at fixed lambda from a guess x (n,), then the tangent.
 
     A start that fails is a state without points whose `status` says what to try.
     """
     settings = settings or Settings()
-    scaled = _Scaled(problem)
+    scaled = Scaled(problem)
     y = scaled.pack(x, lam)
-    found = _correct(scaled, y, _unit(len(y)), y[-1], replace(settings.newton, iterations=40, last_resort=True))
+    found = correct(scaled, y, unit(len(y)), y[-1], replace(settings.newton, iterations=40, last_resort=True))
     empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
     if not found.ok:
         return replace(empty, status=f"no start: {found.status}")
     y = found.y
     D = scaled(y)[1]
-    t = _tangent(D, 1)
+    t = tangent(D, 1)
     if t is None:
         return replace(empty, status="no start: singular derivative: start elsewhere")
     orientation = -1 if t[-1] * settings.direction < 0 else 1
@@ -427,7 +180,7 @@ class _Trial:
 
 
 @dataclass(frozen=True)
-class _Segment:
+class Segment:
     """The curve between two of its points; bends: the tangent jumps between them."""
 
     a: Array
@@ -440,7 +193,7 @@ class _Segment:
     def border(self) -> Array:
         """A direction in which the curve advances from a to b, on both sides of a kink less than 180 degrees."""
         middle = self.ta + self.tb
-        size = _norm(middle)
+        size = norm(middle)
         return middle / size if size > 1e-3 else self.tb
 
     def guesses(self, u: float) -> list[Array]:
@@ -451,7 +204,7 @@ class _Segment:
             first = self.a + u * ahead / float(self.border @ self.ta) * self.ta
             second = self.b - (1 - u) * ahead / float(self.border @ self.tb) * self.tb
             return [first, second] if u < 0.5 else [second, first]
-        length = _norm(chord)
+        length = norm(chord)
         bend = u * (1 - u) * ((1 - u) * (self.ta * length - chord) - u * (self.tb * length - chord))
         return [self.a + u * chord + bend]
 
@@ -464,7 +217,7 @@ def advance(problem: Problem, state: State, settings: Settings) -> State:
     """
     if state.status:
         return state
-    scaled = _Scaled(problem)
+    scaled = Scaled(problem)
     length = min(state.step, settings.step_max)
     while length >= settings.step_min:
         trial = _tried(scaled, state, length, settings)
@@ -487,47 +240,37 @@ def _sign(value: float) -> int:
     return 0 if abs(value) < 1e-12 else (1 if value > 0 else -1)
 
 
-def _oriented(found: _Corrected, orientation: int) -> Array:
+def _oriented(found: Corrected, orientation: int) -> Array:
     assert found.tangent is not None
-    return found.tangent * (orientation * found.sign / _norm(found.tangent))
-
-
-def _tangent(D: Array, orientation: int) -> Array | None:
-    """Unit null vector t of D with the sign of det [D; t] asked for; None where D has a larger null space."""
-    if not np.isfinite(D).all():
-        return None
-    D = D * _weights(D)[:, None]
-    t = np.linalg.svd(D)[2][-1]
-    factors = _factor(np.asfortranarray(np.vstack([D, t])))
-    return None if factors is None else t * (orientation * _determinant(factors))
+    return found.tangent * (orientation * found.sign / norm(found.tangent))
 
 
 def _angle(a: Array, b: Array) -> float:
     """Between two vectors, exact for small angles too."""
-    a, b = a / _norm(a), b / _norm(b)
-    return 2.0 * math.atan2(_norm(a - b), _norm(a + b))
+    a, b = a / norm(a), b / norm(b)
+    return 2.0 * math.atan2(norm(a - b), norm(a + b))
 
 
-def _tried(scaled: _Scaled, state: State, length: float, settings: Settings) -> _Trial:
+def _tried(scaled: Scaled, state: State, length: float, settings: Settings) -> _Trial:
     """Predict, correct, judge."""
     ahead = state.tangent
     if settings.predictor == "secant" and state.before is not None:
-        secant = (state.y - state.before) / _norm(state.y - state.before)
+        secant = (state.y - state.before) / norm(state.y - state.before)
         ahead = secant if _angle(secant, state.tangent) < settings.angle else ahead
     guess = state.y + length * ahead
-    found = _correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton)
+    found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton)
     if not found.ok:
         return _Trial(False, 0.5)
     return _judged(state, found, length, settings)
 
 
-def _judged(state: State, found: _Corrected, length: float, settings: Settings) -> _Trial:
+def _judged(state: State, found: Corrected, length: float, settings: Settings) -> _Trial:
     t, chord = _oriented(found, state.orientation), found.y - state.y
     if _smooth(state.tangent, chord, t, settings.angle):
         return _Trial(True, 1.0, False, False, found.y, t, found.contraction)
     if _smooth(state.tangent, chord, -t, settings.angle):
         return _Trial(False, 0.5, True, False, found.y, -t, found.contraction)
-    if length <= settings.kink_step and chord @ t > 0 and _norm(chord) < 10 * length:
+    if length <= settings.kink_step and chord @ t > 0 and norm(chord) < 10 * length:
         return _Trial(True, 1.0, False, True, found.y, t, found.contraction)
     turned = max(_angle(state.tangent, t), 2 * _angle(state.tangent, chord))
     return _Trial(False, float(np.clip(settings.angle / turned, 0.1, 0.5)))
@@ -539,37 +282,37 @@ def _smooth(ta: Array, chord: Array, tb: Array, limit: float) -> bool:
     return _angle(ta, tb) <= limit and _angle(ta + tb, chord) <= 0.15 * limit
 
 
-def _crossed(scaled: _Scaled, state: State, length: float, settings: Settings, failed: _Trial) -> _Trial:
+def _crossed(scaled: Scaled, state: State, length: float, settings: Settings, failed: _Trial) -> _Trial:
     """The far side of a kink: the tangent there is read off beyond it, then a border that advances on both sides.
 
     Where that fails: lambda itself as the parameter, both ways, and the direction of the last two points.
     """
     for share in (1.0, 3.0, 0.3):
         beyond = state.y + share * length * state.tangent
-        t = _tangent(scaled(beyond)[1], state.orientation)
+        t = tangent(scaled(beyond)[1], state.orientation)
         if t is not None and _angle(t, state.tangent) > 0.05:
-            border = _Segment(state.y, beyond, state.tangent, t, True).border
+            border = Segment(state.y, beyond, state.tangent, t, True).border
             if (trial := _aimed(scaled, state, state.y + 3.0 * share * length * t, border, length, settings)).good:
                 return trial
     for way in (1.0, -1.0):
-        guess = state.y + way * length * _unit(len(state.y))
-        if (trial := _aimed(scaled, state, guess, _unit(len(guess)), length, settings)).good:
+        guess = state.y + way * length * unit(len(state.y))
+        if (trial := _aimed(scaled, state, guess, unit(len(guess)), length, settings)).good:
             return trial
     if state.before is not None and (chord := state.y - state.before).any():
-        chord = chord / _norm(chord)
+        chord = chord / norm(chord)
         if (trial := _aimed(scaled, state, state.y + length * chord, chord, length, settings)).good:
             return trial
     return failed
 
 
-def _aimed(scaled: _Scaled, state: State, guess: Array, border: Array, length: float, settings: Settings) -> _Trial:
+def _aimed(scaled: Scaled, state: State, guess: Array, border: Array, length: float, settings: Settings) -> _Trial:
     """Correct a guess with a border of its own; good if the curve goes on from the new point away from the last."""
-    found = _correct(scaled, guess, border, float(border @ guess), settings.newton)
+    found = correct(scaled, guess, border, float(border @ guess), settings.newton)
     if not found.ok:
         return _Trial(False)
     t, chord = _oriented(found, state.orientation), found.y - state.y
-    far = _norm(chord) > 30 * length
-    if far or not chord @ t > 0 or _norm(chord) < 0.01 * length:
+    far = norm(chord) > 30 * length
+    if far or not chord @ t > 0 or norm(chord) < 0.01 * length:
         return _Trial(False)
     bends = not _smooth(state.tangent, chord, t, settings.angle)
     trial = _Trial(True, 0.5, False, bends, found.y, t, found.contraction)
@@ -579,25 +322,25 @@ def _aimed(scaled: _Scaled, state: State, guess: Array, border: Array, length: f
 # what lies between two points ----------------------------------------------------------------------------------------
 
 
-def _between(scaled: _Scaled, segment: _Segment, u: float, settings: Settings) -> tuple | None:
+def _between(scaled: Scaled, segment: Segment, u: float, settings: Settings) -> tuple | None:
     """Point, tangent, sign and pivots of the determinant at the share u of a segment, or None."""
     border = segment.border
     value = float((1 - u) * (border @ segment.a) + u * (border @ segment.b))
     for guess in segment.guesses(u):
-        found = _correct(scaled, guess, border, value, settings.newton)
-        if found.ok and _norm(found.y - guess) <= _norm(segment.b - segment.a):
+        found = correct(scaled, guess, border, value, settings.newton)
+        if found.ok and norm(found.y - guess) <= norm(segment.b - segment.a):
             return found.y, _oriented(found, found.sign), found.sign, found.pivots
     return None
 
 
-def _is_kink(scaled: _Scaled, state: State, trial: _Trial, length: float, settings: Settings) -> bool:
+def _is_kink(scaled: Scaled, state: State, trial: _Trial, length: float, settings: Settings) -> bool:
     """Do the two tangents belong to one curve that bends at one place? Halved down to `resolution`.
 
     If not, it is another branch that was caught (the curve is not whole), or a narrow turn that shorter steps follow.
     """
     if length <= settings.resolution:
         return True
-    segment = _Segment(state.y, trial.y, state.tangent, trial.tangent, True)
+    segment = Segment(state.y, trial.y, state.tangent, trial.tangent, True)
     border = segment.border
     span = float(border @ (segment.b - segment.a))
     low, high = 0.0, 1.0
@@ -614,23 +357,23 @@ def _is_kink(scaled: _Scaled, state: State, trial: _Trial, length: float, settin
         if _angle(before[1], after[1]) <= 0.5 * settings.angle:
             return False  # a smooth turn
     slowest = min(float(border @ before[1]), float(border @ after[1]))
-    return _norm(after[0] - before[0]) * slowest <= 2.0 * (high - low) * span
+    return norm(after[0] - before[0]) * slowest <= 2.0 * (high - low) * span
 
 
-def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, settings: Settings) -> Array | None:
+def _branch_point(scaled: Scaled, state: State, trial: _Trial, length: float, settings: Settings) -> Array | None:
     """Where the determinant changes its sign along a smooth curve; None if it is a jump to another branch.
 
     Around a branch point the curve is whole: two points a little before and after it are as near as they should be.
     """
     if length <= settings.resolution:
         return trial.y
-    segment = _Segment(state.y, trial.y, state.tangent, trial.tangent, False)
-    chord = _norm(trial.y - state.y)
+    segment = Segment(state.y, trial.y, state.tangent, trial.tangent, False)
+    chord = norm(trial.y - state.y)
 
     def test(u: float) -> float:
         here = _between(scaled, segment, u, settings)
         if here is None:
-            raise _Lost
+            raise Lost
         logarithm = float(np.log(np.abs(here[3])).sum())
         reference.append(logarithm)
         return here[2] * math.exp(min(logarithm - reference[0], 50.0))
@@ -638,67 +381,68 @@ def _branch_point(scaled: _Scaled, state: State, trial: _Trial, length: float, s
     reference: list[float] = []
     try:
         root = float(scipy.optimize.brentq(test, 0.0, 1.0, xtol=0.05 * settings.resolution / chord, rtol=1e-12))
-    except (_Lost, ValueError):
+    except (Lost, ValueError):
         return None
     off = settings.resolution / chord
     sides = [_between(scaled, segment, root + way * off, settings) for way in (-1, 1)]
     before, after = sides
     if before is None or after is None or before[2] == after[2]:
         return None
-    whole = _norm(after[0] - before[0]) <= 3 * settings.resolution
+    whole = norm(after[0] - before[0]) <= 3 * settings.resolution
     straight = _angle(before[1], after[1]) <= settings.angle
     return 0.5 * (before[0] + after[0]) if whole and straight else None
 
 
-class _Lost(Exception):
-    """The corrector failed inside a segment (never leaves this module)."""
+class Lost(Exception):
+    """The corrector failed inside a segment (never leaves this room)."""
 
 
-def _root(scaled: _Scaled, segment: _Segment, settings: Settings, fold: bool, value: float) -> tuple[Array, Array]:
-    """Point and tangent where lambda's component of the tangent (fold) or lambda - value changes its sign.
+def root(
+    scaled: Scaled, segment: Segment, settings: Settings, test: Callable[[Array, Array], float]
+) -> tuple[Array, Array]:
+    """Point and tangent in a segment where a function of both, of different sign at its ends, changes its sign.
 
     Raises:
-        _Lost: the curve was not found again between the two points.
+        Lost: the curve was not found again between the two points, or the signs at its ends are the same.
     """
     kept = {0.0: (segment.a, segment.ta), 1.0: (segment.b, segment.tb)}
 
-    def test(u: float) -> float:
+    def value(u: float) -> float:
         if u not in kept:
             here = _between(scaled, segment, u, settings)
             if here is None:
-                raise _Lost
+                raise Lost
             kept[u] = here[:2]
-        y, t = kept[u]
-        return float(t[-1]) if fold else float(y[-1]) - value
+        return test(*kept[u])
 
-    if test(0.0) * test(1.0) > 0:
-        raise _Lost
-    root = float(scipy.optimize.brentq(test, 0.0, 1.0, xtol=1e-10, rtol=1e-12))
-    test(root)
-    return kept[root]
+    if value(0.0) * value(1.0) > 0:
+        raise Lost
+    place = float(scipy.optimize.brentq(value, 0.0, 1.0, xtol=1e-10, rtol=1e-12))
+    value(place)
+    return kept[place]
 
 
-def _fold(scaled: _Scaled, segment: _Segment, settings: Settings) -> tuple[Array, Array]:
+def _fold(scaled: Scaled, segment: Segment, settings: Settings) -> tuple[Array, Array]:
     """The fold in a segment; if the curve cannot be found between its ends, the end with the extreme lambda."""
     try:
-        return _root(scaled, segment, settings, True, 0.0)
-    except _Lost:
+        return root(scaled, segment, settings, lambda y, t: float(t[-1]))
+    except Lost:
         rising = segment.ta[-1] > 0
         return (segment.a, segment.ta) if (segment.a[-1] > segment.b[-1]) == rising else (segment.b, segment.tb)
 
 
-def _at(scaled: _Scaled, segment: _Segment, lam: float, settings: Settings) -> tuple[Array, Array] | None:
+def _at(scaled: Scaled, segment: Segment, lam: float, settings: Settings) -> tuple[Array, Array] | None:
     """Point and tangent at a given scaled lambda in a segment along which it changes monotonically."""
     span = segment.b[-1] - segment.a[-1]
     guess = segment.guesses(float((lam - segment.a[-1]) / span))[0]
     guess[-1] = lam
-    found = _correct(scaled, guess, _unit(len(guess)), lam, settings.newton)
-    if found.ok and _norm(found.y - guess) <= 0.5 * _norm(segment.b - segment.a):
+    found = correct(scaled, guess, unit(len(guess)), lam, settings.newton)
+    if found.ok and norm(found.y - guess) <= 0.5 * norm(segment.b - segment.a):
         t = _oriented(found, 1)
         return found.y, t if t @ segment.border > 0 else -t
     try:
-        return _root(scaled, segment, settings, False, lam)
-    except _Lost:
+        return root(scaled, segment, settings, lambda y, t: float(y[-1]) - lam)
+    except Lost:
         return None
 
 
@@ -706,13 +450,13 @@ def _at(scaled: _Scaled, segment: _Segment, lam: float, settings: Settings) -> t
 
 
 def _point(
-    scaled: _Scaled, y: Array, t: Array, kind: Kind, kink: bool, arclength: float, lam: float | None = None
+    scaled: Scaled, y: Array, t: Array, kind: Kind, kink: bool, arclength: float, lam: float | None = None
 ) -> Point:
     lam = float(y[-1]) * scaled.lam_scale if lam is None else float(lam)
     return Point(y[:-1] * scaled.x_scale, lam, kind, kink, arclength, t, scaled.count)
 
 
-def _over(scaled: _Scaled, state: State, trial: _Trial, place: Array, length: float, settings: Settings) -> State:
+def _over(scaled: Scaled, state: State, trial: _Trial, place: Array, length: float, settings: Settings) -> State:
     """A step over a branch point: the determinant has the other sign from here on."""
     point = _point(scaled, place, trial.tangent, "branch point", False, _along(state, place))
     state = replace(state, orientation=-state.orientation)
@@ -720,7 +464,7 @@ def _over(scaled: _Scaled, state: State, trial: _Trial, place: Array, length: fl
 
 
 def _taken(
-    scaled: _Scaled, state: State, trial: _Trial, length: float, settings: Settings, extra: tuple[Point, ...] = ()
+    scaled: Scaled, state: State, trial: _Trial, length: float, settings: Settings, extra: tuple[Point, ...] = ()
 ) -> State:
     """The state after a step, with what was passed on the way."""
     sense = _sign(trial.tangent[-1]) or state.sense
@@ -747,10 +491,10 @@ def _taken(
 
 
 def _passed(
-    scaled: _Scaled, state: State, trial: _Trial, sense: int, settings: Settings
+    scaled: Scaled, state: State, trial: _Trial, sense: int, settings: Settings
 ) -> tuple[list[Point], float | None]:
     """Fold and targets between the last point and the new one, and the bound if it is reached."""
-    pieces, found = [_Segment(state.y, trial.y, state.tangent, trial.tangent, trial.kink)], []
+    pieces, found = [Segment(state.y, trial.y, state.tangent, trial.tangent, trial.kink)], []
     if sense != state.sense and (settings.folds or settings.targets):
         y, t = _fold(scaled, pieces[0], settings)
         pieces = [replace(pieces[0], b=y, tb=t), replace(pieces[0], a=y, ta=t)]
@@ -768,10 +512,10 @@ def _passed(
 
 
 def _along(state: State, y: Array) -> float:
-    return state.arclength + _norm(y - state.y)
+    return state.arclength + norm(y - state.y)
 
 
-def _values(piece: _Segment, scale: float, settings: Settings) -> list[tuple[float, bool]]:
+def _values(piece: Segment, scale: float, settings: Settings) -> list[tuple[float, bool]]:
     """Targets passed in a piece (its beginning excluded), in order, the bound last."""
     a, b = piece.a[-1] * scale, piece.b[-1] * scale
     low, high = min(a, b), max(a, b)
@@ -788,7 +532,7 @@ def _closed(state: State, y: Array, t: Array) -> bool:
         return False
     chord = y - state.y
     nearest = state.y + chord * (before / (before - after))
-    return bool(_norm(nearest - state.origin) <= 0.2 * _norm(chord))
+    return bool(norm(nearest - state.origin) <= 0.2 * norm(chord))
 
 
 def _next_step(state: State, trial: _Trial, length: float, settings: Settings) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg
 from pydantic import BeforeValidator, Field
 
-from .body import (
+from ..body import (
     Direction,
     Model,
     Name,
@@ -35,9 +35,9 @@ from .body import (
     override,
     validate,
 )
-from .data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
-from .frames import skew
-from .modes.canonical import signs, turn_clusters
+from ..canonical import signs, turn_clusters
+from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..frames import skew
 
 GROUND = "ground"
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Array, Indices
+from .data import Array, Indices
 
 CLUSTER = 1e-6  # relative gap of eigenvalues below which they count as repeated
 
@@ -65,5 +65,6 @@ def signs(rows: Array) -> Array:
     size = np.abs(rows)
     top = size.max(axis=0)
     first = (size >= (1 - 1e-6) * top).argmax(axis=0)
-    entry, size = rows[first, np.arange(rows.shape[1])].conj(), top
+    entry = rows[first, np.arange(rows.shape[1])].conj()
+    size = np.abs(entry)
     return np.divide(entry, size, out=np.ones_like(entry), where=size > 0)

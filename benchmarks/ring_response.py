@@ -1,0 +1,132 @@
+"""Friction response of a tuned ring of blades: the book's mode, one and three harmonics, growth over the blades.
+
+    python benchmarks/ring_response.py            # 24 blades by one sector; then 12, 24, 48, 100 blades as whole rings
+    python benchmarks/ring_response.py --quick    # the sector alone, 12 x 2 points, 16 frequencies, one round
+
+The blade of section 5.3 with 20 eigenmodes (a coarse mesh: the sweep does not know of it), 24 in a circle, engine order
+6, rough contacts of 72 x 5 points between neighbours, 30 N, 1 N at every blade, 150 frequencies about the first
+resonance, where the contacts slide at half of them. Everything is compiled before; times are the least of some rounds,
+wall and CPU of the process. A whole ring is given a quarter of the points a contact and an eighth of the frequencies,
+and compared with the sector under the same settings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from microslip.basis import read_basis
+from microslip.case.assemble import build
+from microslip.case.run import problem_of
+from microslip.case.settings import CaseSettings
+from microslip.data import ModalBasis
+from microslip.harmonic_balance.problem import Problem
+from microslip.harmonic_balance.solver import sweep
+from microslip.workflow import modes_stage, open_job
+
+ROOT = Path(__file__).resolve().parents[1]
+BLADES, ORDER, FORCE, POINTS, COUNT = 24, 6, 30.0, (72, 5), 150
+
+
+def blade() -> ModalBasis:
+    """The test blade with 20 modes, on a coarse mesh."""
+    coarse = ["mesh.size=12", "output.gauss=false", "output.nodal_stress=false", "output.shapes=false"]
+    return read_basis(modes_stage(open_job(ROOT / "geometry" / "blade", coarse, ROOT / "build" / "bench" / "ring"))[0])
+
+
+def case(low: float, high: float, count: int, blades: int, points: tuple[int, int], **more: object) -> CaseSettings:
+    """The settings of a ring of blades that meet their neighbours."""
+    contact = {
+        "interface": "right", "against": "left", "against_sector": 1, "law": "rough", "roughness": 7.5e-6,
+        "normal_stiffness": 840e6, "tangential_stiffness": 80e6, "friction": 0.2, "points": list(points),
+        "includes": "bulk+surface",
+    }  # fmt: skip
+    return CaseSettings.model_validate({
+        "name": "ring", "body": "blade", "excitation": "magnet", "amplitude": 1.0, "monitor": "accelerometer",
+        "direction": "x", "contacts": [contact], "samples": 64,
+        "ring": {"blades": blades, "engine_order": ORDER * blades // BLADES},
+        "sweep": {"start": low, "stop": high, "points": count, "normal_forces": [FORCE]}, **more,
+    })  # fmt: skip
+
+
+def problem(settings: CaseSettings, basis: ModalBasis) -> Problem:
+    """The balance under the normal force."""
+    return problem_of(build(settings, {"blade": basis}, "ring"), FORCE)
+
+
+def run(settings: CaseSettings, basis: ModalBasis, rounds: int) -> tuple[float, float, int, int, float, float]:
+    """Least wall and CPU seconds of a sweep after one that compiles; Newton steps, failures, Hz and m at the peak."""
+    s, p = settings.sweep, problem(settings, basis)
+    frequency, spent, used = np.linspace(s.start, s.stop, s.points), [], []
+    for _ in range(rounds + 1):
+        began, before = time.perf_counter(), time.process_time()
+        points = sweep(p, frequency)
+        spent.append(time.perf_counter() - began)
+        used.append(time.process_time() - before)
+    motion = [abs(q.x.reshape(p.waves, -1)[1:3]).max() * p.length for q in points]
+    top = int(np.argmax(motion))
+    steps, failed = sum(q.iterations for q in points), sum(not q.converged for q in points)
+    return min(spent[1:]), min(used[1:]), steps, failed, float(frequency[top]), float(motion[top])
+
+
+def sector_rows(
+    basis: ModalBasis, low: float, high: float, rounds: int, count: int, points: tuple[int, int]
+) -> None:  # fmt: skip
+    """The table of the ring by one sector."""
+    print("| mode | wall s | CPU s | Newton steps a point | not converged | peak Hz | contact µm | goal s |")
+    print("|---|--:|--:|--:|--:|--:|--:|--:|")
+    for name, goal, more in (
+        ("book", 1, {"mode": "book"}),
+        ("marched, H = 1", 3, {"harmonics": 1}),
+        ("marched, H = 3", 20, {"harmonics": 3}),
+        ("marched, H = 1, 3 cycles", 3, {"harmonics": 1, "cycles": 3}),
+        ("marched, H = 3, 3 cycles", 20, {"harmonics": 3, "cycles": 3}),
+    ):  # fmt: skip
+        settings = case(low, high, count, BLADES, points, **more)
+        wall, cpu, steps, failed, top, size = run(settings, basis, rounds)
+        each = steps / count
+        print(f"| {name} | {wall:.2f} | {cpu:.2f} | {each:.1f} | {failed} | {top:.1f} | {1e6 * size:.2f} | {goal} |",
+              flush=True)  # fmt: skip
+
+
+def growth_rows(basis: ModalBasis, low: float, high: float, rounds: int) -> None:
+    """The table of whole rings against their sectors."""
+    print("| blades | mode | sector CPU s | ring CPU s | ring / sector | over blades |")
+    print("|--:|---|--:|--:|--:|--:|")
+    for name, more in (("book", {"mode": "book"}), ("marched, H = 1, 3 cycles", {"harmonics": 1, "cycles": 3})):
+        for blades in (12, 24, 48, 100):
+            found = []
+            for model in ("sector", "full"):
+                settings = case(low, high, COUNT // 8, blades, (18, 5), **more)
+                ring = settings.ring.model_copy(update={"model": model}) if settings.ring else None
+                found.append(run(settings.model_copy(update={"ring": ring}), basis, rounds)[1])
+            ratio = found[1] / found[0]
+            print(f"| {blades} | {name} | {found[0]:.3f} | {found[1]:.2f} | {ratio:.1f} | {ratio / blades:.2f} |",
+                  flush=True)  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="the sector alone, small, one round")
+    parser.add_argument("--growth", action="store_true", help="whole rings alone, one round")
+    parser.add_argument("--low", type=float, default=95.0)
+    parser.add_argument("--high", type=float, default=125.0)
+    asked = parser.parse_args()
+    basis, rounds = blade(), 1 if asked.quick or asked.growth else 3
+    load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
+    print(f"{platform.platform()}, {os.cpu_count()} cores, load {load}; Python {platform.python_version()}, "
+          f"numpy {np.__version__}, jax {jax.__version__}")  # fmt: skip
+    if not asked.growth:
+        sector_rows(basis, asked.low, asked.high, rounds, *((16, (12, 2)) if asked.quick else (COUNT, POINTS)))
+    if not asked.quick:
+        growth_rows(basis, asked.low, asked.high, rounds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""Damping elements, wires and underplatform dampers (Sextro 5.4, 5.5): responses of the case files and their optima."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.linalg
+
+from microslip.case import load_case
+from microslip.case.assemble import Built, build
+from microslip.case.run import problem_of
+from microslip.data import Array, ModalBasis
+from microslip.harmonic_balance.problem import Problem
+from microslip.harmonic_balance.reduced import stuck
+from microslip.harmonic_balance.response import operating
+from microslip.harmonic_balance.solver import Point, solve, sweep
+
+CASES = Path(__file__).parent.parent / "pipeline" / "cases"
+Bases = Callable[[str], ModalBasis]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, and which points converged (f,)."""
+
+    frequency: Array
+    watched: Array
+    converged: Array
+
+    def largest(self, pick: Callable[[Array], Array]) -> tuple[float, float]:
+        """Frequency (Hz) and value of the largest amplitude of a combination of the read-outs."""
+        size = np.where(self.converged, np.abs(pick(self.watched)), 0.0)
+        top = int(size.argmax())
+        return float(self.frequency[top]), float(size[top])
+
+
+def opened(case: str, bases: Bases, *changes: str) -> Built:
+    """A case file with some settings changed, its bodies by their names."""
+    path = CASES / f"{case}.toml"
+    settings, _ = load_case(path, list(changes))
+    files: dict[str, ModalBasis] = {}
+    for b in settings.members:
+        files.setdefault(b.body or b.name, bases(b.body or b.name))
+    return build(settings, {b.name: files[b.body or b.name] for b in settings.members}, path)
+
+
+def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:
+    """A sweep, and points halved in where its first read-out is highest, `finer` times on both sides of the top."""
+    points = sweep(problem, frequency)
+    for _ in range(finer):
+        points = _halved(problem, points)
+    first = np.array([operating(problem, p).watched[:, 1] for p in points])
+    return Curve(np.array([p.Omega for p in points]) / (2 * np.pi), first, np.array([p.converged for p in points]))
+
+
+def _halved(problem: Problem, points: list[Point]) -> list[Point]:
+    """Two more points, half way to the neighbours of the highest."""
+    size = [abs(operating(problem, p).watched[0, 1]) if p.converged else 0.0 for p in points]
+    top = int(np.argmax(size))
+    out = list(points)
+    for a in sorted({max(top - 1, 0), min(top, len(points) - 2)}, reverse=True):
+        Omega = 0.5 * (points[a].Omega + points[a + 1].Omega)
+        out.insert(a + 1, solve(problem, Omega, [points[top].x]))
+    return out
+
+
+def sticking(problem: Problem) -> Array:
+    """Frequencies (Hz) with every contact stuck."""
+    k = [c.stiffness for c in problem.assembly.contacts]
+    return stuck(problem.assembly.joined(1), scipy.linalg.block_diag(*k))
+
+
+def over_forces(built: Built, forces: Sequence[float], frequency: Array, finer: int = 3) -> dict[float, Curve]:
+    """Normal force (N) -> response."""
+    return {F: followed(problem_of(built, F), frequency, finer) for F in forces}
+
+
+def optimum(curves: Mapping[float, Curve], pick: Callable[[Array], Array]) -> tuple[float, float, float]:
+    """Normal force (N) whose largest amplitude is smallest, the frequency (Hz) of that and the amplitude."""
+    best = min(curves, key=lambda F: curves[F].largest(pick)[1])
+    return (best, *curves[best].largest(pick))
+
+
+def of_order(built: Built, order: int) -> Built:
+    """The ring of a case under another engine order."""
+    ring = built.assembly.ring
+    assert ring is not None
+    return replace(built, assembly=replace(built.assembly, ring=replace(ring, order=order)))
+
+
+def of_mass(damper: ModalBasis, mass: float) -> ModalBasis:
+    """The body made of a material of another density (mass in kg): its shape and stiffness stay."""
+    share = mass / damper.mass
+    groups = {key: replace(g, M_r=share * g.M_r) for key, g in damper.groups.items()}
+    return replace(damper, mass=mass, groups=groups)
+
+
+def wedged(damper: ModalBasis, rpm: float, roof_angle: float = 90.0) -> float:
+    """Normal force (N) of each flank: half of the centrifugal force over the sine of half of the roof's angle."""
+    radius = float(np.linalg.norm((damper.centre - damper.rotation_point)[[0, 2]]))
+    force = damper.mass * radius * (rpm * np.pi / 30) ** 2
+    return force / (2 * np.sin(np.deg2rad(roof_angle) / 2))
+
+
+SHAPES = {"cottage-roof": "damper", "cylinder": "damper-cylinder", "asymmetric": "damper-asymmetric"}
+MASSES = (0.0165, 0.021, 0.0259, 0.0335, 0.0418, 0.056, 0.075, 0.117, 0.16)
+PRINTED = (0.0259, 0.0418, 0.117)
+RPM = 2700.0
+
+
+def under_platforms(shape: str, mass: float, bases: Bases, frequency: Array, *changes: str, finer: int = 3) -> Curve:
+    """The spin-pit rig with dampers of one shape and mass (kg) at 2700 rpm."""
+    def scaled(name: str) -> ModalBasis:
+        return of_mass(bases(name), mass) if name == SHAPES[shape] else bases(name)
+
+    built = opened(f"spin-pit-{shape}", scaled, *changes)
+    return followed(problem_of(built, wedged(scaled(SHAPES[shape]), RPM)), frequency, finer)
+
+
+def bending(watched: Array) -> Array:
+    """The first read-out."""
+    return watched[:, 0]
+
+
+def torsion(watched: Array) -> Array:
+    """rad: half of the difference of the plate's ends, 38.5 mm from the axis."""
+    return (watched[:, 2] - watched[:, 1]) / 0.077

@@ -1,0 +1,48 @@
+"""Pictures of docs/results.md: the test blade on a rotor, its stresses at resonance, its contacts in partial slip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from microslip.assessment import Assessment, assess
+from microslip.case import keeping, load_case, run_case
+from microslip.case.assemble import build
+from microslip.case.run import problem_of
+from microslip.data import ModalBasis
+from microslip.harmonic_balance.kept import record
+from microslip.harmonic_balance.response import operating
+from microslip.harmonic_balance.solver import sweep
+from microslip.results import response_of
+
+CASES = Path(__file__).parents[1] / "pipeline" / "cases"
+AT_SPEED = ("mesh.size=12", "rotation={speeds_rpm=[3000.0], point=[0.0, 0.0, -250.0]}", "output.gauss=false")
+
+
+def assessed(basis: ModalBasis) -> Assessment:
+    """The stresses of the blade case round its first resonance, driven by 3 N."""
+    changes = ["sweep.start=120", "sweep.stop=240", "sweep.points=241", "amplitude=3.0"]
+    settings, raw = load_case(CASES / "blade.toml", changes)
+    result = run_case(settings, basis, CASES / "blade.toml")
+    name = next(iter(result.built.bodies))
+    head = keeping.head_of(result.built, raw, {name: ""}, {name: ""})
+    points = {
+        keeping.series_name(n): keeping.closed_points(result.built, r, result.at_peaks[n])
+        for n, r in result.responses.items()
+    }
+    told = {"parameters": {keeping.series_name(n): {"normal_force": n} for n in result.responses}}
+    response = response_of({**head, **told}, points)
+    return assess(response, basis, settings.monitor or "", limits=settings.material_limits)
+
+
+def maps(basis: ModalBasis, normal: float, hertz: float) -> list[Any]:
+    """Contact maps of the rough case at one frequency, reached in a few steps from below."""
+    settings, _ = load_case(CASES / "blade-rough.toml")
+    built = build(settings, {b.name: basis for b in settings.members}, CASES / "blade-rough.toml")
+    problem = problem_of(built, normal)
+    point = sweep(problem, np.linspace(0.9, 1.0, 5) * hertz)[-1]
+    if not point.converged:
+        raise RuntimeError(point.status)
+    return keeping.maps_at(built, normal, record(problem, point, operating(problem, point)))

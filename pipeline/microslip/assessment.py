@@ -1,0 +1,301 @@
+"""What a response means for a body: the stress at its resonances, where, and how far from breaking.
+
+From a response file and the body's modal file alone, whoever computed them and when.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .data import Array, ModalBasis, UserError
+from .operating.fatigue import Endurance, MaterialLimits, endurance
+from .operating.motion import Motion, amplitude, read_out
+from .operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
+from .results import Response, Series
+
+if TYPE_CHECKING:
+    from .operating.patches import ContactMap
+    from .progress import Report
+
+LIFTS = "contacts would lift off: not valid"
+"""Note on a resonance of the closed form."""
+
+ENDLESS = MaterialLimits(fatigue_strength=1e300, tensile_strength=1e301)
+"""Limits of a case that gives none: the worst place is then that of the largest amplitude."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A local maximum of a sweep.
+
+    Attributes:
+        normal_force: N. index: of the point in its series. frequency: Hz. amplitude: m, of the read-out that is drawn.
+            worst: place of the body whose vibration may grow least (largest amplitude without limits). lifts: contacts
+            would lift off, which the closed form that gave it does not follow.
+    """
+
+    normal_force: float
+    index: int
+    frequency: float
+    amplitude: float
+    worst: Endurance
+    lifts: bool = False
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Stresses of one body in a response.
+
+    Attributes:
+        member: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
+            places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
+            None.
+    """
+
+    member: str
+    sweeps: Mapping[float, tuple[Series, Motion, Array, StressPeaks]]
+    resonances: tuple[Resonance, ...]
+    limits: MaterialLimits | None
+
+    @property
+    def highest(self) -> Resonance | None:
+        """The resonance with the least margin (without limits, the most stressed one), of the valid ones if any."""
+        valid = [r for r in self.resonances if not r.lifts]
+        key = (lambda r: r.worst.vibration) if self.limits else (lambda r: -r.worst.amplitude)
+        return min(valid or self.resonances, key=key, default=None)
+
+    def at(self, r: Resonance) -> tuple[Motion, CycleStress]:
+        """Motion and stress at a resonance."""
+        motion = self.sweeps[r.normal_force][1].at(r.index)
+        return motion, cycle_stress(motion)
+
+    def table(self) -> list[dict[str, Any]]:
+        """Rows for the terminal and the report; lengths in m, stresses in Pa."""
+        return [self._row(r) for r in self.resonances]
+
+    def _row(self, r: Resonance) -> dict[str, Any]:
+        row: dict[str, Any] = {
+            "normal_force_N": r.normal_force,
+            "frequency_Hz": r.frequency,
+            "amplitude_m": r.amplitude,
+        }
+        row |= {"stress_amplitude_Pa": r.worst.amplitude, "mean_stress_Pa": r.worst.mean}
+        if self.limits is not None:
+            row["vibration_may_grow"] = r.worst.vibration
+        row |= {"at_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
+        return row | ({"note": LIFTS if r.lifts else ""} if any(one.lifts for one in self.resonances) else {})
+
+
+def assess(
+    response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
+    only: Array | None = None, report: Report = lambda _: None, lifted: Mapping[float, Array] | None = None,
+) -> Assessment:  # fmt: skip
+    """The stresses of a body at every point of a response.
+
+    Args:
+        monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
+            where there is one body. only: numbers of the stress places that count, all if None. lifted: normal force
+            (N) -> resonances (Hz) that are not valid because contacts would lift off.
+
+    Raises:
+        UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
+    """
+    name = member or next(iter(response.bodies))
+    sweeps, found = {}, list[Resonance]()
+    for series in response.series:
+        if not len(series.key):
+            continue
+        report(f"stresses of {name}: {series.name}")
+        motion = response.motion(series, basis, name)
+        normal = float(series.parameters.get("normal_force", 0.0))
+        chosen, at = drawn_points(series), tops(series)
+        sweeps[normal] = (series, motion, chosen, stress_peaks(motion.at(chosen), only=only, largest=False))
+        for i in at:
+            worst = endurance(cycle_stress(motion, i), limits or ENDLESS, only)
+            size = float(abs(series.monitor(monitor)[i, 0, 1]))
+            f = float(series.frequency[i])
+            lifts = bool(np.isclose((lifted or {}).get(normal, np.zeros(0)), f, rtol=1e-9).any())
+            found.append(Resonance(normal, i, f, size, worst, lifts))
+    return Assessment(name, sweeps, tuple(found), limits)
+
+
+MOST_DRAWN, BESIDE_A_PEAK = 400, 20
+"""Points of a sweep that are drawn if it has more, and how many on either side of a resonance are drawn in any case."""
+
+
+def drawn_points(series: Series) -> Array:
+    """Numbers of the points of a sweep that a curve needs."""
+    count = len(series.key)
+    chosen = np.zeros(count, dtype=bool)
+    chosen[np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)] = True
+    for i in tops(series):
+        chosen[max(i - BESIDE_A_PEAK, 0) : i + BESIDE_A_PEAK + 1] = True
+    return np.flatnonzero(chosen)
+
+
+def tops(series: Series) -> list[int]:
+    """Points of a series that are resonances: those that were searched for between the others."""
+    flags = series.arrays.get("peak", np.zeros(len(series.key)))
+    return [int(i) for i in np.flatnonzero(flags) if series.converged[i]]
+
+
+def over_engine_order(
+    responses: Mapping[int, Response], basis: ModalBasis, member: str = "", gauge: str = "", only: Array | None = None,
+    first_harmonic: bool = False,
+) -> dict[float, tuple[Array, Array]]:  # fmt: skip
+    """Largest alternating stress of a body over the engine order, for every normal force (Sextro Figs. 5.5-4, 5.5-5).
+
+    Args:
+        responses: engine order -> response, of sweeps over the resonance. gauge: the strain of a gauge instead. only,
+            first_harmonic: see `operating.stress.stress_peaks`.
+
+    Returns:
+        Normal force (N) -> engine orders and MPa (microstrain of a gauge): curves of
+        `pictures.operating.over_engine_order_plot`. Points that did not converge do not count.
+    """
+    found: dict[float, list[tuple[int, float]]] = {}
+    for order, response in sorted(responses.items()):
+        for series in response.series:
+            motion = response.motion(series, basis, member or next(iter(response.bodies)))
+            if gauge:
+                size = 1e6 * amplitude(read_out(motion, gauge, "gauges"))[:, 0]
+            else:
+                peaks = stress_peaks(motion, only=only, first_harmonic=first_harmonic, largest=False)
+                size = 1e-6 * peaks.amplitude
+            highest = float(np.max(size, where=series.converged, initial=0.0))
+            found.setdefault(float(series.parameters.get("normal_force", 0.0)), []).append((order, highest))
+    return {n: (np.array([o for o, _ in rows]), np.array([v for _, v in rows])) for n, rows in found.items()}
+
+
+def has_stresses(basis: ModalBasis, response: Response, member: str = "") -> bool:
+    """Whether every group that a response needs has stress modes at the nodes and shapes."""
+    body = response.bodies[member or next(iter(response.bodies))]
+    for k in {k for k, _ in body.harmonics}:
+        group = next((g for (s, h), g in basis.groups.items() if h == k and s in (body.speed, 0)), None)
+        if group is None or "nodes" not in group.stresses:
+            return False
+    return True
+
+
+# pictures and files ------------------------------------------------------------------------------------------------
+
+
+def draw(
+    found: Assessment, basis: ModalBasis, case: str, folder: Path, scenes: bool = True,
+    maps: Mapping[str, list[ContactMap]] | None = None,
+) -> dict[str, Path]:  # fmt: skip
+    """Stress over frequency and normal force, the most endangered body, its Haigh diagram, contact maps.
+
+    Args:
+        case: for titles. scenes: False leaves out what needs PyVista. maps: title -> patches.
+
+    Returns:
+        Name -> file; names are those under which the report shows them.
+    """
+    from .pictures import operating
+
+    drawn: dict[str, Path] = {}
+    curves = {n: operating.stress_curve(s.frequency[i], p, s.converged[i]) for n, (s, _, i, p) in found.sweeps.items()}
+    if curves:
+        label, title = "largest stress amplitude of the body in MPa", f"{case}: largest stress of the body"
+        drawn["stress over frequency"] = operating.over_frequency_plot(
+            curves, label, title, folder / "stress_over_frequency.png"
+        )
+    out = ", ".join(f"{r.normal_force:g} N" for r in found.resonances if r.lifts)
+    out = f"\n(left out: {out}, where contacts would lift off)" if out else ""
+    if lines := _over_force(found):
+        drawn["stress over normal force"] = operating.over_normal_force_plot(
+            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force{out}",
+            folder / "stress_over_normal_force.png",
+        )  # fmt: skip
+    top = found.highest
+    if top is not None:
+        drawn |= _at_worst(found, top, basis, case, folder, scenes)
+    for title, patches in (maps or {}).items():
+        path = folder / f"{title.replace(' ', '_')}.png"
+        where = f", {top.frequency:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
+        drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}", path)
+    return drawn
+
+
+APART = 1.25
+"""Factor between the frequencies of a resonance at two neighbouring normal forces beyond which it is another one."""
+
+
+def families(found: Assessment) -> dict[str, list[Resonance]]:
+    """Resonances followed over the normal force, from the largest down, the nearest in frequency paired first."""
+    lines: list[list[Resonance]] = []
+    for normal in sorted({r.normal_force for r in found.resonances}, reverse=True):
+        new = [r for r in found.resonances if r.normal_force == normal]
+        pairs = [(abs(np.log(line[-1].frequency / r.frequency)), i, j)
+                 for i, line in enumerate(lines) for j, r in enumerate(new)]  # fmt: skip
+        taken: dict[int, int] = {}
+        for away, i, j in sorted(pairs):
+            if away < np.log(APART) and i not in taken.values() and j not in taken:
+                taken[j] = i
+        for j, r in enumerate(new):
+            if j in taken:
+                lines[taken[j]].append(r)
+            else:
+                lines.append([r])
+    return {f"near {line[0].frequency:.4g} Hz": line for line in lines}
+
+
+def _over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
+    """Normal force, N, and stress amplitude, MPa, of every family of more than two resonances that are valid."""
+    valid = {name: [r for r in line if not r.lifts] for name, line in families(found).items()}
+    return {
+        name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line]
+        for name, line in valid.items()
+        if len(line) > 2
+    }
+
+
+def _at_worst(
+    found: Assessment, top: Resonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
+) -> dict[str, Path]:  # fmt: skip
+    from .pictures import operating
+    from .store import complete_or_absent
+
+    drawn: dict[str, Path] = {}
+    motion, cycle = found.at(top)
+    where = f"{top.frequency:.5g} Hz, $F_N$ = {top.normal_force:g} N"
+    if found.limits is not None:
+        drawn["Haigh diagram"] = operating.haigh_plot(
+            cycle, found.limits, top.worst, f"{case}: {where}", folder / "haigh.png"
+        )
+    if scenes and basis.mesh.n_cells:
+        from .pictures.scene import quiet_vtk
+        from .pictures.views import open_studio
+
+        quiet_vtk()
+        studio = open_studio(basis)
+        try:
+            title = f"{case}: resonance at {top.frequency:.5g} Hz under {top.normal_force:g} N"
+            image = operating.stress_picture(studio, motion, cycle, title, found.limits, top.worst.place)
+        finally:
+            studio.stage.close()
+        if image is not None:
+            drawn["stress at resonance"] = folder / "stress_at_resonance.png"
+            with complete_or_absent(drawn["stress at resonance"]) as temporary:
+                image.save(temporary, format="PNG", compress_level=6)
+    return drawn
+
+
+def write_shape(found: Assessment, basis: ModalBasis, path: Path) -> Path | None:
+    """The operating shape at the worst resonance as VTU; None without resonances, shapes or cells."""
+    from .operating.shape import write_shape_vtu
+
+    top = found.highest
+    if top is None or not basis.mesh.n_cells:
+        return None
+    try:
+        write_shape_vtu(found.sweeps[top.normal_force][1].at(top.index), basis, path, found.limits)
+    except UserError:
+        return None
+    return path

@@ -1,0 +1,445 @@
+"""From a case's settings and modal files to an assembly: names looked up, faces set against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from ..compliance import SURFACE, statics_beside
+from ..coordinates import first_modes, in_modes
+from ..data import Array, Interface, ModalBasis, ModalGroup, UserError
+from ..frames import rotation
+from ..speed_range import basis_at
+from .counting import Face, Springs, brought, counted_once
+from .driving import damped, flow_of, loads_of, remarks_of, with_field
+from .patches import curved_springs, load_of, nodal_patch, patch_of, resolved, waves
+from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
+
+if TYPE_CHECKING:
+    from ..contact.law import Law
+    from ..contact.patch import Patch
+    from ..system.assembly import Assembly, Contact, Load, Member, Side, Watch
+    from ..system.meeting import Met, Place
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A body of a case: its settings, its modal file at the speed asked for, groups in the coordinates to be used.
+
+    stored: the groups as the file has them, by nodal diameter. groups: in modes where statics stand beside them.
+    """
+
+    settings: BodyOfCase
+    basis: ModalBasis
+    stored: Mapping[int, ModalGroup]
+    groups: Mapping[int, ModalGroup]
+
+    @property
+    def group(self) -> ModalGroup:
+        """The first one: of all of a body that is not cyclic."""
+        return self.groups[min(self.groups)]
+
+    @property
+    def beside(self) -> bool:
+        return statics_beside(self.stored[min(self.stored)], self.basis.reduction)
+
+    def face(self, name: str, path: Path | str, key: str) -> Interface:
+        if name not in self.group.interfaces:
+            known = ", ".join(self.group.interfaces) or "none"
+            raise UserError(
+                f"{path}: {key}: the modal file of '{self.basis.name}' has no interface '{name}'; it has {known}"
+            )
+        return self.group.interfaces[name]
+
+
+@dataclass(frozen=True)
+class Built:
+    """An assembly made from a case.
+
+    Attributes:
+        settings. bodies: by name. contacts: with their sizes, in the assembly's order. springs: of
+            each along n, t1, t2, N/m, without what the bodies hold. assembly: its contacts pressed by
+            nothing where the sweep presses them. remarks: what a reader must know.
+    """
+
+    settings: CaseSettings
+    bodies: Mapping[str, Loaded]
+    contacts: tuple[ContactSettings, ...]
+    springs: tuple[Springs, ...]
+    assembly: Assembly
+    remarks: tuple[str, ...]
+
+    @property
+    def speed(self) -> float:
+        """rad/s of the first body."""
+        return next(iter(self.bodies.values())).group.speed
+
+    def pressed(self, normal: float | None) -> Assembly:
+        """The assembly with a normal force (N) in every contact that the sweep presses; all of its ring if asked."""
+        a = self.assembly
+        contacts = tuple(
+            c.pressed(normal) if swept(s) and normal is not None else c
+            for c, s in zip(a.contacts, self.contacts, strict=True)
+        )
+        whole = replace(a, contacts=contacts)
+        return whole.unrolled() if self.settings.ring and self.settings.ring.model == "full" else whole
+
+
+def swept(c: ContactSettings) -> bool:
+    """Whether the sweep's normal forces press a contact."""
+    return c.normal_force is None and c.interference is None
+
+
+def load_bodies(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | str) -> dict[str, Loaded]:
+    """The bodies of a case at their speeds.
+
+    Raises:
+        UserError: a speed that a modal file does not have; a cyclic sector without a ring.
+    """
+    return {b.name: _loaded(settings, b, bases[b.name], path) for b in settings.members}
+
+
+def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path | str) -> Loaded:
+    ring = settings.ring
+    if basis.sectors > 1 and ring is None:
+        raise UserError(
+            f"{path}: body: '{basis.name}' is one of {basis.sectors} cyclic sectors, whose contacts join neighbours: "
+            f"add [ring] with blades = {basis.sectors} and an engine_order; or leave [cyclic] out of its body.toml to "
+            "study a lone sector"
+        )
+    if basis.sectors > 1 and ring is not None and ring.blades != basis.sectors:
+        raise UserError(f"{path}: ring.blades: {ring.blades}, but '{basis.name}' is one of {basis.sectors} sectors")
+    key = "" if settings.body else f"bodies.{b.name}."
+    stored = _at_speed(b, basis, path, key)
+    beside = statics_beside(stored[min(stored)], basis.reduction)
+    groups = {k: in_modes(g) for k, g in stored.items()} if beside else stored
+    if b.damping_ratio is not None:
+        groups = damped(groups, b.damping_ratio, f"{path}: {key}damping_ratio")
+    if b.hold is not None:
+        groups = {k: held(g, b.hold, f"{path}: {key}hold") for k, g in groups.items()}
+    return Loaded(b, basis, stored, groups)
+
+
+def held(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
+    """The group on springs that give each of its rigid motions a frequency (Hz); elastic modes are left alone.
+
+    Raises:
+        UserError: the body has no rigid motion.
+    """
+    rigid = group.omega == 0
+    if not rigid.any():
+        raise UserError(f"{key}: the body is held already; hold is for bodies with free = true, leave it out")
+    V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
+    P = group.M_r @ V[:, rigid]
+    return replace(group, K_r=group.K_r + (2 * np.pi * frequency) ** 2 * P @ P.conj().T)
+
+
+def _at_speed(b: BodyOfCase, basis: ModalBasis, path: Path | str, key: str) -> dict[int, ModalGroup]:
+    """Nodal diameter -> group of a stored speed (a number), or of one in rpm, stored or in the body's range."""
+    speed = b.speed
+    if b.speed_rpm is not None:
+        try:
+            basis, speed = basis_at(basis, b.speed_rpm), 0
+        except UserError as error:
+            raise UserError(f"{path}: {key}speed_rpm: {error}") from error
+    found = {k: g for (s, k), g in basis.groups.items() if s == speed}
+    if not found:
+        count = len({s for s, _ in basis.groups})
+        known = "one speed, number 0" if count == 1 else f"{count} speeds, numbers 0 to {count - 1}"
+        raise UserError(f"{path}: {key}speed: the modal file of '{basis.name}' has {known}; correct it")
+    try:
+        return found if b.modes is None else {k: first_modes(g, b.modes) for k, g in found.items()}
+    except UserError as error:
+        raise UserError(f"{path}: {key}modes: {error}") from error
+
+
+def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | str) -> Built:
+    """The assembly of a case.
+
+    Args:
+        bases: body of the case -> its modal file. path: of the case file, for messages.
+
+    Raises:
+        UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
+            twice.
+    """
+    from ..system.assembly import Assembly, Member, Ring
+
+    bodies = load_bodies(settings, bases, path)
+    members = {
+        name: Member(name, _by_index(b), b.basis.sectors, _brings(settings, name, b)) for name, b in bodies.items()
+    }
+    contacts, springs, made, remarks = [], [], [], []
+    for c in settings.contacts:
+        own, k, said = _stiffness(settings, bodies, c, path)
+        contacts.append(own)
+        springs.append(k)
+        if settings.law_of(c) != "jenkins":  # which has a closed form, and needs no assembly of point contacts
+            contact, more = _contact(settings, bodies, members, own, k, path)
+            made.append(contact)
+            said += more
+        remarks += said
+    flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in members.values())
+    flowing, loads, said = _loads(settings, bodies, flowing, path)
+    remarks += [*said, *remarks_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
+    ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
+    assembly = Assembly(flowing, tuple(made), loads, _watches(settings, bodies, path), ring)
+    return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(dict.fromkeys(remarks)))
+
+
+def _by_index(b: Loaded) -> dict[int, ModalGroup]:
+    return dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
+
+
+def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:
+    faces = {
+        i: SURFACE if c.young else c.includes
+        for c in settings.contacts
+        for body, i in _ends(settings, c)
+        if body == name
+    }
+    first = min(b.groups)
+    return brought(b.groups[first], b.basis.reduction, b.beside, faces)
+
+
+def _ends(settings: CaseSettings, c: ContactSettings) -> list[tuple[str, str]]:
+    """(body, interface) of the one or two faces of a contact."""
+    return [settings.address(end) for end in (c.interface, c.against) if end != GROUND]
+
+
+def _body(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str) -> Loaded:
+    if name not in bodies:
+        raise UserError(f"{path}: {key}: there is no body '{name}' in this case; it has {', '.join(bodies)}")
+    return bodies[name]
+
+
+def _stiffness(
+    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
+) -> tuple[ContactSettings, Springs, list[str]]:
+    """A contact's settings with the size of its patch, its springs, and remarks."""
+    loaded, faces = _sides(settings, bodies, c, path)
+    c = c if c.file is None else _of_file(c, path)[0]
+    own = sized(c, faces[0], path)
+    if c.young is not None:
+        springs, remark = _told(path, c, lambda: curved_springs(own, load_of(settings, c)))
+    else:
+        springs, remark = counted_once(c, _faces(settings, c, loaded), path)
+    if c.file is not None and springs[0] != c.normal_stiffness:
+        raise UserError(
+            f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of the law of a file; give there the "
+            'stiffness of the surface alone, and includes = "surface" here'
+        )
+    return own, springs, [remark] if remark else []
+
+
+def _sides(
+    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
+) -> tuple[list[Loaded], list[Interface]]:
+    """The one or two bodies of a contact and their interfaces."""
+    ends = _ends(settings, c)
+    loaded = [_body(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
+    return loaded, [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
+
+
+def _contact(
+    settings: CaseSettings, bodies: Mapping[str, Loaded], members: Mapping[str, Member], c: ContactSettings,
+    springs: Springs, path: Path | str,
+) -> tuple[Contact, list[str]]:  # fmt: skip
+    """A contact, and remarks."""
+    from ..system.assembly import Side, touching
+
+    ends, law = _ends(settings, c), settings.law_of(c)
+    loaded, faces = _sides(settings, bodies, c, path)
+    first, second, met = Side(*ends[0]), None, None
+    if len(ends) == 2:
+        met = _told(path, c, lambda: _met(settings, c, loaded, faces))
+        second = Side(*ends[1], met.frame, c.against_sector)
+    whole = _of_file(c, path)[1] if c.file is not None else None
+    said, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None
+    if c.patch == "nodal":
+        patch, first, second, compliance, more = _told(
+            path, c, lambda: _nodal(settings, members, c, springs, (first, second), met, whole)
+        )
+        said += more
+    else:
+        patch = _told(path, c, lambda: patch_of(c, springs, law, faces[0], load_of(settings, c), whole))
+    said += _told(path, c, lambda: resolved(c, patch, load_of(settings, c)))
+    return touching(c.interface, patch, first, second, c.normal_force, c.interference or 0.0, compliance), said
+
+
+def _nodal(
+    settings: CaseSettings, members: Mapping[str, Member], c: ContactSettings, springs: Springs,
+    sides: tuple[Side, Side | None], met: Met | None, whole: Law | None,
+) -> tuple[Patch, Side, Side | None, Array, list[str]]:  # fmt: skip
+    """A patch that deforms, its sides, the compliance of the bodies along its coordinates, and remarks."""
+    from ..system.nodal import nodal, static_compliance
+
+    faces = [(members[s.member], s.interface) for s in sides if s]
+    for member, name in faces:
+        if member.brings is not None:
+            raise UserError(
+                f'patch: "nodal" needs the shapes of all that a body yields, but what {member.name} lacks stands in '
+                f'the six rows of {name} alone; reduce it by "rubin" or "craig-bampton", or take a rigid patch'
+            )
+    found = nodal(faces[0], faces[1] if len(faces) > 1 else None, met, waves(settings))
+    first, second = found.sides(*sides)
+    ends = [(members[s.member], s, sign) for s, sign in ((first, 1.0), (second, -1.0)) if s]
+    blades = settings.ring.blades if settings.ring else 0
+    said = (f"{c.interface}: the patch of {len(found.points)} points moves with {found.count - 6} deformations of the "
+            "bodies besides its six rigid coordinates.")  # fmt: skip
+    C = static_compliance(ends, 0, blades)
+    return nodal_patch(c, springs, settings.law_of(c), found, whole), first, second, C, [said]
+
+
+def _told(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
+    """What is made, or its mistake with the contact's place in the case file."""
+    try:
+        return make()
+    except UserError as error:
+        raise UserError(f"{path}: contacts.{c.interface}: {error}") from error
+
+
+def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> list[Face]:
+    """The sides of a contact, for the compliance that the bodies hold."""
+    ends = _ends(settings, c)
+    if len(ends) == 2 and ends[0][0] == ends[1][0] and loaded[0].basis.sectors > 1:  # the gap to the next sector
+        b = loaded[0]
+        k = min(b.stored)
+        return [Face(b.stored[k], b.basis.reduction, ends[0][1], (), b.basis.sectors, ends[1][1])]
+    found = []
+    for b, (body, name) in zip(loaded, ends, strict=True):
+        among = tuple(i for other in settings.contacts if other.against == GROUND
+                      for own, i in _ends(settings, other) if own == body)  # fmt: skip
+        found.append(Face(b.stored[min(b.stored)], b.basis.reduction, name, among if len(ends) == 1 else ()))
+    return found
+
+
+def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Met:
+    """How the two faces of a contact meet."""
+    from ..system.meeting import facing, in_ring
+
+    names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
+    seen = two.seen_from(one)
+    if not settings.ring or not c.against_sector:
+        return facing(faces[0], faces[1], seen, names)
+    basis = loaded[0].basis
+    axis, point = one.turn.T @ basis.rotation_axis, one.turn.T @ (basis.rotation_point - one.shift)
+    return in_ring(faces[0], faces[1], axis, point, settings.ring.blades, names, c.against_sector, seen)
+
+
+def _place(b: Loaded) -> Place:
+    """Where a body stands in the axes of the case."""
+    from ..system.meeting import Place
+
+    R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))
+    centre = b.basis.rotation_point
+    return Place(R, centre - R @ centre + np.asarray(b.settings.shift))
+
+
+def _of_file(c: ContactSettings, path: Path | str) -> tuple[ContactSettings, Law]:
+    """A contact whose stiffnesses are those of its file, and the law in it.
+
+    Raises:
+        UserError: no such file, or one that makes no law for point contacts.
+    """
+    from ..contact.composed import compose
+    from ..contact.settings import load_contact
+
+    file = Path(path).parent / str(c.file)
+    if not file.is_file():
+        raise UserError(f"{path}: contacts.{c.interface}.file: there is no file {file}; correct the path")
+    found = compose(load_contact(file), file)
+    if found.law is None or found.stiffness is None:
+        raise UserError(
+            f"{path}: contacts.{c.interface}.file: {file} needs friction and a tangential stiffness to make a law; "
+            "add them"
+        )
+    includes = c.includes or ("surface" if found.stiffness.includes == "surface" else None)
+    first, _ = found.stiffness.tangential
+    own = {"normal_stiffness": found.normal_0, "tangential_stiffness": first, "includes": includes}
+    return c.model_copy(update=own), found.law
+
+
+def sized(c: ContactSettings, face: Interface, path: Path | str) -> ContactSettings:
+    """The contact with the extents of its patch; given ones that differ by more than 5 % are refused."""
+    b0, h0 = (float(v) for v in face.extent)
+    sizes = {"width": b0, "height": h0}
+    for key, own in (("width", b0), ("height", h0)):
+        given = getattr(c, key)
+        if own == 0:  # a point, of a system by hand: the patch is what the case says
+            sizes[key] = given or 0.0
+        elif given is not None and abs(given / own - 1) > 0.05:
+            raise UserError(
+                f"{path}: contacts.{c.interface}.{key}: {given:g} m is not the patch's, which is {own:g} m; "
+                "leave it out or correct it (metres)"
+            )
+    return c.model_copy(update=sizes)
+
+
+def _blades(settings: CaseSettings) -> int:
+    return settings.ring.blades if settings.ring else 0
+
+
+def _in_flow(settings: CaseSettings, member: Member, b: Loaded, path: Path | str) -> Member:
+    """The member with what the flow adds to its waves."""
+    if b.settings.aerodynamics is None:
+        return member
+    file, where = Path(path).parent / b.settings.aerodynamics, f"{path}: bodies.{b.settings.name}.aerodynamics"
+    return replace(member, aerodynamic=flow_of(file, _blades(settings), settings.turning, where))
+
+
+def _loads(
+    settings: CaseSettings, bodies: Mapping[str, Loaded], members: tuple[Member, ...], path: Path | str
+) -> tuple[tuple[Member, ...], tuple[Load, ...], list[str]]:
+    """Members with the rows of pressure fields, all loads, and what a reader should know."""
+    found: list[Load] = []
+    said, named = [], {m.name: m for m in members}
+    base, blades, turning = settings.base_order, _blades(settings), settings.turning
+    for i, x in enumerate(settings.loads):
+        body, row = settings.address(x.row or x.face or "")
+        b = _body(bodies, body, path, "excitation")
+        if x.field is not None:
+            row, face = f"field-{i + 1}", row
+            named[body], sentence = with_field(named[body], x, row, face, path)
+            said.append(sentence)
+        else:
+            _among(b.group.excitations, row, path, "excitation")
+            if x.speed_rpm is not None and b.group.excitations[row].unit != "rad2/s2":
+                raise UserError(f"{path}: excitations.{row}.speed_rpm: the excitation is no centrifugal load; write "
+                                "centrifugal = true in the body, or leave speed_rpm out")  # fmt: skip
+        try:
+            found += loads_of(x, body, row, base, blades, turning)
+        except UserError as error:
+            raise UserError(f"{path}: excitations.{x.row or x.face}: {error}") from error
+    return tuple(named.values()), tuple(found), said
+
+
+def _watches(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Watch, ...]:
+    from ..system.assembly import Watch
+
+    found = []
+    for m in settings.watches:
+        body, name = settings.address(m.monitor)
+        group = _body(bodies, body, path, "monitor").group
+        if name in group.gauges and name not in group.monitors:
+            found.append(Watch(body, name, group.gauges[name].labels[0]))
+            continue
+        known = group.monitors
+        _among(known, name, path, "monitor")
+        label = f"u_{m.direction}"
+        if label not in known[name].labels:
+            labels = ", ".join(known[name].labels)
+            raise UserError(f"{path}: direction: monitor '{name}' reads {labels}, not {label}; choose one")
+        found.append(Watch(body, name, label))
+    return tuple(found)
+
+
+def _among(rows: Mapping[str, Any], name: str, path: Path | str, key: str) -> None:
+    if name not in rows:
+        raise UserError(f"{path}: {key}: the modal file has no {key} '{name}'; it has {', '.join(rows) or 'none'}")

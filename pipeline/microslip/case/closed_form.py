@@ -1,0 +1,93 @@
+"""Cases of one body on the ground with Jenkins elements: one harmonic in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..data import INTERFACE_ROWS, Array
+from ..harmonic_balance import (
+    FrequencyResponse,
+    JenkinsContact,
+    Residual,
+    frequency_response,
+    refined_peaks,
+    stuck_frequencies,
+)
+from .assemble import Built
+from .counting import Springs
+from .settings import ContactSettings
+
+Answer = tuple[dict[float, FrequencyResponse], dict[float, list[tuple[float, float]]], Array, list[str]]
+
+
+def in_closed_form(
+    built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None],
+    at_peaks: dict[float, FrequencyResponse],
+) -> Answer:  # fmt: skip
+    """Responses and resonances by normal force, sticking frequencies, remarks; `at_peaks` is filled."""
+    responses: dict[float, FrequencyResponse] = {}
+    resonances = {}
+    a, member = built.assembly, built.assembly.members[0]
+    group, load, watch = member.groups[0], a.loads[0], a.watches[0]
+    amplitude = float(load.amplitude.real)
+    force = amplitude * group.excitations[load.row].rows[0]
+    monitored = group.monitors[watch.monitor]
+    row = monitored.rows[monitored.labels.index(watch.label)]
+    residual = None if member.brings is None else _residual(built, member.brings)
+    for normal in forces:
+        report(f"friction response at a normal force of {normal:g} N")
+        pressed = [jenkins_contact(c, normal, s) for c, s in zip(built.contacts, built.springs, strict=True)]
+
+        def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
+            return frequency_response(group, pressed, force, row, at, residual=residual, amplitude=amplitude)
+
+        responses[normal] = respond(frequency)
+        resonances[normal] = refined_peaks(responses[normal], respond)
+        at_peaks[normal] = respond(np.array([f for f, _ in resonances[normal]]))
+    closed = [jenkins_contact(c, max(forces), s) for c, s in zip(built.contacts, built.springs, strict=True)]
+    stuck = stuck_frequencies(group, closed, residual)
+    return responses, resonances, stuck, _lift_off(responses)
+
+
+def _residual(built: Built, brings: Array) -> Residual:
+    """Residual flexibility among contacts, excitation and monitor."""
+    a = built.assembly
+    group, load, watched = a.members[0].groups[0], a.loads[0], a.watches[0]
+    names = list(group.compliance.labels)
+    left = group.compliance.residual * np.outer(brings, brings)
+    six = [f"interface:{c.interface}:{row}" for c in built.contacts for row in INTERFACE_ROWS]
+    at = [names.index(row) for row in six]
+    force = next(i for i, n in enumerate(names) if n.startswith(f"excitation:{load.row}:"))
+    watch = names.index(f"monitor:{watched.monitor}:{watched.label}")
+    return Residual(left[np.ix_(at, at)], left[at, force], left[watch, at], float(left[watch, force]))
+
+
+def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:
+    found = []
+    for normal, r in responses.items():
+        swing = r.normal_swing.max(axis=1, initial=0.0)
+        if normal and (open_ := swing > normal).any():
+            low, high = r.frequency[open_][[0, -1]]
+            found.append(
+                f"At F_N = {normal:g} N the normal force would swing by up to {swing.max():.3g} N between {low:.4g} "
+                f'and {high:.4g} Hz: the contacts would lift off there, which law = "jenkins" does not follow '
+                '(dotted in the picture, marked in the table); write law = "smooth" in the contacts.'
+            )
+    return found
+
+
+def jenkins_contact(c: ContactSettings, normal: float, springs: Springs | None = None) -> JenkinsContact:
+    """Springs of a patch of width b0 along t1 and height h0 along t2 (Sextro Eqs. (5.2-39) to (5.2-41), uniform).
+
+    Args:
+        springs: along n, t1, t2 if not those of the settings.
+    """
+    b2, h2 = (c.width or 0.0) ** 2 / 12, (c.height or 0.0) ** 2 / 12
+    cn, c1, c2 = springs or (c.normal_stiffness, c.tangential_stiffness, c.tangential_stiffness)
+    six = np.array([cn, c1, c2, c2 * b2 + c1 * h2, cn * h2, cn * b2])
+    if normal == 0:
+        six = np.zeros(6)
+    slider = 1 if c.slides_along == "t1" else 2
+    return JenkinsContact(c.interface, six, slider, six[slider], c.friction * normal)

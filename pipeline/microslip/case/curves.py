@@ -1,0 +1,224 @@
+"""Responses of a case followed by arclength: over the frequency, the load, or the normal force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..data import Array, UserError
+from .assemble import Built, build, swept
+from .run import normal_forces, problem_of
+from .surveys import CurveOfCase, pointwise
+
+if TYPE_CHECKING:
+    from ..harmonic_balance.families import Family
+    from ..harmonic_balance.problem import Problem
+    from ..results import Journal
+    from .settings import CaseSettings
+    from .surveys import Bases, Report
+
+Keep = Callable[[Built], AbstractContextManager["Journal"]]
+
+OVER = ("frequency", "load", "normal_force")
+"""What a response is followed over."""
+
+UNITS = {"frequency": "Hz", "load": "of the load", "normal_force": "N"}
+COLUMNS = {"frequency": "frequency_Hz", "load": "load", "normal_force": "normal_force_N"}
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A curve of motions, as far as it was followed.
+
+    Attributes:
+        over: of `OVER`. normal: N of the contacts that the sweep presses; None where it presses none, or is what
+            varies. frequency: Hz at which the others vary, or None. ends: of the parameter, as asked for. name: of its
+            series. rows: points in order, see `harmonic_balance.kept.kept_curve`. status: why it ended.
+    """
+
+    over: str
+    normal: float | None
+    frequency: float | None
+    ends: tuple[float, float]
+    name: str
+    rows: Sequence[Mapping[str, Any]]
+    status: str
+
+    @cached_property
+    def parameter(self) -> Array:
+        """(p,) Hz, share of the load, or N."""
+        return np.array([row["parameter"] for row in self.rows], dtype=float)
+
+    @cached_property
+    def fold(self) -> Array:
+        """(p,) bool, where the curve turns."""
+        return np.array([row["fold"] for row in self.rows], dtype=bool)
+
+    @cached_property
+    def monitor(self) -> Array:
+        """(p, H + 1) complex harmonics of the first read-out, m."""
+        name = next((n for n in self.rows[0] if n.startswith(("monitors/", "gauges/"))), "") if self.rows else ""
+        return np.array([row[name][0] for row in self.rows], dtype=complex) if name else np.zeros((0, 2), dtype=complex)
+
+    @property
+    def amplitude(self) -> Array:
+        """(p,) m, of the first harmonic."""
+        return np.abs(self.monitor[:, 1])
+
+    @property
+    def complete(self) -> bool:
+        """Whether the other end was reached."""
+        return self.status.startswith("bound")
+
+    @property
+    def label(self) -> str:
+        """What sets the curve apart from the others."""
+        said = [] if self.normal is None else [f"F_N = {self.normal:g} N"]
+        return ", ".join(said + ([] if self.frequency is None else [f"{self.frequency:.6g} Hz"])) or "as pressed"
+
+    def columns(self) -> dict[str, Array]:
+        """Name -> column, for a table."""
+        first = {} if self.normal is None else {"normal_force_N": self.normal}
+        first |= {} if self.frequency is None else {"at_frequency_Hz": self.frequency}
+        return {
+            **{name: np.full(len(self.rows), value) for name, value in first.items()},
+            COLUMNS[self.over]: self.parameter,
+            "amplitude_m": self.amplitude,
+            "phase_deg": np.degrees(np.angle(self.monitor[:, 1])),
+            "mean_m": self.monitor[:, 0].real,
+            "slipping": self._share("slipping"),
+            "open": self._share("open"),
+            "fold": self.fold.astype(float),
+            "leg": 1.0 + np.cumsum(self.fold) - self.fold,
+        }
+
+    def _share(self, what: str) -> Array:
+        """(p,) of points times cycle, over all contacts."""
+        return np.array(
+            [np.mean([v for n, v in row.items() if n.endswith(f"/{what}")] or [0.0]) for row in self.rows]
+        )  # fmt: skip
+
+    def sentences(self) -> list[str]:
+        """What was found."""
+        unit, (begin, end) = UNITS[self.over], self.ends
+        if not self.rows:
+            key = "band" if self.over == "frequency" else self.over
+            return [f"{self.label}: {self.status}; begin elsewhere than at {begin:.6g} {unit} (curve.{key})."]
+        top, folds = int(np.argmax(self.amplitude)), self.parameter[self.fold]
+        said = f"{self.label}: {len(self.rows)} points, at most {self.amplitude[top]:.4g} m at "
+        said += f"{self.parameter[top]:.6g} {unit}; "
+        if len(folds) > 4:
+            said += f"{len(folds)} folds between {folds.min():.6g} and {folds.max():.6g} {unit}."
+        else:
+            said += f"folds at {', '.join(f'{f:.6g}' for f in folds)} {unit}." if len(folds) else "no fold."
+        if self.complete:
+            return [said]
+        ended = f"{self.label}: the curve ends at {self.parameter[-1]:.6g} {unit}, not at {end:.6g}: {self.status}"
+        return [said, f"{ended} (curve.points)." if self.status.startswith("points") else f"{ended}."]
+
+
+def curves(
+    settings: CaseSettings, bases: Bases, path: Path | str, over: str, keep: Keep, report: Report
+) -> tuple[list[Followed], bool]:
+    """The curves of a case, one for each normal force of its sweep.
+
+    Args:
+        over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
+
+    Returns:
+        The curves, and whether nobody interrupted: after Ctrl-C what was found until then.
+
+    Raises:
+        UserError: ends that are missing, no resonance to begin at.
+    """
+    from ..harmonic_balance.kept import kept_curve, labels, points_of_curve
+
+    pointwise(settings, "curve", path)
+    asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
+    ends, how = _ends(built, asked, over, path), _settings(asked)
+    found: list[Followed] = []
+    with keep(built) as journal:
+        for normal in _forces(built, over, ends, path):
+            own = None if over == "normal_force" else normal
+            one = Followed(over, own, None, ends, "", (), "interrupted")
+            try:
+                problem = problem_of(built, normal)
+                if over != "frequency":
+                    at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
+                    one = replace(one, frequency=at)
+                one = replace(one, name=f"{one.label}, {ends[0]:.10g} to {ends[1]:.10g} {UNITS[over]}")
+                told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
+                journal.say({**journal.head, "parameters": told, "labels": labels(problem)})
+                report(f"curve over the {over.replace('_', ' ')}, {one.label}")
+                branch, rows = kept_curve(_family(built, problem, one), journal, one.name, report, how)
+            except KeyboardInterrupt:
+                return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
+            found.append(replace(one, rows=rows, status=branch.status))
+    return found, True
+
+
+def _settings(asked: CurveOfCase) -> Any:
+    from ..continuation import Settings
+
+    return Settings(points=asked.points, branch_points=False)
+
+
+def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tuple[float, float]:
+    """First and last value of what varies."""
+    if over == "load":
+        return asked.load
+    if over == "frequency":
+        return asked.band or (built.settings.sweep.start, built.settings.sweep.stop)
+    if not any(swept(c) for c in built.contacts):
+        raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
+    forces = normal_forces(built, path)
+    if asked.normal_force is None and len(set(forces)) < 2:
+        raise UserError(f"{path}: curve.normal_force: give [first, last] in N; the sweep has one normal force alone")
+    return asked.normal_force or (min(forces), max(forces))
+
+
+def _forces(built: Built, over: str, ends: tuple[float, float], path: Path | str) -> tuple[float | None, ...]:
+    """Normal forces (N) of the curves; where it varies the one that they begin with."""
+    return (ends[0],) if over == "normal_force" else normal_forces(built, path) or (None,)
+
+
+def _resonance(
+    built: Built, problem: Problem, normal: float | None, journal: Journal, path: Path | str, report: Report
+) -> float:  # fmt: skip
+    """Hz of the highest resonance in the sweep's band, kept before or searched for now."""
+    from ..harmonic_balance.envelope import largest
+
+    known = dict(journal.head.get("at", {}))
+    s = built.settings.sweep
+    key = f"{normal}, {s.start:.10g} to {s.stop:.10g} Hz by {s.points}"
+    if key not in known:
+        report(f"resonance between {s.start:g} and {s.stop:g} Hz")
+        f, _, _ = largest(problem, np.linspace(s.start, s.stop, s.points))
+        if not np.isfinite(f):
+            raise UserError(f"{path}: curve.frequency: the band of the sweep holds no resonance; give a frequency (Hz)")
+        known[key] = float(f)
+        journal.say({**journal.head, "at": known})
+    return float(known[key])
+
+
+def _family(built: Built, problem: Problem, one: Followed) -> Family:
+    from ..harmonic_balance import families
+
+    a, b = one.ends
+    if one.over == "frequency":
+        return families.of_frequency(problem, a, b)
+    assert one.frequency is not None
+    if one.over == "load":
+        return families.of_load(problem, one.frequency, a, b)
+    top = max(a, b)
+    pressed = problem_of(built, top)
+    count = len(built.contacts)
+    which = frozenset(i for i in range(len(pressed.assembly.contacts)) if swept(built.contacts[i % count]))
+    family = families.of_normal_force(pressed, one.frequency, a / top, b / top, which)
+    return replace(family, unit=1 / top, words="N")

@@ -1,0 +1,218 @@
+"""What drives the bodies of a case: the keys of its excitations and damping, and the loads made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..body import Model, NotNegative, Number, Numbers, Positive
+from ..data import ModalGroup, UserError
+from .keys import Address, Order
+
+if TYPE_CHECKING:
+    from ..system.assembly import Load, Member
+    from ..system.excitation import Turning
+
+ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
+
+
+class MagnetsOfCase(Model):
+    """Exciters that stand around the rotor: their engine orders follow from where they stand.
+
+    angles: degrees. force: peak of each, or one for all, N. width: degrees over which each is felt. pulse: ``cosine``,
+    cos^2, or ``rectangular``. place: degrees at which the loaded spot of the first blade stands at time 0. highest:
+    engine order.
+    """
+
+    angles: Numbers
+    force: Number | Numbers = 1.0
+    width: Positive
+    pulse: Literal["cosine", "rectangular"] = "cosine"
+    place: Number = 0.0
+    highest: Annotated[int, Field(ge=1, le=1000)] = 24
+
+    @model_validator(mode="after")
+    def _fits(self) -> MagnetsOfCase:
+        if not self.angles or (isinstance(self.force, tuple) and len(self.force) != len(self.angles)):
+            raise ValueError("angles and force: give one or more angles, and one force or as many as angles")
+        if self.width > 360:
+            raise ValueError("width: more than a whole turn; give degrees")
+        return self
+
+
+class ExcitationOfCase(Model):
+    """A harmonic force: a row of a body's modal file times an amplitude (N, or Pa for a unit pressure).
+
+    row: ``excitation``, or ``body:excitation``. phase: degrees. harmonic: of the frequency that is swept; 0: steady.
+    engine_order: instead of the harmonic; the swept frequency is that of the greatest common divisor of all engine
+    orders, or of ring.engine_order where that is given. stimulus times steady (N or Pa): instead of the amplitude.
+    speed_rpm: of a centrifugal excitation, steady. magnets: instead of amplitude and order.
+
+    field: a complex pressure field on a face (an interface, or a face that an excitation of the body names) instead of
+    a row: .csv, .npz, .vtu or .vtk beside the case, with x, y, z in length_unit and p_real, p_imag in Pa;
+    time_factor ``-`` for programs with exp(-i Omega t). amplitude then multiplies the field.
+    """
+
+    row: Address | None = None
+    amplitude: Number = 1.0
+    phase: Number = 0.0
+    harmonic: Annotated[int, Field(ge=0, le=1000)] = 1
+    engine_order: Order | None = None
+    steady: Number | None = None
+    stimulus: NotNegative | None = None
+    speed_rpm: NotNegative | None = None
+    magnets: MagnetsOfCase | None = None
+    field: str | None = None
+    face: Address | None = None
+    length_unit: Literal["m", "cm", "mm", "um", "in", "ft"] | None = None
+    time_factor: Literal["+", "-"] = "+"
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> ExcitationOfCase:
+        given = self.model_fields_set
+        if (self.row is None) == (self.field is None):
+            raise ValueError("give a row of the body, or a pressure field (field and face), and not both")
+        if self.field is not None and (self.face is None or self.length_unit is None):
+            raise ValueError("field: a pressure field needs face and length_unit")
+        if self.field is None and given & {"face", "length_unit", "time_factor"}:
+            raise ValueError("face, length_unit and time_factor belong to a pressure field; add field")
+        if (self.steady is None) != (self.stimulus is None) or (self.steady is not None and "amplitude" in given):
+            raise ValueError("stimulus and steady come together, instead of amplitude")
+        if self.engine_order is not None and "harmonic" in given:
+            raise ValueError("engine_order and harmonic: an order is a harmonic of the base order; give one of them")
+        if self.engine_order == 0:
+            raise ValueError("engine_order: 0 is steady; write harmonic = 0")
+        return self._alone(given)
+
+    def _alone(self, given: set[str]) -> ExcitationOfCase:
+        """Magnets and centrifugal loads leave no other way of saying how large and how fast."""
+        others = given & {"amplitude", "steady", "stimulus", "engine_order", "phase"}
+        for key, more in (("magnets", {"speed_rpm", "field", "harmonic"}), ("speed_rpm", {"magnets", "field"})):
+            if getattr(self, key) is not None and (wrong := sorted(others | (given & more))):
+                raise ValueError(f"{key} and {wrong[0]}: one says what the other would; give one of them")
+        if self.speed_rpm is not None and given & {"harmonic"} and self.harmonic != 0:
+            raise ValueError("speed_rpm: a centrifugal load is steady; write harmonic = 0 or leave it out")
+        return self
+
+    @property
+    def size(self) -> complex:
+        """Amplitude with its phase."""
+        share = self.stimulus * self.steady if self.stimulus is not None and self.steady is not None else None
+        return complex((self.amplitude if share is None else share) * np.exp(1j * np.radians(self.phase)))
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Engine orders that it names."""
+        if self.magnets is not None:
+            return pattern_of(self.magnets).orders()
+        return () if self.engine_order is None else (self.engine_order,)
+
+
+def pattern_of(m: MagnetsOfCase):  # type: ignore[no-untyped-def]  # noqa: ANN201 - its room needs jax
+    """The pattern of magnets around the rotor."""
+    from ..system.excitation import magnets
+
+    return magnets(np.radians(m.angles), np.array(m.force), float(np.radians(m.width)), m.highest, m.pulse)
+
+
+# --- from settings to loads ------------------------------------------------------------------------------------------
+
+
+def base_of(excitations: Sequence[ExcitationOfCase], given: int | None, turning: Turning) -> int:
+    """Base engine order, as `Ring.order` has it: the given one, or the greatest common divisor of those named.
+
+    Raises:
+        UserError: orders that run both ways.
+    """
+    from ..system.excitation import base_order
+
+    named = [e for x in excitations for e in x.orders]
+    if given is not None or not named:
+        return turning * (given if given is not None else 1)
+    signs = {np.sign(e) for e in named}
+    return turning * base_order(named) * (-1 if signs == {-1} else 1)
+
+
+def loads_of(
+    x: ExcitationOfCase, member: str, row: str, base: int, blades: int, turning: Turning
+) -> tuple[Load, ...]:  # fmt: skip
+    """The loads of one excitation on a row of a member.
+
+    Args:
+        base: see `base_of`. blades: N of a ring, else 0.
+
+    Raises:
+        UserError: an engine order that is no multiple of the base, or runs the other way round.
+    """
+    from ..system.assembly import Load, Ring
+    from ..system.excitation import harmonic_of, pattern_loads
+    from ..system.pressure import field_loads
+
+    wave = Ring(blades, base) if blades else abs(base)
+    if x.magnets is not None:
+        return pattern_loads(member, row, pattern_of(x.magnets), wave, float(np.radians(x.magnets.place)), turning)
+    if x.speed_rpm is not None:
+        return (Load(member, row, (x.speed_rpm * np.pi / 30) ** 2, 0),)
+    h = x.harmonic if x.engine_order is None else harmonic_of(x.engine_order, wave, turning)
+    return field_loads(member, row, h, x.size) if x.field is not None else (Load(member, row, x.size, h),)
+
+
+def with_field(
+    member: Member, x: ExcitationOfCase, name: str, face: str, path: Path | str
+) -> tuple[Member, str]:  # fmt: skip
+    """A member with the rows of a pressure field, and what a reader should know of it.
+
+    Raises:
+        UserError: a file, a face or a unit that does not fit.
+    """
+    from ..system.pressure import load_face, on_face, read_field, with_pressure
+
+    file = Path(path).parent / str(x.field)
+    try:
+        field = read_field(file, str(x.length_unit), x.time_factor == "-")
+        found = on_face(field, load_face(member, face), face)
+        return with_pressure(member, name, found), found.sentence()
+    except UserError as error:
+        raise UserError(f"{path}: excitations.{x.face}.field: {error}") from error
+
+
+def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], where: str) -> dict[int, ModalGroup]:
+    """Groups with the damping ratios of a case.
+
+    Raises:
+        UserError: no ratio.
+    """
+    from ..system.damping import with_ratios
+
+    try:
+        return {k: with_ratios(g, ratios) for k, g in groups.items()}
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from error
+
+
+def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:
+    """Frequency shift and damping that the flow adds, by wave.
+
+    Raises:
+        UserError: a file that does not fit the ring.
+    """
+    from ..system.damping import read_aerodynamics
+
+    try:
+        return read_aerodynamics(file, blades, turning)
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from error
+
+
+def remarks_of(
+    members: Iterable[Member], loads: Sequence[Load], harmonics: int, blades: int, turning: Turning
+) -> list[str]:
+    """Modes that the flow feeds, and loads beyond the harmonics that are balanced."""
+    from ..system.damping import unstable
+    from ..system.excitation import unheard
+
+    return [s for m in members if m.aerodynamic for s in unstable(m, blades, turning)] + unheard(loads, harmonics)

@@ -1,0 +1,173 @@
+"""What a case puts into its response file: the head that says what points are of, and points of the closed form."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
+from ..harmonic_balance import FrequencyResponse
+from ..results import Body
+from .assemble import Built, Loaded
+from .settings import CaseSettings
+
+if TYPE_CHECKING:
+    from ..operating.patches import ContactMap
+
+SELECTS = ("start", "stop", "points", "normal_forces")
+"""Keys of the sweep that say which points are asked for, and not what they are."""
+
+NOT_OF_A_POINT = (
+    "name", "description", "material_limits", "orders", "speeds", "ranges", "curve", "identification",
+)  # fmt: skip
+"""Keys of a case that no point depends on."""
+
+MOST_MAPS = 4
+"""Patches that are drawn."""
+
+
+def without_defaults(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """A case file without the keys whose values are those they would have anyway."""
+    fields = CaseSettings.model_fields
+    return {k: v for k, v in raw.items() if k not in fields or v != fields[k].default}
+
+
+def of_a_point(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """A case file without what its points do not depend on."""
+    kept = {k: v for k, v in without_defaults(raw).items() if k not in NOT_OF_A_POINT}
+    return kept | {"sweep": {k: v for k, v in raw.get("sweep", {}).items() if k not in SELECTS}}
+
+
+def series_name(normal: float) -> str:
+    """Name of the sweep under a normal force, N."""
+    return f"normal force {normal:g} N"
+
+
+def head_of(
+    built: Built, raw: Mapping[str, Any], hashes: Mapping[str, str], files: Mapping[str, str]
+) -> dict[str, Any]:  # fmt: skip
+    """Head of a case's journal and response file.
+
+    Args:
+        hashes, files: body of the case -> SHA-256 and name of its modal file.
+    """
+    s = built.settings
+    bodies = {
+        member: vars(_body(built, name, hashes[name], files[name]))
+        for name in built.bodies
+        for member in _standing(built, name)
+    }
+    mode = s.mode if s.has_laws else "jenkins"
+    told = {"case": s.name, "description": s.description, "mode": mode, "settings": dict(raw), "bodies": bodies}
+    return told | ({"harmonics": s.balanced} if mode != "jenkins" else {})
+
+
+def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSettings:
+    """A case with the number of harmonics that its response in a folder has, where it does not give one.
+
+    Raises:
+        UserError: there is no response.
+    """
+    if not settings.looks_for_harmonics:
+        return settings
+    try:
+        return settings.with_harmonics(int(json.loads((folder / "response.json").read_text())["harmonics"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        raise UserError(
+            f'{path}: harmonics: "auto" is found by microslip respond {path}; run it first, or give a number'
+        ) from None
+
+
+def _standing(built: Built, name: str) -> list[str]:
+    """Names under which a body stands in the assembly that is balanced: N of a full ring."""
+    ring = built.settings.ring
+    return [f"{name}_{j}" for j in range(ring.blades)] if ring and ring.model == "full" else [name]
+
+
+def _body(built: Built, name: str, sha256: str, file: str) -> Body:
+    b = built.bodies[name]
+    count = built.settings.balanced if built.settings.has_laws or not built.settings.contacts else 1
+    harmonics = tuple(_wave(built, b, h) for h in range(count + 1))
+    speed = b.settings.speed if b.settings.speed_rpm is None else -1
+    return Body(b.basis.name, sha256, file, speed, b.group.speed * 30 / np.pi, harmonics, b.beside)
+
+
+def _wave(built: Built, b: Loaded, harmonic: int) -> tuple[int, bool]:
+    """Nodal diameter of the group that a harmonic moves in, and whether its conjugate is meant."""
+    if b.basis.sectors == 1:
+        return min(b.groups), False
+    index = built.assembly.index(harmonic)
+    return (index, False) if index in b.groups else (b.basis.sectors - index, True)
+
+
+def drawn_monitor(built: Built) -> tuple[str, str]:
+    """Member and array name of the first read-out."""
+    watch = built.assembly.watches[0]
+    member = _standing(built, watch.member)[0]
+    several = len(built.bodies) > 1 or member != watch.member
+    return member, f"{member}:{watch.monitor}" if several else watch.monitor
+
+
+# the closed form ---------------------------------------------------------------------------------------------------
+
+
+def closed_points(
+    built: Built, response: FrequencyResponse, at_peaks: FrequencyResponse
+) -> dict[float, dict[str, Any]]:  # fmt: skip
+    """Points of one normal force, as a journal would keep them: those of the sweep, and of its refined peaks."""
+    return _closed(built, response, 0) | _closed(built, at_peaks, 1)
+
+
+def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[str, Any]]:
+    (member,) = built.assembly.members
+    group, watch = member.groups[0], built.assembly.watches[0]
+    points: dict[float, dict[str, Any]] = {}
+    for i, f in enumerate(map(float, r.frequency)):
+        row: dict[str, Any] = {
+            "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": peak,
+            f"monitors/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
+            f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
+        }  # fmt: skip
+        for c, six in zip(built.contacts, r.force[i].reshape(-1, 6), strict=True):
+            row[f"contacts/{c.interface}/force"] = np.column_stack([0.0 * six.real, six.real, -six.imag])
+        if group.residual is not None:
+            row[f"bodies/{member.name}/forces"] = _beside(built, group, r.force[i])
+        points[f] = row
+    return points
+
+
+def _beside(built: Built, group: ModalGroup, force: Array) -> Array:
+    """(2, r) amplitudes of the forces on the rows of the residual shapes."""
+    assert group.residual is not None
+    labels, load = group.residual.labels, built.assembly.loads[0]
+    out = np.zeros((2, len(labels)), dtype=complex)
+    for c, six in zip(built.contacts, force.reshape(-1, 6), strict=True):
+        for row, value in zip(INTERFACE_ROWS, six, strict=True):
+            out[1, labels.index(f"interface:{c.interface}:{row}")] -= value
+    out[1, next(i for i, x in enumerate(labels) if x.startswith(f"excitation:{load.row}:"))] += load.amplitude
+    return out
+
+
+# contacts ----------------------------------------------------------------------------------------------------------
+
+
+def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[ContactMap]:
+    """The first patches of a case over the cycle of a point that a journal kept."""
+    from ..harmonic_balance.kept import restored
+    from ..operating.patches import contact_map
+    from .run import problem_of
+
+    problem = problem_of(built, normal)
+    point, found = restored(problem, dict(row))
+    maps = []
+    for contact in problem.assembly.contacts[:MOST_MAPS]:
+        member = next(m for m in problem.assembly.members if m.name == contact.first.member)
+        side = next(iter(member.groups.values())).interfaces[contact.first.interface]
+        u = found.relative[contact.name]
+        s = built.settings
+        maps.append(contact_map(contact.patch, side, u, 2 * np.pi / point.Omega, 256, s.cycles, s.settled))
+    return maps

@@ -1,0 +1,427 @@
+"""Running a case: responses at every normal force, resonances, what a reader must know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg
+
+from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
+from ..harmonic_balance import FrequencyResponse
+from ..results import Journal
+from .assemble import Built, build, swept
+from .closed_form import Answer, in_closed_form
+from .keeping import series_name
+from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
+
+if TYPE_CHECKING:
+    from ..harmonic_balance.book import BookPatch
+    from ..harmonic_balance.problem import Problem
+    from ..harmonic_balance.response import HarmonicResponse
+    from ..system.assembly import Assembly, Linear
+
+Keep = Callable[[Built], AbstractContextManager[Journal]]
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """Responses by normal force (N), the free response, and the eigenfrequencies with sticking contacts (Hz).
+
+    resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
+    sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
+    peaks. truncation: largest estimated error of a resonance for want of harmonics, where their number was looked for.
+    """
+
+    settings: CaseSettings
+    responses: dict[float, FrequencyResponse]
+    free: FrequencyResponse
+    stuck: Array
+    resonances: dict[float, list[tuple[float, float]]]
+    speed: float
+    remarks: tuple[str, ...]
+    built: Built
+    at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
+    truncation: float | None = None
+
+    def lifted(self, normal: float) -> tuple[Array, Array]:
+        """Whether contacts would lift off, which the closed form does not follow: (f,) of the sweep, (p,) of its peaks.
+
+        All False for contacts with a law, which do lift off.
+        """
+        if not self.at_peaks or not normal:
+            return np.zeros(len(self.responses[normal].frequency), bool), np.zeros(len(self.resonances[normal]), bool)
+        at = (self.responses[normal], self.at_peaks[normal])
+        swing, at_peaks = (r.normal_swing.max(axis=1, initial=0.0) > normal for r in at)
+        return swing, at_peaks
+
+
+class _TooFew(Exception):
+    """A resonance needs more harmonics (never leaves this module)."""
+
+    def __init__(self, harmonics: int, said: str) -> None:
+        super().__init__(said)
+        self.harmonics = harmonics
+
+
+def run_case(
+    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis], path: Path | str,
+    report: Callable[[str], None] = lambda _: None, keep: Keep | None = None, begin: int = FIRST_HARMONICS,
+) -> CaseResult:  # fmt: skip
+    """Frequency responses at every normal force.
+
+    With ``harmonics = "auto"`` all of them have as many as the most demanding resonance needs: the sweeps begin with
+    few, and begin anew with more where a resonance turns out to need them.
+
+    Args:
+        basis: the modal file, or the body of the case -> its modal file where there are several. keep: opens the
+            journal of an assembly, in which every finished point is kept and those of an earlier run are found; without
+            it nothing is kept. begin: harmonics to begin with, where their number is looked for.
+
+    Raises:
+        UserError: names that the modal files do not hold, see `assemble.build`.
+    """
+    if not settings.looks_for_harmonics:
+        return _run(settings, basis, path, report, keep, None)
+    tolerance = settings.harmonics_error or TRUNCATION
+    while True:
+        try:
+            return _run(settings.with_harmonics(begin), basis, path, report, keep, tolerance)
+        except _TooFew as found:
+            begin = found.harmonics
+            report(str(found))
+
+
+def _run(
+    settings: CaseSettings, basis: ModalBasis | Mapping[str, ModalBasis], path: Path | str,
+    report: Callable[[str], None], keep: Keep | None, tolerance: float | None,
+) -> CaseResult:  # fmt: skip
+    """`run_case` with a number of harmonics; tolerance: of their error, if it is looked at."""
+    bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.members}
+    built = build(settings, bases, path)
+    sweep = settings.sweep
+    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
+    forces = normal_forces(built, path)
+    at_peaks: dict[float, FrequencyResponse] = {}
+    left = None if tolerance is None else _Left(tolerance)
+    _book_can(built, path)
+    if settings.has_laws or not settings.contacts:
+        with keep(built) if keep else nullcontext() as journal:
+            responses, resonances, stuck, remarks = _by_laws(built, forces, frequency, report, journal, left)
+    else:
+        responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
+    free = free_response(built, frequency)
+    remarks = [
+        *built.remarks,
+        *_by_the_book(built),
+        *_between(built),
+        *remarks,
+        *_too_coarse(built, stuck),
+        *_not_converged(responses),
+    ]
+    return CaseResult(
+        settings, responses, free, stuck, resonances, built.speed, tuple(remarks), built, at_peaks,
+        left.most if left else None,
+    )  # fmt: skip
+
+
+def _by_laws(
+    built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
+    left: _Left | None,
+) -> Answer:  # fmt: skip
+    """With the laws of the contact room and as many harmonics as the case asks for."""
+    from ..harmonic_balance.reduced import stuck
+
+    responses: dict[float, FrequencyResponse] = {}
+    resonances, stiff, remarks = {}, np.zeros(0), []
+    for normal in forces or (None,):
+        problem = problem_of(built, normal)
+        key = pressed_by(built, problem) if normal is None else normal
+        report(f"friction response at a normal force of {key:g} N")
+        limits = np.array([c.friction * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
+        found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
+        responses[key] = found
+        remarks += _not_periodic(key, found.unsteady, built.settings)
+        remarks += left.out(problem, found, resonances[key], key) if left else _truncated(built, problem, found, key)
+        if key == max(responses):
+            k = [c.stiffness for c in problem.assembly.contacts]
+            stiff = stuck(problem.assembly.joined(1), scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)))
+    return responses, resonances, stiff, remarks
+
+
+def _swept(
+    problem: Problem, frequency: Array, limits: Array, report: Callable[[str], None], journal: Journal | None,
+    normal: float,
+) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
+    """One sweep and its peaks, from what a journal holds of it and what is computed now."""
+    from ..harmonic_balance import kept, response
+
+    if journal is None:
+        found = response.harmonic_response(problem, frequency, limits, report)
+        return found, response.refined_peaks(problem, found)
+    name = series_name(normal)
+    parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
+    journal.say({**journal.head, "parameters": parameters, "labels": kept.labels(problem)})
+    return kept.kept_response(problem, frequency, limits, journal, name, report)
+
+
+def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
+    """The balance of a case whose swept contacts a normal force (N) presses. finer: other settings of `problem.of`."""
+    from ..harmonic_balance import problem as balance
+
+    s, assembly = built.settings, built.pressed(normal)
+    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching}
+    if s.mode == "book":
+        asked["models"] = _book_models(assembly, s.strips)
+    return balance.of(assembly, **{**asked, **finer})
+
+
+def _book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
+    """The book's contact for every contact; equal patches share one."""
+    from ..harmonic_balance.book import book_patch
+
+    made: dict[int, BookPatch] = {}
+    for c in assembly.contacts:
+        if id(c.patch) not in made:
+            made[id(c.patch)] = book_patch(c.patch, strips)
+    return {i: made[id(c.patch)] for i, c in enumerate(assembly.contacts)}
+
+
+def _book_can(built: Built, path: Path | str) -> None:
+    """Say which contact the book's mode cannot be made of.
+
+    Raises:
+        UserError: a law that is not the book's.
+    """
+    if built.settings.mode != "book":
+        return
+    from ..harmonic_balance.book import normal_law
+
+    for c in built.assembly.contacts:
+        try:
+            normal_law(c.patch.law, built.settings.strips)
+        except UserError as error:
+            more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
+            raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "marched"') from error
+
+
+def _by_the_book(built: Built) -> list[str]:
+    if built.settings.mode != "book":
+        return []
+    from ..harmonic_balance.orbits import TOLERANCE
+
+    return [
+        "Book mode (Sextro 5.2): one harmonic, normal forces that do not change friction within a cycle, elliptic "
+        f"orbits from a table good to {100 * TOLERANCE:g} % of what friction holds; microslip respond CASE "
+        "--compare-book shows what that leaves out."
+    ]
+
+
+def pressed_by(built: Built, problem: Problem) -> float:
+    """Normal force (N) in the first contact of the resting assembly, which names a response that no sweep presses."""
+    from ..harmonic_balance.solver import newton
+
+    given = [c.normal_force for c in built.contacts if c.normal_force is not None]
+    if given or not built.contacts:
+        return float(given[0]) if given else 0.0
+    still = problem.loaded(0.0)
+    point = newton(still.at(2 * np.pi * built.settings.sweep.start), np.zeros(still.size))
+    group = still.groups[0]
+    return float(group.force(group.relative(still.displacement(point.x)), 1.0)[0, 0, 0])
+
+
+def free_response(built: Built, frequency: Array) -> FrequencyResponse:
+    """The first read-out without any contact, over frequency (Hz) and, between its ends, over every resonance."""
+    a = replace(built.assembly, contacts=())
+    watch = a.watches[0]
+    member = next(m for m in a.members if m.name == watch.member)
+    part = a.part(member, 1)
+    frequency = np.union1d(frequency, _about_resonances(part, frequency))
+    portions = np.array_split(2 * np.pi * frequency, len(frequency) // 256 + 1)
+    q = np.concatenate([_moved(part, Omega) for Omega in portions])
+    zero, none = np.zeros(len(frequency)), np.zeros((len(frequency), 0))
+    moved = q @ part.watch[0] + part.watch_given[0]
+    return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool), np.zeros(0), none)
+
+
+def _moved(part: Linear, Omega: Array) -> ComplexArray:
+    """(f, m) coordinates of a body alone under its loads, Omega in rad/s."""
+    at = Omega[:, None, None]
+    A = part.K - at**2 * part.M + 1j * at * part.C
+    return np.linalg.solve(A, np.broadcast_to(part.load[:, None], (len(A), len(part.load), 1)))[..., 0]
+
+
+def _about_resonances(part: Linear, frequency: Array) -> Array:
+    """Hz between the ends of a sweep, about the resonances of a body alone, dense against their widths.
+
+    A peak between two of them is drawn too low by 0.2 % at most. One without damping has no height to be drawn.
+    """
+    n, unit = len(part.M), np.sqrt(np.linalg.norm(part.K) / np.linalg.norm(part.M))  # rad/s
+    zero, one = np.zeros((n, n)), np.eye(n)
+    A = np.block([[zero, one], [-part.K / unit**2, -part.C / unit]])
+    roots = unit * scipy.linalg.eigvals(A, scipy.linalg.block_diag(one, part.M))
+    roots = roots[np.isfinite(roots) & (roots.imag > 0) & (roots.real < 0)]
+    apart = np.sinh(np.linspace(-5.5, 5.5, 101))
+    found = (roots.imag - apart[:, None] * roots.real).ravel() / (2 * np.pi)
+    return found[(found > frequency[0]) & (found < frequency[-1])]
+
+
+TRUNCATION = 0.01
+"""Estimated error of the highest point of a response, by harmonics that are left out, above which a remark is made."""
+
+
+class _Left:
+    """What harmonics that are left out would change at the resonances. tolerance, most: shares of the amplitude."""
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance, self.most = tolerance, 0.0
+
+    def out(
+        self, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
+    ) -> list[str]:
+        """A remark where no number of harmonics is enough at a resonance, or at the highest point where there is none.
+
+        Raises:
+            _TooFew: more of them are.
+        """
+        from ..harmonic_balance.accuracy import enough
+        from ..harmonic_balance.solver import solve
+
+        good, worst = np.flatnonzero(found.converged), (0.0, 0.0)
+        if not len(good) or not problem.groups:
+            return []
+        places = [f for f, _ in peaks] or [float(found.frequency[good[np.argmax(np.abs(found.monitor[good]))]])]
+        for f in places:
+            near = good[np.argmin(np.abs(found.frequency[good] - f))]
+            point = solve(problem, 2 * np.pi * f, [found.x[near]])
+            if not point.converged:
+                continue
+            e = enough(problem, point, self.tolerance)
+            if e.problem.harmonics > problem.harmonics:
+                n = e.problem.harmonics
+                said = f"at F_N = {normal:g} N and {f:.6g} Hz {problem.harmonics} harmonics leave an error of about "
+                raise _TooFew(n, said + f"{100 * e.errors[0].readout:.2g} %; all once more with {n}")
+            worst = max(worst, (e.errors[-1].readout, f))
+        self.most = max(self.most, worst[0])
+        if worst[0] <= self.tolerance:
+            return []
+        return [
+            f"At F_N = {normal:g} N the amplitude at {worst[1]:.6g} Hz is uncertain by about {100 * worst[0]:.2g} % "
+            f"with {problem.harmonics} harmonics, above harmonics_error; no solution with more of them was found."
+        ]
+
+
+def _truncated(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
+    """A remark where the harmonics are too few at the highest point, see `harmonic_balance.accuracy`.
+
+    Not of the book's mode, which is one harmonic by what it is, nor of a whole ring, whose sector says the same.
+    """
+    from ..harmonic_balance.accuracy import error
+
+    good, settings = np.flatnonzero(found.converged), built.settings
+    whole = settings.ring is not None and settings.ring.model == "full"
+    if not len(good) or not problem.groups or settings.mode == "book" or whole:
+        return []
+    top = int(good[np.argmax(np.abs(found.monitor[good]))])
+    estimate = error(problem, found.x[top], 2 * np.pi * float(found.frequency[top])).readout
+    if estimate <= TRUNCATION:
+        return []
+    return [
+        f"At F_N = {normal:g} N the amplitude at {found.frequency[top]:.6g} Hz is uncertain by about "
+        f"{100 * estimate:.2g} % for want of harmonics ({problem.harmonics}); raise harmonics and samples."
+    ]
+
+
+def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> list[str]:
+    worst = float(unsteady.max(initial=0.0))
+    if worst < 1e-3:
+        return []
+    todo = "lower settled" if settings.settled > 1e-4 else "raise cycles"
+    return [
+        f"At F_N = {normal:g} N the sliders were not periodic after {settings.cycles} cycles at most: contact forces "
+        f"change by up to {100 * worst:.2g} % in the next one; {todo}."
+    ]
+
+
+def normal_forces(built: Built, path: Path | str, asked: Any = None) -> tuple[float, ...]:
+    """The forces asked for, or the one that the static state at speed has in every contact that the sweep presses.
+
+    Args:
+        asked: ``static``, or the sweep's own if None.
+
+    Raises:
+        UserError: a static force that no closure tells, or that differs from contact to contact.
+    """
+    settings = built.settings
+    asked = settings.sweep.normal_forces if asked is None else asked
+    contacts = [c for c in settings.contacts if swept(c)]
+    if not isinstance(asked, str):
+        return asked or ()
+    found = [_static_force(*_first_face(built, c)) for c in contacts]
+    missing = [c.interface for c, force in zip(contacts, found, strict=True) if force is None]
+    if missing:
+        raise UserError(
+            f'{path}: sweep.normal_forces: "static", but the modal file has no closure on interface '
+            f"'{missing[0]}' or its partner; add [[closures]] to the body or give numbers"
+        )
+    forces = [force for force in found if force is not None]
+    if not forces or max(forces) - min(forces) > 0.01 * max(forces):
+        raise UserError(
+            f'{path}: sweep.normal_forces: "static" needs contacts that are pressed alike; they have '
+            f"{', '.join(f'{force:.4g}' for force in forces) or 'none'} N; give numbers"
+        )
+    return (forces[0],)
+
+
+def _first_face(built: Built, c: ContactSettings) -> tuple[str, ModalGroup]:
+    body, interface = built.settings.address(c.interface)
+    return interface, built.bodies[body].group
+
+
+def _static_force(interface: str, group: ModalGroup) -> float | None:
+    """Normal force of the closure on an interface, or on the one it faces, N."""
+    partner = group.interfaces[interface].partner
+    return next((c.normal_force for c in group.contacts.values() if c.interface in {interface, partner} - {""}), None)
+
+
+def _between(built: Built) -> list[str]:
+    """A remark where the static normal force is one between two equilibria of a speed range."""
+    error = max(b.group.checks.get("normal_force_error", 0.0) for b in built.bodies.values())
+    if built.settings.sweep.normal_forces != "static" or not error:
+        return []
+    return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
+
+
+def _too_coarse(built: Built, stuck: Array) -> list[str]:
+    """Where the step is wider than the resonances with sticking contacts (Hz), the narrowest ones that friction leaves.
+
+    Peaks are searched for between the points, but one on the flank of another may show at none of them.
+    """
+    sweep = built.settings.sweep
+    group = built.bodies[built.assembly.watches[0].member].group
+    step = (sweep.stop - sweep.start) / (sweep.points - 1)
+    inside = stuck[(stuck > sweep.start) & (stuck < sweep.stop)]
+    if not len(inside):
+        return []
+    at = float(inside.min())
+    width = 2 * group.damping_ratio[group.omega > 0].min(initial=1.0) * at
+    if step <= 4 * width:
+        return []
+    return [
+        f"The step of {step:.3g} Hz is wide against a resonance with sticking contacts ({at:.5g} Hz, half-power width "
+        f"{width:.3g} Hz). Peaks are searched for between the points, but one close beside a higher one may be "
+        "missing; raise sweep.points to see."
+    ]
+
+
+def _not_converged(responses: dict[float, FrequencyResponse]) -> list[str]:
+    return [
+        f"At F_N = {normal:g} N {int(np.sum(~r.converged))} of {len(r.frequency)} points did not converge (first at "
+        f"{r.frequency[~r.converged][0]:.6g} Hz); change sweep.points a little or the normal force."
+        for normal, r in responses.items()
+        if not r.converged.all()
+    ]

@@ -1,0 +1,408 @@
+"""case.toml: an assembly of bodies and what is asked of it; every key, checked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..body import (
+    Model,
+    Name,
+    NotNegative,
+    Number,
+    Numbers,
+    Positive,
+    Vector,
+    _finite_vector,
+    _float,
+    _tuple,
+    load_toml,
+    override,
+    validate,
+)
+from ..compliance import BULK_AND_SURFACE
+from ..operating.fatigue import MaterialLimits
+from .driving import ROTATION, ExcitationOfCase, base_of
+from .keys import GROUND as GROUND
+from .keys import Address, Count, Order
+from .surveys import CurveOfCase, IdentificationOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
+
+if TYPE_CHECKING:
+    from ..system.excitation import Turning
+
+FIRST_HARMONICS = 3
+"""With which ``harmonics = "auto"`` begins."""
+
+SAMPLES_EACH = 8
+"""Samples of a cycle that ``auto`` takes at least for each harmonic, as the estimate of their error does."""
+
+Radius = Annotated[float, BeforeValidator(_float), Field(gt=0)]
+
+
+class BodyOfCase(Model):
+    """A body of an assembly.
+
+    name: in this case. body: whose modal file it is (geometry/<body>, or a folder or system.toml beside the case); the
+    name if not given. file: a modal file instead, beside the case. speed: of the file, counted from 0, or speed_rpm.
+    turn: degrees about the body's rotation axis, and shift: m, from where its file has it to where it stands here.
+    damping_ratio: instead of the file's, one for all modes or one a mode, the last one for all that follow.
+    aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,
+    direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
+    modes: how many of the stored eigenmodes are used, all if not given.
+    hold: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body that
+    slides in all of its contacts has no place of its own; without hold its mean position is anywhere.
+    """
+
+    name: Name
+    body: Name | None = None
+    file: str | None = None
+    speed: Annotated[int, Field(ge=0)] = 0
+    speed_rpm: NotNegative | None = None
+    damping_ratio: NotNegative | Numbers | None = None
+    aerodynamics: str | None = None
+    modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    turn: Number = 0.0
+    hold: Positive | None = None
+    shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)
+
+
+class RingSettings(Model):
+    """All bodies of the case stand blades times in a circle, driven by an engine order.
+
+    engine_order: of the frequency that is swept; if not given, the greatest common divisor of those that excitations
+    name, or 1. Negative ones run round with the rotor and faster. rotation: ``-`` for a rotor that turns from sector 1
+    to sector 0. model: ``sector``, one that stands for all, or ``full``, all of them.
+    """
+
+    blades: Annotated[int, Field(ge=2, le=1000)]
+    engine_order: Order | None = None
+    rotation: Literal["+", "-"] = "+"
+    model: Literal["sector", "full"] = "sector"
+
+
+class ContactSettings(Model):
+    """A contact of an interface with the ground, a rigid neighbour, or with another body's interface.
+
+    Stiffnesses in N/m for the whole patch (book: c_N0, c_R0). against: ``ground``, or an interface, ``body:interface``;
+    against_sector: of a ring, how many sectors further that body stands. normal_force: N, or interference: m, negative
+    a gap, where the sweep's normal forces are not this contact's.
+
+    width (along t1) and height (along t2) in m are the patch's own if not given. includes: which compliance the
+    stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
+
+    law: ``jenkins``, linear springs and one Jenkins element along `slides_along` in closed form, one harmonic; or point
+    contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough`` (3.3, with
+    `roughness` R_Z in m). Not given: ``jenkins`` for one body on the ground, else ``smooth``. points: how many along
+    t1 and t2.
+
+    file: a contact.toml (`docs/contact_toml.md`) beside the case instead of stiffnesses, friction, law and roughness:
+    any law of the contact room, of which every point carries its share.
+
+    patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
+    relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
+    young (Pa) and poisson of both bodies take the place of the two stiffnesses there: springs that agree with Hertz in
+    `fit`, at the load `fitted_at` (N; the contact's own normal force or the largest of the sweep if not given); or
+    law = ``hertz``: a line of contact in pieces, or one round contact, with its exact approach. isotropic: of both
+    tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
+    """
+
+    interface: Address
+    against: Address = GROUND
+    against_sector: Annotated[int, Field(ge=-1000, le=1000)] = 0
+    normal_force: NotNegative | None = None
+    interference: Number | None = None
+    file: str | None = None
+    normal_stiffness: Positive = 0.0  # of the file, if there is one
+    tangential_stiffness: Positive = 0.0
+    width: Positive | None = None
+    height: Positive | None = None
+    friction: NotNegative = 0.0
+    slides_along: Literal["t1", "t2"] = "t1"
+    includes: Literal["surface", "bulk+surface"] | None = None
+    law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
+    roughness: Positive | None = None
+    points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
+    patch: Literal["rigid", "nodal"] = "rigid"
+    curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None
+    young: Positive | None = None
+    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = 0.3
+    fit: Literal["approach", "width"] = "approach"
+    fitted_at: Positive | None = None
+    isotropic: bool = False
+
+    @model_validator(mode="after")
+    def _says_what_it_is(self) -> ContactSettings:
+        own = ("normal_stiffness", "tangential_stiffness", "friction")
+        given = [key for key in (*own, "law", "roughness") if key in self.model_fields_set]
+        if self.file is not None and given:
+            raise ValueError(f"{given[0]}: stands in the contact file already; give file or {given[0]}")
+        needed = own if self.young is None else ("friction",)
+        missing = [key for key in needed if key not in self.model_fields_set]
+        if self.file is None and missing:
+            raise ValueError(f"{missing[0]}: is missing; give it, or a contact file (file)")
+        return self
+
+    @model_validator(mode="after")
+    def _belongs_to_the_law(self) -> ContactSettings:
+        if (self.law == "rough") != (self.roughness is not None):
+            raise ValueError('roughness (R_Z in m) belongs to law = "rough": give both or neither')
+        if self.normal_force is not None and self.interference is not None:
+            raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
+        return self._curved()
+
+    def _curved(self) -> ContactSettings:
+        given = {"normal_stiffness", "tangential_stiffness", "file"} & self.model_fields_set
+        if self.young is not None and (self.curvature is None or given):
+            raise ValueError("young stands for both stiffnesses where a curvature is given; give one or the other")
+        if self.law == "hertz" and (self.young is None or self.patch == "nodal"):
+            raise ValueError('law = "hertz" needs curvature and young, and a rigid patch')
+        if self.curvature is not None and min(self.curvature) == math.inf:
+            raise ValueError("curvature: inf, inf is flat; leave it out, or give the radius of the curved direction")
+        if self.patch == "nodal" and self.points is not None:
+            raise ValueError('points: a patch = "nodal" has those of the mesh; leave points out')
+        if self.isotropic and self.young is None:
+            raise ValueError("isotropic belongs to young: two stiffnesses given are the same along t1 and t2 anyway")
+        if self.young is not None and self.includes == BULK_AND_SURFACE:
+            raise ValueError('includes: Hertz\' contact beyond what the face yields is the "surface"; leave it out')
+        return self
+
+
+class Sweep(Model):
+    """Frequencies (Hz), linearly spaced, and the normal forces (N) to compare, or ``static``: the modal file's own.
+
+    They press every contact that has neither normal_force nor interference.
+    """
+
+    start: Positive
+    stop: Positive
+    points: Annotated[int, Field(ge=2, le=200000)] = 600
+    normal_forces: Literal["static"] | Numbers | None = None
+
+    @model_validator(mode="after")
+    def _rising(self) -> Sweep:
+        if self.stop <= self.start:
+            raise ValueError("stop must be above start")
+        if isinstance(self.normal_forces, tuple) and (not self.normal_forces or min(self.normal_forces) < 0):
+            raise ValueError('normal_forces must be one or more numbers, none negative, or "static"')
+        return self
+
+
+class MonitorOfCase(Model):
+    """A read-out: ``monitor`` or ``body:monitor``, and the direction of a displacement; or a strain gauge."""
+
+    monitor: Address
+    direction: Literal["x", "y", "z"] = "x"
+
+
+class CaseSettings(Model):
+    """A whole case.toml.
+
+    body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
+    [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
+    many as an estimated harmonics_error (a share of the amplitude) at the resonances asks for; samples (of a cycle),
+    cycles (marched at most until the sliders are periodic) and settled (within which share of the largest force
+    they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
+    (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
+    touching part of a rough surface, for microslip (5.2-33), 0 for none. material_limits: of the body whose monitor is
+    drawn, for the margins of its stresses.
+    """
+
+    name: Name
+    description: str = ""
+    body: Name | None = None
+    bodies: Annotated[tuple[BodyOfCase, ...], BeforeValidator(_tuple)] = ()
+    ring: RingSettings | None = None
+    speed: Annotated[int, Field(ge=0)] = 0
+    speed_rpm: NotNegative | None = None
+    modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    excitation: Address | None = None
+    amplitude: Number = 1.0
+    excitations: Annotated[tuple[ExcitationOfCase, ...], BeforeValidator(_tuple)] = ()
+    monitor: Address | None = None
+    direction: Literal["x", "y", "z"] = "x"
+    monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
+    mode: Literal["marched", "book"] = "marched"
+    strips: Annotated[int, Field(ge=0, le=1000)] = 0
+    harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
+    harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
+    samples: Annotated[int, Field(ge=8, le=100000)] = 64
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 100
+    settled: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
+    sweep: Sweep
+    material_limits: MaterialLimits | None = None
+    orders: OrdersOfCase | None = None
+    speeds: SpeedsOfCase | None = None
+    ranges: RangesOfCase | None = None
+    curve: CurveOfCase | None = None
+    identification: IdentificationOfCase | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> CaseSettings:
+        for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
+            if bool(getattr(self, short)) == bool(getattr(self, many)):
+                raise ValueError(f"{short}: give {short}, or one or more [[{many}]], and not both")
+        names = [b.name for b in self.members]
+        if twice := sorted({n for n in names if names.count(n) > 1}):
+            raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
+        laws = {self.law_of(c) == "jenkins" for c in self.contacts}
+        if len(laws) > 1:
+            raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')
+        if True in laws and not self.one_on_the_ground:
+            raise ValueError(
+                'contacts: law = "jenkins" is a closed form for one body on the ground; write "smooth" or "rough"'
+            )
+        if any(self.law_of(c) == "jenkins" and c.points is not None for c in self.contacts):
+            raise ValueError('contacts: points belong to law = "smooth" or "rough"; the closed form needs none')
+        if any(self.law_of(c) == "jenkins" and (c.patch == "nodal" or c.curvature) for c in self.contacts):
+            raise ValueError('contacts: patch = "nodal" and curvature need points; write law = "smooth" or "rough"')
+        if said := self._met_twice():
+            raise ValueError(said)
+        count = self.number_of_harmonics
+        if self.samples < 4 * count:
+            raise ValueError(
+                f"samples: {self.samples} are too few for {count} harmonics; take at least {4 * count}, better "
+                f"{16 * count}"
+            )
+        return self._automatic()._book()._pressed()
+
+    def _automatic(self) -> CaseSettings:
+        if self.harmonics_error is not None and self.harmonics != "auto":
+            raise ValueError('harmonics_error: belongs to harmonics = "auto"; a number of them is taken as it is')
+        if self.harmonics == "auto" and self.ring is not None and self.ring.model == "full":
+            raise ValueError('harmonics: "auto" needs ring.model = "sector"; the whole ring needs as many: give them')
+        return self
+
+    def _met_twice(self) -> str:
+        """A sentence where an interface stands in two contacts, which would count its area twice; else nothing."""
+        first: dict[tuple[str, str], int] = {}
+        for i, c in enumerate(self.contacts, 1):
+            for end in (c.interface, c.against):
+                if end != GROUND and first.setdefault(self.address(end), i) != i:
+                    return (
+                        f"contacts: interface '{end}' stands in contacts {first[self.address(end)]} and {i} (counted "
+                        "from 1), but a face has one contact; name another interface in one of them or take it out"
+                    )
+        return ""
+
+    def _book(self) -> CaseSettings:
+        if self.mode == "book" and not self.has_laws:
+            raise ValueError('mode: "book" needs point contacts; write law = "smooth" or "rough" in every contact')
+        if self.strips and self.mode != "book":
+            raise ValueError(
+                'strips: belong to mode = "book"; a marched law brings its own microslip (contacts.file)'
+            )
+        return self
+
+    def _pressed(self) -> CaseSettings:
+        open_ = [c.interface for c in self.contacts if c.normal_force is None and c.interference is None]
+        if open_ and self.sweep.normal_forces is None:
+            raise ValueError(
+                f"contacts.{open_[0]}: nothing presses it; give sweep.normal_forces, or its normal_force or "
+                "interference"
+            )
+        if any(b.aerodynamics for b in self.bodies) and self.ring is None:
+            raise ValueError("bodies: aerodynamics belong to the waves of a ring; add [ring] with its blades")
+        if any(b.aerodynamics for b in self.bodies) and self.ring and self.ring.model == "full":
+            raise ValueError(
+                'bodies: aerodynamics belong to waves, which a full ring does not have; write model = "sector"'
+            )
+        if any(c.against_sector for c in self.contacts) and self.ring is None:
+            raise ValueError("contacts: against_sector belongs to a ring; add [ring] with blades and engine_order")
+        return self
+
+    @property
+    def number_of_harmonics(self) -> int:
+        """The number given, or the one from which more are looked for."""
+        return FIRST_HARMONICS if self.harmonics == "auto" else self.harmonics
+
+    @property
+    def balanced(self) -> int:
+        """Harmonics of the balance: one in the book's mode."""
+        return 1 if self.mode == "book" else self.number_of_harmonics
+
+    @property
+    def looks_for_harmonics(self) -> bool:
+        """Whether their number follows from an estimated error."""
+        return self.harmonics == "auto" and self.mode == "marched" and (self.has_laws or not self.contacts)
+
+    def with_harmonics(self, count: int) -> CaseSettings:
+        """The case with a number of harmonics, and samples enough for them."""
+        return self.model_copy(update={"harmonics": count, "samples": max(self.samples, SAMPLES_EACH * count)})
+
+    @property
+    def marching(self) -> dict[str, Any]:
+        """How finely forces are marched in time, as `harmonic_balance.problem.of` asks."""
+        return {"samples": self.samples, "cycles": self.cycles, "settled": self.settled}
+
+    @property
+    def members(self) -> tuple[BodyOfCase, ...]:
+        """The bodies; one that the short form names."""
+        return self.bodies or (
+            BodyOfCase(name=self.body or "", speed=self.speed, speed_rpm=self.speed_rpm, modes=self.modes),
+        )
+
+    @property
+    def loads(self) -> tuple[ExcitationOfCase, ...]:
+        """The excitations; one that the short form names."""
+        return self.excitations or (ExcitationOfCase(row=self.excitation or "", amplitude=self.amplitude),)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files beside the case that it names, modal files left out."""
+        named = [c.file for c in self.contacts] + [x.field for x in self.loads] + [b.aerodynamics for b in self.members]
+        return tuple(dict.fromkeys(f for f in named if f is not None))
+
+    @property
+    def turning(self) -> Turning:
+        """1 or -1, see `system.excitation.Turning`."""
+        return ROTATION[self.ring.rotation] if self.ring else 1
+
+    @property
+    def base_order(self) -> int:
+        """Engine order of the swept frequency, as `system.assembly.Ring` has it: negative against the numbers."""
+        return base_of(self.loads, self.ring.engine_order if self.ring else None, self.turning)
+
+    @property
+    def watches(self) -> tuple[MonitorOfCase, ...]:
+        """The monitors; one that the short form names."""
+        return self.monitors or (MonitorOfCase(monitor=self.monitor or "", direction=self.direction),)
+
+    @property
+    def one_on_the_ground(self) -> bool:
+        """One body whose contacts all meet the ground, pressed by the forces of the sweep."""
+        alone = len(self.members) == 1 and self.ring is None and not (self.excitations or self.monitors)
+        return alone and all(
+            c.against == GROUND and c.normal_force is None and c.interference is None for c in self.contacts
+        )
+
+    def law_of(self, contact: ContactSettings) -> str:
+        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``file``."""
+        if contact.file is not None:
+            return "file"
+        plain = self.one_on_the_ground and contact.patch == "rigid" and contact.curvature is None
+        return contact.law or ("jenkins" if plain else "smooth")
+
+    @property
+    def has_laws(self) -> bool:
+        """Whether the contacts are points with a law, and not the closed form."""
+        return any(self.law_of(c) != "jenkins" for c in self.contacts)
+
+    def address(self, text: str) -> tuple[str, str]:
+        """Body and row of ``body:row``; the only body of the case where none is named."""
+        body, _, row = text.rpartition(":")
+        return body or self.members[0].name, row
+
+
+def load_case(path: Path | str, assignments: list[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:
+    """Read and check a case file (SI units).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    path = Path(path)
+    raw = override(load_toml(path), assignments or [], path)
+    return validate(CaseSettings, raw, path), raw

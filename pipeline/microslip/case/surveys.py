@@ -1,0 +1,341 @@
+"""What else a case may ask: responses over engine orders, speeds or ranges; contact stiffness from a measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..body import Model, NotNegative, Positive, _finite_vector, _tuple
+from ..data import Array, ModalBasis, UserError
+from .keys import Orders, Positives
+
+if TYPE_CHECKING:
+    from ..harmonic_balance.envelope import Envelope, OverOrders
+    from ..harmonic_balance.identification import Identified, NodalDiagram
+    from ..harmonic_balance.problem import Problem
+    from ..harmonic_balance.speed_line import SpeedResponse
+    from ..system.assembly import Assembly
+    from .assemble import Built
+    from .settings import CaseSettings
+
+Report = Callable[[str], None]
+Bases = Mapping[str, ModalBasis]
+NotNegatives = Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)]
+Pair = Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)]
+Ends = Annotated[tuple[Positive, Positive], BeforeValidator(_finite_vector)]
+
+
+class OrdersOfCase(Model):
+    """The largest resonance in the sweep's band for each engine order (Sextro Fig. 5.5-2), by `respond --over orders`.
+
+    engine_orders: ``all`` from 1 to half the number of blades, or a list. points: of the sweep that looks for them, the
+    case's own if not given.
+    """
+
+    engine_orders: Literal["all"] | Orders = "all"
+    points: Annotated[int, Field(ge=5, le=10000)] | None = None
+
+    @model_validator(mode="after")
+    def _some(self) -> OrdersOfCase:
+        if self.engine_orders == () or 0 in self.engine_orders:
+            raise ValueError('engine_orders: give one or more whole numbers other than 0, or "all"')
+        return self
+
+
+class SpeedsOfCase(Model):
+    """Response along an engine-order line, f = e n / 60, by `respond --over speeds`.
+
+    Bodies whose modal files have a speed range take part in the speed; centrifugal excitations (speed_rpm) follow it.
+    normal_force: of the contacts that the sweep presses, ``static`` (the closures of the modal file), a number (N), or
+    [[rpm, N], ...], straight lines in the square of the speed; if not given, the sweep's one.
+    """
+
+    start_rpm: Positive
+    stop_rpm: Positive
+    points: Annotated[int, Field(ge=2, le=100000)] = 101
+    normal_force: Literal["static"] | NotNegative | Annotated[tuple[Pair, ...], BeforeValidator(_tuple)] | None = None
+
+    @model_validator(mode="after")
+    def _rising(self) -> SpeedsOfCase:
+        if self.stop_rpm == self.start_rpm:
+            raise ValueError("stop_rpm and start_rpm: give two different speeds")
+        if isinstance(self.normal_force, tuple):
+            rpm = [n for n, _ in self.normal_force]
+            if len(rpm) < 2 or rpm != sorted(set(rpm)):
+                raise ValueError("normal_force: give two or more pairs [rpm, N], the speeds rising")
+        return self
+
+
+class RangesOfCase(Model):
+    """Envelope of the responses over all combinations of these values (Sextro Fig. 5.4-2), by `respond --over ranges`.
+
+    damping_ratio: of all modes of all bodies. load: factors on the loads that are not steady. friction: of all
+    contacts. normal_force: N, of the contacts that the sweep presses. Two values are the ends of a range; give more
+    where the smallest amplitude matters, which may lie between them.
+    """
+
+    damping_ratio: NotNegatives = ()
+    load: NotNegatives = ()
+    friction: NotNegatives = ()
+    normal_force: NotNegatives = ()
+
+    @model_validator(mode="after")
+    def _some(self) -> RangesOfCase:
+        if not self.given:
+            raise ValueError("give values of damping_ratio, load, friction or normal_force")
+        return self
+
+    @property
+    def given(self) -> dict[str, tuple[float, ...]]:
+        """Name -> values of what varies."""
+        return {name: values for name, values in self if values}
+
+
+class CurveOfCase(Model):
+    """Responses followed through folds and lift-off, by `respond --over frequency`, `load` and `normal-force`.
+
+    band: Hz, first and last frequency; the sweep's start and stop if not given. load: first and last factor on the
+    loads that are not steady. normal_force: N, first and last; the smallest and the largest of the sweep if not given.
+    The first may be the larger one. frequency: Hz, at which load and normal force vary; the highest resonance in the
+    sweep's band if not given, for the normal force that at its first value. points: of a curve at most.
+    """
+
+    band: Ends | None = None
+    load: Ends = (0.01, 1.0)
+    normal_force: Pair | None = None
+    frequency: Positive | None = None
+    points: Annotated[int, Field(ge=2, le=1000000)] = 3000
+
+    @model_validator(mode="after")
+    def _apart(self) -> CurveOfCase:
+        for key in ("band", "load", "normal_force"):
+            ends = getattr(self, key)
+            if ends is not None and ends[0] == ends[1]:
+                raise ValueError(f"{key}: give two different values, first and last")
+        return self
+
+
+class MeasuredOfCase(Model):
+    """A measured frequency (Hz) of a mode, counted from 1, of a nodal diameter."""
+
+    nodal_diameter: Annotated[int, Field(ge=0, le=500)]
+    mode: Annotated[int, Field(ge=1, le=500)] = 1
+    frequency: Positive
+
+
+class IdentificationOfCase(Model):
+    """Contact stiffness from one measured frequency, others predicted (Sextro Fig. 5.4-1), by `microslip identify`.
+
+    fit: the frequency that is met. measured: others that are predicted. ratio: tangential over normal stiffness, kept.
+    stiffnesses: N/m, of further curves in the diagram. modes: how many of them are drawn.
+    """
+
+    fit: MeasuredOfCase
+    measured: Annotated[tuple[MeasuredOfCase, ...], BeforeValidator(_tuple)] = ()
+    ratio: Positive = 0.5
+    stiffnesses: Positives = ()
+    modes: Annotated[int, Field(ge=1, le=100)] = 3
+
+
+# --- from settings to answers ----------------------------------------------------------------------------------------
+
+
+def _asked(settings: CaseSettings, key: str, path: Path | str) -> Any:
+    found = getattr(settings, key)
+    if found is None:
+        raise UserError(f"{path}: {key}: is not asked for in this case; add [{key}]")
+    pointwise(settings, key, path)
+    return found
+
+
+def pointwise(settings: CaseSettings, key: str, path: Path | str) -> None:
+    """Refuse contacts in closed form.
+
+    Raises:
+        UserError: law = "jenkins".
+    """
+    if settings.contacts and not settings.has_laws:
+        raise UserError(f'{path}: {key}: needs point contacts; write law = "smooth" or "rough" in the contacts')
+
+
+def _one_force(built: Built, path: Path | str, key: str) -> float | None:
+    """The one normal force of the sweep; None where it presses nothing."""
+    from .run import normal_forces
+
+    forces = normal_forces(built, path)
+    if len(forces) > 1:
+        raise UserError(
+            f"{path}: {key}.normal_force: the sweep compares {len(forces)} normal forces; say which is meant"
+        )
+    return forces[0] if forces else None
+
+
+def over_orders(
+    settings: CaseSettings, bases: Bases, path: Path | str, report: Report,
+    keep: Callable[[dict[str, OverOrders]], None] = lambda _: None,
+) -> dict[str, OverOrders]:  # fmt: skip
+    """Normal force in words -> resonances over the engine order.
+
+    Args:
+        keep: is given what there is after every engine order.
+
+    Raises:
+        UserError: no ring, or excitations that name their own engine orders.
+    """
+    from ..harmonic_balance import envelope
+    from .assemble import build
+    from .run import normal_forces, problem_of
+
+    asked, ring = _asked(settings, "orders", path), settings.ring
+    if ring is None:
+        raise UserError(f"{path}: orders: engine orders need a ring; add [ring] with its blades")
+    if any(x.orders for x in settings.loads):
+        raise UserError(
+            f"{path}: orders: excitations name their own engine orders; leave these out, the survey has its"
+        )
+    orders = range(1, ring.blades // 2 + 1) if asked.engine_orders == "all" else asked.engine_orders
+
+    @cache
+    def at(order: int) -> Built:
+        return build(settings.model_copy(update={"ring": ring.model_copy(update={"engine_order": order})}), bases, path)
+
+    found: dict[str, OverOrders] = {}
+    sweep = settings.sweep
+    for normal in normal_forces(at(orders[0]), path) or (None,):
+        label = "as pressed" if normal is None else f"$F_N$ = {normal:g} N"
+        under = "" if normal is None else f", F_N = {normal:g} N"
+
+        def problem(order: int, normal: float | None = normal) -> Problem:
+            return problem_of(at(order), normal)
+
+        band, points = (sweep.start, sweep.stop), asked.points or sweep.points
+        so_far = partial(_so_far, keep, found, label)
+        found[label] = envelope.over_orders(problem, list(orders), band, points, report, under, so_far)
+    return found
+
+
+def _so_far(
+    keep: Callable[[dict[str, OverOrders]], None], found: dict[str, OverOrders], label: str, one: OverOrders
+) -> None:
+    keep({**found, label: one})
+
+
+def over_speeds(
+    settings: CaseSettings, bases: Bases, path: Path | str, report: Report,
+    keep: Callable[[SpeedResponse], None] = lambda _: None,
+) -> SpeedResponse:  # fmt: skip
+    """The response along the engine-order line of a case. keep: is given what there is after every speed.
+
+    Raises:
+        UserError: no engine order, no body with a range of speeds, or a speed outside of it.
+    """
+    from ..harmonic_balance import speed_line
+    from .assemble import build
+
+    asked = _asked(settings, "speeds", path)
+    named = settings.ring is not None and settings.ring.engine_order is not None
+    if not named and not any(x.orders for x in settings.loads):
+        raise UserError(f"{path}: speeds: no engine order is named; give engine_order in the excitations or in [ring]")
+    turning = [b.name for b in settings.members if bases[b.name].ranges]
+    if not turning:
+        raise UserError(f"{path}: speeds: no modal file has a range of speeds; write rotation.range_rpm in a body.toml")
+
+    def at(rpm: float) -> Assembly:
+        built = build(_at_speed(settings, turning, rpm), bases, path)
+        return built.pressed(_force_at(built, asked.normal_force, rpm, path))
+
+    rpm = np.linspace(asked.start_rpm, asked.stop_rpm, asked.points)
+    order = abs(settings.base_order)
+    return speed_line.along(at, rpm, order, report, keep, harmonics=settings.number_of_harmonics, **settings.marching)
+
+
+def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:
+    bodies = tuple(b.model_copy(update={"speed_rpm": rpm}) if b.name in turning else b for b in settings.members)
+    loads = tuple(x if x.speed_rpm is None else x.model_copy(update={"speed_rpm": rpm}) for x in settings.loads)
+    return settings.model_copy(update={"bodies": bodies, "excitations": loads})
+
+
+def _force_at(built: Built, asked: Any, rpm: float, path: Path | str) -> float | None:
+    from .run import normal_forces
+
+    if asked is None:
+        return _one_force(built, path, "speeds")
+    if asked == "static":
+        return normal_forces(built, path, "static")[0]
+    if isinstance(asked, tuple):
+        n, force = np.array(asked).T
+        if not n[0] <= rpm <= n[-1]:
+            raise UserError(f"{path}: speeds.normal_force: is known from {n[0]:g} to {n[-1]:g} rpm, not at {rpm:g} rpm")
+        return float(np.interp(rpm**2, n**2, force))
+    return float(asked)
+
+
+def over_ranges(
+    settings: CaseSettings, bases: Bases, path: Path | str, report: Report,
+    keep: Callable[[Envelope], None] = lambda _: None,
+) -> Envelope:  # fmt: skip
+    """The envelope of a case. keep: is given what there is after every combination.
+
+    Raises:
+        UserError: friction of a contact whose law stands in a file.
+    """
+    from ..harmonic_balance import envelope
+    from .assemble import build
+    from .run import problem_of
+
+    asked = _asked(settings, "ranges", path)
+    if asked.friction and (files := [c.interface for c in settings.contacts if c.file is not None]):
+        raise UserError(f"{path}: ranges.friction: the friction of contact '{files[0]}' stands in its file")
+
+    @cache
+    def at(damping_ratio: float | None, friction: float | None) -> Built:
+        changed: dict[str, Any] = {}
+        if damping_ratio is not None:
+            every = {"damping_ratio": damping_ratio}
+            changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.members)
+        if friction is not None:
+            changed["contacts"] = tuple(c.model_copy(update={"friction": friction}) for c in settings.contacts)
+        return build(settings.model_copy(update=changed), bases, path)
+
+    forces = () if asked.normal_force else (_one_force(at(None, None), path, "ranges"),)
+
+    def problem(
+        damping_ratio: float | None = None, load: float = 1.0, friction: float | None = None,
+        normal_force: float | None = forces[0] if forces else None,
+    ) -> Problem:  # fmt: skip
+        return problem_of(at(damping_ratio, friction), normal_force).loaded(load)
+
+    return envelope.envelope(problem, asked.given, _frequency(settings), report, keep)
+
+
+def _frequency(settings: CaseSettings) -> Array:
+    return np.linspace(settings.sweep.start, settings.sweep.stop, settings.sweep.points)
+
+
+def identification(settings: CaseSettings, bases: Bases, path: Path | str) -> tuple[Identified, list[NodalDiagram]]:
+    """The contact stiffness that meets a case's measured frequency, and diagrams of rising stiffness with it.
+
+    Raises:
+        UserError: a frequency that no stiffness gives, a nodal diameter that the ring or the modal file does not have.
+    """
+    from ..harmonic_balance.identification import Measured, identify, nodal_diagram
+    from .assemble import build
+
+    asked = _asked(settings, "identification", path)
+    a = build(settings, bases, path).assembly
+    most = a.blades // 2
+    wrong = [m.nodal_diameter for m in (asked.fit, *asked.measured) if m.nodal_diameter > most]
+    if wrong:
+        raise UserError(f"{path}: identification: nodal diameter {wrong[0]}: the ring has 0 to {most}; correct it")
+    fit, *others = (Measured(m.nodal_diameter, m.frequency, m.mode - 1) for m in (asked.fit, *asked.measured))
+    try:
+        found = identify(a, fit, asked.ratio, others)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from error
+    drawn = sorted({*asked.stiffnesses, found.stiffness})
+    return found, [nodal_diagram(a, c, asked.ratio, modes=asked.modes) for c in drawn]

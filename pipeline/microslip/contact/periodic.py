@@ -1,0 +1,336 @@
+"""Periodic motion through a contact law: cycles are marched until what the sliders remember comes back with them.
+
+Most points forget their beginning within a cycle. A point that slides a little in each cycle, always nearly the same
+way, forgets it slowly: its force turns on the friction circle by a small angle a cycle. Where two marched cycles
+differ, the memory x at which a cycle begins is therefore solved for, by Newton's method with the exact derivative of
+the map P from it to the memory at the end, which costs two tangents more. Sliders do not know of each other, so this
+is a 2 x 2 system for each.
+
+A slider that does not slide at all keeps what the first cycle, from rest, has left in it; one that slides ever so
+little forgets that in the end. Between both the limit of infinitely many cycles jumps, so what is solved is
+
+    x = P(x) + d (x_1 - x)
+
+with the memory x_1 after the first cycle and d = `RECALL`: the mean of all cycles with weights (1 + d)^-n, continuous
+in the motion. It differs from the limit where less than d of the memory is forgotten in a cycle.
+
+P brings two memories never further apart (friction and springs dissipate), so that cycle after cycle converges; a
+slider that Newton's step does not bring closer goes on so for a while, longer each time.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from .law import Array, Law, State
+
+PLAIN = 2
+"""Cycles that are marched before slow sliders are solved for."""
+
+FEWEST = 4
+"""Cycles that have to be allowed if sliders are to be solved for; fewer are marched."""
+
+RECALL = 1e-5
+"""Share of its memory that a slider regains in a cycle from the first one."""
+
+SLOPES = 1e-6
+"""Share of the largest tangent of a memory within which tangents are taken for periodic."""
+
+_LAPS = 6  # cycles of tangents at most
+_STILL = 1e-13  # share of the largest force within which two marched cycles are the same
+
+
+class Periodic(NamedTuple):
+    """The last of the cycles.
+
+    Attributes:
+        force: (s, n, 3) N. state: at its end. cycles: how many were marched, without those for derivatives alone.
+    """
+
+    force: Array
+    state: State
+    cycles: Array
+
+
+class _At(NamedTuple):
+    """Between two cycles.
+
+    Attributes:
+        found: the last one. begun: state it began with. start: state the next one begins with. memory: of that.
+        change: of the memory over the last marched cycle, the largest entry. tried: (..., n) what each slider missed of
+            the solution when it was solved for last. solved: (..., n) whether the next start was solved for.
+        failed: (..., n) how often that was in vain. wait: (..., n) cycles to march before it is tried again.
+        first: memory after the first cycle. settled: whether the memory is periodic.
+    """
+
+    found: Periodic
+    begun: State
+    start: State
+    memory: Array
+    change: Array
+    tried: Array
+    solved: Array
+    failed: Array
+    wait: Array
+    first: Array
+    settled: Array
+
+
+class _Along(NamedTuple):
+    """Tangents on their way.
+
+    Attributes:
+        begun: state the next cycle with tangents begins with. tangents: of it, p along the first axis. first: (p, ...,
+            2, n) of the memory after the first cycle. slope: see `with_slopes`. laps: how many there were. smooth:
+            whether the tangents are periodic.
+    """
+
+    begun: State
+    tangents: State
+    first: Array
+    slope: Array
+    laps: Array
+    smooth: Array
+
+
+def periodic(
+    law: Law, path: Array, period: float | Array, count: int = 2, settled: float | Array = 0.0
+) -> Periodic:  # fmt: skip
+    """Force in the last cycle of a periodic path, marched from rest.
+
+    The memory is taken for periodic when Newton's step is within the tolerance. Of laws that cannot be solved for, or
+    if fewer than `FEWEST` cycles are allowed: when what its change still sums up to, the rest of a geometric series
+    with the ratio of the last two changes, is. The cycle that shows it is the one returned, so that a memory that one
+    cycle makes periodic takes two.
+
+    Args:
+        path: (s, n, 3) m. period: s. count: of cycles at most. settled: tolerance as a share of the cycle's largest
+            force; 0 marches all of them and solves for nothing.
+    """
+    laps = _Laps(law, path, period / len(path), settled, count)
+    at = jax.lax.while_loop(laps.unfinished, laps.marching, laps.rest())
+    return (laps.solved(at) if laps.solves else at).found
+
+
+def with_slopes(
+    law: Law, path: Array, period: float | Array, count: int, settled: float | Array, moves: Array, weights: Array
+) -> tuple[Periodic, Array]:
+    """`periodic` and the derivative of the force.
+
+    Where sliders can be solved for it is that of the periodic state, from the tangents of the first cycle and those of
+    the periodic one; otherwise tangents are marched along, and it is that of the cycles marched.
+
+    Args:
+        moves: (s, p, 3) m, how each of p parameters moves all points alike. weights: (w, s) over the samples.
+
+    Returns:
+        The cycle, and (w, p, n, 3) weighted sums of the derivatives over its samples.
+    """
+    laps = _Laps(law, path, period / len(path), settled, count)
+    return laps.periodic_slopes(moves, weights) if laps.solves else laps.marched_slopes(moves, weights)
+
+
+def cycles(
+    law: Law, u: Array, period: float | Array, count: int = 2, settled: float | Array = 0.0
+) -> tuple[Array, State]:
+    """Forces (s, n, 3) over the last cycle of a periodic path u (s, n, 3), and the state at its end: `periodic`."""
+    found = periodic(law, u, period, count, settled)
+    return found.force, found.state
+
+
+class _Laps:
+    """A path through a law, again and again; arguments as in `periodic`."""
+
+    def __init__(self, law: Law, path: Array, dt: Array | float, settled: Array | float, count: int) -> None:
+        self.law, self.path, self.dt, self.settled, self.count = law, path, dt, settled, count
+        one = law.init(1)
+        self.solves = count >= FEWEST and law.recalled(one, law.memory(jnp.zeros((1, 3)), one)) is not None
+
+    def rest(self) -> _At:
+        """Before the first cycle."""
+        state, force = self.law.init(self.path.shape[1]), jnp.zeros(self.path.shape)
+        memory, no, never = self.law.memory(force[-1], state), jnp.asarray(0), jnp.asarray(False)
+        each = jnp.zeros((*memory.shape[:-2], memory.shape[-1]))
+        none, counted, far = each > 0, each.astype(int), jnp.asarray(jnp.inf)
+        found = Periodic(force, state, no)
+        return _At(found, state, state, memory, far, each + jnp.inf, none, counted, counted, memory, never)
+
+    def unfinished(self, at: _At) -> Array:
+        """Whether to march on; where sliders can be solved for, not for long."""
+        return (at.found.cycles < (PLAIN if self.solves else self.count)) & ~at.settled
+
+    def marching(self, at: _At) -> _At:
+        """One cycle more, and the next begins where it ends."""
+        force, state = self._march(at.start)
+        return self._marched(at, force, state)
+
+    def solved(self, at: _At) -> _At:
+        """Cycles that begin where Newton's method puts them."""
+        return jax.lax.while_loop(
+            lambda at: (at.found.cycles >= PLAIN) & (at.found.cycles < self.count) & ~at.settled, self._solving, at
+        )
+
+    def marched_slopes(self, moves: Array, weights: Array) -> tuple[Periodic, Array]:
+        """Tangents are marched along with every cycle."""
+
+        def lap(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
+            at, tangents, _ = carried
+            (force, after), (slope, changed) = self._push(at.start, tangents, moves)
+            return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
+
+        size, rest = moves.shape[1], self.rest()
+        begin = rest, _blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
+        at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), lap, begin)
+        return at.found, slope
+
+    def periodic_slopes(self, moves: Array, weights: Array) -> tuple[Periodic, Array]:
+        """Tangents follow once the state is periodic: linear in those it begins with, so that one cycle tells how."""
+        rest, size = self.rest(), moves.shape[1]
+        at = self.solved(jax.lax.while_loop(self.unfinished, self.marching, rest))  # as `periodic` does
+        with_memory = jnp.pad(moves, ((0, 0), (0, 2), (0, 0)))
+
+        def lap(a: _Along) -> _Along:
+            along = jax.tree_util.tree_map(lambda x, y: jnp.concatenate([x, y]), a.tangents, self._units(at))
+            _, (slope, changed) = self._push(a.begun, along, with_memory)
+            own = jax.tree_util.tree_map(lambda leaf: leaf[:size], changed)
+            before, ended, rested = self._remembered(a.tangents), self._remembered(changed), a.laps == 0
+            first = jnp.where(rested, ended[:size], a.first)
+            turned = _Newton(ended[size:])(ended[:size] - before + RECALL * (first - before))
+            smooth = ~rested & (jnp.abs(turned).max() <= SLOPES * jnp.abs(ended[:size]).max())
+            next_ = jax.vmap(self.law.recalled)(own, jnp.where(rested, first, before + turned))
+            slope = jnp.einsum("ws,spnk->wpnk", weights, slope[:, :size])
+            return _Along(at.begun, next_, first, slope, a.laps + 1, smooth)
+
+        blank, none = _blank(rest.start, size), jnp.asarray(0)
+        slope = jnp.zeros((len(weights), size, *self.path.shape[1:]))
+        begin = _Along(rest.start, blank, self._remembered(blank), slope, none, none > 0)
+        found = jax.lax.while_loop(lambda a: ~a.smooth & (a.laps < _LAPS), lap, begin)
+        return at.found, found.slope
+
+    def _solving(self, at: _At) -> _At:
+        """One cycle more, and the next begins where Newton's method expects the solution."""
+        (force, after), (_, changed) = self._push(at.start, self._units(at), jnp.zeros((len(self.path), 2, 3)))
+        memory, size = self.law.memory(force[-1], after), jnp.abs(force).max()
+        newton = _Newton(self._remembered(changed))
+        missing = memory - at.memory + RECALL * (at.first - at.memory)
+        left = _length(missing)
+        step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
+
+        across = at.solved & (left > 0.5 * at.tried)  # the step is straight, the circle is not: a cycle brings it back
+        ready = ~across & (at.wait == 0)
+        vain = ready & ~at.solved & (left > 0.9 * at.tried)
+        failed = at.failed + vain
+        wait = jnp.where(vain, failed, jnp.maximum(at.wait - 1, 0))
+        use = ready & ~vain & newton.regular & (self.settled > 0)
+        tried = jnp.where(use | vain, left, at.tried)
+        marched = jnp.where(self.settled > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
+        held = jnp.where(use[..., None, :], at.memory + step, marched)
+        settled = (self.settled > 0) & (jnp.abs(step).max() <= self.settled * size)
+        found = Periodic(force, after, at.found.cycles + 1)
+        start = self.law.recalled(after, held)
+        return _At(found, at.start, start, held, at.change, tried, use, failed, wait, at.first, settled)
+
+    def _marched(self, at: _At, force: Array, state: State) -> _At:
+        memory = self.law.memory(force[-1], state)
+        change, settled = self._change(at, force, memory)
+        found = Periodic(force, state, at.found.cycles + 1)
+        first = jnp.where(at.found.cycles > 0, at.first, memory)
+        return at._replace(
+            found=found, begun=at.start, start=state, memory=memory, change=change, first=first, settled=settled
+        )
+
+    def _units(self, at: _At) -> State:
+        """Tangents of a start along both directions of its memory."""
+        units = jnp.stack([jnp.zeros_like(at.memory).at[..., k, :].set(1.0) for k in range(2)])
+        return jax.vmap(self.law.recalled)(_blank(at.start, 2), units)
+
+    def _remembered(self, tangents: State) -> Array:
+        """(p, ..., 2, n) tangents of the memory."""
+        size = jax.tree_util.tree_leaves(tangents)[0].shape[0]
+        return jax.vmap(self.law.memory)(jnp.zeros((size, *self.path.shape[1:])), tangents)
+
+    def _change(self, at: _At, force: Array, memory: Array) -> tuple[Array, Array]:
+        """Largest change of the memory over the cycle, and whether it is periodic as `periodic` says of marching."""
+        first = at.found.cycles == 0  # began where no cycle ends, though an open contact's memory may be the same
+        change = jnp.where(first, jnp.inf, jnp.abs(memory - at.memory).max())
+        gap, size = at.change - change, jnp.abs(force).max()
+        left = jnp.where(gap > 0, change**2 / jnp.where(gap > 0, gap, 1.0), jnp.inf)
+        if self.solves:
+            return change, change <= jnp.minimum(self.settled, _STILL) * size
+        rounding = change <= jnp.minimum(self.settled, 1e-15) * size
+        return change, rounding | (jnp.maximum(change, left) <= self.settled * size)
+
+    def _march(self, state: State) -> tuple[Array, State]:
+        """One cycle."""
+
+        def one(state: State, row: tuple[Array, Array]) -> tuple[State, Array]:
+            force, after = self.law.step(*row, self.dt, state)
+            return after, force
+
+        after, force = jax.lax.scan(one, state, (self.path, self._rate(self.path)))
+        return force, after
+
+    def _push(self, state: State, tangents: State, moves: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
+        """One cycle with the tangents of force and state along every parameter.
+
+        A parameter moves all points alike: only (p, 3) numbers a sample, and not those of every point, are handed to
+        the tangents of `Law.step`.
+        """
+        rows = (self.path, self._rate(self.path), moves, self._rate(moves))
+
+        def one(carried: tuple[State, State], row: tuple[Array, ...]) -> tuple[tuple[State, State], tuple[Array, ...]]:
+            state, tangents = carried
+            u, v, *moved = row
+
+            def push(along: State, *moved: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
+                whole = tuple(jnp.broadcast_to(m, u.shape) for m in moved)
+                return jax.jvp(lambda x, v, s: self.law.step(x, v, self.dt, s), (u, v, state), (*whole, along))
+
+            (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
+            return (after, changed), (force, slope)
+
+        (after, changed), (force, slope) = jax.lax.scan(one, (state, tangents), rows)
+        return (force, after), (slope, changed)
+
+    def _rate(self, path: Array) -> Array:
+        return (path - jnp.roll(path, 1, axis=0)) / self.dt
+
+
+def _blank(state: State, size: int) -> State:
+    """No tangents, so many."""
+    return jax.tree_util.tree_map(lambda leaf: jnp.zeros((size, *leaf.shape)), state)
+
+
+def _length(memory: Array) -> Array:
+    """(..., n) of (..., 2, n)."""
+    return jnp.sqrt(jnp.sum(memory**2, axis=-2))
+
+
+def _chosen(first: Array, one: State, other: State) -> State:
+    """One of two trees of the same form."""
+    return jax.tree_util.tree_map(lambda x, y: jnp.where(first, x, y), one, other)
+
+
+class _Newton:
+    """((1 + d) I - P')^-1 of every slider, where it is regular, as it is of laws that dissipate; elsewhere I.
+
+    P' (2, ..., 2, n): derivative along the two directions of the start.
+    """
+
+    def __init__(self, slope: Array) -> None:
+        a, b = 1 + RECALL - slope[0, ..., 0, :], -slope[1, ..., 0, :]
+        c, d = -slope[0, ..., 1, :], 1 + RECALL - slope[1, ..., 1, :]
+        found = a * d - b * c
+        self.regular = found > 0
+        over = jnp.where(self.regular, 1 / jnp.where(self.regular, found, 1.0), 1.0)
+        one, none = jnp.ones_like(a), jnp.zeros_like(a)
+        a, b, c, d = (jnp.where(self.regular, x, y) for x, y in ((a, one), (b, none), (c, none), (d, one)))
+        self.rows = over * jnp.stack([d, -b]), over * jnp.stack([-c, a])
+
+    def __call__(self, change: Array) -> Array:
+        """(..., 2, n) of (..., 2, n)."""
+        first, second = change[..., 0, :], change[..., 1, :]
+        return jnp.stack([row[0] * first + row[1] * second for row in self.rows], axis=-2)

@@ -1,0 +1,42 @@
+"""A contact shared out among the points of a patch: each carries its share of what the whole one would."""
+
+from __future__ import annotations
+
+from .law import Array, Law, State, settings
+
+
+@settings
+class Portion(Law):
+    """A law of a whole contact, of which each point carries a share (Sextro Eq. (5.2-34)).
+
+    A point answers its own displacement as the whole contact would, times its share: force, limit and energy are
+    extensive, path and state are not. Any law will do, because nothing of it has to be taken apart.
+
+    Attributes:
+        whole: law of the full area. share: of a point, one number or one per point; all of them together are 1.
+    """
+
+    whole: Law
+    share: Array
+
+    def init(self, n: int) -> State:
+        return self.whole.init(n)
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+        force, after = self.whole.step(u, v, dt, state)
+        return (self.share * force.T).T, after
+
+    def memory(self, force: Array, state: State) -> Array:
+        return self.share * self.whole.memory((force.T / self.share).T, state)
+
+    def recalled(self, state: State, memory: Array) -> State | None:
+        return self.whole.recalled(state, memory / self.share)
+
+    def limit(self, force: Array, state: State) -> Array:
+        return self.share * self.whole.limit((force.T / self.share).T, state)
+
+    def slip(self, state: State) -> Array:
+        return self.whole.slip(state)
+
+    def stored(self, u: Array, state: State) -> Array:
+        return self.share * self.whole.stored(u, state)

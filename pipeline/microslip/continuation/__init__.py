@@ -1,0 +1,26 @@
+"""Newton's method (`newton`), following R(x, lambda) = 0 through folds, branch points and kinks (`curve`), peaks of an
+output on that curve, followed over a further parameter down to where they are lowest (`extremum`).
+
+Knows no mechanics: lambda may be a frequency, a normal force, a level of excitation.
+"""
+
+from .curve import Branch as Branch
+from .curve import Kind as Kind
+from .curve import Point as Point
+from .curve import Settings as Settings
+from .curve import State as State
+from .curve import advance as advance
+from .curve import follow as follow
+from .curve import start as start
+from .curve import trace as trace
+from .extremum import Lowest as Lowest
+from .extremum import Peak as Peak
+from .extremum import Ridge as Ridge
+from .extremum import lowest as lowest
+from .extremum import peak as peak
+from .extremum import ridge as ridge
+from .newton import CONVERGED as CONVERGED
+from .newton import NewtonSettings as NewtonSettings
+from .newton import Problem as Problem
+from .newton import Solution as Solution
+from .newton import newton as newton

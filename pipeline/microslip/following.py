@@ -1,0 +1,307 @@
+"""What is followed from a case instead of swept: backbones, the optimum of a setting, and the stability of a response.
+
+Each is a table (CSV) and a picture in the case's folder, and sentences for the terminal.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import store
+from .basis import read_basis
+from .body import load_toml, override
+from .case import CaseSettings, keeping
+from .case.assemble import Built, build
+from .case.run import problem_of
+from .data import ModalBasis, UserError
+from .mistakes import validate
+from .results import read_response
+from .workflow import Report
+
+if TYPE_CHECKING:
+    from .continuation import Peak
+    from .harmonic_balance.nonlinear_modes import Backbone
+    from .harmonic_balance.peak import Optimum
+    from .harmonic_balance.problem import Problem
+    from .harmonic_balance.stability import Stability
+
+OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughness")
+"""Keys of a contact that `optimum` may change in all of them at once."""
+
+NORMAL_FORCE = "normal_force"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case file and its modal files. Attributes: path. raw: its text as a table. bases: by body. folder: products."""
+
+    path: Path
+    raw: dict[str, Any]
+    bases: Mapping[str, ModalBasis]
+    folder: Path
+
+    def with_(self, changes: Mapping[str, float]) -> Built:
+        """The assembly, some keys of the case changed."""
+        raw = copy.deepcopy(self.raw)
+        for key, value in changes.items():
+            if key in OF_CONTACTS:
+                for contact in raw.get("contacts", []):
+                    if key in contact:
+                        contact[key] = value
+            elif key != NORMAL_FORCE:
+                override(raw, [f"{key}={value!r}"], self.path)
+        return build(validate(CaseSettings, raw, self.path), self.bases, self.path)
+
+
+def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
+    """A case and its modal files.
+
+    Raises:
+        UserError: contacts in closed form, which has no solutions to follow.
+    """
+    raw = override(load_toml(path), list(assignments), path)
+    asked = validate(CaseSettings, raw, path)
+    settings = keeping.as_found(asked, folder, path)
+    if asked.looks_for_harmonics:
+        raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
+        raw |= {"harmonics": settings.harmonics, "samples": settings.samples}
+    case = Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
+    if settings.contacts and not settings.has_laws:
+        raise UserError(
+            f'{path}: contacts: law = "jenkins" is one harmonic in closed form; write law = "smooth" or "rough" to '
+            "follow backbones, optima and stability"
+        )
+    return case
+
+
+def normal_forces(built: Built) -> tuple[float | None, ...]:
+    """Those of the sweep, N; None: every contact has its own."""
+    asked = built.settings.sweep.normal_forces
+    if isinstance(asked, str):
+        raise UserError(f'sweep.normal_forces: "{asked}" has one value; give numbers here')
+    return asked or (None,)
+
+
+# nonlinear modes -----------------------------------------------------------------------------------------------------
+
+
+def backbones(
+    case: Case, mode: int | None = None, low: float | None = None, high: float | None = None,
+    report: Report = lambda _: None,
+) -> dict[float, Backbone]:  # fmt: skip
+    """Frequency and damping over the amplitude of the first read-out, for every normal force (N) of the case.
+
+    Args:
+        mode: number of the mode with sticking contacts, 1 the lowest; the one that answers the excitation most in the
+            band of the sweep if not given.
+        low, high: amplitudes, m; from a thirtieth to thirty times where the contacts begin to slide if not given.
+    """
+    from .harmonic_balance.nonlinear_modes import backbone, sliding_amplitude, strongest
+
+    found: dict[float, Backbone] = {}
+    built = case.with_({})
+    band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
+    forces = normal_forces(built)
+    for i, normal in enumerate(forces):
+        report(f"backbone at F_N = {normal or 0:g} N, {i + 1} of {len(forces)}")
+        problem = problem_of(built, normal, form="relative")
+        number = mode - 1 if mode is not None else strongest(problem, band[0], band[1])
+        begins = sliding_amplitude(problem, number)
+        found[normal or 0.0] = backbone(problem, low or begins / 30, high or begins * 30, number, report=report)
+        _backbone_table(found, case)
+        one = found[normal or 0.0]
+        said = f"mode {number + 1}, {one.stuck / 2 / np.pi:.6g} Hz stuck"
+        if len(one.amplitude):
+            i = int(np.argmax(one.damping))
+            said += (
+                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} m; damping at most "
+                f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} m"
+            )
+        report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
+    return found
+
+
+def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
+    """``backbone.csv`` and ``pictures/backbone.png``."""
+    from .pictures.following import backbone_plot
+
+    picture = case.folder / "pictures" / "backbone.png"
+    return [_backbone_table(found, case), backbone_plot(found, _title(case, "nonlinear mode"), picture)]
+
+
+def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
+    rows = ["normal_force_N,amplitude_m,frequency_Hz,damping_ratio"]
+    for normal, one in sorted(found.items()):
+        order = zip(one.amplitude, one.Omega / (2 * np.pi), one.damping, strict=True)
+        rows += [f"{normal:g},{a:.8g},{f:.10g},{d:.8g}" for a, f, d in order]
+    store.write_text(case.folder / "backbone.csv", "\n".join(rows) + "\n")
+    return case.folder / "backbone.csv"
+
+
+def _title(case: Case, what: str) -> str:
+    return f"{case.raw.get('name', case.path.stem)}: {what}"
+
+
+# the optimum of a setting --------------------------------------------------------------------------------------------
+
+
+def optimum_over(
+    case: Case, over: str = NORMAL_FORCE, low: float | None = None, high: float | None = None, points: int = 6,
+    report: Report = lambda _: None,
+) -> Optimum:  # fmt: skip
+    """The value of a setting at which the highest resonance of the sweep's band is lowest.
+
+    Args:
+        over: ``normal_force``; a key of the contacts, changed in all of them; or any key of the case, dotted.
+        low, high: of that value; the sweep's normal forces if not given. points: through which the peak is followed.
+            ``optimum.csv`` holds the peaks as they are found.
+
+    Raises:
+        UserError: no range, or contacts that the sweep does not press.
+    """
+    from .harmonic_balance.peak import optimum
+
+    built = case.with_({})
+    forces = [n for n in normal_forces(built) if n is not None]
+    if over == NORMAL_FORCE and len(forces) > 1:
+        low, high = low or min(n for n in forces if n > 0), high or max(forces)
+    if low is None or high is None or not 0 < low < high:
+        raise UserError(f"{over}: give --low and --high, two positive numbers between which its optimum is looked for")
+    if over == NORMAL_FORCE and not forces:
+        raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
+    length = problem_of(built, forces[0] if forces else None).length
+
+    @lru_cache(maxsize=64)
+    def make(value: float) -> Problem:
+        normal = value if over == NORMAL_FORCE else forces[-1] if forces else None
+        return problem_of(built if over == NORMAL_FORCE else case.with_({over: value}), normal, length=length)
+
+    sweep = built.settings.sweep
+    band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
+    rows = [f"{over},frequency_Hz,amplitude_m,what"]
+
+    def keep(number: int, value: float, peak: Peak) -> None:
+        rows.append(_peak_row(number, value, peak))
+        store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
+
+    return optimum(make, [float(v) for v in np.geomspace(low, high, points)], band, report=report, keep=keep)
+
+
+def _peak_row(number: int, value: float, peak: Peak) -> str:
+    return f"{value:.10g},{peak.lam / 2 / np.pi:.10g},{np.sqrt(peak.value):.8g},peak {number}"
+
+
+def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
+    """``optimum.csv``: the peaks followed and the optimum; ``pictures/optimum.png``."""
+    from .pictures.following import optimum_plot
+
+    rows = [f"{over},frequency_Hz,amplitude_m,what"]
+    best = found.resonance
+    for i, ridge in enumerate(found.ridges):
+        for value, peak in zip(ridge.parameter, ridge.peaks, strict=True):
+            rows.append(_peak_row(i + 1, value, peak))
+    rows.append(f"{found.parameter:.10g},{best.Omega / 2 / np.pi:.10g},{best.amplitude:.8g},optimum: {found.status}")
+    store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
+    label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
+    picture = case.folder / "pictures" / "optimum.png"
+    return [case.folder / "optimum.csv", optimum_plot(found, label, _title(case, "resonance and optimum"), picture)]
+
+
+def told(found: Optimum, over: str) -> str:
+    """The optimum in a sentence."""
+    best, (other, height) = found.resonance, found.other
+    unit = " N" if over == NORMAL_FORCE else ""
+    where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} m at "
+    lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
+    lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
+    if height > 1.001 * best.amplitude:
+        lines += f"; another one, near {other / 2 / np.pi:.6g} Hz, is higher there: {height:.4g} m"
+    return lines
+
+
+def is_optimum(found: Optimum) -> bool:
+    """Whether the lowest place lies between the ends."""
+    return found.status in ("converged", "kink", "two peaks")
+
+
+def missed(found: Optimum, over: str) -> str:
+    """Why there is no optimum, and where to look for it."""
+    values, unit = np.concatenate([one.parameter for one in found.ridges]), " N" if over == NORMAL_FORCE else ""
+    low, high = values.min(), values.max()
+    if not found.status.startswith("no optimum between"):
+        return f"no optimum was found: {found.status}"
+    end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"
+    return (
+        f"no optimum between {low:g} and {high:g}{unit}: the resonance is lowest at {found.parameter:g}{unit}, an end; "
+        f"look beyond it with {end}"
+    )
+
+
+# stability -----------------------------------------------------------------------------------------------------------
+
+
+def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict[float, Stability]]:
+    """Of every converged point of the case's ``response.h5``: normal force, N -> frequency, Hz -> its stability.
+
+    ``stability.csv`` holds the points as they are found.
+
+    Raises:
+        UserError: a sector that stands for a ring, whose sectors may part company.
+    """
+    from .harmonic_balance.stability import Settings, orbit, stability
+
+    built, found = case.with_({}), dict[float, dict[float, Any]]()
+    if built.settings.ring is not None and built.settings.ring.model == "sector":
+        raise UserError(
+            f'{case.path}: ring.model: "sector" cannot tell whether the sectors stay alike; write model = "full"'
+        )
+    if built.settings.mode == "book":
+        raise UserError(f'{case.path}: mode: "book" has no motion in time to perturb; write mode = "marched"')
+    response = read_response(case.folder / "response.h5")
+    done, count = 0, sum(int(series.converged.sum()) for series in response.series)
+    for series in response.series:
+        normal = float(series.parameters["normal_force"])
+        problem = problem_of(built, normal if normal_forces(built) != (None,) else None)
+        rows = found.setdefault(normal, {})
+        for i in np.flatnonzero(series.converged):
+            f = float(series.frequency[i])
+            done += 1
+            report(f"{done} of {count} points' stability: {normal:g} N, {f:.6g} Hz")
+            rows[f] = stability(orbit(problem, series.arrays["x"][i], 2 * np.pi * f), Settings(steps=256))
+            _stability_table(found, case)
+    return found
+
+
+def write_stabilities(found: Mapping[float, Mapping[float, Stability]], case: Case) -> list[Path]:
+    """``stability.csv`` and ``pictures/stability.png``."""
+    from .pictures.following import stability_plot
+
+    picture = case.folder / "pictures" / "stability.png"
+    return [_stability_table(found, case), stability_plot(found, _title(case, "stability"), picture)]
+
+
+def _stability_table(found: Mapping[float, Mapping[float, Stability]], case: Case) -> Path:
+    rows = ["normal_force_N,frequency_Hz,stable,growth,error,loss"]
+    for normal, points in found.items():
+        for f, one in sorted(points.items()):
+            error = one.error[0] if len(one.error) else 0.0
+            rows.append(f"{normal:g},{f:.10g},{one.stable:d},{one.growth:.6g},{error:.2g},{one.loss}")
+    store.write_text(case.folder / "stability.csv", "\n".join(rows) + "\n")
+    return case.folder / "stability.csv"
+
+
+def unstable(found: Mapping[float, Mapping[float, Stability]]) -> str:
+    """Which points are not stable, in a sentence."""
+    lost = [(n, f, one.loss) for n, points in found.items() for f, one in sorted(points.items()) if not one.stable]
+    count = sum(len(points) for points in found.values())
+    if not lost:
+        return f"all {count} points are stable"
+    normal, f, loss = lost[0]
+    return f"{len(lost)} of {count} points are not stable, the first at {normal:g} N, {f:.6g} Hz ({loss})"

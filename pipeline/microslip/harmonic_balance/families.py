@@ -1,0 +1,203 @@
+"""Responses followed by arclength: over frequency through its folds, over the level of the loads, over normal force.
+
+A sweep gives one motion at each value and jumps where the curve folds; here every motion on the curve is found, in the
+order in which it passes them, the unstable ones between two folds too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .. import continuation
+from ..continuation import Branch, Settings, State
+from ..data import Array
+from .problem import AtFrequency, Problem
+from .solver import CONVERGED, OverLoad, Point, Report, solve
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Motions along a curve.
+
+    Attributes:
+        parameter: (p,) Hz, share of the loads or of the normal forces. points: motions, in order. kinds: of each, see
+            `continuation.Point`: "fold", "bound", ... status: why it ended. problem: the balance at a value.
+    """
+
+    parameter: Array
+    points: tuple[Point, ...]
+    kinds: tuple[str, ...]
+    status: str
+    problem: Callable[[float], Problem]
+
+    @property
+    def folds(self) -> Array:
+        """Values of the parameter at which the curve turns."""
+        return self.parameter[[kind == "fold" for kind in self.kinds]]
+
+
+@dataclass(frozen=True, eq=False)
+class OverNormal:
+    """The balance at one frequency over a factor on the normal forces, for `continuation`.
+
+    Unknown are displacements from the state preloaded by the factor's forces. The stiffness about which bodies are
+    eliminated stays: any gives the same answer.
+
+    Attributes:
+        problem: at the factor 1. Omega: rad/s. x_scale, lam_scale: see `continuation.Problem`. contacts: numbers of
+            those whose force changes; None: all that have one. What an interference presses stays as it is.
+    """
+
+    problem: Problem
+    Omega: float
+    x_scale: float
+    lam_scale: float = 1.0
+    contacts: frozenset[int] | None = None
+
+    def at(self, factor: float) -> Problem:
+        """The balance with normal forces multiplied; by zero, if the factor is negative."""
+        p, groups = self.problem, []
+        for g in p.groups:
+            known: dict[float, Any] = {}
+            pressed = []
+            for i in g.contacts:
+                c = p.assembly.contacts[i]
+                normal = max(factor, 0.0) * float(c.preload[0])
+                if c.preload[0] > 0 and (self.contacts is None or i in self.contacts):
+                    c = known[normal] = known.get(normal) or c.pressed(normal)
+                pressed.append(c)
+            offset, preload = (np.array([getattr(c, key) for c in pressed]) for key in ("offset", "preload"))
+            groups.append(replace(g, offset=offset, preload=preload))
+        return replace(p, groups=tuple(groups))
+
+    def evaluate(self, x: Array, factor: float) -> tuple[Array, Array, Array]:
+        """R, dR/dx, and dR/dfactor by differences, central where there is room."""
+        h = 1e-5 * max(abs(factor), 1e-3)
+        ends = max(factor - h, 0.0), max(factor, 0.0) + h
+        low, high = (replace(self._here, problem=self.at(end)).residual(x) for end in ends)
+        R, J, _ = replace(self._here, problem=self.at(factor)).evaluate(x)
+        return R, J, (high - low) / (ends[1] - ends[0])
+
+    @cached_property
+    def _here(self) -> AtFrequency:
+        return self.problem.at(self.Omega)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A balance over a parameter, to be followed from one value to another.
+
+    Attributes:
+        equations: see `continuation.Problem`. begin, end: of its lambda. unit: lambda of one unit of the parameter that
+            people read. words: "Hz", ... problem, Omega: the balance and the frequency (rad/s) at a lambda.
+    """
+
+    equations: continuation.Problem
+    begin: float
+    end: float
+    unit: float
+    words: str
+    problem: Callable[[float], Problem]
+    Omega: Callable[[float], float]
+
+    def points(self, branch: Branch) -> tuple[Point, ...]:
+        """The motions of a branch."""
+        return tuple(Point(self.Omega(p.lam), p.x, CONVERGED, 0.0, p.evaluations) for p in branch.points)
+
+    def settings(self, given: Settings | None = None) -> Settings:
+        """How the curve is followed, between its own ends."""
+        given = given or Settings(points=3000, branch_points=False)
+        way = 1 if self.end > self.begin else -1
+        return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
+
+
+def of_frequency(problem: Problem, low: float, high: float) -> Family:
+    """Over the frequency, Hz."""
+    a, b = 2 * np.pi * low, 2 * np.pi * high
+    scaled = replace(problem, lam_scale=abs(b - a) / 10)
+    return Family(scaled, a, b, 2 * np.pi, "Hz", lambda _: scaled, lambda Omega: Omega)
+
+
+def of_load(problem: Problem, frequency: float, low: float, high: float) -> Family:
+    """Over the share of the loads that are not steady, at a frequency (Hz)."""
+    Omega = 2 * np.pi * frequency
+    equations = OverLoad(problem.at(Omega), problem.x_scale, abs(high - low) / 10)
+    return Family(equations, low, high, 1.0, "of the load", problem.loaded, lambda _: Omega)
+
+
+def of_normal_force(
+    problem: Problem, frequency: float, low: float, high: float, contacts: frozenset[int] | None = None
+) -> Family:
+    """Over the factor on the normal forces of all contacts, or of some, at a frequency (Hz)."""
+    Omega = 2 * np.pi * frequency
+    equations = OverNormal(problem, Omega, problem.x_scale, abs(high - low) / 10, contacts)
+    return Family(equations, low, high, 1.0, "of the normal force", equations.at, lambda _: Omega)
+
+
+def over_frequency(
+    problem: Problem, low: float, high: float, report: Report = lambda _: None, settings: Settings | None = None
+) -> Curve:
+    """From one frequency (Hz) to another, which may be the lower one, through all folds between.
+
+    Args:
+        settings: how the curve is followed; its bounds and direction are those of the frequencies.
+    """
+    return curve(of_frequency(problem, low, high), report, settings)
+
+
+def over_load(
+    problem: Problem, frequency: float, low: float, high: float, report: Report = lambda _: None,
+    settings: Settings | None = None,
+) -> Curve:  # fmt: skip
+    """From one share of the loads that are not steady to another, at a frequency (Hz)."""
+    return curve(of_load(problem, frequency, low, high), report, settings)
+
+
+def over_normal_force(
+    problem: Problem, frequency: float, low: float, high: float, report: Report = lambda _: None,
+    settings: Settings | None = None,
+) -> Curve:  # fmt: skip
+    """From one factor on all normal forces to another, at a frequency (Hz)."""
+    return curve(of_normal_force(problem, frequency, low, high), report, settings)
+
+
+def curve(family: Family, report: Report = lambda _: None, settings: Settings | None = None) -> Curve:
+    """The curve of a family."""
+    branch = followed(family, report, settings)
+    kinds = tuple(p.kind for p in branch.points)
+    return Curve(branch.lam / family.unit, family.points(branch), kinds, branch.status, family.problem)
+
+
+def followed(
+    family: Family, report: Report = lambda _: None, settings: Settings | None = None, begun: Branch | None = None,
+    keep: Callable[[State], None] = lambda _: None,
+) -> Branch:  # fmt: skip
+    """The curve from a solution at its beginning; without one a branch that says so.
+
+    Args:
+        begun: goes on from its state. keep: told of every state as it is found, with the points that are new.
+    """
+    settings = family.settings(settings)
+    if begun is None or begun.state is None:
+        first = solve(family.problem(family.begin), family.Omega(family.begin), [])
+        if not first.converged:
+            return Branch((), f"no start: {first.status}", None)
+        state = continuation.start(family.equations, first.x, family.begin, settings)
+        begun = Branch((), state.status, state)
+        keep(state)
+        points = list(state.found)
+    else:
+        state, points = begun.state, list(begun.points)
+    while not state.status:
+        state = continuation.advance(family.equations, state, settings)
+        keep(state)
+        points += state.found
+        if state.found:
+            said = f"{points[-1].lam / family.unit:.6g} {family.words}"
+            report(f"{len(points)} of {settings.points} points at most, {said}")
+    return Branch(tuple(points), state.status, state)

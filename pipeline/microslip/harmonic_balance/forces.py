@@ -1,0 +1,132 @@
+"""Harmonics of contact forces: equal contacts evaluated together, laws marched in time.
+
+A force model answers `force(u, period)` -> (c, k, W) and `forces(u, period)` -> that and its derivative
+(c, k, W, k, W), for c contacts of k coordinates and W = 2 H + 1 harmonics (mean, cos, sin, cos 2, ...), from their
+displacements u (c, k, W).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact.harmonics import CHUNK, force_alone, force_harmonics
+from ..contact.law import Law, point_axes
+from ..contact.patch import Patch
+from ..data import Array
+from .patch import Cycle, needs_rate, watch
+
+
+class Forces(Protocol):
+    """What a harmonic balance needs of c equal contacts."""
+
+    def force(self, u: Array, period: float) -> Array:
+        """(c, k, W) N and N m."""
+        ...
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        """`force` and its derivative (c, k, W, k, W) with respect to u."""
+        ...
+
+    def rate(self, u: Array, period: float) -> Array | None:
+        """(c, k, W) derivative of `force` with respect to the period, N/s; None where it is zero."""
+        ...
+
+    def watch(self, u: Array, period: float) -> list[Cycle]:
+        """What the points of each contact do in a cycle."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """The law of a patch, marched point by point: alternating frequency/time.
+
+    Attributes:
+        patch. contacts: c, how many equal ones. samples: of a cycle. cycles: at most, the last one counts.
+        settled: they end when the sliders are periodic within this share of the largest force; 0 marches all.
+    """
+
+    patch: Patch
+    contacts: int
+    samples: int
+    cycles: int
+    settled: float = 1e-10
+
+    @cached_property
+    def law(self) -> Law:
+        """The law for the points of all contacts."""
+        return repeated(self.patch.law, len(self.patch.points), self.contacts)
+
+    @cached_property
+    def kinematics(self) -> Any:
+        """(n, 3, k) jax array."""
+        return jnp.asarray(self.patch.kinematics)
+
+    def force(self, u: Array, period: float) -> Array:
+        return np.asarray(_alone(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        F, J = _both(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles)
+        return np.asarray(F), np.asarray(J)
+
+    def rate(self, u: Array, period: float) -> Array | None:
+        if not needs_rate(self.patch.law):
+            return None
+        return np.asarray(_rate(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
+
+    def watch(self, u: Array, period: float) -> list[Cycle]:
+        G = self.kinematics
+        return [watch(self.patch.law, G, one, period, self.samples, self.cycles, self.settled) for one in u]
+
+
+def repeated(law: Law, n: int, times: int) -> Law:
+    """A law of n points for `times` times as many: what it has per point is repeated."""
+    if times == 1:
+        return law
+    leaves, tree = jax.tree_util.tree_flatten(law)
+    axes = point_axes(law, n)
+
+    def more(leaf: Any, axis: int | None) -> Any:
+        if axis is None:
+            return leaf
+        return jnp.concatenate([jnp.asarray(leaf)] * times, axis=axis)
+
+    return jax.tree_util.tree_unflatten(tree, [more(x, a) for x, a in zip(leaves, axes, strict=True)])
+
+
+def _points(G: jax.Array, u: jax.Array) -> jax.Array:
+    """(c n, 3, W) displacements of all points."""
+    return jnp.einsum("nia,caw->cniw", G, u).reshape(-1, 3, u.shape[2])
+
+
+@partial(jax.jit, static_argnames=("samples", "count"))
+def _both(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    count: int,
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    c, n, W = u.shape[0], G.shape[0], u.shape[2]
+    force, slope = force_harmonics(law, _points(G, u), period, samples, count, CHUNK, settled)
+    half = jnp.einsum("nia,cnikjl->cnajkl", G, slope.reshape(c, n, 3, W, 3, W))
+    return jnp.einsum("nia,cniw->caw", G, force.reshape(c, n, 3, W)), jnp.einsum("cnajkl,njb->cakbl", half, G)
+
+
+@partial(jax.jit, static_argnames=("samples", "count"))
+def _alone(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    count: int,
+) -> jax.Array:  # fmt: skip
+    force = force_alone(law, _points(G, u), period, samples, count, CHUNK, settled)
+    return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2]))
+
+
+@partial(jax.jit, static_argnames=("samples", "count"))
+def _rate(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    count: int,
+) -> jax.Array:  # fmt: skip
+    return jax.jvp(lambda T: _alone(law, G, u, T, settled, samples, count), (period,), (jnp.ones(()),))[1]

@@ -1,0 +1,258 @@
+"""Responses whose points are kept as they are found, so that a sweep or a curve can be interrupted and goes on where it
+was."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import continuation
+from ..continuation import Branch, Settings, State
+from ..continuation.newton import Scaled
+from ..data import Array, ComplexArray
+from ..results.journal import Journal
+from ..system.assembly import Member
+from .families import Family, followed
+from .jenkins import tops
+from .patch import Cycle
+from .problem import Problem
+from .response import HarmonicResponse, Operating, highest, of_points, operating
+from .solver import CONVERGED, Point, Report, sweep
+
+
+def kept_response(
+    problem: Problem, frequency: Array, limit: Array, journal: Journal, series: str, report: Report = lambda _: None
+) -> tuple[HarmonicResponse, list[tuple[float, float]]]:
+    """`response.harmonic_response` and its refined peaks; what a series of the journal holds already is not computed.
+
+    Args:
+        frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Points between those of
+            `frequency` where the response is highest are kept as well, with ``peak`` = 1.
+
+    Returns:
+        The response at `frequency`, and (Hz, m) of its local maxima.
+    """
+    held = {key: restored(problem, row) for key, row in journal.of(series).items()}
+    known = {f: held[f][0] for f in map(float, frequency) if f in held}
+    found = {f: held[f][1] for f in known}
+
+    def keep(point: Point) -> None:
+        f = point.Omega / (2 * np.pi)
+        at = min(frequency, key=lambda x: abs(x - f))  # the number asked for, not the one divided back
+        found[float(at)] = operating(problem, point)
+        journal.keep(series, float(at), record(problem, point, found[float(at)]) | {"frequency": float(at)})
+
+    points = sweep(problem, frequency, report, known=known, keep=keep)
+    response = of_points(problem, points, limit, [found[float(f)] for f in frequency])
+    peaks = [_peak(problem, response, i, journal, series, report) for i in tops(response)]
+    return response, peaks
+
+
+def _peak(
+    problem: Problem, response: HarmonicResponse, top: int, journal: Journal, series: str, report: Report
+) -> tuple[float, float]:  # fmt: skip
+    """The highest point beside a local maximum, kept before or searched for now."""
+    low, high = response.frequency[top - 1], response.frequency[top + 1]
+    for key, row in journal.of(series).items():
+        if row.get("peak") and low < key < high:
+            return key, float(abs(restored(problem, row)[1].watched[0, 1]))
+    report(f"{series}: peak near {response.frequency[top]:.6g} Hz")
+    point, amplitude = highest(problem, response, top)
+    f = point.Omega / (2 * np.pi)
+    journal.keep(series, f, record(problem, point, operating(problem, point)) | {"peak": 1})
+    return f, amplitude
+
+
+# curves ------------------------------------------------------------------------------------------------------------
+
+OF_THE_WAY = "curve/"
+"""Names, in a point of a curve, of what it takes to go on from there."""
+
+
+def kept_curve(
+    family: Family, journal: Journal, series: str, report: Report = lambda _: None, settings: Settings | None = None
+) -> tuple[Branch, list[dict[str, Any]]]:
+    """The curve of a family, from where a series of the journal ends, and its points as `points_of_curve` tells them.
+
+    A point of a curve has beside what other points have: ``parameter`` in the family's unit, ``fold`` and ``arclength``
+    (scaled); its key is its place along the curve.
+    """
+    settings = family.settings(settings)
+    rows = points_of_curve(journal, series)
+
+    def keep(state: State) -> None:
+        last = len(state.found) - 1
+        for i, p in enumerate(state.found):
+            problem, Omega = family.problem(p.lam), family.Omega(p.lam)
+            point = Point(Omega, p.x, CONVERGED, 0.0, p.evaluations)
+            row = record(problem, point, operating(problem, point)) | {
+                "parameter": p.lam / family.unit, "fold": int(p.kind == "fold"), "arclength": p.arclength,
+            } | _way(p, state, state.status if i == last else "")  # fmt: skip
+            journal.keep(series, len(rows), row)
+            rows.append(row)
+
+    return followed(family, report, settings, _begun(family, rows, settings), keep), rows
+
+
+def points_of_curve(journal: Journal, series: str) -> list[dict[str, Any]]:
+    """The points of a curve that a journal holds, up to the last step that is whole."""
+    rows = list(journal.of(series).values())
+    while rows and not rows[-1]["curve/ended"] and rows[-1]["curve/kind"] not in ("start", "regular"):
+        rows.pop()
+    return rows
+
+
+def _way(p: continuation.Point, state: State, ended: str) -> dict[str, Any]:
+    own = {
+        "lam": p.lam, "kind": p.kind, "kink": int(p.kink), "tangent": p.tangent, "orientation": state.orientation,
+        "step": state.step, "sense": state.sense, "ended": ended,
+    }  # fmt: skip
+    return {OF_THE_WAY + name: value for name, value in own.items()}
+
+
+def _begun(family: Family, rows: list[dict[str, Any]], settings: Settings) -> Branch | None:
+    """The curve as far as it is known; ended because of its length, it goes on where more points are allowed."""
+    if not rows:
+        return None
+    scaled = Scaled(family.equations)
+    points = tuple(
+        continuation.Point(
+            r["x"], r["curve/lam"], r["curve/kind"], bool(r["curve/kink"]), r["arclength"], r["curve/tangent"],
+            int(r["iterations"]),
+        )
+        for r in rows
+    )  # fmt: skip
+    steps = [(p, r) for p, r in zip(points, rows, strict=True) if p.kind in ("start", "regular")]
+    (last, row), before = steps[-1], steps[-2][0] if len(steps) > 1 else None
+    status = rows[-1]["curve/ended"]
+    status = "" if status.startswith("points") and len(rows) < settings.points else status
+    state = State(
+        y=scaled.pack(last.x, last.lam), tangent=last.tangent, orientation=int(row["curve/orientation"]),
+        step=row["curve/step"], before=None if before is None else scaled.pack(before.x, before.lam),
+        sense=int(row["curve/sense"]), origin=scaled.pack(points[0].x, points[0].lam),
+        origin_tangent=points[0].tangent, count=len(rows), arclength=last.arclength, found=(), status=status,
+    )  # fmt: skip
+    return Branch(points, status, state)
+
+
+# records -----------------------------------------------------------------------------------------------------------
+
+
+def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
+    """A point as a journal keeps it; the names are those of docs/response_file.md."""
+    kept: dict[str, Any] = {
+        "frequency": point.Omega / (2 * np.pi), "status": point.status, "error": point.error,
+        "iterations": point.iterations, "seconds": point.seconds, "peak": 0, "x": point.x,
+        "harmonics": problem.harmonics,
+        "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
+    }  # fmt: skip
+    for (name, _), rows in zip(_watches(problem), _split(problem, found.watched), strict=True):
+        kept[name] = rows
+    for member in problem.assembly.members:
+        kept[f"bodies/{member.name}/q"] = _rectangle(found.q[member.name])
+        forces = [beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
+        if any(len(f) for f in forces):
+            kept[f"bodies/{member.name}/forces"] = _rectangle(forces)
+    for name, cycle in found.cycles.items():
+        kept |= _of_contact(f"contacts/{name}", found.relative[name], found.force[name], cycle)
+    return kept
+
+
+def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[str, Any]:
+    return {
+        f"{name}/displacement": relative, f"{name}/force": force, f"{name}/dissipated": float(cycle.dissipated.sum()),
+        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/slipping": float(cycle.slipping.mean()),
+        f"{name}/open": float(cycle.open.mean()), f"{name}/unsteady": float(cycle.unsteady),
+    }  # fmt: skip
+
+
+def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
+    """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone."""
+    point = Point(
+        2 * np.pi * row["frequency"], row["x"], row["status"], row["error"], int(row["iterations"]), row["seconds"],
+        history=tuple(row["history"]),
+    )  # fmt: skip
+    names = [c.name for c in problem.assembly.contacts]
+    watched = [row[name] for name, _ in _watches(problem)]
+    cycles = {}
+    for name in names:
+        d, s, slips, opened = (
+            np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "slipping", "open")
+        )
+        cycles[name] = Cycle(d, s, slips, opened, row[f"contacts/{name}/unsteady"])
+    found = Operating(
+        point.Omega,
+        {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
+        np.concatenate(watched) if watched else np.zeros((0, problem.harmonics + 1), dtype=complex),
+        {name: row[f"contacts/{name}/displacement"] for name in names},
+        {name: row[f"contacts/{name}/force"] for name in names},
+        row["supplied"],
+        row["damped"],
+        cycles,
+    )
+    return point, found
+
+
+def _watches(problem: Problem) -> list[tuple[str, list[str]]]:
+    """Name of an array and its rows for every monitor or gauge that is read, in the order of the assembly.
+
+    The member's name stands before the monitor's where there are several.
+    """
+    a, out = problem.assembly, list[tuple[str, list[str]]]()
+    for w in a.watches:
+        group = next(iter(next(m for m in a.members if m.name == w.member).groups.values()))
+        kind = "monitors" if w.monitor in group.monitors else "gauges"
+        name = f"{kind}/" + (f"{w.member}:{w.monitor}" if len(a.members) > 1 else w.monitor)
+        if out and out[-1][0] == name:
+            out[-1][1].append(w.label)
+        else:
+            out.append((name, [w.label]))
+    return out
+
+
+def labels(problem: Problem) -> dict[str, list[str]]:
+    """Name of an array -> its rows, for the head of a journal."""
+    return dict(_watches(problem))
+
+
+def _split(problem: Problem, watched: ComplexArray) -> list[ComplexArray]:
+    ends = np.cumsum([len(rows) for _, rows in _watches(problem)])
+    return np.split(watched, ends[:-1]) if len(ends) else []
+
+
+def _rectangle(rows: list[ComplexArray]) -> ComplexArray:
+    """(H + 1, m) of rows that may differ in length from one nodal diameter to the next."""
+    out = np.zeros((len(rows), max(len(r) for r in rows)), dtype=complex)
+    for to, row in zip(out, rows, strict=True):
+        to[: len(row)] = row
+    return out
+
+
+def _ragged(problem: Problem, member: Member, q: ComplexArray) -> list[ComplexArray]:
+    return [row[: member.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
+
+
+def beside(problem: Problem, member: Member, harmonic: int, found: Operating) -> ComplexArray:
+    """(r,) amplitudes of the forces on the rows of a member's residual shapes, N and N m; (0,) where it has none.
+
+    From a contact a body gets minus what acts on the first side of it, and what acts on the second side.
+    """
+    a, index = problem.assembly, problem.assembly.index(harmonic)
+    residual = member.at(index).group.residual
+    if residual is None:
+        return np.zeros(0, dtype=complex)
+    out = np.zeros(len(residual.labels), dtype=complex)
+    for i, second, side in a.sides(member.name):
+        contact, F = a.contacts[i], found.force[a.contacts[i].name]
+        at = F[:, 0] - contact.preload if harmonic == 0 else F[:, 2 * harmonic - 1] - 1j * F[:, 2 * harmonic]
+        six = np.conj(side.frame.T * side._phase(index, a.blades)) @ at * (1.0 if second else -1.0)
+        for label, value in zip(side.labels, six, strict=True):
+            if label in residual.labels:
+                out[residual.labels.index(label)] += value
+    for load in a.loads:
+        if load.member == member.name and load.harmonic == harmonic:
+            for i, label in enumerate(residual.labels):  # none of them for a pressure field, which has no shape beside
+                if label.startswith(f"excitation:{load.row}:"):
+                    out[i] += load.amplitude * (problem.share if harmonic else 1.0)
+    return out

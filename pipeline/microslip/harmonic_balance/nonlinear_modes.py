@@ -1,0 +1,185 @@
+"""Damped nonlinear modes: frequency and damping ratio of an assembly with contacts over the amplitude.
+
+A periodic motion of the undriven assembly needs something that feeds its losses. The extended periodic motion concept
+(M. Krack, Computers & Structures 154, 2015) takes a force in phase with the speed of every mass,
+
+    M q'' + (C - xi M) q' + K q + T^T F(T q) = 0,
+
+whose xi makes the motion periodic: with xi = 2 zeta omega the mode's damping ratio zeta at that amplitude. It is exact
+for one degree of freedom in resonance and for a mode that keeps its shape. Small motions are the modes with sticking
+contacts, large ones those with contacts that slide freely.
+
+Unknown are the contact displacements over the amplitude, omega and xi; the logarithm of the amplitude is the parameter
+that `continuation` changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from ..continuation import Point, Settings, follow, start
+from ..data import Array, UserError
+from ..system.assembly import Linear
+from .problem import AtFrequency, Problem
+from .readout import amplitude
+from .solver import Report
+
+HELD = 2.0
+"""Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
+is never in resonance by itself, which it would be with that of the sticking contact in small motions."""
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """A nonlinear mode.
+
+    Attributes:
+        amplitude: (k,) of the read-out's first harmonic, m. Omega: (k,) rad/s. damping: (k,) ratio.
+        x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended.
+    """
+
+    amplitude: Array
+    Omega: Array
+    damping: Array
+    x: Array
+    stuck: float
+    status: str
+
+    @property
+    def complete(self) -> bool:
+        """All amplitudes asked for were reached."""
+        return self.status.startswith("bound")
+
+
+def stuck_modes(problem: Problem) -> tuple[Array, Array]:
+    """(m,) rad/s and (m, m) shapes, columns, with sticking contacts, in the wave of the first harmonic.
+
+    Raises:
+        UserError: the problem eliminates its bodies one by one.
+    """
+    part, k = _only(problem), problem.stiffness[0]
+    held = k @ np.linalg.inv(np.eye(part.count) + part.residual @ k)
+    K = part.K + part.rows.conj().T @ held @ part.rows
+    values, shapes = scipy.linalg.eigh(0.5 * (K + K.conj().T), part.M)
+    return np.sqrt(np.maximum(values, 0.0)), shapes
+
+
+def _only(problem: Problem) -> Linear:
+    if len(problem.parts[1]) != 1:
+        raise UserError('nonlinear modes: take the form "relative", in which all bodies are eliminated together')
+    return problem.parts[1][0]
+
+
+def backbone(
+    problem: Problem, low: float, high: float, mode: int = 0, watch: int = 0, asked: Sequence[float] = (),
+    settings: Settings | None = None, report: Report = lambda _: None,
+) -> Backbone:  # fmt: skip
+    """A nonlinear mode from a small amplitude of a read-out to a large one.
+
+    Args:
+        low, high: m; at the low one the contacts should hardly slide. mode: number of the mode with sticking contacts,
+            0 the lowest. watch: read-out. asked: amplitudes (m) that are hit exactly.
+
+    Raises:
+        UserError: a mode that does not move the read-out, or that there is not.
+    """
+    curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), watch)
+    z, omega = curve.linear(problem, mode)
+    settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
+    bounds = np.log([low, high])
+    settings = replace(settings, low=float(bounds[0]) - 1e-9, high=float(bounds[1]), targets=tuple(np.log(asked)))
+    points = list[Point]()
+    for state in follow(curve, start(curve, z, float(bounds[0]), settings), settings):
+        points += state.found
+        if points:
+            share = int(100 * min((points[-1].lam - bounds[0]) / (bounds[1] - bounds[0]), 1.0))
+            report(f"{share} of 100 % of the amplitudes: {np.exp(points[-1].lam):.4g} m")
+    A = np.exp([p.lam for p in points])
+    Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
+    x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), -1)
+    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, state.status)
+
+
+def strongest(problem: Problem, low: float, high: float, watch: int = 0) -> int:
+    """Number of the mode with sticking contacts that makes the highest resonance of a read-out under the loads, among
+    those between two frequencies (rad/s), or among all if there is none.
+
+    With (w phi)(phi^H f) / (phi^H C phi omega) as the height of each.
+    """
+    part, (omega, shapes) = _only(problem), stuck_modes(problem)
+    seen, driven = np.abs(part.watch[watch] @ shapes), np.abs(shapes.conj().T @ part.load)
+    loss = np.einsum("im,ij,jm->m", shapes.conj(), 0.5 * (part.C + part.C.conj().T), shapes).real * omega
+    height = seen * driven / np.maximum(loss, 1e-12 * omega**2)
+    inside = (omega >= low) & (omega <= high)
+    return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
+
+
+def sliding_amplitude(problem: Problem, mode: int = 0, watch: int = 0) -> float:
+    """About the amplitude of a read-out, m, at which the contacts begin to slide in a mode: their largest motion is
+    then `Problem.length`."""
+    curve = _Curve(problem, watch)
+    curve.linear(problem, mode)
+    return float(problem.length / curve.x_scale[0])
+
+
+class _Curve:
+    """The equations of `backbone` for `continuation`: z = (x / (A / length), Omega, xi), lambda = ln A."""
+
+    def __init__(self, problem: Problem, watch: int) -> None:
+        self.problem, self.watch = problem, watch
+        self.x_scale: Array = np.ones(problem.size + 2)
+        self.lam_scale = 1.0
+
+    def linear(self, stuck: Problem, mode: int) -> tuple[Array, float]:
+        """The mode with sticking contacts as a guess, and its frequency; sets the scales."""
+        omega, shapes = stuck_modes(stuck)
+        if not 0 <= mode < len(omega):
+            raise UserError(f"mode: number {mode + 1}; there are {len(omega)}, counted from 1")
+        part, k, q = _only(stuck), stuck.stiffness[0], shapes[:, mode].astype(complex)
+        d = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ q)
+        seen = complex(part.watch[self.watch] @ q - part.watch_residual[self.watch] @ (k @ d))
+        if abs(seen) < 1e-9 * np.abs(part.watch[self.watch]).max(initial=0.0) * np.abs(q).max():
+            at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
+            raise UserError(f"mode: number {at} does not move the read-out; take another")
+        C = 0.5 * (part.C + part.C.conj().T)
+        xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
+        z = np.zeros((self.problem.waves, self.problem.count))
+        z[1], z[2] = (d / seen).real, -(d / seen).imag
+        z *= self.problem.length / self.problem.scale
+        self.x_scale[:-2] = np.abs(z).max()
+        self.x_scale[-2:] = omega[mode], 0.1 * omega[mode]
+        return np.append(z.ravel(), [omega[mode], xi]), float(omega[mode])
+
+    def evaluate(self, z: Array, lam: float) -> tuple[Array, Array, Array]:
+        """R over the amplitude and y / A - 1 (real and imaginary part), and their derivatives."""
+        A, Omega, xi = float(np.exp(lam)), float(z[-2]), float(z[-1])
+        unit = A / self.problem.length
+        x, at = z[:-2] * unit, self._at(Omega, xi)
+        force, slopes = at.forces(x)
+        R, y = at.residual_of(x, force), amplitude(at, x, force, slopes, self.watch)
+        J, by_x = at.jacobian(slopes).dense(), y.by_x * unit / A
+        sides = [self._given(self._at(Omega, xi + way * 1e-6 * Omega), x, force, slopes) for way in (1.0, -1.0)]
+        R_xi, y_xi = ((a - b) / (2e-6 * Omega) for a, b in zip(*sides, strict=True))
+        n = len(x)
+        D = np.zeros((n + 2, n + 2))
+        D[:n, :n], D[:n, n], D[:n, n + 1] = J, at.rate(x, force) / unit, R_xi / unit
+        D[n:, :n] = by_x.real, by_x.imag
+        D[n:, n:] = np.array([[y.rate.real, y_xi.real], [y.rate.imag, y_xi.imag]]) / A
+        lam_rate = np.concatenate([J @ z[:-2] - R / unit, _pair(complex(by_x @ z[:-2]) - y.value / A)])
+        return np.concatenate([R / unit, _pair(y.value / A - 1.0)]), D, lam_rate
+
+    def _given(self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]) -> tuple[Array, complex]:
+        return at.residual_of(x, force), amplitude(at, x, force, slopes, self.watch).value
+
+    def _at(self, Omega: float, xi: float) -> AtFrequency:
+        parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)
+        problem = replace(self.problem, parts=parts)
+        return AtFrequency(problem, Omega, tuple(one.directly(Omega) for one in problem.eliminated))
+
+
+def _pair(value: complex) -> Array:
+    return np.array([value.real, value.imag])

@@ -1,0 +1,170 @@
+"""Resonance peaks of an assembly followed over a parameter: normal force, mass, angle, whatever makes a problem.
+
+`continuation.extremum` does the work on the squared amplitude of a read-out; here are its starts, which a sweep over
+the band finds, and the check by another one that no other resonance is higher where the followed one is lowest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from ..continuation import CONVERGED, Lowest, Peak, Ridge, lowest, ridge
+from ..continuation import peak as climbed
+from ..data import Array
+from .problem import Problem
+from .readout import Watched
+from .solver import Report, sweep
+
+SAME = 5e-3
+"""Relative difference of the frequencies of what counts as one resonance."""
+
+Make = Callable[[float], Problem]
+"""The problem at a value of the parameter; its scales must not depend on the value (give `length` to `problem.of`)."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A peak. Attributes: Omega: rad/s. amplitude: m. x: see `Problem`. status: "converged", or what went wrong."""
+
+    Omega: float
+    amplitude: float
+    x: Array
+    status: str
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where the highest resonance of a band is lowest.
+
+    Attributes:
+        parameter. resonance: there. status: "converged": a minimum of one peak; "kink": one where its derivative
+            jumps; "two peaks": where one takes over from another, of the same height; else what went wrong.
+        ridges: the peaks followed, from the first value on and from the last one back. other: rad/s and m of the
+            highest response of the band besides, on the grid of the check.
+    """
+
+    parameter: float
+    resonance: Resonance
+    status: str
+    ridges: tuple[Ridge, ...]
+    other: tuple[float, float]
+
+
+def highest(problem: Problem, Omega: Array, watch: int = 0, report: Report = lambda _: None) -> Peak:
+    """The highest peak of a read-out in a band: a sweep over Omega (f,) in rad/s, then uphill from its highest point.
+
+    A band without any solution gives a peak that says so.
+    """
+    points = sweep(problem, Omega / (2 * np.pi), report)
+    watched = Watched(problem, watch)
+    heights = [watched.output(p.x, p.Omega)[0] if p.converged else -np.inf for p in points]
+    best = points[int(np.argmax(heights))]
+    return climbed(watched, best.x, best.Omega)
+
+
+def resonance(peak: Peak) -> Resonance:
+    """A peak of a squared amplitude in the words of vibrations."""
+    return Resonance(peak.lam, float(np.sqrt(peak.value)), peak.x, peak.status)
+
+
+def follow(make: Make, first: Peak, values: Sequence[float], watch: int = 0) -> Ridge:
+    """A peak of the problem at values[0] followed through the others, see `continuation.extremum.ridge`."""
+    return ridge(lambda value: Watched(make(value), watch), first, values)
+
+
+Keep = Callable[[int, float, Peak], None]
+"""Is given which of the followed peaks (1 or 2), the value, and the peak there."""
+
+
+def optimum(
+    make: Make, values: Sequence[float], Omega: Array, watch: int = 0, report: Report = lambda _: None,
+    keep: Keep = lambda number, value, peak: None,
+) -> Optimum:  # fmt: skip
+    """The value between the first and the last one at which the highest resonance in a band is lowest.
+
+    The highest peaks at both ends are followed through all values; a few of them do. The lowest place of the higher
+    one is found by its derivative, or where the two are of the same height.
+
+    Args:
+        values: rising or falling. Omega: (f,) rad/s, the band on a grid that sees its resonances. keep: is told every
+            peak as it is found.
+    """
+
+    def family(value: float) -> Watched:
+        return Watched(make(value), watch)
+
+    def followed(number: int, way: Sequence[float]) -> Ridge:
+        report(f"highest peak at {way[0]:.5g}")
+        first = highest(make(way[0]), Omega, watch, report)
+
+        def told(value: float, found: Peak) -> None:
+            one = resonance(found)
+            report(f"peak {number} at {value:.5g}: {one.Omega / (2 * np.pi):.6g} Hz, {one.amplitude:.4g} m")
+            keep(number, value, found)
+
+        report(f"peak {number} followed from {way[0]:.5g} to {way[-1]:.5g}")
+        return ridge(family, first, way, keep=told)
+
+    forward, back = followed(1, values), followed(2, values[::-1])
+    last = back.peaks[0]
+    report("where the highest peak is lowest")
+    same = forward.status == "complete" and abs(forward.lam[-1] / last.lam - 1) <= SAME
+    ridges = (forward,) if same else (forward, back)
+    found = _crossing(family, forward, back) if not same else None
+    if found is None:
+        known = [one for one in ridges if len(one.peaks) > 1] or list(ridges)
+        found = min((lowest(family, one) for one in known), key=lambda one: (one.status != CONVERGED, one.peak.value))
+    report(f"other peaks at {found.parameter:.5g}")
+    return Optimum(
+        found.parameter, resonance(found.peak), found.status, ridges,
+        _beside(make(found.parameter), Omega, found.peak, watch, report),
+    )  # fmt: skip
+
+
+def _crossing(family: Callable[[float], Watched], forward: Ridge, back: Ridge) -> Lowest | None:
+    """Where a falling peak meets a rising one, if they do at parameters that both reach."""
+    ways = [dict(zip(one.parameter.tolist(), one.peaks, strict=True)) for one in (forward, back)]
+    common = [value for value in ways[0] if value in ways[1]]
+    rows = [(ways[0][value], ways[1][value]) for value in common]
+    gap = np.array([np.log(a.value / b.value) for a, b in rows])
+    change = np.flatnonzero(gap[:-1] * gap[1:] < 0)
+    if not len(change):
+        return None
+    i = int(change[0])
+    kept = {}
+
+    def difference(value: float) -> float:
+        pair = [ridge(family, one, [common[i], value]).peaks[-1] for one in rows[i]]
+        kept[value] = pair
+        return float(np.log(pair[0].value / pair[1].value))
+
+    value = float(scipy.optimize.brentq(difference, common[i], common[i + 1], rtol=1e-9))
+    difference(value)
+    rates = [one.rate for one in kept[value]]
+    if min(rates) > 0 or max(rates) < 0:  # both rise or both fall: no lowest place
+        return None
+    return Lowest(value, kept[value][0], "two peaks", sum(p.evaluations for pair in kept.values() for p in pair))
+
+
+def _beside(problem: Problem, Omega: Array, peak: Peak, watch: int, report: Report) -> tuple[float, float]:
+    """(rad/s, m) of the highest point of a band that is not on the flanks of a peak."""
+    points = [p for p in sweep(problem, Omega / (2 * np.pi), report) if p.converged]
+    watched = Watched(problem, watch)
+    heights = np.array([watched.output(p.x, p.Omega)[0] for p in points])
+    at = int(np.argmin([abs(p.Omega - peak.lam) for p in points]))
+    while (best := max((at - 1, at, at + 1), key=lambda i: heights[i] if 0 <= i < len(points) else -np.inf)) != at:
+        at = best
+    low = high = at
+    while low > 0 and heights[low - 1] < heights[low]:
+        low -= 1
+    while high < len(points) - 1 and heights[high + 1] < heights[high]:
+        high += 1
+    rest = [i for i in range(len(points)) if i < low or i > high]
+    if not rest:
+        return float("nan"), 0.0
+    top = max(rest, key=lambda i: heights[i])
+    return points[top].Omega, float(np.sqrt(heights[top]))

@@ -1,0 +1,416 @@
+"""The balance of an assembly: R(x, Omega) = 0 for the harmonics of its contact coordinates, with exact derivatives.
+
+Two forms of the same equations. `relative`: unknown are the relative motions of all contacts, every body eliminated
+together with its neighbours; few unknowns, all coupled. `sides`: unknown are the motions of both sides of every
+contact, each body eliminated on its own; a body then knows only the bodies it touches, and the cost of a ring grows
+with the number of its blades, not with its cube.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from ..data import Array, ComplexArray, Indices
+from ..system.assembly import Assembly, Linear
+from . import blocks, played, reduced
+from .blocks import Matrix
+from .forces import Forces
+from .patch import Cycle
+from .reduced import Eliminated, Seen, View
+
+RELATIVE_AT_MOST = 8
+"""Members up to which all are eliminated together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Equal contacts, evaluated together.
+
+    Attributes:
+        model: of their forces. first: (n, k) coordinates of their first sides, or relative ones; second: of the second
+            sides, or None. offset, preload: (n, k). phase: (n,), see `system.assembly.Contact`. contacts: (n,) numbers
+            in the assembly.
+    """
+
+    model: Forces
+    first: Indices
+    second: Indices | None
+    offset: Array
+    preload: Array
+    phase: Array
+    contacts: tuple[int, ...]
+
+    def relative(self, v: Array) -> Array:
+        """(n, k, W) displacements, preloaded state included, from (W, c) those of the coordinates."""
+        d = v[:, self.first] if self.second is None else v[:, self.first] - v[:, self.second]
+        out = np.ascontiguousarray(d.transpose(1, 2, 0))
+        out[:, :, 0] += self.offset
+        return out
+
+    def force(self, u: Array, period: float) -> Array:
+        """See `forces.Forces`."""
+        return self._ahead(self.model.force(self._back(u), period))
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        """See `forces.Forces`."""
+        F, S = self.model.forces(self._back(u), period)
+        if self.phase.any():
+            turn = self._turns(S.shape[2])
+            S = np.einsum("nkwlz,nwy,nzx->nkylx", S, turn, turn, optimize=True)
+        return self._ahead(F), S
+
+    def rate(self, u: Array, period: float) -> Array | None:
+        """See `forces.Forces`."""
+        rate = self.model.rate(self._back(u), period)
+        return None if rate is None else self._ahead(rate)
+
+    def watch(self, u: Array, period: float) -> list[Cycle]:
+        """See `forces.Forces`."""
+        return self.model.watch(self._back(u), period)
+
+    def _back(self, u: Array) -> Array:
+        return np.matmul(u, self._turns(u.shape[2]).transpose(0, 2, 1)) if self.phase.any() else u
+
+    def _ahead(self, F: Array) -> Array:
+        return np.matmul(F, self._turns(F.shape[2])) if self.phase.any() else F
+
+    def _turns(self, waves: int) -> Array:
+        """(n, W, W) from harmonics of a signal to those of the same signal later by the phase."""
+        out = np.zeros((len(self.phase), waves, waves))
+        out[:, 0, 0] = 1.0
+        for h in range(1, waves // 2 + 1):
+            cos, sin = np.cos(h * self.phase), np.sin(h * self.phase)
+            a, b = 2 * h - 1, 2 * h
+            out[:, a, a], out[:, a, b], out[:, b, a], out[:, b, b] = cos, -sin, sin, cos
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """An assembly and how finely it is balanced.
+
+    The unknowns x are displacements from the preloaded state over `scale`, harmonic by harmonic: (c,) means, (c,)
+    cosines, (c,) sines, (c,) cosines of 2 Omega t, ...
+
+    Attributes:
+        assembly. parts: harmonic -> what is eliminated together. at: where the coordinates of each part begin.
+        stiffness: (c_i, c_i) of each part, taken into it. groups: of contacts. harmonics: H. length: m, about what the
+            contacts move by; only the scaling. share: of the loads that are not steady.
+        x_scale, lam_scale: what counts as a large x, and a large change of Omega (rad/s), where the solutions are
+            followed by `continuation`.
+    """
+
+    assembly: Assembly
+    parts: tuple[tuple[Linear, ...], ...]
+    begins: tuple[int, ...]
+    stiffness: tuple[Array, ...]
+    groups: tuple[Group, ...]
+    harmonics: int = 3
+    length: float = 1e-6
+    share: float = 1.0
+    x_scale: float = 10.0
+    lam_scale: float = 100.0
+
+    @property
+    def waves(self) -> int:
+        """2 H + 1."""
+        return 2 * self.harmonics + 1
+
+    @property
+    def count(self) -> int:
+        """c, number of contact coordinates."""
+        return sum(part.count for part in self.parts[0])
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.count * self.waves
+
+    @cached_property
+    def scale(self) -> Array:
+        """(c,) of a unit of x: every coordinate moves the points of its patch by as much as the others do."""
+        out = np.ones(self.count)
+        for g in self.groups:
+            for row, i in enumerate(g.contacts):
+                G = np.abs(self.assembly.contacts[i].patch.kinematics)
+                unit = self.length / np.maximum(G.max(axis=(0, 1)), 1e-3)
+                for side in (g.first, g.second):
+                    if side is not None:
+                        out[side[row]] = unit
+        return out
+
+    @cached_property
+    def eliminated(self) -> tuple[Eliminated, ...]:
+        """Of each part, what does not depend on the frequency."""
+        return tuple(Eliminated(one, k) for one, k in zip(zip(*self.parts, strict=True), self.stiffness, strict=True))
+
+    def loaded(self, share: float) -> Problem:
+        """The same with a share of the loads that are not steady."""
+        return replace(self, share=share)
+
+    def slices(self) -> list[slice]:
+        """Coordinates of each part."""
+        return [slice(b, b + p.count) for b, p in zip(self.begins, self.parts[0], strict=True)]
+
+    def at(self, Omega: float) -> AtFrequency:
+        """The problem at one frequency (rad/s)."""
+        return AtFrequency(self, Omega, tuple(one.at(Omega) for one in self.eliminated))
+
+    def evaluate(self, x: Array, Omega: float) -> tuple[Array, Array, Array]:
+        """R, dR/dx and dR/dOmega (Omega in rad/s); (k,), (k, k), (k,)."""
+        return self.at(Omega).evaluate(x)
+
+    def displacement(self, x: Array) -> Array:
+        """(W, c) harmonics of the contact coordinates from the preloaded state, m and rad."""
+        return x.reshape(self.waves, -1) * self.scale
+
+    def relative(self, x: Array) -> dict[int, Array]:
+        """Contact -> (k, W) relative displacement as the law measures it, with the preloaded state."""
+        v = self.displacement(x)
+        found = {i: one for g in self.groups for i, one in zip(g.contacts, g.relative(v), strict=True)}
+        return {i: found[i] for i in sorted(found)}
+
+
+@dataclass(frozen=True, eq=False)
+class AtFrequency:
+    """The residual at one frequency.
+
+    R = v - v_ref + D p in each harmonic and part, in units of `Problem.scale`: p = E^T (F(E v + u_0) - F_0) - k v.
+    """
+
+    problem: Problem
+    Omega: float
+    views: tuple[View, ...]
+
+    @property
+    def period(self) -> float:
+        return 2 * np.pi / self.Omega
+
+    @cached_property
+    def seen(self) -> tuple[tuple[Seen, ...], ...]:
+        """Harmonic -> part -> what its own coordinates do besides."""
+        p = self.problem
+        return tuple(
+            tuple(reduced.seen(part, k, self.Omega, h) for part, k in zip(parts, p.stiffness, strict=True))
+            for h, parts in enumerate(p.parts)
+        )
+
+    @cached_property
+    def reference(self) -> Array:
+        """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
+        return self._stacked([view.reference for view in self.views])
+
+    def residual(self, x: Array) -> Array:
+        """(size,) R alone."""
+        return self.residual_of(x, self.force(x))
+
+    def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
+        """See `Problem.evaluate`."""
+        force, slope = self.forces(x)
+        return self.residual_of(x, force), self.jacobian(slope).dense(), self.rate(x, force)
+
+    def force(self, x: Array) -> Array:
+        """(W, c) contact forces less the preload along the coordinates, N and N m."""
+        v = self.problem.displacement(x)
+        return self.along([g.force(g.relative(v), self.period) for g in self.problem.groups])
+
+    def forces(self, x: Array) -> tuple[Array, list[Array]]:
+        """`force`, and of every group of contacts its derivative (n, k, W, k, W)."""
+        v = self.problem.displacement(x)
+        both = [g.forces(g.relative(v), self.period) for g in self.problem.groups]
+        return self.along([F for F, _ in both]), [S for _, S in both]
+
+    def jacobian(self, slopes: list[Array]) -> Matrix:
+        """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
+        p = self.problem
+        pieces: dict[tuple[int, int], Array] = {}
+        for g, S in zip(p.groups, slopes, strict=True):
+            _add_slopes(pieces, g, S, p)
+        for i, k in enumerate(p.stiffness):
+            block = pieces.setdefault((i, i), np.zeros((p.waves, len(k), p.waves, len(k))))
+            for w in range(p.waves):
+                block[w, :, w] -= k
+        where = p.slices()
+        D = {(i, j): self._scaled(self._applied(i, P), where[i], where[j]) for (i, j), P in pieces.items()}
+        return blocks.one_plus(D, [s.stop - s.start for s in where], p.waves)
+
+    def rate(self, x: Array, force: Array) -> Array:
+        """(size,) dR/dOmega."""
+        p, v = self.problem, self.problem.displacement(x)
+        excess = self._excess(v, force)
+        out = np.zeros_like(v)
+        for i, s in enumerate(p.slices()):
+            out[:, s] += _harmonics(self.views[i].compliance_rate, excess[:, s])
+        rates = [g.rate(g.relative(v), self.period) for g in p.groups]
+        if any(r is not None for r in rates):
+            zero = [np.zeros((len(g.first), g.first.shape[1], p.waves)) for g in p.groups]
+            given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
+            out += self._compliant(self.along(given, preload=False))
+        driven = self._stacked([view.reference_rate for view in self.views])
+        return (out / p.scale).ravel() - driven
+
+    def load_rate(self) -> Array:
+        """(size,) dR/dshare, of the loads that are not steady."""
+        p = self.problem
+        if p.share:
+            return -(self.reference - replace(self, problem=replace(p, share=0.0)).reference) / p.share
+        return -(replace(self, problem=replace(p, share=1.0)).reference - self.reference)
+
+    def modal(self, x: Array, force: Array) -> list[list[ComplexArray]]:
+        """Harmonic -> part -> (m,) amplitudes of the bodies' coordinates."""
+        p = self.problem
+        g = self.amplitudes(self._excess(p.displacement(x), force))
+        return [
+            [s.modal * (p.share if h else 1.0) - s.modal_compliance @ g[h][at]
+             for s, at in zip(parts, p.slices(), strict=True)]
+            for h, parts in enumerate(self.seen)
+        ]  # fmt: skip
+
+    def amplitudes(self, v: Array) -> list[ComplexArray]:
+        """(c,) complex amplitudes of the harmonics 0 to H of (W, c) real ones."""
+        pairs = zip(v[1::2], v[2::2], strict=True)
+        return [v[0].astype(complex), *(cos - 1j * sin for cos, sin in pairs)]
+
+    def _excess(self, v: Array, force: Array) -> Array:
+        """(W, c) p: forces less the preload, less what the reference stiffness makes of the displacement."""
+        out = force.copy()
+        for s, k in zip(self.problem.slices(), self.problem.stiffness, strict=True):
+            out[:, s] -= v[:, s] @ k.T
+        return out
+
+    def residual_of(self, x: Array, force: Array) -> Array:
+        """(size,) R for forces that are known."""
+        p = self.problem
+        moved = self._compliant(self._excess(p.displacement(x), force))
+        return x - self.reference + (moved / p.scale).ravel()
+
+    def along(self, forces: list[Array], preload: bool = True) -> Array:
+        """(W, c) forces of the groups (n, k, W) along the coordinates."""
+        p = self.problem
+        out = np.zeros((p.waves, p.count))
+        for g, F in zip(p.groups, forces, strict=True):
+            F = F.transpose(2, 0, 1).copy()
+            if preload:
+                F[0] -= g.preload
+            out[:, g.first] += F
+            if g.second is not None:
+                out[:, g.second] -= F
+        return out
+
+    def _compliant(self, force: Array) -> Array:
+        """(W, c) D applied to (W, c)."""
+        out = np.empty_like(force)
+        for i, s in enumerate(self.problem.slices()):
+            out[:, s] = _harmonics(self.views[i].compliance, force[:, s])
+        return out
+
+    def _applied(self, part: int, P: Array) -> Array:
+        return _harmonics(self.views[part].compliance, P)
+
+    def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
+        """A block (W, a, W, b) as a matrix, in units of x."""
+        unit, W = self.problem.scale, len(block)
+        block = block * unit[columns] / unit[rows][:, None, None]
+        return block.reshape(W * block.shape[1], W * block.shape[3])
+
+    def _stacked(self, amplitudes: list[ComplexArray]) -> Array:
+        """(size,) x of complex amplitudes (H + 1, c_i) under the loads, a standing for Re(a exp(i h Omega t))."""
+        p, a = self.problem, np.concatenate(amplitudes, axis=1)
+        out = np.empty((p.waves, p.count))
+        out[0], out[1::2], out[2::2] = a[0].real, p.share * a[1:].real, -p.share * a[1:].imag
+        return (out / p.scale).ravel()
+
+
+def _harmonics(D: ComplexArray, V: Array) -> Array:
+    """(W, c, ...) compliances (H + 1, c, c) of the harmonics applied to (W, c, ...)."""
+    flat = V.reshape(*V.shape[:2], -1)
+    out = np.empty_like(flat)
+    out[0] = D[0].real @ flat[0]
+    amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])
+    out[1::2], out[2::2] = amplitude.real, -amplitude.imag
+    return out.reshape(V.shape)
+
+
+def _add_slopes(pieces: dict[tuple[int, int], Array], g: Group, S: Array, p: Problem) -> None:
+    """Derivatives (n, k, W, k, W) of a group's forces into blocks of parts (W, a, W, b)."""
+    begins, sizes = np.array(p.begins), [part.count for part in p.parts[0]]
+    sides: list[tuple[Any, float]] = [(g.first, 1.0)] + ([] if g.second is None else [(g.second, -1.0)])
+    for n, slope in enumerate(S.transpose(0, 2, 1, 4, 3)):  # (W, k, W, k)
+        for row, plus in sides:
+            for column, minus in sides:
+                a, b = row[n], column[n]
+                i, j = (int(np.searchsorted(begins, at[0], "right")) - 1 for at in (a, b))
+                block = pieces.setdefault((i, j), np.zeros((p.waves, sizes[i], p.waves, sizes[j])))
+                at, to = slice(a[0] - begins[i], a[-1] + 1 - begins[i]), slice(b[0] - begins[j], b[-1] + 1 - begins[j])
+                block[:, at, :, to] += plus * minus * slope
+
+
+def of(
+    assembly: Assembly, harmonics: int = 3, samples: int = 64, cycles: int = 100, settled: float = 1e-10,
+    length: float | None = None, form: str | None = None, models: dict[int, Forces] | None = None,
+) -> Problem:  # fmt: skip
+    """The balance of an assembly.
+
+    Args:
+        harmonics: H. samples: of a cycle. cycles: marched at most. settled: see `forces.Marched`. length: m, see
+            `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
+            the number of members if not given. models: first contact of a group of equal ones -> its force model, if
+            it is not the marched law.
+    """
+    together = len(assembly.members) <= RELATIVE_AT_MOST if form is None else form == "relative"
+    contacts = assembly.contacts
+    begins, where = _numbered(assembly, together)
+    groups = []
+    for same in _equal(assembly):
+        patch = contacts[same[0]].patch
+        model = (models or {}).get(same[0]) or played.model(patch, len(same), samples, cycles, settled)
+        first = np.array([where[i, 0] for i in same])
+        second = None if together or contacts[same[0]].second is None else np.array([where[i, 1] for i in same])
+        offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))
+        phase = np.array([contacts[i].phase for i in same])
+        groups.append(Group(model, first, second, offset, preload, phase, tuple(same)))
+    parts = tuple(eliminated(assembly, h, together) for h in range(harmonics + 1))
+    k = [c.stiffness for c in contacts]
+    if together:
+        stiffness: tuple[Array, ...] = (scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)),)
+    else:
+        stiffness = tuple(
+            scipy.linalg.block_diag(*[k[i] for i, _, _ in assembly.sides(m.name)]) for m in assembly.members
+        )
+    return Problem(assembly, parts, begins, stiffness, tuple(groups), harmonics, length or moves_by(assembly))
+
+
+def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linear, ...]:
+    """What is eliminated in one harmonic: all bodies together, or each by itself."""
+    if together:
+        return (assembly.joined(harmonic),)
+    return tuple(assembly.part(m, harmonic) for m in assembly.members)
+
+
+def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict[tuple[int, int], Array]]:
+    """Where the coordinates of each part begin, and (contact, side) -> its coordinates."""
+    if together:
+        starts = np.cumsum([0, *(c.patch.count for c in assembly.contacts)])
+        return (0,), {(i, 0): np.arange(a, b) for i, (a, b) in enumerate(zip(starts[:-1], starts[1:], strict=True))}
+    where = {(i, j): np.arange(start, start + k) for i, j, start, k in assembly.coordinates}
+    counts = [sum(assembly.contacts[i].patch.count for i, *_ in assembly.sides(m.name)) for m in assembly.members]
+    return tuple(int(b) for b in np.cumsum([0, *counts[:-1]])), where
+
+
+def _equal(assembly: Assembly) -> list[list[int]]:
+    """Contacts of one patch object, and alike in having a second side or none."""
+    found: dict[tuple[int, bool], list[int]] = {}
+    for i, c in enumerate(assembly.contacts):
+        found.setdefault((id(c.patch), c.second is None), []).append(i)
+    return list(found.values())
+
+
+def moves_by(assembly: Assembly) -> float:
+    """About how far the contacts move before they slide, m: the unit of the unknowns."""
+    pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
+    return max([*(limit / k for limit, k in pairs if k), 1e-9])

@@ -1,0 +1,124 @@
+"""Amplitudes of read-outs with all derivatives, for whatever looks for their peaks or prescribes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Array, ComplexArray
+from .problem import AtFrequency, Group, Problem
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Complex 0-peak amplitude of a read-out in one harmonic, and its derivatives.
+
+    Attributes:
+        value: m. by_x: (size,) m. rate: with respect to Omega, m s.
+    """
+
+    value: complex
+    by_x: ComplexArray
+    rate: complex
+
+
+def amplitude(
+    at: AtFrequency, x: Array, force: Array, slopes: list[Array], watch: int = 0, harmonic: int = 1
+) -> Amplitude:  # fmt: skip
+    """The amplitude of read-out number `watch` for forces (W, c) and their derivatives as `AtFrequency.forces` gives.
+
+    y = W q + e - r F with q = q_ref - X (F - k v): linear in the forces and in v.
+    """
+    p, h = at.problem, harmonic
+    share = p.share if h else 1.0
+    v, f = at.amplitudes(p.displacement(x))[h], at.amplitudes(force)[h]
+    of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
+    value, by_Omega = 0.0j, 0.0j
+    first = 0
+    for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices(), strict=True):
+        if first <= watch < first + len(part.watch):
+            row, beside = part.watch[watch - first], part.watch_residual[watch - first]
+            excess = f[s] - k @ v[s]
+            driven = share * (row @ seen.modal + part.watch_given[watch - first])
+            value = complex(driven - row @ (seen.modal_compliance @ excess) - beside @ f[s])
+            by_Omega = complex(share * (row @ seen.modal_rate) - row @ (seen.modal_compliance_rate @ excess))
+            of_force[s] = -(row @ seen.modal_compliance + beside)
+            of_motion[s] = row @ seen.modal_compliance @ k
+        first += len(part.watch)
+    by_v = _through(p, of_force, slopes, h)
+    for wave, unit in _waves(h):
+        by_v[wave] += unit * of_motion
+    for (_, unit), rate in _force_rates(at, x, h):
+        by_Omega += complex(unit * (of_force @ rate))
+    return Amplitude(complex(value), (by_v * p.scale).ravel(), complex(by_Omega))
+
+
+def _waves(harmonic: int) -> list[tuple[int, complex]]:
+    """Entries of a signal's harmonics that make up an amplitude, cos part - i sin part, and their factors."""
+    return [(2 * harmonic - 1, 1.0), (2 * harmonic, -1.0j)] if harmonic else [(0, 1.0)]
+
+
+def _through(p: Problem, weights: ComplexArray, slopes: list[Array], harmonic: int) -> ComplexArray:
+    """(W, c) derivative of weights (c,) times the forces' amplitude."""
+    out = np.zeros((p.waves, p.count), dtype=complex)
+    for g, S in zip(p.groups, slopes, strict=True):
+        own = weights[g.first] - (0.0 if g.second is None else weights[g.second])
+        found = sum(unit * np.einsum("nk,nklz->znl", own, S[:, :, wave]) for wave, unit in _waves(harmonic))
+        for side, sign in _sides(g):
+            out[:, side] += sign * found
+    return out
+
+
+def _sides(g: Group) -> list[tuple[Array, float]]:
+    return [(g.first, 1.0)] + ([] if g.second is None else [(g.second, -1.0)])
+
+
+def _force_rates(at: AtFrequency, x: Array, harmonic: int) -> list[tuple[tuple[int, complex], Array]]:
+    """Derivatives (c,) of the forces with respect to Omega at the same displacements; of most laws there are none."""
+    p, v = at.problem, at.problem.displacement(x)
+    rates = [g.rate(g.relative(v), at.period) for g in p.groups]
+    if all(r is None for r in rates):
+        return []
+    zero = [np.zeros((*g.first.shape, p.waves)) for g in p.groups]
+    given = [z if r is None else r * (-at.period / at.Omega) for r, z in zip(rates, zero, strict=True)]
+    whole = at.along(given, preload=False)
+    return [((wave, unit), whole[wave]) for wave, unit in _waves(harmonic)]
+
+
+class Watched:
+    """A problem whose output is the squared amplitude of a read-out, as `continuation.extremum` asks for it.
+
+    The forces found last are kept: residual, derivative and output of one place cost them once.
+    """
+
+    def __init__(self, problem: Problem, watch: int = 0, harmonic: int = 1) -> None:
+        self.problem, self.watch, self.harmonic = problem, watch, harmonic
+        self._kept: tuple[bytes, float, AtFrequency, Array, list[Array]] | None = None
+
+    @property
+    def x_scale(self) -> float:
+        return self.problem.x_scale
+
+    @property
+    def lam_scale(self) -> float:
+        return self.problem.lam_scale
+
+    def evaluate(self, x: Array, Omega: float) -> tuple[Array, Array, Array]:
+        """See `Problem.evaluate`."""
+        at, force, slopes = self._at(x, Omega)
+        return at.residual_of(x, force), at.jacobian(slopes).dense(), at.rate(x, force)
+
+    def output(self, x: Array, Omega: float) -> tuple[float, Array, float]:
+        """|y|^2 in m2 and its derivatives with respect to x and Omega."""
+        at, force, slopes = self._at(x, Omega)
+        y = amplitude(at, x, force, slopes, self.watch, self.harmonic)
+        turned = 2.0 * np.conj(y.value)
+        return abs(y.value) ** 2, (turned * y.by_x).real, float((turned * y.rate).real)
+
+    def _at(self, x: Array, Omega: float) -> tuple[AtFrequency, Array, list[Array]]:
+        key = np.asarray(x, dtype=float).tobytes()
+        if self._kept is None or self._kept[:2] != (key, Omega):
+            at = self.problem.at(Omega)
+            self._kept = (key, Omega, at, *at.forces(x))
+        return self._kept[2:]

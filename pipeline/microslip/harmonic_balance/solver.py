@@ -1,0 +1,195 @@
+"""Newton's method on the balance of an assembly, and sweeps: point after point, failures recorded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .. import continuation
+from ..data import Array
+from .problem import AtFrequency, Problem
+
+Report = Callable[[str], None]
+CONVERGED = "converged"
+
+
+@dataclass(frozen=True)
+class Point:
+    """A solution at one frequency.
+
+    Attributes:
+        Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong. error: largest entry of R over the
+            largest of x. iterations: Newton steps, all attempts together. seconds: spent. slope: the last derivative of
+            the contact forces, if it is kept. history: `error` before every Newton step, attempt after attempt.
+    """
+
+    Omega: float
+    x: Array
+    status: str
+    error: float
+    iterations: int
+    seconds: float = 0.0
+    slope: Any = None
+    history: tuple[float, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        return self.status == CONVERGED
+
+
+CONTRACTION = 0.1
+"""Share of |R| that a step may leave for the derivative to be used again: it costs as much as a dozen residuals."""
+
+
+def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None) -> Point:
+    """Newton's method; derivatives of the forces are used again while they serve, steps halved until |R| falls.
+
+    The contact forces are continuous with a piecewise continuous derivative; where a step crosses to other pieces |R|
+    may rise, and the half of it need not.
+
+    Args:
+        x: start. tolerance: of the largest entry of R over that of x, which counts within 1e-3 and 1e3 of the
+            reference's.
+        slope: derivative of the forces somewhere near, to begin with.
+    """
+    R, fresh, history = at.residual(x), False, list[float]()
+    reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
+    for count in range(most):
+        error = float(np.abs(R).max() / np.clip(np.abs(x).max(), 1e-3 * reference, 1e3 * reference))
+        history.append(error)
+        if not np.isfinite(error):
+            return Point(at.Omega, x, "not a number", error, count, history=tuple(history))
+        if error <= tolerance:
+            return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
+        if slope is None:
+            slope, fresh = at.forces(x)[1], True
+        step = at.jacobian(slope).solve(-R)
+        trial, left = x + step, at.residual(x + step)
+        if np.linalg.norm(left) <= CONTRACTION * np.linalg.norm(R):
+            x, R, fresh = trial, left, False
+            continue
+        if fresh:
+            x, R = _shortened(at, x, R, step, left)
+        slope, fresh = None, False
+    words = f"no convergence in {most} steps, |R|/|x| = {error:.1e}"
+    return Point(at.Omega, x, words, error, most, history=tuple(history))
+
+
+def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) -> tuple[Array, Array]:
+    """x and R after the longest of 1, 1/2, ... 1/1024 of a step that lowers |R|, or the last of them."""
+    share = 1.0
+    while not np.linalg.norm(left) < np.linalg.norm(R) and share > 1e-3:
+        share *= 0.5
+        left = at.residual(x + share * step)
+    return x + share * step, left
+
+
+def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
+    """Newton's method from one start after the other, then from the sticking contact, then along the load."""
+    began, at, spent = time.perf_counter(), problem.at(Omega), 0
+    history: tuple[float, ...] = ()
+    for x in [*starts, at.reference]:
+        point = newton(at, x, slope=slope)
+        spent, history = spent + point.iterations, (*history, *point.history)
+        if point.converged:
+            break
+    else:
+        point = _raised(problem, Omega)
+        spent, history = spent + point.iterations, (*history, *point.history)
+    return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
+
+
+@dataclass(frozen=True, eq=False)
+class OverLoad:
+    """The balance at one frequency over the share of the loads that are not steady, for `continuation`."""
+
+    at: AtFrequency
+    x_scale: float
+    lam_scale: float = 1.0
+
+    def evaluate(self, x: Array, share: float) -> tuple[Array, Array, Array]:
+        """R, dR/dx, dR/dshare."""
+        at = replace(self.at, problem=self.at.problem.loaded(share))
+        force, slope = at.forces(x)
+        return at.residual_of(x, force), at.jacobian(slope).dense(), at.load_rate()
+
+
+def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
+    """The load from nothing to its whole size along the curve of solutions, which may turn back on its way."""
+    at, whole = problem.at(Omega), problem.share
+    family = OverLoad(at, max(float(np.abs(at.reference).max(initial=0.0)), 1e-3))
+    settings = continuation.Settings(low=0.0, high=whole, points=most, step=0.05, step_max=0.3, branch_points=False)
+    branch = continuation.trace(family, replace(at, problem=problem.loaded(0.0)).reference, 0.0, settings)
+    spent = sum(p.evaluations for p in branch.points)
+    if branch.points and branch.points[-1].lam == whole:
+        point = newton(at, branch.points[-1].x)
+        return replace(point, iterations=spent + point.iterations)
+    x = branch.points[-1].x if branch.points else at.reference
+    reached = branch.points[-1].lam / whole if branch.points and whole else 0.0
+    error = float(np.abs(at.residual(x)).max() / max(np.abs(x).max(), 1e-300))
+    return Point(Omega, x, f"{branch.status}, at {reached:.3g} of the load", error, spent)
+
+
+def sweep(
+    problem: Problem, frequency: Array, report: Report = lambda _: None, start: Array | None = None,
+    known: Mapping[float, Point] | None = None, keep: Callable[[Point], None] = lambda _: None,
+) -> list[Point]:  # fmt: skip
+    """Solutions at frequencies (Hz) in the given order, each started from its neighbours. A failure is recorded.
+
+    What failed is tried again from the neighbour behind it, where that one has a solution.
+
+    Args:
+        start: (k,) where the first point starts; the sticking contact if None. known: Hz -> point that was found
+            before. keep: told of every other point as soon as it is found.
+    """
+    done: list[Point] = []
+    slope: Any = None
+    known = known or {}
+    for i, f in enumerate(frequency):
+        if float(f) in known:
+            done.append(known[float(f)])
+            continue
+        failed = sum(not p.converged for p in done)
+        report(f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else ""))
+        good = [p for p in done[-2:] if p.converged]
+        starts = [] if start is None or done else [start]
+        if good:
+            starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) == 2 else [good[-1].x]
+        point = solve(problem, 2 * np.pi * float(f), starts, slope)
+        slope = point.slope
+        done.append(replace(point, slope=None))
+        keep(done[-1])
+    for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
+        if not done[i].converged and done[i + 1].converged:
+            report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
+            done[i] = _walked(problem, done[i + 1], done[i])
+            keep(done[i])
+    return done
+
+
+def _walked(problem: Problem, known: Point, failed: Point) -> Point:
+    """The failed point, reached from a known one in steps of frequency that are shortened where need be."""
+    began, last, step, spent = time.perf_counter(), known, 1.0, failed.iterations
+    while step > 1 / 64:
+        Omega = last.Omega + step * (failed.Omega - known.Omega)
+        Omega = failed.Omega if abs(Omega - known.Omega) >= abs(failed.Omega - known.Omega) else Omega
+        point = newton(problem.at(Omega), last.x, most=30)
+        spent += point.iterations
+        if not point.converged:
+            step *= 0.5
+        elif Omega == failed.Omega:
+            return replace(point, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
+        else:
+            last = point
+    return replace(failed, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
+
+
+def _ahead(points: list[Point], Omega: float) -> Array:
+    """The line through two solutions, at another frequency."""
+    a, b = points
+    share = (Omega - b.Omega) / (b.Omega - a.Omega) if b.Omega != a.Omega else 0.0
+    return b.x + share * (b.x - a.x)

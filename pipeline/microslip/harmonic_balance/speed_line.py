@@ -1,0 +1,180 @@
+"""Forced vibration along an engine-order line: rotation speed and frequency tied together, f = e n / 60.
+
+At every speed the bodies are those of that speed, contacts are pressed by what presses them there, and the steady
+loads are that speed's: a problem of its own, started from its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..data import Array, ModalBasis, ModalGroup, UserError
+from ..speed_range import basis_at
+from ..system.assembly import Assembly, Load, Member
+from . import problem as balance
+from . import response
+from .response import HarmonicResponse
+from .solver import Point, Report, solve
+
+Build = Callable[[float], Assembly]
+"""Rotation speed in rpm -> the assembly at that speed."""
+
+
+@dataclass(frozen=True)
+class SpeedResponse(HarmonicResponse):
+    """`HarmonicResponse` along an engine-order line.
+
+    Attributes:
+        rpm: (s,). order: base engine order, of the first harmonic. normal: (s, contacts) mean normal forces, N.
+    """
+
+    rpm: Array
+    order: int
+    normal: Array
+
+    def columns(self) -> dict[str, Array]:
+        forces = {f"normal_force_{i + 1}_N": force for i, force in enumerate(self.normal.T)}
+        return {"speed_rpm": self.rpm, **super().columns(), **forces}
+
+
+def frequency(order: int, rpm: Array) -> Array:
+    """Hz of an engine order at rotation speeds in rpm."""
+    return abs(order) * np.asarray(rpm, dtype=float) / 60
+
+
+def along(
+    build: Build, rpm: Array, order: int | None = None, report: Report = lambda _: None,
+    keep: Callable[[SpeedResponse], None] = lambda _: None, **settings: Any,
+) -> SpeedResponse:  # fmt: skip
+    """Steady vibration at every speed, each started from the one or two before it.
+
+    Args:
+        build: see `Build`; contacts that stay the same keep their `Patch`, so that nothing is compiled twice. rpm: (s,)
+            in the order in which they are run through. order: base engine order, of the first harmonic; the ring's if
+            None. keep: is given what there is after every speed. settings: of `problem.of`.
+
+    Raises:
+        UserError: no speed, one that is not above 0, no engine order.
+    """
+    speeds = np.asarray(rpm, dtype=float)
+    if not len(speeds) or not (speeds > 0).all():
+        raise UserError("speeds: an engine-order line needs one or more speeds in rpm, all above 0")
+    found: list[HarmonicResponse] = []
+    normal, done = [], list[Point]()
+    for i, n in enumerate(speeds):
+        problem = balance.of(build(float(n)), **settings)
+        settings.setdefault("length", problem.length)  # one unit for the unknowns of all speeds
+        base = _order(problem.assembly, order)
+        point = solve(problem, 2 * np.pi * float(frequency(base, n)), _starts(done, float(frequency(base, n))))
+        done.append(point)
+        found.append(response.of_points(problem, [point], np.zeros(len(problem.assembly.contacts))))
+        forces = response.operating(problem, point).force
+        normal.append([float(F[0, 0]) for F in forces.values()])
+        words = "" if point.converged else ", not converged"
+        report(f"{i + 1} of {len(speeds)} speeds: {n:.6g} rpm, {frequency(base, n):.6g} Hz{words}")
+        whole = SpeedResponse(**_together(found), rpm=speeds[: i + 1], order=base, normal=np.array(normal))
+        keep(whole)
+    return whole
+
+
+def _order(assembly: Assembly, order: int | None) -> int:
+    if order is None and assembly.ring is None:
+        raise UserError("engine order: the bodies stand in no ring, which would tell it; give one")
+    base = abs(assembly.ring.order if order is None and assembly.ring else order or 0)
+    if not base:
+        raise UserError("engine order: 0 is steady; an engine-order line needs one that vibrates")
+    return base
+
+
+def _starts(done: list[Point], f: float) -> list[Array]:
+    good = [p for p in done[-2:] if p.converged]
+    if len(good) < 2 or good[0].Omega == good[1].Omega:
+        return [p.x for p in good[-1:]]
+    a, b = good
+    share = (2 * np.pi * f - b.Omega) / (b.Omega - a.Omega)
+    return [b.x + share * (b.x - a.x), b.x]
+
+
+def _together(found: list[HarmonicResponse]) -> dict[str, Any]:
+    """Responses of one point each as the fields of one response."""
+    out: dict[str, Any] = {}
+    for f in fields(HarmonicResponse):
+        values = [getattr(r, f.name) for r in found]
+        if f.name == "limit":
+            out[f.name] = values[0]
+        elif isinstance(values[0], tuple):
+            out[f.name] = tuple(v for one in values for v in one)
+        else:
+            out[f.name] = np.concatenate(values)
+    return out
+
+
+# --- an assembly at another speed ------------------------------------------------------------------------------------
+
+
+def member_at(
+    member: Member, basis: ModalBasis, rpm: float, made: Callable[[ModalGroup], ModalGroup] = lambda g: g
+) -> Member:  # fmt: skip
+    """The member at a speed of its modal file or of its speed range.
+
+    Args:
+        made: what else is made of a group: other damping, rows of a pressure field.
+
+    Raises:
+        UserError: see `speed_range.basis_at`.
+    """
+    at = basis_at(basis, rpm)
+    return replace(member, groups={k: made(g) for (_, k), g in at.groups.items()})
+
+
+def loads_at(loads: tuple[Load, ...], members: tuple[Member, ...], rpm: float) -> tuple[Load, ...]:
+    """The loads with the centrifugal ones as they are at a speed."""
+    groups = {m.name: next(iter(m.groups.values())) for m in members}
+
+    def at(x: Load) -> Load:
+        centrifugal = groups[x.member].excitations[x.row].unit == "rad2/s2"
+        return replace(x, amplitude=(rpm * np.pi / 30) ** 2) if centrifugal else x
+
+    return tuple(at(x) for x in loads)
+
+
+def static_normal_force(group: ModalGroup, interface: str) -> float:
+    """Normal force (N) of the closure on an interface in the static state, or on the interface it faces.
+
+    Raises:
+        UserError: the body has no such closure.
+    """
+    names = {interface, group.interfaces[interface].partner} - {""}
+    for contact in group.contacts.values():
+        if contact.interface in names:
+            return contact.normal_force
+    raise UserError(
+        f"interface '{interface}': the modal file has no closure on it or on its partner, which would tell the normal "
+        "force at speed; add [[closures]] to the body or give the force"
+    )
+
+
+def assembly_at(
+    assembly: Assembly, bases: Mapping[str, ModalBasis], rpm: float, normal: Mapping[str, float] | None = None,
+    made: Callable[[ModalGroup], ModalGroup] = lambda g: g,
+) -> Assembly:  # fmt: skip
+    """An assembly at another speed.
+
+    Args:
+        bases: member -> its modal basis; members that are not named do not turn. normal: contact -> normal force
+            there, N; the others stay as they are pressed. made: see `member_at`.
+
+    Raises:
+        UserError: see `speed_range.basis_at`; a patch that deforms, whose rows would stay those of another speed.
+    """
+    stiff = [c.name for c in assembly.contacts for s in (c.first, c.second) if s and s.rows and s.member in bases]
+    if stiff:
+        raise UserError(f"contact '{stiff[0]}': its patch deforms with the shapes of one speed; make it anew at each")
+    members = tuple(member_at(m, bases[m.name], rpm, made) if m.name in bases else m for m in assembly.members)
+    forces = normal or {}
+    contacts = tuple(c.pressed(forces[c.name]) if c.name in forces else c for c in assembly.contacts)
+    return replace(assembly, members=members, contacts=contacts, loads=loads_at(assembly.loads, members, rpm))

@@ -1,0 +1,193 @@
+"""A contact patch over one cycle, point by point: pressure, traction, slip, dissipated energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact.harmonics import waves
+from ..contact.law import Law, State
+from ..contact.patch import Patch
+from ..contact.periodic import cycles
+from ..data import Array, ComplexArray, Indices, Interface
+from ..exchange import vtu
+
+
+@dataclass(frozen=True)
+class ContactMap:
+    """What n point contacts do in one cycle.
+
+    Attributes:
+        name. places: (n, 2) m along t1 and t2 from the patch's origin. areas: (n,) m2. origin: (3,) m and rotation:
+            (3, 3) rows n, t1, t2 of the side it is drawn on, body axes.
+        pressure_mean, pressure_least, pressure_most: (n,) Pa, nothing where open. traction: (n,) Pa, largest swing of
+            the tangential traction about its mean. tractions: (n, 3, H + 1) complex harmonics, Pa along n, t1, t2, of
+            the traction on the body, the mean first; pressure is negative there.
+        dissipated: (n,) J/m2 a cycle, work done on the contact. sticking, slipping, open: (n,) shares of the cycle.
+        by_samples: the largest change of a pressure or traction from one sample to the next, over the largest of all:
+            how far least and most may be off.
+    """
+
+    name: str
+    places: Array
+    areas: Array
+    origin: Array
+    rotation: Array
+    pressure_mean: Array
+    pressure_least: Array
+    pressure_most: Array
+    traction: Array
+    tractions: ComplexArray
+    dissipated: Array
+    sticking: Array
+    slipping: Array
+    open: Array
+    by_samples: float
+
+    @property
+    def points(self) -> Array:
+        """(n, 3) m, body axes."""
+        return self.origin + self.places @ self.rotation[1:]
+
+    @property
+    def normal_force(self) -> float:
+        """Mean normal force of the patch, N."""
+        return float(self.areas @ self.pressure_mean)
+
+    @property
+    def loss(self) -> float:
+        """J a cycle of the whole patch."""
+        return float(self.areas @ self.dissipated)
+
+
+def contact_map(
+    patch: Patch, side: Interface, u: Array, period: float, samples: int = 256, count: int = 4, settled: float = 0.0
+) -> ContactMap:  # fmt: skip
+    """March a patch through the cycle of its coordinates and look at every point.
+
+    Args:
+        side: where it is drawn. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... of the patch's coordinates, measured as its
+            law does. period: s. samples: of a cycle. count, settled: see `contact.periodic.periodic`.
+    """
+    G = jnp.asarray(patch.kinematics)
+    traced = _traced(patch.law, G, jnp.asarray(u), period, samples, count, settled)
+    force, slid, path = (np.asarray(x) for x in traced)
+    p = force / patch.areas[None, :, None]
+    swing = p[..., 1:] - p[..., 1:].mean(axis=0)
+    moved = path - np.roll(path, 1, axis=0)
+    work = (0.5 * (p + np.roll(p, 1, axis=0)) * moved).sum(axis=(0, 2))
+    opened = force[..., 0] <= 0
+    slips = (np.abs(slid).max(axis=-1) > 1e-9 * np.abs(moved).max(initial=0.0)) & ~opened
+    H = u.shape[1] // 2
+    waves_of = np.moveaxis(np.fft.rfft(p, axis=0)[: H + 1] * (2 / samples), 0, -1)
+    waves_of[..., 0] *= 0.5
+    jumps = np.abs(p - np.roll(p, 1, axis=0)).max(initial=0.0)
+    return ContactMap(
+        patch.interface, patch.points, patch.areas, side.origin, side.rotation,
+        p[..., 0].mean(axis=0), p[..., 0].min(axis=0), p[..., 0].max(axis=0),
+        np.linalg.norm(swing, axis=-1).max(axis=0),
+        -waves_of, work, 1.0 - (slips | opened).mean(axis=0), slips.mean(axis=0), opened.mean(axis=0),
+        float(jumps / max(np.abs(p).max(initial=0.0), 1e-300)),
+    )  # fmt: skip
+
+
+@partial(jax.jit, static_argnames=("samples", "count"))
+def _traced(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
+    settled: jax.Array | float,
+) -> tuple[jax.Array, jax.Array, jax.Array]:  # fmt: skip
+    """Forces (s, n, 3), path slid in every step (s, n, 2) and displacement (s, n, 3) of one more cycle."""
+    values, _ = waves(u.shape[1] // 2, samples)
+    path = jnp.einsum("sk,nia,ak->sni", values, G, u)
+    _, state = cycles(law, path, period, count, settled)
+    speed = (path - jnp.roll(path, 1, axis=0)) * (samples / period)
+
+    def one(state: State, sample: tuple[jax.Array, jax.Array]) -> tuple[State, tuple[jax.Array, jax.Array]]:
+        force, after = law.step(sample[0], sample[1], period / samples, state)
+        return after, (force, law.slip(after) - law.slip(state))
+
+    _, (force, slid) = jax.lax.scan(one, state, (path, speed))
+    return force, slid, path
+
+
+# drawing -----------------------------------------------------------------------------------------------------------
+
+
+def grid_of(places: Array) -> tuple[Array, Array] | None:
+    """Edges along t1 and along t2 of the rectangles whose centres the places are; None where they are no grid."""
+    axes = []
+    for x in places.T:
+        centres = np.unique(np.round(x, 12))
+        step = np.diff(centres)
+        if len(step) and step.max() > 1.001 * step.min():
+            return None
+        axes.append((centres, step.mean() if len(step) else 0.0))
+    (y, dy), (z, dz) = axes
+    if len(y) * len(z) != len(places) or not (dy or dz):
+        return None
+    dy, dz = dy or dz, dz or dy
+    return np.append(y - dy / 2, y[-1] + dy / 2), np.append(z - dz / 2, z[-1] + dz / 2)
+
+
+def on_grid(places: Array, values: Array) -> Array:
+    """(n_z, n_y) values of the points of a grid, t1 to the right."""
+    y, z = (np.unique(np.round(x, 12), return_inverse=True)[1] for x in places.T)
+    out = np.full((z.max() + 1, y.max() + 1), np.nan)
+    out[z, y] = values
+    return out
+
+
+def write_contact_vtu(found: ContactMap, path: Path | str) -> None:
+    """The patch as a VTU file: rectangles of a grid, or points.
+
+    Cell data (point data without a grid): ``pressure_mean``, ``pressure_least``, ``pressure_most``, ``traction``,
+    Pa; ``traction_mean``, ``traction_h1_real``, ``traction_h1_imag``, ... (3,) Pa on the body, body axes;
+    ``dissipated`` J/m2 a cycle; ``sticking``, ``slipping``, ``open``; ``area`` m2.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    import meshio
+
+    data = _fields(found)
+    points, cells = _rectangles(found)
+    kind = "quad" if cells.shape[1] == 4 else "vertex"
+    vtu.save(meshio.Mesh(points, {kind: cells}, cell_data={k: [v] for k, v in data.items()}), path)
+
+
+def _fields(found: ContactMap) -> dict[str, Any]:
+    names = (
+        "pressure_mean",
+        "pressure_least",
+        "pressure_most",
+        "traction",
+        "dissipated",
+        "sticking",
+        "slipping",
+        "open",
+    )
+    data = {name: vtu.single(getattr(found, name)) for name in names}
+    turned = np.einsum("nah,ab->nbh", found.tractions, found.rotation)
+    data["traction_mean"] = vtu.single(turned[..., 0].real)
+    for h in range(1, turned.shape[2]):
+        data[f"traction_h{h}_real"], data[f"traction_h{h}_imag"] = (
+            vtu.single(part) for part in (turned[..., h].real, turned[..., h].imag)
+        )
+    return data | {"area": vtu.single(found.areas)}
+
+
+def _rectangles(found: ContactMap) -> tuple[Array, Indices]:
+    """Points (., 3) and cells: four corners of each rectangle in the order of the places, or the points alone."""
+    edges = grid_of(found.places)
+    if edges is None:
+        return found.points, np.arange(len(found.places))[:, None]
+    (dy, dz) = (e[1] - e[0] for e in edges)
+    corners = found.places[:, None] + 0.5 * np.array([[-dy, -dz], [dy, -dz], [dy, dz], [-dy, dz]])
+    points = found.origin + corners.reshape(-1, 2) @ found.rotation[1:]
+    return points, np.arange(len(points)).reshape(-1, 4)

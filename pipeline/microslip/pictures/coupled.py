@@ -1,0 +1,147 @@
+"""A coupled ring in pictures: nodal diameters over contact stiffness, resonances over engine order, envelopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import Array
+from .operating import shades
+from .plots import _figure, _plain, _save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..harmonic_balance.envelope import Envelope, OverOrders
+    from ..harmonic_balance.identification import Identified, NodalDiagram
+
+
+def _in_micrometres(axes: Axes) -> None:
+    """Amplitudes on a logarithmic scale with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylabel("amplitude in µm (0-peak)")
+
+
+def _whole(axes: Axes) -> None:
+    """Whole numbers along the abscissa."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def nodal_diameter_picture(
+    diagrams: Sequence[NodalDiagram], path: Path, title: str, found: Identified | None = None
+) -> Path:  # fmt: skip
+    """Frequencies over the nodal diameter for several contact stiffnesses, with what was measured (Sextro Fig. 5.4-1).
+
+    Args:
+        diagrams: of rising stiffness. found: measured frequencies, the fitted one filled.
+    """
+    figure = _figure(9.0, 6.0)
+    axes = figure.subplots()
+    _plain(axes)
+    for colour, d in zip(shades(len(diagrams)), diagrams, strict=True):
+        for j, f in enumerate(d.frequency.T):
+            label = f"$c_N$ = {d.stiffness:.3g} N/m" if j == 0 else None
+            axes.plot(d.index, f, "o-", color=colour, markersize=3.5, linewidth=1.3, label=label)
+    if found is not None:
+        for m in found.measured:
+            fitted = m == found.fitted
+            axes.plot(m.index, m.frequency, "^", color="#b3261e", markersize=9, zorder=5,
+                      markerfacecolor="#b3261e" if fitted else "none")  # fmt: skip
+        axes.plot([], [], "^", color="#b3261e", label="measured, fitted")
+        if len(found.measured) > 1:
+            axes.plot([], [], "^", color="#b3261e", markerfacecolor="none", label="measured, predicted")
+    axes.set_xlabel("nodal diameter")
+    axes.set_ylabel("frequency in Hz")
+    axes.set_title(title)
+    _whole(axes)
+    axes.set_ylim(bottom=0.0)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=9)
+    return _save(figure, path)
+
+
+def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str) -> Path:
+    """Resonance frequency and amplitude over the engine order (Sextro Figs. 5.5-2, 5.5-7b).
+
+    Args:
+        found: label, such as a normal force, -> resonances.
+    """
+    figure = _figure(9.0, 7.0)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for axes in (upper, lower):
+        _plain(axes)
+    for colour, (label, r) in zip(shades(len(found)), found.items(), strict=True):
+        upper.plot(r.order, r.frequency, "o-", color=colour, markersize=4, linewidth=1.3, label=label)
+        lower.plot(r.order, 1e6 * r.amplitude, "o-", color=colour, markersize=4, linewidth=1.3)
+    last = list(found.values())[-1]
+    upper.plot(last.order, last.stuck, color="0.6", linewidth=1, linestyle="--", label="sticking contacts")
+    upper.set_ylabel("resonance in Hz")
+    _in_micrometres(lower)
+    lower.set_xlabel("engine order")
+    _whole(lower)
+    upper.set_title(title)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=9)
+    return _save(figure, path)
+
+
+def envelope_picture(
+    found: Envelope, path: Path, title: str, measured: tuple[Array, Array] | None = None
+) -> Path:  # fmt: skip
+    """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2).
+
+    Args:
+        measured: (f,) Hz and (f,) m.
+    """
+    figure = _figure(9.0, 6.0)
+    axes = figure.subplots()
+    _plain(axes)
+    axes.fill_between(found.frequency, 1e6 * found.low, 1e6 * found.high, color="#9ec5e8", alpha=0.6, linewidth=0,
+                      label="between the smallest and the largest")  # fmt: skip
+    for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
+        label = f"each of {len(found.monitor)} combinations" if i == 0 else None
+        axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
+    if measured is not None:
+        axes.plot(measured[0], 1e6 * measured[1], ".", color="#b3261e", label="measured")
+    _in_micrometres(axes)
+    axes.set_xlim(found.frequency[0], found.frequency[-1])
+    axes.set_xlabel("excitation frequency in Hz")
+    axes.set_title(title)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=9)
+    return _save(figure, path)
+
+
+def speed_line_picture(
+    rpm: Array, frequency: Array, amplitude: Array, normal: Array, path: Path, title: str
+) -> Path:  # fmt: skip
+    """Amplitude and normal forces along an engine-order line.
+
+    Args:
+        rpm, frequency: (s,) speeds and Hz. amplitude: (s,) m, NaN where not converged. normal: (s, contacts) N.
+    """
+    figure = _figure(9.0, 6.5)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    for axes in (upper, lower):
+        _plain(axes)
+    upper.plot(rpm, 1e6 * amplitude, color="#1f5f99", linewidth=1.6)
+    _in_micrometres(upper)
+    upper.set_title(title)
+    for i, (colour, force) in enumerate(zip(shades(normal.shape[1]), normal.T, strict=True)):
+        lower.plot(rpm, force, color=colour, linewidth=1.4, label=f"contact {i + 1}")
+    lower.set_ylabel("mean normal force in N")
+    lower.set_xlabel("rotation speed in rpm")
+    lower.set_xlim(rpm[0], rpm[-1])
+    if 1 < normal.shape[1] < 9:
+        lower.legend(fontsize=8)
+    ratio = float(frequency[0] / rpm[0])
+    second = upper.secondary_xaxis("top", functions=(lambda n: n * ratio, lambda f: f / ratio))
+    second.set_xlabel("excitation frequency in Hz")
+    return _save(figure, path)

@@ -1,0 +1,149 @@
+"""Pictures of what is followed: curves through folds, backbones, a resonance over a setting, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .operating import shades
+from .plots import COLOURS, _figure, _length, _plain, _save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..case.curves import Followed
+    from ..harmonic_balance.nonlinear_modes import Backbone
+    from ..harmonic_balance.peak import Optimum
+    from ..harmonic_balance.stability import Stability
+
+
+def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
+    """Amplitude over frequency, load or normal force; folds marked, every second leg between folds dashed."""
+    figure = _figure(9.0, 5.6)
+    axes = figure.subplots()
+    _plain(axes)
+    _, unit = _length(0.1 * np.concatenate([one.amplitude for one in found]))
+    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    colours = shades(len(found)) if len(found) > 1 else [COLOURS[0]]
+    for colour, one in zip(colours, found, strict=True):
+        x, y = one.parameter, scale * one.amplitude
+        ends = [0, *np.flatnonzero(one.fold), len(x) - 1]
+        for leg, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+            axes.plot(x[a : b + 1], y[a : b + 1], color=colour, linewidth=1.6, linestyle="--" if leg % 2 else "-",
+                      label=one.label.replace("F_N", "$F_N$") if leg == 0 else None)  # fmt: skip
+        size = 6 if one.fold.sum() < 8 else 3.5
+        axes.plot(x[one.fold], y[one.fold], "o", color=colour, markersize=size, markerfacecolor="white", zorder=4)
+        if not one.complete:
+            axes.plot(x[-1], y[-1], "x", color="#c8382c", markersize=9, zorder=5)
+    if any(one.fold.any() for one in found):
+        axes.plot([], [], "o", color="0.3", markersize=6, markerfacecolor="white", label="fold")
+        axes.plot([], [], "--", color="0.3", label="runs back")
+    if not all(one.complete for one in found):
+        axes.plot([], [], "x", color="#c8382c", markersize=9, linestyle="none", label="ends early")
+    _for_reading(axes, found, scale)
+    axes.set(xlabel=_OVER[found[0].over], ylabel=f"amplitude of the read-out in {unit} (0-peak)", title=title)
+    figure.legend(loc="outside lower center", ncols=5, fontsize=9)
+    return _save(figure, path)
+
+
+_OVER = {"frequency": "excitation frequency in Hz", "load": "share of the load", "normal_force": "normal force in N"}
+
+
+def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
+    """Logarithmic axes where values are spread over more than a factor of thirty."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    heights = scale * np.concatenate([one.amplitude for one in found])
+    ends = np.concatenate([one.parameter for one in found])
+    spread = {"y": heights} if found[0].over == "frequency" else {"y": heights, "x": ends}
+    axes.set_ylim(bottom=0)
+    for name, values in spread.items():
+        if not 0 < 30 * values.min() < values.max():
+            continue
+        axis = axes.yaxis if name == "y" else axes.xaxis
+        axes.set(**{f"{name}scale": "log"})
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if values.max() < 300 * values.min() else (1.0,)))
+        axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+        axis.set_minor_formatter(NullFormatter())
+        axes.autoscale(axis="both" if name == "y" else "x")
+
+
+def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path) -> Path:
+    """Frequency and damping ratio over the amplitude, a curve a normal force (N)."""
+    figure = _figure(10.5, 4.4)
+    left, right = figure.subplots(1, 2)
+    _, unit = _length(0.1 * np.concatenate([[1e-9], *(one.amplitude[-1:] for one in found.values())]))
+    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    for colour, (normal, one) in zip(shades(len(found)), sorted(found.items()), strict=True):
+        x, label = scale * one.amplitude, f"$F_N$ = {normal:g} N"
+        left.semilogx(x, one.Omega / (2 * np.pi), color=colour, linewidth=1.7, label=label)
+        left.axhline(one.stuck / (2 * np.pi), color=colour, linewidth=0.8, linestyle=":")
+        right.semilogx(x, 100 * one.damping, color=colour, linewidth=1.7, label=label)
+    for axes, quantity in ((left, "frequency in Hz (dotted: contacts stuck)"), (right, "damping ratio in %")):
+        _plain(axes)
+        axes.set(xlabel=f"amplitude of the read-out in {unit} (0-peak)", ylabel=quantity)
+    right.set_ylim(bottom=0)
+    figure.suptitle(title, fontsize=12)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=9)
+    return _save(figure, path)
+
+
+def optimum_plot(found: Optimum, label: str, title: str, path: Path) -> Path:
+    """Height and frequency of the followed peaks over a setting, the optimum marked."""
+    figure = _figure(10.5, 4.4)
+    left, right = figure.subplots(1, 2)
+    _, unit = _length(np.array([found.resonance.amplitude]))
+    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    best = found.resonance
+    for i, ridge in enumerate(found.ridges):
+        points = [*zip(ridge.parameter, ridge.lam / (2 * np.pi), scale * np.sqrt(ridge.value), strict=True)]
+        if i == 0:
+            points.append((found.parameter, best.Omega / (2 * np.pi), scale * best.amplitude))
+        x, f, a = np.array(sorted(points)).T
+        name = f"peak {i + 1}" if len(found.ridges) > 1 else None
+        left.semilogx(x, a, "o-", color=COLOURS[i], markersize=4, linewidth=1.6, label=name)
+        right.semilogx(x, f, "o-", color=COLOURS[i], markersize=4, linewidth=1.6)
+    for axes, y in ((left, scale * best.amplitude), (right, best.Omega / (2 * np.pi))):
+        axes.plot(found.parameter, y, "o", markersize=11, mfc="none", mec="#c8382c", mew=1.8)
+        _plain(axes)
+        axes.set_xlabel(label)
+    left.annotate(
+        f"{found.parameter:.4g}", (found.parameter, scale * best.amplitude), xytext=(0, -18),
+        textcoords="offset points", ha="center", fontsize=9, color="#c8382c",
+    )  # fmt: skip
+    heights = scale * np.sqrt(np.concatenate([ridge.value for ridge in found.ridges]))
+    if heights.max() > 20 * heights.min():
+        left.set_yscale("log")
+    for axes in (left, right):
+        ticks = sorted({float(v) for ridge in found.ridges for v in ridge.parameter})
+        axes.set_xticks(ticks, labels=[f"{v:.3g}" for v in ticks])
+        axes.minorticks_off()
+    left.set_ylabel(f"height of the resonance in {unit} (0-peak)")
+    left.margins(y=0.15)
+    right.set_ylabel("its frequency in Hz")
+    if len(found.ridges) > 1:
+        left.legend(fontsize=9)
+    figure.suptitle(title, fontsize=12)
+    return _save(figure, path)
+
+
+def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str, path: Path) -> Path:
+    """Largest multiplier over the frequency, a curve a normal force (N); what is not stable stands out."""
+    figure = _figure(9.0, 5.0)
+    axes = figure.subplots()
+    _plain(axes)
+    axes.axhline(1.0, color="#333", linewidth=1.0)
+    for colour, (normal, points) in zip(shades(len(found)), sorted(found.items()), strict=True):
+        f = np.array(sorted(points))
+        growth = np.array([points[x].growth for x in f])
+        lost = np.array([not points[x].stable for x in f], dtype=bool)
+        axes.plot(f, growth, color=colour, linewidth=1.5, label=f"$F_N$ = {normal:g} N")
+        axes.plot(f[lost], growth[lost], "o", color="#c8382c", markersize=5)
+    axes.set(
+        xlabel="excitation frequency in Hz", ylabel="largest Floquet multiplier (red dots: not stable)", title=title
+    )
+    figure.legend(loc="outside lower center", ncols=6, fontsize=9)
+    return _save(figure, path)

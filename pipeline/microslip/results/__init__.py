@@ -1,0 +1,14 @@
+"""Results that survive interruption: every finished point is kept at once, the file people use is complete or absent.
+
+`journal`: points as they are found, appended to a file of complete records. `files`: ``response.h5``, made from it.
+"""
+
+from .files import Body as Body
+from .files import Response as Response
+from .files import Series as Series
+from .files import read_response as read_response
+from .files import response_of as response_of
+from .files import write_response as write_response
+from .journal import Journal as Journal
+from .journal import open_journal as open_journal
+from .journal import read_journal as read_journal

@@ -1,0 +1,358 @@
+"""``response.h5``: what a case found, in one HDF5 file. The layout is documented in ``docs/response_file.md``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ..basis.hdf5 import IMAGINARY, create, put, seal, seal_state
+from ..coordinates import first_modes, in_modes
+from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
+from ..hostile import HostileFile, inspect, trial
+from ..operating.motion import Motion, motion_of
+from ..store import complete_or_absent
+from .journal import is_journal, read_journal
+
+FORMAT = "microslip-response"
+FORMAT_VERSION = "0.1"
+CONVERGED = "converged"
+
+UNITS = {
+    "frequency": "Hz", "Omega": "rad/s", "seconds": "s", "supplied": "J", "damped": "J", "dissipated": "J",
+    "by_slip": "J", "monitors": "m", "gauges": "1", "bodies": "m kg^1/2", "displacement": "m, rad",
+    "force": "N, N m", "limit": "N", "normal_swing": "N", "normal_mean": "N",
+}  # fmt: skip
+"""Units by the last part of a name, or by its first one; everything else is a pure number."""
+
+_DAMAGE = (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
+    NotImplementedError, HostileFile, RecursionError,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Body:
+    """Whose coordinates a result holds: the group of every harmonic in a modal file.
+
+    Attributes:
+        basis: name of the body. sha256: of the modal file. file: where it was, for people. speed: number of the group,
+            or -1 where the group was made for `rpm` from a range. rpm: rotation speed. harmonics: nodal diameter of
+            the group and whether its rows are read conjugate, for every harmonic, the mean first. modes: whether the
+            coordinates are those of `coordinates.in_modes` of the groups.
+    """
+
+    basis: str
+    sha256: str
+    file: str
+    speed: int
+    rpm: float
+    harmonics: tuple[tuple[int, bool], ...]
+    modes: bool = False
+
+
+@dataclass(frozen=True)
+class Series:
+    """The f points of one sweep, in order.
+
+    Attributes:
+        name: like ``normal_force = 100``. parameters: what sets it apart, in SI: name -> number. key: (f,) see
+            `journal.Journal`. status: f texts, `CONVERGED` or what went wrong. arrays: name -> (f, ...), see
+            docs/response_file.md.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    key: Array
+    status: tuple[str, ...]
+    arrays: Mapping[str, Array]
+
+    @property
+    def converged(self) -> Array:
+        """(f,) bool."""
+        return np.array([s == CONVERGED for s in self.status], dtype=bool)
+
+    @property
+    def frequency(self) -> Array:
+        """(f,) Hz."""
+        return self.arrays["frequency"]
+
+    def monitor(self, name: str) -> ComplexArray:
+        """(f, r, H + 1) harmonics of a monitor's rows, m, or of a strain gauge.
+
+        Raises:
+            UserError: none of that name.
+        """
+        known = {n.split("/", 1)[1]: n for n in self.arrays if n.startswith(("gauges/", "monitors/"))}
+        if name not in known:
+            raise UserError(f"monitor '{name}': the response has {', '.join(known) or 'none'}")
+        return np.asarray(self.arrays[known[name]], dtype=complex)
+
+
+@dataclass(frozen=True)
+class Response:
+    """A case's response.
+
+    Attributes:
+        case: its name. description. mode: how the contacts were treated (``marched``, ``book``, ``jenkins``).
+            settings: the case file. inputs: hash of all that a point depends on. bodies: member -> `Body`. labels: name
+            of an array -> its rows. series: in the order they were computed. resonances: rows of a table. finished:
+            whether every point that was asked for is there. remarks: sentences a reader must know.
+    """
+
+    case: str
+    mode: str
+    series: tuple[Series, ...]
+    bodies: Mapping[str, Body] = field(default_factory=dict)
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    inputs: str = ""
+    description: str = ""
+    resonances: tuple[Mapping[str, Any], ...] = ()
+    finished: bool = True
+    remarks: tuple[str, ...] = ()
+
+    def one(self, **parameters: float) -> Series:
+        """The series whose parameters have these values.
+
+        Raises:
+            UserError: none, or more than one.
+        """
+        found = [s for s in self.series if all(s.parameters.get(k) == v for k, v in parameters.items())]
+        if len(found) != 1:
+            asked = ", ".join(f"{k} = {v:g}" for k, v in parameters.items()) or "nothing"
+            raise UserError(f"{self.case}: {len(found)} series have {asked}; there are {_names(self.series)}")
+        return found[0]
+
+    def motion(self, series: Series, basis: ModalBasis, member: str = "", sha256: str = "") -> Motion:
+        """The motion of a member in a series, for `operating`.
+
+        Args:
+            basis: its modal file. member: may be left out where there is one. sha256: of the modal file's bytes, to be
+                compared with the one that the response was computed with.
+
+        Raises:
+            UserError: another body, another file, no such member.
+        """
+        name = member or (next(iter(self.bodies)) if len(self.bodies) == 1 else member)
+        if name not in self.bodies:
+            raise UserError(f"{self.case}: member '{name}': the response has {', '.join(self.bodies) or 'none'}")
+        body = self.bodies[name]
+        if body.basis != basis.name or (sha256 and sha256 != body.sha256):
+            what = f"'{basis.name}'" if body.basis != basis.name else "another state of it"
+            raise UserError(f"{self.case}: it was computed with the modal file of '{body.basis}', this is {what}")
+        q, turned = series.arrays[f"bodies/{name}/q"], [c for _, c in body.harmonics]
+        groups = [g if g.n_modes <= q.shape[2] else first_modes(g, q.shape[2]) for g in _groups(body, basis)]
+        forces = series.arrays.get(f"bodies/{name}/forces")
+        H = q.shape[1]
+        return motion_of(2 * np.pi * series.frequency, q, groups[:H], turned[:H], forces)
+
+
+def _names(series: Sequence[Series]) -> str:
+    return "; ".join(s.name for s in series) or "none"
+
+
+def _groups(body: Body, basis: ModalBasis) -> list[ModalGroup]:
+    if body.speed < 0:
+        from ..speed_range import basis_at
+
+        basis = basis_at(basis, body.rpm)
+    known = {k: basis.groups[max(body.speed, 0), k] for k, _ in body.harmonics}
+    if body.modes:
+        known = {k: in_modes(g) for k, g in known.items()}
+    return [known[k] for k, _ in body.harmonics]
+
+
+# from the journal --------------------------------------------------------------------------------------------------
+
+
+def response_of(head: Mapping[str, Any], series: Mapping[str, Mapping[float, Mapping[str, Any]]]) -> Response:
+    """A response from a journal's head and series, as far as it goes.
+
+    The head's keys are those of `Response`; ``parameters`` gives each series its own.
+    """
+    parameters = head.get("parameters", {})
+    return Response(
+        case=str(head["case"]),
+        mode=str(head.get("mode", "")),
+        series=tuple(_series(name, parameters.get(name, {}), points) for name, points in series.items()),
+        bodies={k: _body(b) for k, b in head.get("bodies", {}).items()},
+        labels={k: tuple(v) for k, v in head.get("labels", {}).items()},
+        settings=head.get("settings", {}),
+        inputs=str(head.get("inputs", "")),
+        description=str(head.get("description", "")),
+        resonances=tuple(head.get("resonances", ())),
+        finished=bool(head.get("finished", False)),
+        remarks=tuple(head.get("remarks", ())),
+    )
+
+
+def _body(b: Mapping[str, Any]) -> Body:
+    pairs = tuple((int(k), bool(c)) for k, c in b["harmonics"])
+    own = bool(b.get("modes", False))
+    return Body(str(b["basis"]), str(b["sha256"]), str(b["file"]), int(b["speed"]), float(b["rpm"]), pairs, own)
+
+
+def _series(name: str, parameters: Mapping[str, float], points: Mapping[float, Mapping[str, Any]]) -> Series:
+    keys = sorted(points)
+    rows = [points[k] for k in keys]
+    names = [n for n, v in (rows[0] if rows else {}).items() if n != "status" and not isinstance(v, str)]
+    arrays = {n: stacked([np.asarray(row[n]) for row in rows]) for n in names}
+    own = {k: float(v) for k, v in parameters.items()}
+    return Series(name, own, np.array(keys), tuple(str(row.get("status", "")) for row in rows), arrays)
+
+
+def stacked(values: Sequence[Array]) -> Array:
+    """(f, ...) of arrays that may have different numbers of harmonics: what an array lacks is zero."""
+    shapes = {v.shape for v in values}
+    if len(shapes) == 1:
+        return np.stack(values)
+    out = np.zeros((len(values), *np.max([list(s) for s in shapes], axis=0)), dtype=np.result_type(*values))
+    for row, value in zip(out, values, strict=True):
+        row[tuple(slice(n) for n in value.shape)] = value
+    return out
+
+
+# HDF5 --------------------------------------------------------------------------------------------------------------
+
+
+def write_response(path: Path | str, response: Response) -> None:
+    """Write ``response.h5``, complete or absent.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    with complete_or_absent(path) as temporary:
+        with create(temporary) as file:
+            _write(file, response)
+        seal(temporary)
+
+
+_TEXTS = ("case", "mode", "inputs", "description")
+
+
+def _write(file: h5py.File, r: Response) -> None:
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["units"] = "SI: m, kg, s, N, rad, Pa"
+    file.attrs["conventions"] = (
+        "time factor exp(+i Omega t), amplitudes 0-peak; arrays of harmonics are complex, the mean first; "
+        "contact arrays are mean, cos, sin, cos 2, sin 2, ...; "
+        "coordinates are those of the modal file, about its static state"
+    )
+    for name in _TEXTS:
+        file.attrs[name] = getattr(r, name)
+    file.attrs["finished"] = int(r.finished)
+    for name in ("settings", "labels", "resonances", "remarks"):
+        _put_text(file, name, json.dumps(getattr(r, name)))
+    bodies = {k: {**vars(b), "harmonics": [[n, int(c)] for n, c in b.harmonics]} for k, b in r.bodies.items()}
+    _put_text(file, "bodies", json.dumps(bodies))
+    for i, s in enumerate(r.series):
+        group = file.create_group(f"series_{i:04d}")
+        group.attrs["name"], group.attrs["parameters"] = s.name, json.dumps(dict(s.parameters))
+        put(group, "key", s.key)
+        put(group, "status", np.array(s.status or ("",)))
+        for name, value in s.arrays.items():
+            put(group, name, value, unit_of(name))
+
+
+def _put_text(file: h5py.File, name: str, text: str) -> None:
+    put(file, name, np.frombuffer(text.encode(), dtype=np.uint8))
+
+
+def unit_of(name: str) -> str:
+    """Unit of an array by its name."""
+    parts = name.split("/")
+    return UNITS.get(parts[-1]) or UNITS.get(parts[0], "1")
+
+
+def read_response(path: Path | str) -> Response:
+    """Read ``response.h5``, or the journal of a response that is still computed or was killed.
+
+    Raises:
+        UserError: missing, damaged, foreign or of another major version.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(f"{path}: no such response; run the case first or correct the path")
+    try:
+        if is_journal(path):
+            return _from_journal(path)
+        state = seal_state(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
+    if state == "broken":
+        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); run the case again")
+    if not h5py.is_hdf5(path):
+        raise UserError(f"{path}: is damaged or no HDF5 file; run the case again")
+    if state == "absent" and (trouble := trial(_TRIAL, path)):
+        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); run the case again")
+    return _read(path)
+
+
+_TRIAL = "from microslip.results.files import _read; _read(path)"
+
+
+def _from_journal(path: Path) -> Response:
+    head, series = read_journal(path)
+    try:
+        return response_of(head, series)
+    except _DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); run the case again") from error
+
+
+def _read(path: Path) -> Response:
+    try:
+        with h5py.File(path, "r") as file:
+            form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
+            if form != FORMAT:
+                raise UserError(f"{path}: is no response (its attribute 'format' is {form!r}, not '{FORMAT}')")
+            if version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
+                raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}")
+            inspect(file)
+            return _response(file)
+    except _DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); run the case again") from error
+
+
+def _response(file: h5py.File) -> Response:
+    told = {
+        name: json.loads(file[name][()].tobytes()) for name in ("settings", "labels", "resonances", "remarks", "bodies")
+    }
+    names = sorted(n for n in file if n.startswith("series_"))
+    return Response(
+        **{name: str(file.attrs[name]) for name in _TEXTS},
+        series=tuple(_read_series(file[n]) for n in names),
+        bodies={k: _body(b) for k, b in told["bodies"].items()},
+        labels={k: tuple(v) for k, v in told["labels"].items()},
+        settings=told["settings"],
+        resonances=tuple(told["resonances"]),
+        finished=bool(file.attrs["finished"]),
+        remarks=tuple(told["remarks"]),
+    )
+
+
+def _read_series(group: h5py.Group) -> Series:
+    arrays: dict[str, Array] = {}
+
+    def take(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and name not in ("key", "status") and not name.endswith(IMAGINARY):
+            arrays[name] = item[()]
+            if name + IMAGINARY in group:
+                arrays[name] = arrays[name] + 1j * group[name + IMAGINARY][()]
+
+    group.visititems(take)
+    key = group["key"][()]
+    status = tuple(s.decode() for s in group["status"][()])[: len(key)]
+    if any(len(a) != len(key) for a in arrays.values()) or len(status) != len(key):
+        raise ValueError(f"{group.name}: arrays of different lengths")
+    parameters = {str(k): float(v) for k, v in json.loads(group.attrs["parameters"]).items()}
+    return Series(str(group.attrs["name"]), parameters, key, status, arrays)
+
+
+def _short(error: BaseException) -> str:
+    return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]

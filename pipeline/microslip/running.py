@@ -1,0 +1,557 @@
+"""Running bodies and cases from beginning to end: the modal files a case needs, its response, the page."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import importlib.util
+import json
+import re
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import assessment, store
+from .basis import read_basis
+from .body import load_toml
+from .case import CaseResult, CaseSettings, keeping, load_case, run_case
+from .case.comparison import Pair, comparison_table, paired
+from .case.settings import FIRST_HARMONICS
+from .data import Array, ModalBasis, UserError
+from .report import response_page
+from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
+from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage, touch
+
+if TYPE_CHECKING:
+    from .case.assemble import Built
+    from .case.settings import BodyOfCase
+    from .operating.patches import ContactMap
+
+CASE_CODE = (
+    "speed_range.py", "harmonic_balance", "contact", "system", "compliance.py", "truncation.py", "case",
+)  # fmt: skip
+_ASSESSMENT_CODE = ("pictures/response.py", "pictures/operating.py", "operating", "assessment.py", "results")
+
+# response --------------------------------------------------------------------------------------------------------
+
+
+def response_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, log: bool = False,
+) -> tuple[dict[str, Any], bool]:  # fmt: skip
+    """Friction frequency response of a case in `folder`: HDF5, CSV, pictures, files for ParaView, a summary (JSON).
+
+    Every finished point is kept in ``response.points``, from which an interrupted run goes on.
+
+    Args:
+        files: body of the case -> its modal file. log: write ``convergence.csv``.
+
+    Returns:
+        The summary, and whether every point converged.
+    """
+    settings, raw = load_case(case_path, assignments)
+    summary_file = folder / "response.json"
+    hashes = {name: store.hash_file(file) for name, file in files.items()}
+    beside = hashes_of({f: case_path.parent / f for f in settings.files})
+    case = keeping.without_defaults(raw)
+    inputs = {"case": case, "basis": hashes, "files": beside, "code": code_hash(CASE_CODE + _ASSESSMENT_CODE)}
+    if not force and store.is_up_to_date(summary_file, inputs) and _all_drawn(folder):
+        report(f"{summary_file} is up to date")
+        touch(summary_file)
+        if log:
+            _write_log(read_response(folder / "response.h5"), folder, report)
+        summary = json.loads(summary_file.read_text())
+        return summary, summary["failed_points"] == 0
+    bases = {name: read_basis(file) for name, file in files.items()}
+    keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force, beside)
+    try:
+        result = run_case(settings, bases, case_path, report, keeper.journal, keeper.harmonics())
+    except KeyboardInterrupt:
+        keeper.unfinished()
+        raise
+    summary = _finished(keeper, result, report)
+    if log:
+        _write_log(read_response(folder / "response.h5"), folder, report)
+    for remark in result.remarks:
+        report(f"warning: {remark}")
+    store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
+    store.note_product(summary_file, inputs)
+    return summary, summary["failed_points"] == 0
+
+
+def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
+    """Name -> hash of files; what is missing is told where it is read."""
+    return {name: store.hash_file(file) for name, file in files.items() if file.is_file()}
+
+
+def _all_drawn(folder: Path) -> bool:
+    """Whether the pictures and files that a summary names are there."""
+    try:
+        summary = json.loads((folder / "response.json").read_text())
+        pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
+        return all(p.is_file() for p in [*pictures, *(folder / name for name in summary["files"])])
+    except (OSError, ValueError, KeyError, AttributeError):
+        return False
+
+
+@dataclass
+class Keeper:
+    """Where the points of a case are kept while it runs: `journal` opens ``response.points``."""
+
+    folder: Path
+    raw: dict[str, Any]
+    hashes: Mapping[str, str]
+    files: Mapping[str, str]
+    fresh: bool
+    beside: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def points(self) -> Path:
+        return self.folder / "response.points"
+
+    @contextlib.contextmanager
+    def journal(self, built: Built) -> Iterator[Journal]:
+        """The journal of an assembly; see `results.open_journal`."""
+        inputs = self._inputs(built.settings.balanced)
+        head = keeping.head_of(built, self.raw, self.hashes, self.files) | {"finished": False}
+        with open_journal(self.points, inputs, head, self.fresh) as journal:
+            self.fresh = False
+            yield journal
+
+    def harmonics(self) -> int:
+        """With how many to begin where their number is looked for: those of the points that are kept."""
+        with contextlib.suppress(UserError, KeyError, ValueError, TypeError):
+            head, _ = read_journal(self.points)
+            if not self.fresh and head["inputs"] == self._inputs(int(head["harmonics"])):
+                return int(head["harmonics"])
+        return FIRST_HARMONICS
+
+    def _inputs(self, harmonics: int) -> str:
+        """Hash of all that a point depends on."""
+        given = {
+            "case": keeping.of_a_point(self.raw),
+            "basis": self.hashes,
+            "files": dict(self.beside),
+            "code": code_hash(CASE_CODE),
+        }
+        looked_for = self.raw.get("harmonics") == "auto"
+        return store.hash_settings(given | ({"harmonics": harmonics} if looked_for else {}))
+
+    def unfinished(self) -> None:
+        """``response.h5`` of what there is so far."""
+        if self.points.is_file():
+            with contextlib.suppress(UserError):
+                write_response(self.folder / "response.h5", read_response(self.points))
+
+
+def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, Any]:
+    """Tables, pictures and files of a case that has run, and their summary."""
+    from .harmonic_balance import response_table
+    from .pictures.response import response_picture
+
+    folder, summary = keeper.folder, summarise(result)
+    store.write_text(folder / "response.csv", response_table(result.responses))
+    picture = folder / "pictures" / "response.png"
+    with store.complete_or_absent(picture) as temporary:
+        response_picture(result, temporary)
+    response = _response(keeper, result, summary)
+    write_response(folder / "response.h5", response)
+    drawn, files = {"friction response": picture}, [folder / "response.h5", folder / "response.csv"]
+    more = _assessed(result, response, folder, report)
+    if more is not None:
+        summary["resonances"] = more.rows or summary["resonances"]
+        drawn, files = drawn | more.drawn, files + more.files
+    summary["response_sha256"] = store.hash_file(folder / "response.h5")
+    summary["pictures"] = {title: path.name for title, path in drawn.items()}
+    summary["files"] = [path.name for path in [*files, folder / "response.html"]]
+    response_page(summary, drawn, folder / "response.html")
+    return summary
+
+
+def _response(keeper: Keeper, result: CaseResult, summary: Mapping[str, Any]) -> Response:
+    """What goes into ``response.h5``: the journal's points of this case's sweep, or those of the closed form."""
+    names = {keeping.series_name(n): n for n in result.responses}
+    if result.at_peaks:
+        head = keeping.head_of(result.built, keeper.raw, keeper.hashes, keeper.files)
+        found = {
+            name: keeping.closed_points(result.built, result.responses[n], result.at_peaks[n])
+            for name, n in names.items()
+        }
+    else:
+        head, held = read_journal(keeper.points)
+        low, high = result.settings.sweep.start, result.settings.sweep.stop
+        found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
+    told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
+    told |= {"resonances": summary["resonances"], "remarks": list(result.remarks)}
+    return response_of({**head, **told}, found)
+
+
+@dataclass(frozen=True)
+class _Assessed:
+    rows: list[dict[str, Any]]
+    drawn: dict[str, Path]
+    files: list[Path]
+
+
+def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
+    """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
+    member, monitor = keeping.drawn_monitor(result.built)
+    basis = result.built.bodies[result.built.assembly.watches[0].member].basis
+    if not assessment.has_stresses(basis, response, member):
+        return None
+    lifted = {n: np.array([f for f, _ in peaks])[result.lifted(n)[1]] for n, peaks in result.resonances.items()}
+    limits = result.settings.material_limits
+    found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)
+    maps = {} if found.highest is None or result.at_peaks else {"contacts at resonance": _maps(result, found, report)}
+    report("pictures of stresses")
+    scenes = _can_draw() is None
+    drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
+    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder))
+
+
+def _maps(result: CaseResult, found: assessment.Assessment, report: Report) -> list[ContactMap]:
+    top = found.highest
+    assert top is not None
+    report(f"contacts at {top.frequency:.6g} Hz")
+    series = found.sweeps[top.normal_force][0]
+    row = {name: values[top.index] for name, values in series.arrays.items()} | {"status": series.status[top.index]}
+    return keeping.maps_at(result.built, top.normal_force, row)
+
+
+def _for_paraview(
+    found: assessment.Assessment, basis: ModalBasis, maps: Mapping[str, list[ContactMap]], folder: Path
+) -> list[Path]:  # fmt: skip
+    """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
+    if not _is_there("meshio"):
+        return []
+    from .operating.patches import write_contact_vtu
+
+    files = []
+    if assessment.write_shape(found, basis, folder / "operating_shape.vtu") is not None:
+        files.append(folder / "operating_shape.vtu")
+    for patch in [patch for patches in maps.values() for patch in patches]:
+        files.append(folder / f"contact_{re.sub(r'[^A-Za-z0-9_.-]', '_', patch.name)}.vtu")
+        write_contact_vtu(patch, files[-1])
+    return files
+
+
+@cache
+def _can_draw() -> str | None:
+    """See `pictures.can_draw`; asked once."""
+    if not _is_there("pyvista"):
+        return "PyVista is not there"
+    from .pictures import can_draw
+
+    return can_draw()
+
+
+def _is_there(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ImportError:  # an environment that hides it
+        return False
+
+
+def _write_log(response: Response, folder: Path, report: Report) -> None:
+    """``convergence.csv``: what Newton's method did at every point."""
+    if response.mode == "jenkins":
+        report('warning: --log: law = "jenkins" is solved in closed form; there is nothing to log')
+        return
+    store.write_text(folder / "convergence.csv", convergence_table(response))
+
+
+def convergence_table(response: Response) -> str:
+    """CSV text: a row a point with its status, steps, time, and the error before every Newton step."""
+    rows = ["sweep,frequency_Hz,peak,status,iterations,seconds,error,errors before each step"]
+    for s in response.series:
+        columns = [s.arrays.get(n, np.full(len(s.key), np.nan)) for n in ("peak", "iterations", "seconds", "error")]
+        history = s.arrays.get("history", np.zeros((len(s.key), 0)))
+        for f, status, peak, steps, spent, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
+            each = " ".join(f"{e:.1e}" for e in errors if e)
+            said = status.replace(",", ";")
+            rows.append(f"{s.name},{f:.10g},{peak:.0f},{said},{steps:.0f},{spent:.3g},{error:.1e},{each}")
+    return "\n".join(rows) + "\n"
+
+
+def summarise(result: CaseResult) -> dict[str, Any]:
+    """Numbers of a case for the report and the terminal."""
+    rows = []
+    lifted = {normal: result.lifted(normal)[1] for normal in result.resonances}
+    for normal, peaks in result.resonances.items():
+        for (frequency, amplitude), lifts in zip(peaks, lifted[normal], strict=True):
+            row = {"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude}
+            rows.append(row | ({"note": assessment.LIFTS if lifts else ""} if any(map(any, lifted.values())) else {}))
+    failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
+    balanced: dict[str, float] = {"harmonics": result.settings.balanced} if result.settings.has_laws else {}
+    if result.truncation is not None:
+        balanced["estimated_error_of_harmonics"] = result.truncation
+    return {
+        "case": result.settings.name,
+        "mode": result.settings.mode if result.settings.has_laws else "jenkins",
+        **balanced,
+        "description": result.settings.description,
+        "rotation_speed_rpm": result.speed * 30 / np.pi,
+        "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
+        **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
+        "resonances": rows,
+        "failed_points": failed,
+        "remarks": list(result.remarks),
+    }
+
+
+# chains ------------------------------------------------------------------------------------------------------------
+
+
+def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> tuple[Path, bool]:
+    """The whole chain of a body, and of the case of the same name if there is one.
+
+    Returns:
+        The report's path, and whether every point of the response converged.
+    """
+    response, converged = None, True
+    if job.case_file is not None:
+        case, _ = load_case(job.case_file)
+        if job.settings.name not in {b.body or b.name for b in case.members}:
+            raise UserError(
+                f"{job.case_file}: body: it names '{case.members[0].name}', but the body beside it is "
+                f"'{job.settings.name}'; make them agree"
+            )
+    modes_stage(job, force=force, report=report)
+    if job.case_file is not None:
+        files = {b.name: job.basis_file for b in case.members if (b.body or b.name) == job.settings.name}
+        files |= modal_files(case, job.case_file, job.root, report, known=files)
+        response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
+    return report_stage(job, response, force, report), converged
+
+
+def run_case_file(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal files a case needs, and the case; the products of one not named like its body have their own folder.
+
+    Returns:
+        The report's path (the table's, for a case that has its own folder), and whether every point converged.
+    """
+    case, _ = load_case(path, assignments)
+    files = modal_files(case, path, Path("."), report)
+    if case.body is not None and case.body == case.name:
+        job = open_job(find_body(path, case.body, Path(".")))
+        response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
+        return report_stage(job, response, force, report), converged
+    folder = Path(".") / "build" / case.name
+    _, converged = response_stage(path, files, folder, assignments, force, report)
+    return folder / "response.csv", converged
+
+
+def modal_files(
+    case: CaseSettings, path: Path, root: Path, report: Report, known: Mapping[str, Path] | None = None
+) -> dict[str, Path]:
+    """Body of a case -> its modal file, computed where that is not up to date.
+
+    Raises:
+        UserError: a body that is nowhere.
+    """
+    found = dict(known or {})
+    for b in case.members:
+        if b.name in found:
+            continue
+        body = b.body or b.name
+        if b.file is not None:
+            found[b.name] = _named(path, b)
+        elif (lumped := _lumped(path, body)) is not None:
+            found[b.name] = system_stage(lumped, report=report, root=root)
+        else:
+            job = open_job(find_body(path, body, root))
+            modes_stage(job, report=report)
+            found[b.name] = job.basis_file
+    return found
+
+
+def _lumped(case_path: Path, name: str) -> Path | None:
+    """The system.toml of a small system of that name beside a case, in its folder or in one of the system's name."""
+    for place in (case_path.parent / "system.toml", case_path.parent / name / "system.toml"):
+        file = system_file(place) if place.is_file() else None
+        if file is not None and load_toml(file).get("name") == name:
+            return file
+    return None
+
+
+def run_system(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal file of a system, and the friction response of the case.toml beside it if there is one.
+
+    Returns:
+        The path of the last product, and whether every point of the response converged.
+    """
+    basis_file = system_stage(path, assignments, None, force, report)
+    case = path.parent / "case.toml"
+    return respond(case, basis_file, force=force, report=report) if case.is_file() else (basis_file, True)
+
+
+def respond(
+    case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."), log: bool = False,
+) -> tuple[Path, bool]:  # fmt: skip
+    """Friction response of a case on modal files that are there already: CSV, JSON, picture in build/<case>/.
+
+    Args:
+        basis_file: of the only body; None: basis.h5 beside the case, or build/<body>/basis.h5 of every body.
+
+    Returns:
+        The path of the table, and whether every point converged.
+
+    Raises:
+        UserError: the case is about another body, a modal file is missing.
+    """
+    case, _ = load_case(case_path, assignments)
+    files = existing_files(case, case_path, basis_file, root)
+    for b in case.members:
+        name = read_basis(files[b.name]).name
+        if (b.body or b.name) != name and b.file is None:
+            raise UserError(
+                f"{case_path}: body: it names '{b.body or b.name}', but {files[b.name]} holds '{name}'; make them agree"
+            )
+    folder = root / "build" / case.name
+    summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
+    for peak in summary["resonances"]:
+        note = f" ({peak['note']})" if peak.get("note") else ""
+        report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m{note}")
+    return folder / "response.csv", converged
+
+
+def compare_book(
+    case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."), log: bool = False,
+) -> tuple[Path, list[Pair], bool]:  # fmt: skip
+    """The response of a case in both modes, and what the book's leaves out: a table and a picture beside the response.
+
+    The response in the case's own mode stands in build/<case>/, that in the other mode in a folder of its name there;
+    whichever is there already is not computed again. Arguments: see `respond`.
+
+    Returns:
+        The path of the table, the resonances of both, and whether every point of both converged.
+    """
+    from .pictures.response import comparison_picture
+
+    given = list(assignments or [])
+    own, _ = load_case(case_path, given)
+    case, _ = load_case(case_path, [*given, 'mode="marched"', "strips=0"])
+    strips = load_case(case_path, [*given, 'mode="book"'])[0].strips
+    files = existing_files(case, case_path, basis_file, root)
+    folder = root / "build" / case.name
+    folders = {mode: folder if mode == own.mode else folder / mode for mode in ("marched", "book")}
+    ways = {
+        "marched": (folders["marched"], [*given, 'mode="marched"', "strips=0"]),
+        "book": (folders["book"], [*given, 'mode="book"', f"strips={strips}"]),
+    }
+    found = {m: response_stage(case_path, files, f, a, force, report, log) for m, (f, a) in ways.items()}
+    pairs = paired(*(summary["resonances"] for summary, _ in found.values()))
+    case = keeping.as_found(case, folder, case_path)
+    table, picture = folder / "book.csv", folder / "pictures" / "book.png"
+    store.write_text(table, comparison_table(pairs))
+    marched, book = (_curves(f / "response.h5", case) for f, _ in ways.values())
+    with store.complete_or_absent(picture) as temporary:
+        comparison_picture(case, marched, book, temporary)
+    return table, pairs, all(converged for _, converged in found.values())
+
+
+def _curves(file: Path, case: CaseSettings) -> dict[str, Array]:
+    """Normal force as text -> (2, f) Hz and amplitude (m) of the first read-out, in a response file."""
+    found, monitor = {}, case.address(case.watches[0].monitor)[1]
+    for s in read_response(file).series:
+        name = next(n for n in s.arrays if n.startswith("monitors/") and n.endswith(monitor))
+        amplitude = np.abs(s.arrays[name][:, 0, 1])
+        whole = np.stack([s.frequency, np.where(np.array(s.status) == "converged", amplitude, np.nan)])
+        found[f"{s.parameters['normal_force']:g}"] = whole[:, np.argsort(s.frequency, kind="stable")]
+    return found
+
+
+def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root: Path) -> dict[str, Path]:
+    """Body of a case -> a modal file that exists."""
+    beside = path.with_name("basis.h5")
+    if len(case.members) == 1 and case.members[0].file is None and (basis_file is not None or beside.is_file()):
+        return {case.members[0].name: basis_file or beside}
+    if basis_file is not None:
+        raise UserError(f"{path}: has {len(case.members)} bodies; name their modal files in it (bodies.<name>.file)")
+    found = {}
+    for b in case.members:
+        found[b.name] = _named(path, b) if b.file else root / "build" / (b.body or b.name) / "basis.h5"
+        if not found[b.name].is_file():
+            own = [beside] if len(case.members) == 1 else []
+            raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
+    return found
+
+
+def _named(path: Path, b: BodyOfCase) -> Path:
+    """The modal file that a body of a case names.
+
+    Raises:
+        UserError: it is not there.
+    """
+    file = path.parent / (b.file or "")
+    if not file.is_file():
+        raise UserError(
+            f"{path}: bodies.{b.name}.file: there is no file {file}; paths in a case start in the folder of the case: "
+            "correct it"
+        )
+    return file
+
+
+def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], root: Path) -> str:
+    """A modal file that is not there: where it was looked for, and what to type."""
+    name, said = b.body or b.name, " or ".join(map(str, looked))
+    begun = f"{path}: there is no modal file of '{name}': no {said} in {root.resolve()}"
+    with contextlib.suppress(UserError):
+        if _lumped(path, name) is None:
+            find_body(path, name, root)
+        return f"{begun}; microslip run {shlex.quote(str(path))} makes it"
+    give = "give it after the case" if len(case.members) == 1 else f"name one in bodies.{b.name}.file"
+    return f"{begun}; {_elsewhere(path, name, root) or f'correct the name, or {give}'}"
+
+
+def _elsewhere(path: Path, name: str, root: Path) -> str:
+    """What to do about a body that is not here: go to the folder where it is, or write the name of one that is."""
+    here = root.resolve()
+    for folder in dict.fromkeys((*path.resolve().parents, *here.parents)):
+        there = (folder / "build" / name / "basis.h5", folder / "geometry" / name / "body.toml")
+        if folder != here and any(p.is_file() for p in there):
+            case = path.resolve()
+            case = case.relative_to(folder) if case.is_relative_to(folder) else case
+            return f"it is in {folder}: go there (cd {shlex.quote(str(folder))}) and give the case as {case}"
+    known = sorted({p.parent.name for p in (*root.glob("build/*/basis.h5"), *root.glob("geometry/*/body.toml"))})
+    close = difflib.get_close_matches(name, known, 1)
+    if close:
+        return f"is '{close[0]}' meant? Correct the name in the case"
+    return f"the bodies here are {', '.join(known)}: correct the name in the case" if known else ""
+
+
+def is_case(path: Path) -> bool:
+    """True for a case file (it has a sweep), False for a body file."""
+    return path.is_file() and path.suffix == ".toml" and bool({"body", "sweep"} & set(load_toml(path)))
+
+
+def find_body(case_path: Path, name: str, root: Path) -> Path:
+    """The body file a case refers to: beside the case, in geometry/<name>/ or a folder of that name, or any file
+    of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
+
+    Raises:
+        UserError: if there is none.
+    """
+    for place in (case_path.parent, root / "geometry" / name, root / name):
+        if (place / "body.toml").is_file() and load_toml(place / "body.toml").get("name") == name:
+            return place / "body.toml"
+    for file in sorted((root / "geometry").glob("*/*.toml")):
+        if load_toml(file).get("name") == name:
+            return file
+    places = [case_path.parent, root / "geometry" / name, root / name]
+    advice = _elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is"
+    raise UserError(
+        f"{case_path}: body: no body.toml of a body '{name}' is in {', '.join(map(str, places[:-1]))} or {places[-1]}, "
+        f"seen from {root.resolve()}; {advice}"
+    )

@@ -1,0 +1,481 @@
+"""Bodies that touch each other or the ground, and what drives them: the equation of motion of every analysis.
+
+With the coordinates q of all members and their relative motions d = T q at the contacts (Sextro Eqs. (5.1-4) to
+(5.1-13)),
+
+    M q'' + (C + G) q' + K q + T^T (F(u_0 + d) - F_0) = f(t)
+
+F are the contact forces by their laws, u_0 and F_0 displacement and force of a preloaded contact, from which d counts.
+Everything linear is handed out harmonic by harmonic, because a member of a ring has other matrices in each of them:
+the harmonic h of a travelling wave whose base engine order is e moves the N sectors with the nodal diameter
+h e mod N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+
+from ..data import INTERFACE_ROWS, Array, ComplexArray, ModalGroup, Rows, UserError
+
+if TYPE_CHECKING:
+    from ..contact.patch import Patch
+
+
+@dataclass(frozen=True)
+class Ring:
+    """N equal sectors in a circle and a wave that runs round them.
+
+    Attributes:
+        blades: N. order: base engine order e; the phase from one sector to the next is exp(i h e 2 pi / N) in harmonic
+            h. Negative for a pattern that runs the other way.
+    """
+
+    blades: int
+    order: int = 1
+
+    def index(self, harmonic: int) -> int:
+        """h e mod N, 0 <= index < N; above N/2 the wave of N - index running the other way."""
+        return (harmonic * self.order) % self.blades
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A body of an assembly.
+
+    Attributes:
+        name. groups: index of a ring (see `Ring.index`) -> group; a body that is not cyclic has one, under 0. What the
+            conjugate of a stored group gives need not be there. sectors: N of a cyclic body, else 1.
+        brings: (r,) share of each compliance label's residual that is added to the modes; None: nothing.
+        aerodynamic: index of a ring -> relative frequency shift + i times damping ratio that the flow adds to every
+            mode, in the travelling wave of that index.
+    """
+
+    name: str
+    groups: Mapping[int, ModalGroup]
+    sectors: int = 1
+    brings: Array | None = None
+    aerodynamic: Mapping[int, complex] = field(default_factory=dict)
+
+    def at(self, index: int) -> InWave:
+        """Matrices and rows in the wave of a ring's index.
+
+        Raises:
+            UserError: the modal file has no such nodal diameter.
+        """
+        if self.sectors == 1:
+            return InWave(self.groups[0], False, self.brings, self.aerodynamic.get(index, 0.0))
+        other = (self.sectors - index) % self.sectors
+        if index in self.groups:
+            return InWave(self.groups[index], False, self.brings, self.aerodynamic.get(index, 0.0))
+        if other in self.groups:
+            return InWave(self.groups[other], True, self.brings, self.aerodynamic.get(index, 0.0))
+        known = ", ".join(str(k) for k in sorted(self.groups))
+        raise UserError(
+            f"{self.name}: the nodal diameter {min(index, other)} is needed, but the modal file holds {known}; add it "
+            'to cyclic.nodal_diameters of the body, or write "all"'
+        )
+
+
+@dataclass(frozen=True)
+class InWave:
+    """A member in one wave: its group, or the conjugate of it. See `Member`."""
+
+    group: ModalGroup
+    conjugate: bool
+    brings: Array | None
+    aerodynamic: complex
+
+    def _moving(self, values: Array) -> Array:
+        return values.conj() if self.conjugate else values
+
+    @cached_property
+    def matrices(self) -> tuple[Array, Array, Array]:
+        """(m, m) M, K, C with the gyroscopic matrix and what the flow adds."""
+        g = self.group
+        M, K, C = g.M_r, g.K_r, g.C_r + g.G_r
+        if self.aerodynamic:
+            V = np.eye(len(M)) if g.to_diagonal is None else g.to_diagonal
+            P = M @ V
+            K = K + (P * (2 * self.aerodynamic.real * g.omega**2)) @ P.conj().T
+            C = C + (P * (2 * self.aerodynamic.imag * g.omega)) @ P.conj().T
+        return self._moving(M), self._moving(K), self._moving(C)
+
+    def interface(self, name: str) -> Array:
+        """(6, m) rows of an interface."""
+        return self._moving(self.group.interfaces[name].rows)
+
+    def excitation(self, name: str) -> Array:
+        """(m,) row of an excitation."""
+        return self._moving(self.group.excitations[name].rows[0])
+
+    def monitor(self, name: str, label: str) -> Array:
+        """(m,) row of a monitor or a gauge."""
+        found = self.group.monitors.get(name) or self.group.gauges[name]
+        return self._moving(found.rows[found.labels.index(label)])
+
+    def residual(self, rows: Sequence[str], columns: Sequence[str]) -> Array:
+        """(rows, columns) residual compliance among labels; zero for those that the compliance does not know."""
+        out = np.zeros((len(rows), len(columns)), dtype=self.group.compliance.static.dtype)
+        if self.brings is None or not len(rows) or not len(columns):
+            return out
+        names = {label: i for i, label in enumerate(self.group.compliance.labels)}
+        left = self.group.compliance.residual * np.outer(self.brings, self.brings)
+        a = [(i, names[r]) for i, r in enumerate(rows) if r in names]
+        b = [(j, names[c]) for j, c in enumerate(columns) if c in names]
+        if a and b:
+            (i, p), (j, q) = np.array(a).T, np.array(b).T
+            out[np.ix_(i, j)] = left[np.ix_(p, q)]
+        return self._moving(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One of the two faces of a contact.
+
+    Attributes:
+        member, interface: names. frame: (k, 6) motion along the contact's coordinates, in the contact's frame, per
+            unit of the interface's six rows. shift: the member stands that many sectors further than the one whose
+            coordinates are used (of a sector that stands for a ring).
+        rows: index of a ring -> (k, m) motion along the contact's coordinates, of a patch that deforms; else None.
+    """
+
+    member: str
+    interface: str
+    frame: Array = field(default_factory=lambda: np.eye(6))
+    shift: int = 0
+    rows: Mapping[int, Array] | None = None
+
+    def motion(self, linear: InWave, index: int, blades: int) -> Array:
+        """(k, m) motion per unit of the member's coordinates, with the phase of the sector it stands in."""
+        if self.rows is None:
+            own = self.frame @ linear.interface(self.interface)
+        elif index in self.rows:
+            own = self.rows[index]
+        else:
+            own = self.rows[0] if len(self.rows) == 1 else self.rows[(blades - index) % blades].conj()
+        return own * self._phase(index, blades)
+
+    def _phase(self, index: int, blades: int) -> complex | float:
+        steps = (self.shift * index) % blades if blades else 0
+        if 2 * steps in (0, blades):
+            return -1.0 if steps else 1.0
+        return complex(np.exp(2j * np.pi * steps / blades))
+
+    @property
+    def labels(self) -> list[str]:
+        """Compliance labels of the six rows."""
+        return [f"interface:{self.interface}:{row}" for row in INTERFACE_ROWS]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Two faces that touch, or one and the ground, which does not move.
+
+    The relative motion d = first - second, seen in the frame of the first: its normal entry is positive where the two
+    come nearer.
+
+    Attributes:
+        name. patch: points and law. first, second: sides; None: the ground.
+        offset: (k,) relative displacement of the preloaded state, m and rad. preload: (k,) force that is in balance
+            there with loads which nothing else of the assembly tells of, N and N m. Zeros where loads, interference
+            and the contact find their balance in the analysis itself.
+        phase: radians by which the wave leads here in the first harmonic. Laws are marched from where the wave is at
+            zero phase: what a contact remembers of its beginning is then the same in every sector of a ring.
+        compliance: (k, k) of the bodies along the coordinates, by which a patch that deforms yields to its preload.
+    """
+
+    name: str
+    patch: Patch
+    first: Side
+    second: Side | None
+    offset: Array
+    preload: Array
+    phase: float = 0.0
+    compliance: Array | None = None
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """(k, k) about which the analysis is made: that of the sticking contact where it is preloaded."""
+        from ..contact.patch import stuck_stiffness
+
+        preloaded, at = stuck_stiffness(self.patch, self.offset), np.zeros_like(self.offset)
+        if preloaded[0, 0] > 0 or self.preload[0] > 0:
+            return preloaded
+        for at[0] in 1e-9 * 4.0 ** np.arange(10):  # open in that state: it will be pressed by something
+            k = stuck_stiffness(self.patch, at)
+            if k[0, 0] > 0:
+                return k
+        return preloaded
+
+    def pressed(self, normal: float) -> Contact:
+        """The contact under another normal force (N)."""
+        found = touching(self.name, self.patch, self.first, self.second, normal=normal, compliance=self.compliance)
+        return replace(found, phase=self.phase)
+
+
+def touching(
+    name: str, patch: Patch, first: Side, second: Side | None, normal: float | None = None, interference: float = 0.0,
+    compliance: Array | None = None,
+) -> Contact:  # fmt: skip
+    """A contact pressed by a given normal force (N), or as near as an interference (m; negative: a gap) makes it.
+
+    Under a given force the points carry what they carry in that state, moments included, and all of it counts as
+    preload; an interference finds its balance with the bodies in the analysis itself.
+
+    Args:
+        compliance: see `Contact`; without it a patch that deforms is pressed in the shape that it was made with.
+
+    Raises:
+        UserError: a negative normal force, or one that the law does not reach.
+    """
+    from ..contact.patch import equilibrium, pressing
+
+    offset, preload = np.zeros(patch.count), np.zeros(patch.count)
+    if normal is None:
+        offset[0] = interference
+    else:
+        offset, preload[0] = equilibrium(patch, normal, compliance=compliance), normal
+        preload[6:] = pressing(patch, offset)[6:]
+    return Contact(name, patch, first, second, offset, preload, compliance=compliance)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A harmonic force on a member.
+
+    Attributes:
+        member. row: name of an excitation. amplitude: complex 0-peak number that multiplies the row, N for a unit
+            force, Pa for a unit pressure. harmonic: of the base frequency; 0 for a steady load.
+    """
+
+    member: str
+    row: str
+    amplitude: complex = 1.0
+    harmonic: int = 1
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A read-out of a member: a row of a monitor or a gauge."""
+
+    member: str
+    monitor: str
+    label: str
+
+
+@dataclass(frozen=True)
+class Linear:
+    """What is linear in one harmonic, of one member or of several together.
+
+    Attributes:
+        M, K, C: (m, m); C with the gyroscopic matrix. rows: (c, m) motion along the contact coordinates.
+        residual: (c, c) static compliance along them that the coordinates leave out, m/N.
+        load: (m,) amplitude of the generalised force. given: (c,) motion by the loads beside the coordinates, m.
+        watch: (w, m) read-outs. watch_residual: (w, c) and watch_given: (w,) of them beside the coordinates.
+    """
+
+    M: Array
+    K: Array
+    C: Array
+    rows: Array
+    residual: Array
+    load: ComplexArray
+    given: ComplexArray
+    watch: Array
+    watch_residual: Array
+    watch_given: ComplexArray
+
+    @property
+    def count(self) -> int:
+        """Number of contact coordinates."""
+        return len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Members, contacts, loads and read-outs.
+
+    Attributes:
+        members, contacts, loads, watches. ring: if the members are one sector that stands for N, or N sectors.
+    """
+
+    members: tuple[Member, ...]
+    contacts: tuple[Contact, ...]
+    loads: tuple[Load, ...]
+    watches: tuple[Watch, ...]
+    ring: Ring | None = None
+
+    def index(self, harmonic: int) -> int:
+        """Index of the wave that the members move in, see `Ring.index`; 0 without a ring."""
+        return self.ring.index(harmonic) if self.ring else 0
+
+    @property
+    def blades(self) -> int:
+        return self.ring.blades if self.ring else 0
+
+    def sides(self, member: str) -> list[tuple[int, int, Side]]:
+        """(contact, 0 for its first or 1 for its second side, side) of all sides of a member, by contact."""
+        both = [(i, j, s) for i, c in enumerate(self.contacts) for j, s in enumerate((c.first, c.second)) if s]
+        return [found for found in both if found[2].member == member]
+
+    def part(self, member: Member, harmonic: int) -> Linear:
+        """One member in one harmonic; its contact coordinates are the motions of its sides, one after the other."""
+        index, at = self.index(harmonic), member.at(self.index(harmonic))
+        sides = [s for _, _, s in self.sides(member.name)]
+        loads = [x for x in self.loads if x.member == member.name and x.harmonic == harmonic]
+        watches = [w for w in self.watches if w.member == member.name]
+        M, K, C = at.matrices
+        m = len(M)
+        T = [s.motion(at, index, self.blades) for s in sides]
+        rows = np.vstack(T) if T else np.zeros((0, m))
+        amplitudes = np.array([x.amplitude for x in loads], dtype=complex)
+        f = sum((np.conj(at.excitation(x.row)) * x.amplitude for x in loads), np.zeros(m, dtype=complex))
+        frames = [s.frame * s._phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
+                  for s, t in zip(sides, T, strict=True)]  # fmt: skip
+        A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
+        labels = [label for s in sides for label in s.labels]
+        forced = [_load_label(at.group.excitations[x.row], x.row) for x in loads]
+        seen = [f"monitor:{w.monitor}:{w.label}" for w in watches]
+        watch = np.array([at.monitor(w.monitor, w.label) for w in watches]).reshape(-1, m)
+        return Linear(
+            M, K, C, rows, A @ at.residual(labels, labels) @ A.conj().T, f,
+            A @ (at.residual(labels, forced) @ amplitudes), watch, at.residual(seen, labels) @ A.conj().T,
+            at.residual(seen, forced) @ amplitudes,
+        )  # fmt: skip
+
+    def unrolled(self) -> Assembly:
+        """All N sectors in place of the one that stands for them: bodies ``blade_0``, ``blade_1``, ..., or one ring of
+        a cyclic body, whose faces and rows are then ``right@0``, ``right@1``, ...
+
+        Raises:
+            UserError: a lone blade to which the flow adds something else in each wave.
+        """
+        if self.ring is None:
+            return self
+        flown = [m.name for m in self.members if m.sectors == 1 and len(set(m.aerodynamic.values())) > 1]
+        if flown:
+            raise UserError(
+                f"{flown[0]}: what the flow adds differs from wave to wave, which couples the blades of a whole ring: "
+                "let one sector stand for it"
+            )
+        N, ring = self.ring.blades, self.ring
+        cyclic = {m.name for m in self.members if m.sectors > 1}
+
+        def body(name: str, j: int) -> str:
+            return name if name in cyclic else f"{name}_{j % N}"
+
+        def row(member: str, name: str, j: int) -> str:
+            return f"{name}@{j % N}" if member in cyclic else name
+
+        def side(s: Side, j: int) -> Side:
+            at, rows = j + s.shift, s.rows
+            if rows is not None and s.member in cyclic:
+                rows = _rows_all_round(s, at, N)
+            return replace(s, member=body(s.member, at), interface=row(s.member, s.interface, at), shift=0, rows=rows)
+
+        def met(c: Contact, j: int) -> Contact:
+            second = side(c.second, j) if c.second else None
+            phase = c.phase + 2 * np.pi * (j * ring.index(1) % N) / N
+            return replace(c, name=f"{c.name}_{j}", first=side(c.first, j), second=second, phase=phase)
+
+        def load(x: Load, j: int) -> Load:
+            turn = complex(np.exp(2j * np.pi * (j * ring.index(x.harmonic) % N) / N))
+            return Load(body(x.member, j), row(x.member, x.row, j), x.amplitude * turn, x.harmonic)
+
+        def watch(w: Watch, j: int) -> Watch:
+            return Watch(body(w.member, j), row(w.member, w.monitor, j), w.label)
+
+        return Assembly(
+            _all_round(self.members, N),
+            tuple(met(c, j) for j in range(N) for c in self.contacts),
+            tuple(load(x, j) for j in range(N) for x in self.loads),
+            tuple(watch(w, j) for j in range(N) for w in self.watches),
+        )
+
+    def joined(self, harmonic: int) -> Linear:
+        """All members in one harmonic; the contact coordinates are the relative motions, contact by contact."""
+        return join([self.part(m, harmonic) for m in self.members], self.signs)
+
+    @cached_property
+    def coordinates(self) -> list[tuple[int, int, int, int]]:
+        """(contact, side, where its coordinates begin, how many) of all sides, member by member."""
+        found, start = [], 0
+        for member in self.members:
+            for i, j, _ in self.sides(member.name):
+                k = self.contacts[i].patch.count
+                found.append((i, j, start, k))
+                start += k
+        return found
+
+    @cached_property
+    def signs(self) -> Array:
+        """(relative, sides) first side less second side of every contact."""
+        begins = np.cumsum([0, *(c.patch.count for c in self.contacts)])
+        out = np.zeros((begins[-1], sum(k for *_, k in self.coordinates)))
+        for i, j, start, k in self.coordinates:
+            out[begins[i] : begins[i] + k, start : start + k] = np.eye(k) * (-1.0 if j else 1.0)
+        return out
+
+
+def _all_round(members: Sequence[Member], blades: int) -> tuple[Member, ...]:
+    """The members of every sector, sector by sector; a cyclic body once, as a whole ring."""
+    from .disc import whole
+
+    rings = [whole(m) for m in members if m.sectors > 1]
+    return (*rings, *(replace(m, name=f"{m.name}_{j}") for j in range(blades) for m in members if m.sectors == 1))
+
+
+def _rows_all_round(side: Side, sector: int, N: int) -> Mapping[int, Array]:
+    """Rows of a patch that deforms on the coordinates of a whole ring.
+
+    Raises:
+        UserError: a wave is missing.
+    """
+    from .disc import spread
+
+    rows = side.rows or {}
+    if missing := [k for k in range(N // 2 + 1) if k not in rows]:
+        raise UserError(
+            f"{side.member}:{side.interface}: a whole ring needs the patch's shapes in every wave; that of nodal "
+            f"diameter {missing[0]} was not asked for"
+        )
+    return {0: spread([rows[k] for k in range(N // 2 + 1)], sector, N)}
+
+
+def join(parts: Sequence[Linear], E: Array) -> Linear:
+    """Several parts as one, their contact coordinates combined by E (c, all of theirs)."""
+    diag = scipy.linalg.block_diag
+    residual = E @ diag(*[p.residual for p in parts]) @ E.T
+    return Linear(
+        diag(*[p.M for p in parts]), diag(*[p.K for p in parts]), diag(*[p.C for p in parts]),
+        E @ diag(*[p.rows for p in parts]), residual,
+        np.concatenate([p.load for p in parts]), E @ np.concatenate([p.given for p in parts]),
+        diag(*[p.watch for p in parts]), diag(*[p.watch_residual for p in parts]) @ E.T,
+        np.concatenate([p.watch_given for p in parts]),
+    )  # fmt: skip
+
+
+def _load_label(rows: Rows, name: str) -> str:
+    return f"excitation:{name}:{rows.labels[0]}"
+
+
+def across(first: Array, second: Array, offset: Array | None = None) -> Array:
+    """(6, 6) six rows in the second face's frame to motions in the first face's frame.
+
+    Args:
+        first, second: (3, 3) rows n, t1, t2 of the two frames in common axes. offset: (3,) m, from the second face's
+            origin to the first one's, in common axes: rotations move the place of the contact; zero if not given.
+    """
+    Q = first @ second.T
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = Q
+    if offset is not None:
+        r = first @ offset
+        out[:3, 3:] = -np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]]) @ Q  # phi x r
+    return out

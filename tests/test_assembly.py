@@ -1,0 +1,145 @@
+"""Assemblies: a sector that stands for a ring, the two forms of the equations, frames, derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from microslip.contact.friction import Coulomb
+from microslip.contact.normal import Penalty
+from microslip.contact.patch import Patch, grid
+from microslip.contact.point import PointContact
+from microslip.data import ModalBasis
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance import response
+from microslip.harmonic_balance.solver import newton, solve
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
+from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, across, touching
+
+
+def blade() -> ModalBasis:
+    """A rigid tip of 1 kg with a contact on each side, 50 to 150 Hz, pushed off its centre."""
+    tip = Body("tip", 1.0, (0, 0, 0), inertia=(1e-3, 2e-3, 3e-3))
+    faces = [
+        Contact("right", "tip", (1, 0, 0), t2=(0, 0, 1), at=(0.02, 0, 0)),
+        Contact("left", "tip", (-1, 0, 0), t2=(0, 0, 1), at=(-0.02, 0, 0)),
+    ]
+    push = Force("gas", "tip", (1, 0.4, 0.2), at=(0, 0.01, 0.005))
+    spring = Spring("ground", "tip", (1e5, 3e5, 9e5, 100.0, 200.0, 300.0))
+    return System("blade", [tip], [spring], faces, [push], [Monitor("tip", "tip")], ratio=0.01).basis()
+
+
+def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> Assembly:
+    """One blade that stands for a ring: its right face meets the left one of the next blade."""
+    places, areas = grid(0.02, 0.01, (4, 3))
+    n = len(areas)
+    law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(0.05)), jnp.asarray(1e6 / n))
+    facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
+    patch = Patch("right", places, areas, law)
+    contact = touching("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=normal)
+    member, load = Member("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
+    return Assembly((member,), (contact,), (load,), (Watch("blade", "tip", "u_x"),), Ring(blades, order))
+
+
+FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "settled": 1e-13, "length": 1e-6}
+
+
+@pytest.mark.parametrize(("blades", "order"), [(6, 1), (6, 5), (4, 2), (7, 2), (5, 0)])
+@pytest.mark.parametrize("form", ["relative", "sides"])
+def test_a_sector_stands_for_the_whole_ring(blades: int, order: int, form: str) -> None:
+    """1e-9 of the amplitude in every harmonic of every blade, work N times, with slip and lift-off; the number of
+    samples (40) need not fit the number of blades, because every contact is marched from its own phase of the wave."""
+    one, Omega = sector(blades, order), 2 * np.pi * 60.0
+    lone, ring = balance.of(one, **FINE), balance.of(one.unrolled(), form=form, **FINE)
+    a, b = solve(lone, Omega, []), solve(ring, Omega, [])
+    assert a.converged and b.converged
+    x, y = response.operating(lone, a), response.operating(ring, b)
+    h = np.arange(4)
+    turned = x.watched[0] * np.exp(2j * np.pi * h * order * np.arange(blades)[:, None] / blades)
+    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    assert y.supplied == pytest.approx(blades * x.supplied, rel=1e-9)
+    share = x.cycles["shroud"].slipping.mean()
+    assert 0 < share < 1 or 2 * order == blades or order == 0  # the push does not slide there
+
+
+@pytest.mark.parametrize("form", ["relative", "sides"])
+def test_jacobian_against_differences(form: str) -> None:
+    """Central differences at a random state of a ring of five in both forms: 1e-6."""
+    ring = balance.of(sector(5, 2).unrolled(), form=form, **{**FINE, "harmonics": 1, "samples": 16})
+    rng, Omega, h = np.random.default_rng(3), 2 * np.pi * 60.0, 1e-6
+    x, d = 0.5 * rng.normal(size=ring.size), rng.normal(size=ring.size)
+    _, J, R_Omega = ring.evaluate(x, Omega)
+    along = (ring.evaluate(x + h * d, Omega)[0] - ring.evaluate(x - h * d, Omega)[0]) / (2 * h)
+    np.testing.assert_allclose(J @ d, along, rtol=0, atol=1e-6 * np.abs(along).max())
+    h = 1e-4
+    along = (ring.evaluate(x, Omega + h)[0] - ring.evaluate(x, Omega - h)[0]) / (2 * h)
+    np.testing.assert_allclose(R_Omega, along, rtol=0, atol=1e-5 * np.abs(along).max())
+
+
+def test_both_forms_are_the_same_equations() -> None:
+    """A chain of three that rubs on a wall: relative motions or both sides as unknowns, 1e-9."""
+    ring = sector(3, 1, normal=50.0, push=2.0).unrolled()
+    places, areas = grid(0.02, 0.01, (2, 2))
+    law = PointContact(Penalty(jnp.asarray(2e6 / 4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e6 / 4))
+    wall = touching("wall", Patch("left", places, areas, law), Side("blade_0", "left"), None, normal=30.0)
+    chain = Assembly(ring.members, (*ring.contacts[:2], wall), ring.loads, ring.watches)
+    found = []
+    for form in ("relative", "sides"):
+        problem = balance.of(chain, form=form, **FINE)
+        point = solve(problem, 2 * np.pi * 60.0, [])
+        assert point.converged
+        found.append(response.operating(problem, point))
+    scale = np.abs(found[0].watched).max()
+    np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * scale)
+    for name, force in found[0].force.items():
+        np.testing.assert_allclose(found[1].force[name], force, rtol=0, atol=1e-8 * np.abs(force).max())
+
+
+def test_turned_frames_move_the_place_and_the_axes() -> None:
+    """Rigid motion of the second body, its rows read at another origin and in other axes: that of the first frame."""
+    rng = np.random.default_rng(1)
+    first, second = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+    move, turn, away = rng.normal(size=(3, 3))
+    rows = np.concatenate([second @ move, second @ turn])
+    place = move + np.cross(turn, away)  # of the first frame's origin, `away` from the second's
+    np.testing.assert_allclose(
+        across(first, second, away) @ rows, np.concatenate([first @ place, first @ turn]), rtol=0, atol=1e-12
+    )
+
+
+def test_linear_limit_is_modal_superposition() -> None:
+    """Pressed so hard that nothing slides or opens, the sector's answer is that of the sticking stiffness: 1e-10."""
+    one, Omega = sector(6, 2, normal=1e5, push=1.0), 2 * np.pi * 70.0
+    problem = balance.of(one, **FINE)
+    point = newton(problem.at(Omega), np.zeros(problem.size))
+    part, k = problem.parts[1][0], problem.stiffness[0]
+    A = part.K - Omega**2 * part.M + 1j * Omega * part.C + part.rows.conj().T @ k @ part.rows
+    direct = part.watch @ np.linalg.solve(A, part.load)
+    np.testing.assert_allclose(response.operating(problem, point).watched[0, 1], direct[0], rtol=1e-10)
+
+
+def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
+    """Pressed together by what the preload makes: the same response from a given approach as from a given force."""
+    one, Omega = sector(6, 2, push=2.0), 2 * np.pi * 60.0
+    given = one.contacts[0]
+    wall = touching("shroud", given.patch, Side("blade", "right"), None, normal=20.0)
+    by_force = Assembly(one.members, (wall,), one.loads, one.watches)
+    # the steady load that holds the blade against the wall where the contact is pressed by 20 N
+    near = touching("shroud", given.patch, Side("blade", "right"), None, interference=float(wall.offset[0]))
+    loads = (*one.loads, Load("blade", "hold", 1.0, harmonic=0))
+    group = one.members[0].groups[0]
+    rows = group.interfaces["right"].rows[0][None] * 20.0
+    held = replace(
+        group, excitations={**group.excitations, "hold": replace(group.excitations["gas"], rows=rows, labels=("hold",))}
+    )
+    by_balance = Assembly((Member("blade", {0: held}),), (near,), loads, one.watches)
+    found = []
+    for each in (by_force, by_balance):
+        problem = balance.of(each, **FINE)
+        point = solve(problem, Omega, [])
+        assert point.converged
+        found.append(response.operating(problem, point))
+    np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * np.abs(found[0].watched).max())

@@ -1,0 +1,218 @@
+"""Contacts of a case file: node-wise and curved patches, faces that do not meet; every mistake is one sentence."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import small
+
+from microslip.basis import write_basis
+from microslip.body import validate
+from microslip.case import CaseSettings, run_case
+from microslip.case.assemble import build
+from microslip.cli import main
+from microslip.contact.curved import Line, foundation_of_line
+from microslip.contact.patch import pressure
+from microslip.contact.solids import Solid
+from microslip.data import UserError
+
+PATH = Path("case.toml")
+HEIGHT, DEPTH = small.SIZE[2], small.SIZE[1]
+
+
+def table(**contact: Any) -> dict[str, Any]:
+    """A beam on the ground, its right face pressed."""
+    return {
+        "name": "pressed", "body": "small", "excitation": "shaker", "monitor": "tip-probe", "harmonics": 1,
+        "samples": 16, "cycles": 20, "contacts": [{"interface": "right", "friction": 0.3} | contact],
+        "sweep": {"start": 400.0, "stop": 440.0, "points": 2, "normal_forces": [200.0]},
+    }  # fmt: skip
+
+
+STIFF = {"normal_stiffness": 1e9, "tangential_stiffness": 8e8}
+
+
+def made(raw: dict[str, Any]) -> CaseSettings:
+    return validate(CaseSettings, copy.deepcopy(raw), PATH)
+
+
+def two(second: dict[str, Any] | None = None, **contact: Any) -> dict[str, Any]:
+    """Two beams side by side: the right face of one lies on the left face of the other."""
+    raw = table(**{"interface": "a:right", "against": "b:left", **STIFF, **contact})
+    del raw["body"]
+    other = {"name": "b", "body": "small"} | (second or {"shift": [small.SIZE[0], 0, 0]})
+    return raw | {
+        "bodies": [{"name": "a", "body": "small"}, other], "excitation": "a:shaker", "monitor": "a:tip-probe"
+    }  # fmt: skip
+
+
+TWICE = table(**STIFF) | {"contacts": [{"interface": "right", "friction": 0.3} | STIFF] * 2}
+BETWEEN = two() | {"contacts": two()["contacts"] + two(interface="b:right", against="a:right")["contacts"]}
+
+
+def built(raw: dict[str, Any]) -> Any:
+    settings = made(raw)
+    return build(settings, {b.name: small.basis() for b in settings.members}, PATH)
+
+
+def test_a_beam_whose_patch_deforms_on_the_ground() -> None:
+    """It converges, and says how many deformations there are."""
+    for patch in ("nodal", "rigid"):
+        result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()}, PATH)
+        response = result.responses[200.0]
+        assert response.converged.all()
+        assert any("deformations of the bodies" in r for r in result.remarks) == (patch == "nodal")
+
+
+def test_patches_that_deform_between_two_beams() -> None:
+    """Six rigid coordinates and at most the modes of both bodies; pressed by the normal force of the sweep."""
+    found = built(two(patch="nodal"))
+    contact = found.pressed(200.0).contacts[0]
+    assert 6 < contact.patch.count <= 6 + 2 * 6
+    p = pressure(contact.patch, contact.offset)
+    assert p @ contact.patch.areas == pytest.approx(200.0, rel=1e-9)
+    assert contact.first.rows is not None and contact.second is not None and contact.second.rows is not None
+
+
+def test_faces_are_set_against_each_other_by_their_places() -> None:
+    """The same frame for two beams side by side, and for both turned and moved alike; others do not meet."""
+    plain = built(two()).assembly.contacts[0].second.frame
+    np.testing.assert_allclose(plain, np.kron(np.eye(2), np.diag([-1.0, -1, 1])), rtol=0, atol=1e-12)
+    raw = two()
+    for b in raw["bodies"]:
+        b["turn"] = 30.0
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    raw["bodies"][1]["shift"] = [c * small.SIZE[0], 0.0, -s * small.SIZE[0]]  # the axis of rotation is y
+    np.testing.assert_allclose(built(raw).assembly.contacts[0].second.frame, plain, rtol=0, atol=1e-12)
+
+
+RADIUS = 1000.0  # m: a line 17 mm wide on the face of 120 mm
+PIN = {"curvature": [float("inf"), RADIUS], "young": 2.1e11}
+
+
+def test_a_curved_face_is_fitted_to_hertz() -> None:
+    """The foundation of a line along t1 whose length and strip are the face's; springs shared out by area."""
+    found = built(table(**PIN, points=[2, 60]))
+    steel = Solid(2.1e11, 0.3)
+    line = Line(steel, steel, RADIUS, DEPTH)
+    k = foundation_of_line(line, 200.0, HEIGHT).stiffness
+    assert found.springs[0][0] == pytest.approx(k * DEPTH * HEIGHT, rel=1e-12)
+    assert found.springs[0][1] == pytest.approx(0.7 * found.springs[0][0], rel=1e-12)  # along the line: 1 - nu
+    assert any("agrees with Hertz in approach at 200 N" in r for r in found.remarks)
+    contact = found.pressed(200.0).contacts[0]
+    assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=0.02)
+    p = pressure(contact.patch, contact.offset)
+    assert (p[np.abs(contact.patch.points[:, 1]) > 0.4 * HEIGHT] == 0).all()
+
+
+def test_a_line_of_contact_in_pieces() -> None:
+    """law = "hertz": the approach of the line under the force of the sweep, to the cubic between the law's knots."""
+    found = built(table(**PIN, law="hertz", points=[5, 1]))
+    contact = found.pressed(200.0).contacts[0]
+    steel = Solid(2.1e11, 0.3)
+    assert len(contact.patch.points) == 5 and np.ptp(contact.patch.points[:, 1]) == 0
+    line = Line(steel, steel, RADIUS, DEPTH)
+    assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=1e-3)
+
+
+def test_the_books_mode_of_a_curved_contact() -> None:
+    """Gaps and Hertz' law in book mode, with one tangential stiffness; two are refused in one sentence."""
+    for law, points in (("smooth", [2, 44]), ("hertz", [3, 1])):
+        raw = table(**PIN, law=law, points=points) | {"mode": "book"}
+        with pytest.raises(UserError, match="isotropic = true"):
+            run_case(made(raw), {"small": small.basis()}, PATH)
+        raw["contacts"][0]["isotropic"] = True
+        assert run_case(made(raw), {"small": small.basis()}, PATH).responses[200.0].converged.all()
+
+
+def test_one_round_contact() -> None:
+    found = built(table(curvature=[0.5, 1.0], young=2.1e11, law="hertz"))
+    contact = found.pressed(200.0).contacts[0]
+    assert len(contact.patch.points) == 1 and contact.offset[0] > 0
+
+
+def test_a_curved_face_that_converges_in_a_case() -> None:
+    for law, points in (("smooth", [2, 44]), ("hertz", [3, 1])):
+        result = run_case(made(table(**PIN, law=law, points=points)), {"small": small.basis()}, PATH)
+        assert result.responses[200.0].converged.all()
+
+
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "no stiffness": (table(), "normal_stiffness: is missing"),
+    "twice": (table(**STIFF, **PIN), "young stands for both stiffnesses"),
+    "young alone": (table(young=2e11), "young stands for both stiffnesses where a curvature is given"),
+    "flat": (table(**STIFF, curvature=[float("inf"), float("inf")]), "inf, inf is flat"),
+    "hollow": (table(**STIFF, curvature=[1.0, -2.0]), "curvature"),
+    "no number": (table(**STIFF, curvature=[1.0, float("nan")]), "curvature"),
+    "three": (table(**STIFF, curvature=[1.0, 2.0, 3.0]), "curvature"),
+    "hertz bare": (table(**STIFF, law="hertz"), 'law = "hertz" needs curvature and young'),
+    "hertz nodal": (table(**PIN, law="hertz", patch="nodal"), 'law = "hertz" needs curvature and young, and a rigid'),
+    "points of a mesh": (table(**STIFF, patch="nodal", points=[3, 3]), "has those of the mesh"),
+    "closed form": (table(**STIFF, patch="nodal", law="jenkins"), 'write law = "smooth" or "rough"'),
+    "closed curve": (table(**STIFF, curvature=[1.0, 2.0], law="jenkins"), 'write law = "smooth" or "rough"'),
+    "statics in six rows": (table(**STIFF, includes="surface", patch="nodal"), "stands in the six rows of right alone"),
+    "one of both": (table(**STIFF, isotropic=True), "isotropic belongs to young"),
+    "bulk": (table(**PIN, includes="bulk+surface"), "beyond what the face yields"),
+    "kind": (table(**STIFF, patch="soft"), "patch"),
+    "pressed twice": (table(**STIFF, normal_force=3.0, interference=1e-6), "pressed by one or by the other"),
+    "pulls": (table(**STIFF, normal_force=-3.0), "normal_force"),
+    "no load": (table(**PIN, interference=1e-6), "a curved contact is fitted to Hertz at a load"),
+    "full line": (table(**{**PIN, "curvature": [float("inf"), 1e6]}), "line contact: under 200 N it is"),
+    "full face": (table(curvature=[1e6, 1e6], young=2.1e11, law="hertz"), "point contact: under 200 N it is"),
+    "coarse": (table(**{**PIN, "curvature": [float("inf"), 2.0]}, points=[2, 40]),
+               "2 points in a row are pressed at 200 N; take more points"),
+    "apart": (two({"shift": [0.5, 0, 0]}), "do not face each other: they lie 480 mm apart along the normal"),
+    "aside": (two({"shift": [0.02, 0.05, 0]}), "their centres lie 50 mm apart in the contact plane"),
+    "turned": (two({"turn": 40.0}), "their normals are 40 degrees from opposite"),
+    "one face twice": (TWICE, "interface 'right' stands in contacts 1 and 2 (counted from 1), but a face has one"),
+    "two neighbours": (BETWEEN, "interface 'a:right' stands in contacts 1 and 2"),
+    "same side": (two(against="b:right"), "their normals are 180 degrees from opposite"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("raw, words", WRONG.values(), ids=list(WRONG))
+def test_mistakes_are_named_with_the_file(raw: dict[str, Any], words: str) -> None:
+    with pytest.raises(UserError) as caught:
+        built(raw)
+    assert words in str(caught.value) and str(caught.value).startswith("case.toml: ")
+
+
+def test_mistakes_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 2, one sentence, and what was there before stays as it was."""
+    write_basis(tmp_path / "beam.h5", small.basis())
+    case = tmp_path / "case.toml"
+    text = """name = "pair"
+excitation = "a:shaker"
+monitor = "a:tip-probe"
+bodies = [{name = "a", file = "beam.h5"}, {name = "b", file = "beam.h5", shift = [0.02, 0.0, 0.0]}]
+harmonics = 1
+sweep = {start = 400.0, stop = 440.0, points = 2, normal_forces = [200.0]}
+[[contacts]]
+interface = "a:right"
+against = "b:left"
+normal_stiffness = 1e9
+tangential_stiffness = 8e8
+friction = 0.3
+"""
+    case.write_text(text)
+    assert main(["respond", str(case), "-q"]) == 0
+    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+    for old, new, words in (
+        ("0.02, 0.0", "0.02, 0.9", "do not face each other"),
+        ('"b:left"', '"b:right"', "180 degrees"),
+        ('"b:left"', '"b:front"', "no interface 'front'"),
+        ("friction = 0.3", 'friction = 0.3\npatch = "nodal"\npoints = [2, 2]', "those of the mesh"),
+        ("friction = 0.3", "friction = 0.3\ncurvature = [0.0, 1.0]", "curvature"),
+        ("friction = 0.3", "friction = 0.3\nnormal_force = -1.0", "normal_force"),
+    ):
+        case.write_text(text.replace(old, new))
+        capsys.readouterr()
+        assert main(["respond", str(case), "-q"]) == 2
+        said = capsys.readouterr()
+        assert words in said.err and "Traceback" not in said.err + said.out
+        now = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file() and p != case}
+        assert now == {p: b for p, b in before.items() if p != case}

@@ -1,0 +1,152 @@
+"""The book's mode of a case, and `microslip respond CASE --compare-book`."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from microslip import running
+from microslip.case.comparison import Pair, comparison_table, paired, sentence
+from microslip.cli import main
+from microslip.data import UserError
+from microslip.results import read_response
+
+pytest.importorskip("matplotlib")
+SAMPLES = Path(running.__file__).parent / "samples"
+
+CASE = """
+name = "vane"
+body = "vane-eigenmodes"
+excitation = "magnet"
+amplitude = 2.0
+monitor = "probe"
+harmonics = 1
+samples = 48
+
+[[contacts]]
+interface = "right"
+law = "rough"
+roughness = 2e-5
+points = [2, 2]
+normal_stiffness = 2e5
+tangential_stiffness = 4e5
+friction = 0.2
+includes = "surface"
+
+[sweep]
+start = 315.0
+stop = 355.0
+points = 9
+normal_forces = [50.0]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copy(SAMPLES / "basis.h5", tmp_path)
+    (tmp_path / "case.toml").write_text(CASE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    return tmp_path
+
+
+def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One harmonic of both: what is left between them is the swing of the normal force, some per cent here."""
+    assert main(["respond", "case.toml", "--compare-book", "--quiet"]) == 0
+    build = folder / "build/vane"
+    with open(build / "book.csv", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert abs(float(row["difference_Hz_percent"])) < 0.3 and 0 < abs(float(row["difference_m_percent"])) < 10
+    assert (build / "pictures/book.png").stat().st_size > 5000
+    modes = [read_response(f / "response.h5") for f in (build, build / "book")]
+    assert [r.mode for r in modes] == ["marched", "book"]
+    told = [json.loads((f / "response.json").read_text()) for f in (build, build / "book")]
+    assert [summary["mode"] for summary in told] == ["marched", "book"]
+    assert any("Book mode" in remark for remark in modes[1].remarks) and modes[1].series[0].converged.all()
+    capsys.readouterr()
+    assert main(["respond", "case.toml", "--compare-book"]) == 0  # up to date: nothing is computed again
+    out = capsys.readouterr()
+    assert "of 9 frequencies" not in out.err and "F_N = 50 N: marched" in out.out
+
+
+@pytest.mark.parametrize("own", ["", 'mode = "book"\n'])
+def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
+    """A plain response and the comparison of both modes, after one another: each point is computed once."""
+    (folder / "case.toml").write_text(own + CASE)
+
+    def told(ask: Callable[..., Any]) -> tuple[int, int]:
+        said: list[str] = []
+        ask(folder / "case.toml", None, ["sweep.points=4"], report=said.append)
+        return sum("of 4 frequencies" in s for s in said), sum("is up to date" in s for s in said)
+
+    assert told(running.respond) == (4, 0)
+    assert told(running.compare_book) == (4, 1)
+    assert told(running.respond) == (0, 1)
+    assert told(running.compare_book) == (0, 2)
+    files = {way: folder / "build/vane" / way / "response.h5" for way in ("", "marched" if own else "book")}
+    assert [read_response(f).mode for f in files.values()] == (["book", "marched"] if own else ["marched", "book"])
+
+
+def test_a_case_in_the_books_mode(folder: Path) -> None:
+    """`mode` and `strips` in the file: microslip takes energy where without it everything sticks."""
+    sticks = ["sweep.normal_forces=[0.4]", "amplitude=0.002", "sweep.start=300.0", "sweep.points=4"]
+    lost = []
+    for strips in (0, 8):
+        running.respond(folder / "case.toml", None, [*sticks, 'mode="book"', f"strips={strips}"])
+        found = read_response(folder / "build/vane/response.h5")
+        assert found.mode == "book" and found.series[0].arrays["x"].shape[1] == 18
+        lost.append(found.series[0].arrays["contacts/right/dissipated"].max())
+    assert lost[0] <= 1e-18 < lost[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (['mode="book"', 'contacts.0.law="jenkins"', "contacts.0.roughness=1"], "roughness"),
+        (["strips=4"], "strips: belong to mode"),
+        (['mode="books"'], "mode"),
+        (['mode="book"', "strips=-1"], "strips"),
+    ],
+)
+def test_modes_that_are_none(folder: Path, changes: list[str], said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        running.respond(folder / "case.toml", None, changes)
+
+
+def test_the_closed_form_is_no_point_contact(folder: Path) -> None:
+    text = CASE.replace('law = "rough"\nroughness = 2e-5\npoints = [2, 2]\n', 'law = "jenkins"\n')
+    (folder / "case.toml").write_text(text)
+    with pytest.raises(UserError, match=r"case.toml: mode: \"book\" needs point contacts"):
+        running.compare_book(folder / "case.toml", None)
+
+
+def test_a_law_that_is_not_the_books_is_told_by_contact(folder: Path) -> None:
+    (folder / "contact.toml").write_text(
+        'name = "shroud"\n[stiffness]\nkind = "given"\nnormal = 2e5\ntangential = 4e5\nincludes = "surface"\n'
+        '[friction]\nkind = "static-sliding"\nstatic = 0.3\nsliding = 0.2\n'
+    )
+    start, stop = CASE.index("law ="), CASE.index("\n[sweep]")
+    own = CASE[:start] + 'file = "contact.toml"\nincludes = "surface"\n' + CASE[stop:]
+    (folder / "case.toml").write_text(own)
+    with pytest.raises(UserError, match=r"case.toml: contacts.right: book mode: friction StaticSliding.*marched"):
+        running.respond(folder / "case.toml", None, ['mode="book"'])
+
+
+def test_resonances_are_paired_by_frequency() -> None:
+    def rows(*peaks: tuple[float, float, float]) -> list[dict[str, float]]:
+        return [dict(zip(("normal_force_N", "frequency_Hz", "amplitude_m"), p, strict=True)) for p in peaks]
+
+    marched = rows((10, 100, 1e-6), (10, 300, 2e-6), (20, 110, 1e-6))
+    book = rows((10, 303, 3e-6), (10, 101, 1.1e-6), (20, 150, 1e-6))
+    pairs = paired(marched, book)
+    assert pairs[0] == Pair(10, (100, 1e-6), (101, 1.1e-6)) and pairs[1] == Pair(10, (300, 2e-6), (303, 3e-6))
+    assert pairs[2:] == [Pair(20, (110, 1e-6), None), Pair(20, None, (150, 1e-6))]
+    assert pairs[0].differences() == pytest.approx((0.01, 0.1))
+    assert "+1 % in frequency, +10 % in amplitude" in sentence(pairs[0]) and "no resonance" in sentence(pairs[2])
+    assert comparison_table(pairs).splitlines()[3] == "20,110,,,1e-06,,"

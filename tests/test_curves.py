@@ -1,0 +1,197 @@
+"""Responses followed by arclength from the command line: every point a solution; interrupted, resumed, ended early."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from microslip import surveying
+from microslip.basis import write_basis
+from microslip.case import load_case
+from microslip.case.assemble import build
+from microslip.case.run import problem_of
+from microslip.cli import main
+from microslip.data import ModalBasis
+from microslip.harmonic_balance.families import over_frequency, over_load
+from microslip.harmonic_balance.response import operating
+from microslip.harmonic_balance.solver import newton, solve
+from microslip.results import read_response
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
+
+CASE = """
+name = "lifting"
+body = "lifting"
+excitation = "push"
+amplitude = 0.25
+monitor = "middle"
+direction = "z"
+harmonics = 1
+samples = 32
+[[contacts]]
+interface = "sole"
+law = "smooth"
+normal_stiffness = 1e6
+tangential_stiffness = 1e6
+friction = 0.3
+points = [1, 1]
+[sweep]
+start = 100.0
+stop = 140.0
+points = 13
+normal_forces = [10.0]
+"""
+BACK = "[curve]\nband = [140.0, 100.0]\n"
+
+
+def lifting() -> ModalBasis:
+    """A block of 2 kg pressed on the ground and shaken along the normal: it lifts off, and its resonance leans over."""
+    block = Body("block", 2.0, (0.0, 0.0, 0.0), inertia=(0.01, 0.02, 0.015))
+    legs = [Spring("ground", "block", (2e5, 2e5, 2e5, 500.0, 500.0, 500.0))]
+    sole = Contact("sole", "block", (0, 0, -1), t2=(0, 1, 0), at=(0, 0, -0.02))
+    push, middle = Force("push", "block", (0, 0, 1)), Monitor("middle", "block")
+    return System("lifting", [block], legs, [sole], [push], [middle], ratio=0.01).basis()
+
+
+@pytest.fixture
+def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "basis.h5", lifting())
+    (tmp_path / "case.toml").write_text(CASE + BACK)
+    return tmp_path / "case.toml"
+
+
+def rows(name: str) -> dict[str, np.ndarray]:
+    with Path(f"build/lifting/{name}").open() as file:
+        table = list(csv.DictReader(file))
+    return {key: np.array([float(row[key]) for row in table]) for key in table[0]}
+
+
+def problem(case: Path, normal: float = 10.0) -> Any:
+    return problem_of(build(load_case(case)[0], {"lifting": lifting()}, case), normal)
+
+
+def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The curve of `over_frequency` in the table; every point in the response file solves the balance anew."""
+    assert main(["respond", "case.toml", "--over", "frequency"]) == 0
+    said = capsys.readouterr()
+    found, plain = rows("over_frequency.csv"), over_frequency(problem(case), 140.0, 100.0)
+    np.testing.assert_allclose(found["frequency_Hz"], plain.parameter, rtol=1e-10)
+    folds = found["frequency_Hz"][found["fold"] == 1]
+    np.testing.assert_allclose(folds, plain.folds, rtol=1e-10)
+    assert len(folds) >= 2 and "fold" in said.out and found["leg"].max() == len(folds) + 1
+    assert "points at most" in said.err or said.err.count("\n") < 5
+    assert found["open"].max() > 0.1 and Path("build/lifting/pictures/over_frequency.png").stat().st_size > 10_000
+    page = Path("build/lifting/over_frequency.html").read_text()
+    assert "data:image/png" in page and f"<summary>{len(found['leg'])} rows" in page
+    held = read_response("build/lifting/over_frequency.h5").series[0]
+    np.testing.assert_allclose(np.abs(held.monitor("middle")[:, 0, 1]), found["amplitude_m"], rtol=1e-10)
+    assert not any(name.startswith("curve/") for name in held.arrays)
+    for x, f in list(zip(held.arrays["x"], held.frequency, strict=True))[::9]:
+        assert newton(problem(case).at(2 * np.pi * f), x).iterations <= 2
+    assert main(["respond", "case.toml", "--over", "frequency"]) == 0
+    assert "is up to date" in "".join(capsys.readouterr())
+
+
+def test_interrupted_and_resumed(case: Path) -> None:
+    """Ctrl-C leaves a table, a picture and a response file of what was found; the next call adds the rest."""
+
+    def impatient(text: str) -> None:
+        if text.startswith("20 of"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        surveying.survey_stage(case, None, "frequency", report=impatient)
+    half = rows("over_frequency.csv")
+    assert len(half["leg"]) >= 20 and not read_response("build/lifting/over_frequency.h5").finished
+    assert Path("build/lifting/pictures/over_frequency.png").is_file()
+    told: list[str] = []
+    _, sentences, whole = surveying.survey_stage(case, None, "frequency", report=told.append)
+    resumed = rows("over_frequency.csv")
+    assert whole and sentences and int([t for t in told if "points at most" in t][0].split()[0]) > 20
+    np.testing.assert_array_equal(resumed["frequency_Hz"][: len(half["leg"])], half["frequency_Hz"])
+    surveying.survey_stage(case, None, "frequency", force=True)
+    assert rows("over_frequency.csv")["frequency_Hz"] == pytest.approx(resumed["frequency_Hz"], rel=1e-6)
+    assert read_response("build/lifting/over_frequency.h5").finished
+
+
+def test_ended_early_and_gone_on(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Too few points are said, with exit code 1; more of them go on from there. No start is said too."""
+    few = ["respond", "case.toml", "--over", "frequency", "--set", "curve.points=8"]
+    assert main(few) == 1
+    said = capsys.readouterr()
+    assert "allow more to go on (curve.points)" in said.out and "some of the curves end early" in said.err
+    assert len(rows("over_frequency.csv")["leg"]) == 8
+    told: list[str] = []
+    surveying.survey_stage(case, None, "frequency", ["curve.points=16"], report=told.append)
+    assert [int(t.split()[0]) for t in told if "points at most" in t][0] > 8
+
+
+def test_no_start_is_said(case: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from microslip.harmonic_balance import families
+
+    failed = newton(problem(case).at(300.0), np.full(problem(case).size, np.nan))
+    monkeypatch.setattr(families, "solve", lambda *_: failed)
+    assert main(["respond", "case.toml", "--over", "frequency", "-q"]) == 1
+    assert main(["respond", "case.toml", "--over", "frequency"]) == 1
+    assert "no start: not a number; begin elsewhere than at 140 Hz (curve.band)." in capsys.readouterr().out
+
+
+def test_over_the_load(case: Path) -> None:
+    """At the resonance, if no frequency is given; the end of the curve is a motion under the whole load."""
+    case.write_text(CASE + "[curve]\nload = [0.1, 1.0]\n")
+    assert main(["respond", "case.toml", "--over", "load", "-q"]) == 0
+    found = rows("over_load.csv")
+    f = found["at_frequency_Hz"][0]
+    assert 100 < f < 125 and found["load"][[0, -1]].tolist() == [0.1, 1.0]
+    last = over_load(problem(case), f, 0.1, 1.0).points[-1]
+    np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).watched[0, 1]), rtol=1e-6)
+
+
+def test_over_the_normal_force(case: Path) -> None:
+    """In newtons, from the larger to the smaller: at both ends the motion of a case pressed so."""
+    case.write_text(CASE.replace("[10.0]", "[15.0, 9.0]") + "[curve]\nfrequency = 100.0\nnormal_force = [15.0, 9.0]\n")
+    assert main(["respond", "case.toml", "--over", "normal-force", "-q"]) == 0
+    found = rows("over_normal_force.csv")
+    np.testing.assert_allclose(found["normal_force_N"][[0, -1]], [15.0, 9.0], rtol=1e-12)
+    for i, normal in ((0, 15.0), (-1, 9.0)):
+        anew = problem(case, normal)
+        exact = operating(anew, solve(anew, 2 * np.pi * 100.0, [])).watched[0, 1]
+        assert found["amplitude_m"][i] == pytest.approx(abs(exact), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("change", "over", "words"),
+    [
+        ("[curve]\nband = [120.0, 120.0]", "frequency", "band: give two different values, first and last"),
+        ("[curve]\nband = [120.0]", "frequency", "band"),
+        ("[curve]\nload = [0.0, 1.0]", "load", "load"),
+        ("[curve]\nnormal_force = [-1.0, 1.0]", "normal-force", "normal_force"),
+        ("", "normal-force", "curve.normal_force: give [first, last] in N; the sweep has one normal force alone"),
+        ("", "weather", "weather"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    case: Path, capsys: pytest.CaptureFixture[str], change: str, over: str, words: str
+) -> None:
+    case.write_text(CASE + change)
+    assert main(["respond", "case.toml", "--over", over]) == 2
+    said = "".join(capsys.readouterr())
+    assert words in said and "Traceback" not in said
+
+
+def test_nothing_to_press_and_closed_forms(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = CASE.replace("points = [1, 1]", "points = [1, 1]\nnormal_force = 10.0")
+    own = own.replace("normal_forces = [10.0]\n", "")
+    case.write_text(own)
+    assert main(["respond", "case.toml", "--over", "normal-force"]) == 2
+    assert "press no contact" in "".join(capsys.readouterr())
+    case.write_text(CASE.replace('law = "smooth"\n', "").replace("points = [1, 1]\n", ""))
+    assert main(["respond", "case.toml", "--over", "load"]) == 2
+    assert "needs point contacts" in "".join(capsys.readouterr())
+    case.write_text(CASE.replace("start = 100.0", "start = 131.0"))
+    assert main(["respond", "case.toml", "--over", "load"]) == 2
+    assert "holds no resonance; give a frequency" in "".join(capsys.readouterr())

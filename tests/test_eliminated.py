@@ -1,0 +1,60 @@
+"""The coordinates of a body eliminated by its eigenvalues: what the equations themselves give."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from microslip.harmonic_balance.reduced import Eliminated, seen
+from microslip.system.assembly import Linear
+
+
+def part(seed: int = 0, rigid: int = 0) -> Linear:
+    """Eight coordinates, damped and gyroscopic beyond any proportion, complex rows, four contact coordinates."""
+    rng = np.random.default_rng(seed)
+    m, c = 8, 4
+    A, D, G = (rng.normal(size=(m, m)) for _ in range(3))
+    K = np.diag(np.r_[np.zeros(rigid), 10.0 ** np.linspace(2, 6, m - rigid)])
+    M = np.eye(m) + 0.05 * A @ A.T
+    C = 0.2 * (D @ D.T) + 3.0 * (G - G.T)
+    rows = rng.normal(size=(c, m)) + 1j * rng.normal(size=(c, m))
+    residual = 1e-5 * np.diag(rng.uniform(0.5, 1, c))
+    load, given = (rng.normal(size=n) + 1j * rng.normal(size=n) for n in (m, c))
+    none = np.zeros((0, m)), np.zeros((0, c)), np.zeros(0, complex)
+    return Linear(M, K, C, rows, residual, load, 1e-5 * given, *none)
+
+
+@pytest.mark.parametrize("rigid", [0, 2])
+def test_sums_over_the_eigenvalues_are_the_solutions_of_the_equations(rigid: int) -> None:
+    """Compliance, reference and their rates in every harmonic, also of a body that its contacts alone hold; the
+    derivative with respect to Omega against differences."""
+    first, k = part(rigid=rigid), 1e5 * np.diag([1.0, 2, 3, 4])
+    calm = replace(first, load=np.zeros(8, complex), given=np.zeros(4, complex))
+    other = replace(first, M=2 * first.M)  # another harmonic may be that of another nodal diameter
+    whole = Eliminated((calm, first, other, first), k)
+    assert whole.poles is not None and [list(p.harmonics) for p in whole.poles] == [[0, 1, 3], [2]]
+    for Omega in (3.0, 40.0, 700.0):
+        view = whole.at(Omega)
+        for h, one in enumerate(whole.parts):
+            exact = seen(one, k, Omega, h)
+            for key in ("compliance", "reference", "compliance_rate", "reference_rate"):
+                expected = getattr(exact, key)
+                np.testing.assert_allclose(getattr(view, key)[h], expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+        step = 1e-5 * Omega
+        along = (whole.at(Omega + step).compliance - whole.at(Omega - step).compliance) / (2 * step)
+        np.testing.assert_allclose(view.compliance_rate, along, rtol=0, atol=1e-6 * np.abs(along).max())
+
+
+def test_eigenvalues_that_tell_too_little_are_not_used() -> None:
+    """A coordinate that no contact feels and nothing holds has a double eigenvalue of zero with one eigenvector; the
+    equations can still be solved where it vibrates."""
+    one = part(rigid=1)
+    rows, C = one.rows.copy(), np.zeros((8, 8))
+    rows[:, 0] = 0.0
+    free = replace(one, M=np.eye(8), C=C, rows=rows)
+    whole = Eliminated((free, free), np.eye(4))
+    assert whole.poles is None
+    with pytest.raises(np.linalg.LinAlgError):
+        whole.at(10.0)  # its mean is nowhere

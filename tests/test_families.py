@@ -1,0 +1,92 @@
+"""Responses followed over frequency, load and normal force: folds, and what a problem made anew at a value says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_assembly import sector
+from test_harmonic_balance_time import cantilever, duffing
+
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance import response
+from microslip.harmonic_balance.families import OverNormal, over_frequency, over_load, over_normal_force
+from microslip.harmonic_balance.problem import Problem
+from microslip.harmonic_balance.solver import newton, solve
+
+FINE = {"harmonics": 1, "samples": 32, "cycles": 30, "length": 1e-6}
+
+
+def ring(normal: float = 20.0) -> Problem:
+    return balance.of(sector(6, 2, normal=normal, push=4.0), **FINE)
+
+
+def test_folds_over_the_frequency() -> None:
+    """Both of a Duffing oscillator, from either end; between them three motions, which a sweep does not show."""
+    problem = balance.of(duffing(), 7, 64, length=1.0)
+    told: list[str] = []
+    up = over_frequency(problem, 0.3 / (2 * np.pi), 2.5 / (2 * np.pi), told.append)
+    down = over_frequency(problem, 2.5 / (2 * np.pi), 0.3 / (2 * np.pi))
+    np.testing.assert_allclose(2 * np.pi * up.folds, [1.462616, 1.156018], rtol=1e-6)
+    np.testing.assert_allclose(down.folds[::-1], up.folds, rtol=1e-7)
+    passed = 2 * np.pi * up.parameter - 1.3
+    assert np.count_nonzero(np.diff(np.sign(passed))) == 3 and "Hz" in told[-1]
+    at = response.of_points(problem, up.points[::20], np.zeros(1))
+    assert at.converged.all() and np.abs(at.frequency - up.parameter[::20]).max() < 1e-12
+
+
+def test_over_the_load() -> None:
+    """A slider that sticks under little load: at the end of the curve the motion of a sweep under the whole load."""
+    problem = balance.of(cantilever(), 5, 128, length=0.0125)
+    found = over_load(problem, 3.9 / (2 * np.pi), 0.05, 1.0)
+    last = found.points[-1]
+    assert found.parameter[-1] == 1.0 and found.status.startswith("bound")
+    exact = solve(problem, 3.9, [])
+    np.testing.assert_allclose(last.x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
+    stuck = response.operating(found.problem(0.05), found.points[0])
+    assert stuck.cycles["face"].slipping[0] == 0.0 < response.operating(problem, last).cycles["face"].slipping[0]
+
+
+@pytest.mark.parametrize("factor", [0.85, 4.0])
+def test_over_the_normal_force(factor: float) -> None:
+    """From the force given to another one: there the motion of a problem that is pressed so from the beginning."""
+    found = over_normal_force(ring(), 60.0, 1.0, factor)
+    assert found.parameter[-1] == factor
+    anew = ring(20.0 * factor)
+    exact = newton(anew.at(2 * np.pi * 60.0), found.points[-1].x)
+    assert exact.converged
+    np.testing.assert_allclose(found.points[-1].x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
+    a = response.operating(found.problem(factor), found.points[-1]).watched
+    np.testing.assert_allclose(a, response.operating(anew, exact).watched, rtol=1e-7)
+
+
+def test_derivatives_over_the_normal_force() -> None:
+    family, rng = OverNormal(ring(), 2 * np.pi * 60.0, 10.0), np.random.default_rng(4)
+    x, d, h = 0.5 * rng.normal(size=family.problem.size), rng.normal(size=family.problem.size), 1e-6
+    _, J, by_force = family.evaluate(x, 1.3)
+    along = (family.evaluate(x + h * d, 1.3)[0] - family.evaluate(x - h * d, 1.3)[0]) / (2 * h)
+    np.testing.assert_allclose(J @ d, along, rtol=0, atol=1e-6 * np.abs(along).max())
+    along = (family.evaluate(x, 1.3 + 1e-4)[0] - family.evaluate(x, 1.3 - 1e-4)[0]) / 2e-4
+    np.testing.assert_allclose(by_force, along, rtol=0, atol=1e-4 * np.abs(along).max())
+
+
+def test_the_normal_force_of_some_contacts() -> None:
+    """Those that are not named keep theirs, whatever presses them; a force below zero counts as none."""
+    problem = ring()
+    kept = OverNormal(problem, 300.0, 10.0, contacts=frozenset()).at(3.0).groups[0]
+    np.testing.assert_array_equal(kept.offset, problem.groups[0].offset)
+    family = OverNormal(problem, 300.0, 10.0)
+    assert family.at(3.0).groups[0].preload[0, 0] == 60.0 and family.at(-1.0).groups[0].preload[0, 0] == 0.0
+    contacts = tuple(replace(c, preload=0.0 * c.preload) for c in problem.assembly.contacts)  # by interference
+    held = replace(problem, assembly=replace(problem.assembly, contacts=contacts))
+    np.testing.assert_array_equal(OverNormal(held, 300.0, 10.0).at(3.0).groups[0].offset, problem.groups[0].offset)
+
+
+def test_a_curve_that_has_no_beginning_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    from microslip.harmonic_balance import families
+
+    failed = newton(ring().at(300.0), np.full(ring().size, np.nan))
+    monkeypatch.setattr(families, "solve", lambda *_: failed)
+    found = over_frequency(ring(), 40.0, 80.0)
+    assert found.points == () and found.status.startswith("no start") and len(found.folds) == 0

@@ -1,0 +1,125 @@
+"""Backbones, optima and stability of a case from the command line: tables that agree with what is solved directly."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_harmonic_balance_laws import CASE, sled
+
+from microslip import cli, following
+from microslip.basis import write_basis
+from microslip.case import load_case, run_case
+from microslip.cli import main
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sled's case and its modal file."""
+    folder = tmp_path_factory.mktemp("sled")
+    text = CASE.replace("points = 25", "points = 12").replace("start = 35.0", "start = 60.0")
+    text = text.replace("stop = 200.0", "stop = 170.0").replace("[5.0, 1e5]", "[8.0, 40.0]")
+    (folder / "case.toml").write_text(text)
+    write_basis(folder / "basis.h5", sled())
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def there(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(place)
+
+
+def table(name: str) -> list[dict[str, str]]:
+    with (Path("build/sled") / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
+    """At the small end the frequency of the sticking contact, at the large end a lower one, much damped between."""
+    assert main(["backbone", "case.toml"]) == 0
+    assert "backbone.csv" in capsys.readouterr().out
+    assert Path("build/sled/pictures/backbone.png").stat().st_size > 10_000
+    for normal in ("8", "40"):
+        rows = [r for r in table("backbone.csv") if r["normal_force_N"] == normal]
+        f, d = (np.array([float(r[key]) for r in rows]) for key in ("frequency_Hz", "damping_ratio"))
+        assert len(rows) > 10 and f[-1] < 0.9 * f[0] and d.max() > 5 * d[0]
+
+
+def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> None:
+    """Lower than at both neighbours, which are solved for themselves by another way: the sweep's refined peaks."""
+    assert main(["optimum", "case.toml", "--points", "4"]) == 0
+    rows = table("optimum.csv")
+    best = rows[-1]
+    normal, height = float(best["normal_force"]), float(best["amplitude_m"])
+    assert 8 < normal < 15 and best["what"] == "optimum: converged"
+    assert f"normal_force = {normal:.4g}"[:-1] in capsys.readouterr().out
+    assert Path("build/sled/pictures/optimum.png").stat().st_size > 10_000
+    settings, _ = load_case(Path("case.toml"), [f"sweep.normal_forces=[{0.9 * normal}, {normal}, {1.1 * normal}]"])
+    peaks = [max(a for _, a in one) for one in run_case(settings, sled(), "case.toml").resonances.values()]
+    assert peaks[1] == pytest.approx(height, rel=1e-3) and min(peaks[0], peaks[2]) > 1.0005 * peaks[1]
+
+
+def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at the second normal force, the second peak, the third point: the rows before it are in the table."""
+
+    def stop_at(words: str, *names: str) -> list[str]:
+        said: list[str] = []
+
+        def report(text: str) -> None:
+            said.append(text)
+            if text.startswith(words):
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            opened = cli._followed(Path("case.toml"), None, ())
+            {"backbone": following.backbones, "stability": following.stabilities}[names[0]](opened, report=report)
+        return said
+
+    said = stop_at("backbone at F_N = 40 N, 2 of 2", "backbone")
+    assert "backbone at F_N = 8 N, 1 of 2" in said and any(t.startswith("100 of 100 %") for t in said)
+    assert {r["normal_force_N"] for r in table("backbone.csv")} == {"8"}
+    assert main(["respond", "case.toml", "-q"]) == 0
+    stop_at("3 of ", "stability")
+    assert len(table("stability.csv")) == 2
+    peaks = 0
+
+    def second(text: str) -> None:
+        nonlocal peaks
+        peaks += text.startswith("peak 1 at ")
+        if peaks == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        following.optimum_over(cli._followed(Path("case.toml"), None, ()), points=4, report=second)
+    assert [r["what"] for r in table("optimum.csv")] == ["peak 1", "peak 1"]
+
+
+def test_no_optimum_says_where_to_look(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2"]) == 1
+    assert "no optimum between 20 and 30 N" in (err := capsys.readouterr().err)
+    assert "lowest at 20 N, an end; look beyond it with --low below 20" in err
+
+
+def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
+    """The response of a sliding block is stable; small growth factors of every point are in the table."""
+    assert main(["respond", "case.toml", "--stability"]) == 0
+    rows = table("stability.csv")
+    assert len(rows) >= 24 and all(r["stable"] == "1" and 0 < float(r["growth"]) < 1 for r in rows)
+    assert Path("build/sled/pictures/stability.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["backbone", "case.toml", "--mode", "99"], "mode: number 99"),
+        (["optimum", "case.toml", "--over", "friction"], "give --low and --high"),
+        (["optimum", "case.toml", "--over", "contacts.sole.mu", "--low", "0.1", "--high", "0.5"], "mu"),
+        (["backbone", "case.toml", "--set", 'contacts.sole.law="jenkins"'], "contacts"),
+    ],
+)
+def test_mistakes_are_one_sentence(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert said in told and "Traceback" not in told

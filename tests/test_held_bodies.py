@@ -1,0 +1,36 @@
+"""Free bodies of a case: soft springs that say where a body stays which slides in all of its contacts; gauges read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from microslip.case.assemble import held
+from microslip.data import UserError
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
+
+
+def pair(grounded: bool) -> System:
+    """Two masses on a spring, free or one of them on the ground."""
+    a = Body("a", 2.0, (0, 0, 0), inertia=(1e-3, 2e-3, 3e-3))
+    b = Body("b", 1.0, (0.1, 0, 0), inertia=(1e-3, 1e-3, 1e-3))
+    springs = [Spring("a", "b", (1e6, 2e6, 3e6, 1e3, 2e3, 3e3))]
+    if grounded:
+        springs.append(Spring("ground", "a", (1e5, 1e5, 1e5, 100.0, 100.0, 100.0)))
+    face = Contact("face", "b", (1, 0, 0), t2=(0, 0, 1), at=(0.12, 0, 0))
+    return System("pair", [a, b], springs, [face], [Force("push", "a", (1, 0, 0))], [Monitor("b", "b")])
+
+
+def test_hold_gives_every_rigid_motion_one_frequency_and_leaves_the_elastic_ones() -> None:
+    """Eigenvalues of K and M: six of (2 pi f)^2, the others as before to rounding."""
+    group = pair(False).basis().groups[0, 0]
+    after = held(group, 3.0, "hold")
+    omega = np.sqrt(np.abs(scipy.linalg.eigh(after.K_r, after.M_r, eigvals_only=True)))
+    np.testing.assert_allclose(omega[:6], 2 * np.pi * 3.0, rtol=1e-9)
+    np.testing.assert_allclose(omega[6:], group.omega[6:], rtol=1e-9)
+
+
+def test_what_is_held_already_is_not_held_again() -> None:
+    with pytest.raises(UserError, match="bodies.pin.hold: the body is held already"):
+        held(pair(True).basis().groups[0, 0], 3.0, "bodies.pin.hold")

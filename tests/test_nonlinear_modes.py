@@ -1,0 +1,153 @@
+"""Frequency and damping over the amplitude: limits, closed forms, and the resonances of forced vibration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_assembly import sector
+from test_harmonic_balance_laws import body, oscillator, point, value
+
+from microslip.contact.friction import Coulomb
+from microslip.contact.normal import Penalty, Preload
+from microslip.contact.patch import Patch, grid
+from microslip.contact.point import PointContact
+from microslip.data import UserError
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, strongest, stuck_modes
+from microslip.harmonic_balance.peak import highest, resonance
+from microslip.harmonic_balance.response import of_body, operating
+from microslip.harmonic_balance.solver import solve
+from microslip.system.assembly import Watch
+
+ONE = np.array([1.0])
+
+
+def sliding(harmonics=1, samples=1024, ratio=0.02, force=1.0):
+    """1 kg, 100 rad/s, a Jenkins element of 2e4 N/m that slides at 0.6 N: 30 um."""
+    patch = point(Preload(value(2.0)), 2e4, 0.3)
+    return of_body(
+        oscillator(ratio), (patch,), np.array([2.0]), force * ONE, ONE, harmonics=harmonics, samples=samples,
+        length=3e-5,
+    )  # fmt: skip
+
+
+def test_a_jenkins_element_against_its_closed_form():
+    """One harmonic, A > limit: with theta = acos(1 - 2 / A), c = (theta - sin(2 theta)/2)/pi, b = 4 (A - 1)/(pi A^2)
+    (errata to chapter 5): omega^2 = k + kt c and 2 zeta omega = 2 D omega_0 + kt b / omega."""
+    asked = 3e-5 * np.array([0.5, 1.5, 3.0, 10.0])
+    found = backbone(sliding(), 3e-6, 3e-3, asked=asked)
+    assert found.complete and found.stuck == pytest.approx(np.sqrt(3e4))
+    A = np.maximum(found.amplitude / 3e-5, 1.0)
+    theta = np.arccos(1 - 2 / A)
+    c, b = (theta - 0.5 * np.sin(2 * theta)) / np.pi, 4 * (A - 1) / (np.pi * A * A)
+    omega = np.sqrt(1e4 + 2e4 * c)
+    np.testing.assert_allclose(found.Omega, omega, rtol=2e-5)  # sampled 1024 times
+    np.testing.assert_allclose(found.damping, (4.0 + 2e4 * b / omega) / (2 * omega), rtol=0, atol=1e-5)
+    assert all((abs(found.amplitude - a) < 1e-9 * a).any() for a in asked)
+
+
+def test_small_motions_stick_and_large_ones_slide():
+    """Two modes and eight points: the modes of both linear limits, each with its own damping."""
+    problem = two_modes(4.0, harmonics=1)
+    for mode in (0, 1):
+        found = backbone(problem, 1e-7, 3.0, mode=mode)
+        assert found.complete
+        part, k = problem.parts[1][0], problem.stiffness[0]
+        for i, held in ((0, k), (-1, 0.0 * k)):
+            A = np.block([[np.zeros((2, 2)), np.eye(2)], [-part.K - part.rows.T @ held @ part.rows, -part.C]])
+            values = np.linalg.eigvals(A)
+            exact = values[np.argmin(abs(abs(values) - found.Omega[i]))]
+            assert found.Omega[i] == pytest.approx(abs(exact), rel=2e-4)
+            assert found.damping[i] == pytest.approx(-exact.real / abs(exact), abs=2e-4)
+        assert found.damping.max() > 0.02
+
+
+def two_modes(normal, harmonics=3, force=1.0, second=55.0):
+    rows = np.zeros((6, 2))
+    rows[1] = 1.0, 0.7
+    rows[3] = 0.0, 60.0  # turns the patch about its normal: its points slide one after the other
+    g = body(rows, 2 * np.pi * np.array([30.0, second]), 0.003)
+    places, areas = grid(0.02, 0.01, (8, 1))
+    law = PointContact(Penalty(jnp.asarray(4e5)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e3))
+    return of_body(
+        g, (Patch("face", places, areas, law),), np.array([normal]), force * np.array([1.0, 0.0]),
+        np.array([1.0, -0.5]), harmonics=harmonics, samples=128, length=1e-4,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("harmonics", [1, 5])
+def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
+    """One degree of freedom, i xi Omega M A drives its first harmonic at Omega: with one harmonic the same equations,
+    with more of them the same up to what xi does to the others."""
+    found = backbone(sliding(harmonics), 3e-5, 3e-4, asked=[6e-5, 1.5e-4])
+    for A in (6e-5, 1.5e-4):
+        i = int(np.argmin(abs(found.amplitude - A)))
+        force = 2 * found.damping[i] * found.Omega[i] ** 2 * A
+        problem = sliding(harmonics, force=force)
+        start = found.x[i].copy()
+        point = solve(problem, found.Omega[i], [start])
+        y = operating(problem, point).watched[0, 1]
+        tolerance = 1e-8 if harmonics == 1 else 1e-2
+        assert point.converged and abs(y + 1j * A) < tolerance * A  # the force leads by a quarter of a period
+
+
+def test_resonances_at_many_levels_of_load_lie_on_the_backbone():
+    """Two ways: peaks of the forced response, each found on its own curve, and the mode. The peak of an amplitude lies
+    about zeta^2 beside the mode's frequency; the other mode is far away."""
+    found = backbone(two_modes(4.0, 1, second=400.0), 1e-6, 3e-2, mode=0)
+    order = np.argsort(found.amplitude)
+    for force in (0.3, 1.0, 2.0, 4.0):
+        problem = two_modes(4.0, 1, force, 400.0)
+        peak = resonance(highest(problem, 2 * np.pi * np.linspace(28, 45, 35)))
+        assert peak.status == "converged"
+        at = np.interp(np.log(peak.amplitude), np.log(found.amplitude[order]), found.Omega[order])
+        zeta = np.interp(np.log(peak.amplitude), np.log(found.amplitude[order]), found.damping[order])
+        assert abs(peak.Omega / at - 1) < 2 * zeta**2 + 5e-4  # and what is between two points of the curve
+
+
+@pytest.mark.parametrize("order", [pytest.param(1, marks=pytest.mark.slow), 3])
+def test_a_nodal_diameter_of_a_ring(order):
+    """One sector for six blades: the mode at a large amplitude, put into all of them, is one of the whole ring; the
+    wave that runs the other way has the same frequency and damping."""
+    fine = {"harmonics": 3, "samples": 48, "length": 1e-6}
+    forward, backward = (replace(sector(6, e), watches=(Watch("blade", "tip", "u_y"),)) for e in (order, 6 - order))
+    lone, ring = balance.of(forward, **fine), balance.of(forward.unrolled(), **fine)
+    mode = strongest(lone, 0.0, 2 * np.pi * 1000.0)
+    ways = [backbone(balance.of(one, **fine), 1e-7, 3e-5, mode, asked=[1e-5]) for one in (forward, backward)]
+    found = ways[0]
+    i = int(np.argmin(abs(found.amplitude - 1e-5)))
+    assert found.complete and found.damping.max() > 2 * found.damping[0]
+    v = lone.displacement(found.x[i])
+    a = np.array([v[0], *(v[1::2] - 1j * v[2::2])])  # (H + 1, 6) amplitudes, then those of every contact
+    turned = a[:, None] * np.exp(2j * np.pi * np.arange(4)[:, None] * order * np.arange(6) / 6)[..., None]
+    turned = turned.reshape(4, 36)
+    whole = np.zeros((7, 36))
+    whole[0], whole[1::2], whole[2::2] = turned[0].real, turned[1:].real, -turned[1:].imag
+    x, xi = (whole / ring.scale).ravel() * 1e-6 / 1e-5, 2 * found.damping[i] * found.Omega[i]
+    held = replace(ring, stiffness=tuple(2 * k for k in ring.stiffness), share=0.0)
+    R = _Curve(held, 0).evaluate(np.append(x, [found.Omega[i], xi]), np.log(1e-5))[0]
+    assert np.abs(R).max() < 1e-7 * np.abs(x).max()
+    j = int(np.argmin(abs(ways[1].amplitude - 1e-5)))
+    assert ways[1].Omega[j] == pytest.approx(found.Omega[i], rel=1e-9)
+    assert ways[1].damping[j] == pytest.approx(found.damping[i], rel=1e-7)
+
+
+def test_a_body_of_one_mode_without_damping():
+    """Its only eigenvalue is its own geometric mean; what the contacts see is finite beside it."""
+    problem = sliding(ratio=0.0)
+    seen = problem.eliminated[0].at(150.0)
+    assert np.isfinite(seen.compliance).all()
+    assert seen.compliance[1, 1, 1] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
+
+
+def test_mistakes():
+    with pytest.raises(UserError, match="there are 1"):
+        backbone(sliding(), 1e-6, 1e-5, mode=1)
+    problem = two_modes(4.0)
+    part = problem.parts[1][0]
+    still = replace(part, watch=(np.linalg.inv(stuck_modes(problem)[1]) @ np.linalg.inv(part.M))[1:] @ part.M)
+    with pytest.raises(UserError, match="does not move"):
+        backbone(replace(problem, parts=(problem.parts[0], (still,), *problem.parts[2:])), 1e-6, 1e-5)

@@ -1,0 +1,95 @@
+"""Pictures of a steady vibration: they are made, show what they are told to, and say what does not fit on an axis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small import basis as small_basis
+
+pytest.importorskip("matplotlib")
+
+from microslip.operating import MaterialLimits, motion_of
+from microslip.operating.fatigue import endurance
+from microslip.operating.motion import displacement
+from microslip.operating.stress import cycle_stress
+from microslip.pictures import operating
+
+LIMITS = MaterialLimits(fatigue_strength=300e6, tensile_strength=900e6, yield_strength=700e6)
+
+
+def motion(harmonics: int = 1):
+    group = small_basis((0.0, 3000.0)).groups[1, 0]
+    q = np.zeros((harmonics + 1, group.n_modes), dtype=complex)
+    q[1, 0], q[1, 1], q[-1, 2] = 2e-4, 1e-4j, 1e-5
+    return motion_of(900.0, q, group)
+
+
+def dark(path) -> float:
+    """Share of a picture that is not white."""
+    from PIL import Image
+
+    return float((np.asarray(Image.open(path).convert("L")) < 250).mean())
+
+
+def test_curves(tmp_path):
+    f = np.linspace(100, 200, 50)
+    curves = {n: (f, np.where(f > 190, np.nan, n / (1 + (f - 150) ** 2))) for n in (1.0, 10.0, 100.0)}
+    peaks = {"first": [(0.0, 9.0), (1.0, 3.0), (10.0, 1.0), (99.0, 5.0)]}
+    shown = [
+        operating.over_frequency_plot(curves, "amplitude in µm", "t", tmp_path / "a.png", [120.0, 900.0], (f, f)),
+        operating.over_normal_force_plot(peaks, "y", "t", tmp_path / "b.png"),
+        operating.over_engine_order_plot({1.0: (np.arange(4), f[:4])}, "stress in MPa", "t", tmp_path / "c.png"),
+    ]  # fmt: skip
+    assert all(0.01 < dark(p) < 0.6 for p in shown)
+
+
+def test_haigh_diagram(tmp_path):
+    cycle = cycle_stress(motion())
+    worst = endurance(cycle, LIMITS)
+    assert 0.01 < dark(operating.haigh_plot(cycle, LIMITS, worst, "t", tmp_path / "h.png")) < 0.6
+    still = replace(cycle, amplitude=0 * cycle.amplitude)
+    operating.haigh_plot(still, LIMITS, endurance(still, LIMITS), "t", tmp_path / "h.png", np.arange(9))
+
+
+@pytest.mark.parametrize("harmonics", [1, 3])
+def test_the_body_is_drawn_where_it_is_farthest_out(harmonics):
+    moving = motion(harmonics)
+    n = small_basis().mesh.n_points
+    shape, size, _ = operating.farthest(moving, n)
+    a = displacement(moving, np.arange(n))[0]
+    t = 2 * np.pi * np.arange(3000) / 3000
+    turn = np.exp(1j * np.multiply.outer(t, np.arange(1, harmonics + 1)))
+    far = np.linalg.norm(np.tensordot(turn, a[1:], axes=1).real, axis=2).max()
+    assert np.linalg.norm(shape, axis=1).max() == size == pytest.approx(far, rel=1e-2)
+
+
+def test_stressed_body_and_contact_maps(tmp_path):
+    """Three tiles at speed with limits; nothing where the file has no shapes."""
+    from test_operating import linear_patch
+
+    from microslip.operating.patches import contact_map
+    from microslip.pictures import can_draw
+
+    patch, u0 = linear_patch()
+    u = np.zeros((6, 3))
+    u[:, 0], u[1, 1] = u0, 2e-5
+    side = small_basis().groups[0, 0].interfaces["right"]
+    found = contact_map(patch, side, u, 0.01)
+    scattered = replace(found, places=found.places + 1e-4 * np.sin(np.arange(24)).reshape(12, 2))
+    assert dark(operating.contact_map_plot([found, scattered, found], "t", tmp_path / "m.png")) > 0.05
+    if (reason := can_draw()) is not None:
+        pytest.skip(reason)
+    from microslip.pictures.scene import quiet_vtk
+    from microslip.pictures.views import open_studio
+
+    quiet_vtk()
+    studio, moving = open_studio(small_basis((0.0, 3000.0))), motion()
+    try:
+        cycle = cycle_stress(moving)
+        tiles = [operating.stress_picture(studio, moving, cycle, "t", limits, 3) for limits in (None, LIMITS)]
+        assert tiles[0] is not None and tiles[1] is not None and tiles[1].width > 1.2 * tiles[0].width
+        assert operating.stress_picture(studio, moving, replace(cycle, points=cycle.points[:5]), "t") is None
+    finally:
+        studio.stage.close()

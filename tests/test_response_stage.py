@@ -1,0 +1,385 @@
+"""The response of a case from its files: interrupted, resumed, extended, failing; what stands in its folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_harmonic_balance_laws import sled
+
+from microslip import running
+from microslip.basis import read_basis, write_basis
+from microslip.data import UserError
+from microslip.following import open_case
+from microslip.results import read_response
+from microslip.surveying import survey_stage
+
+pytest.importorskip("matplotlib")
+SAMPLES = Path(running.__file__).parent / "samples"
+
+CASE = """
+name = "vane"
+body = "vane-eigenmodes"
+excitation = "magnet"
+amplitude = 2.0
+monitor = "probe"
+harmonics = 1
+samples = 24
+
+[[contacts]]
+interface = "right"
+law = "smooth"
+points = [2, 2]
+normal_stiffness = 2e5
+tangential_stiffness = 4e5
+friction = 0.2
+includes = "surface"
+
+[sweep]
+start = 300.0
+stop = 380.0
+points = 9
+normal_forces = [50.0]
+
+[material_limits]
+fatigue_strength = 250e6
+tensile_strength = 900e6
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copy(SAMPLES / "basis.h5", tmp_path)
+    (tmp_path / "case.toml").write_text(CASE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    return tmp_path
+
+
+def respond(folder: Path, *changes: str, report: Any = None, **more: Any) -> tuple[list[str], bool]:
+    """What was told, and whether all converged."""
+    told: list[str] = []
+
+    def tell(text: str) -> None:
+        told.append(text)
+        if report is not None:
+            report(text)
+
+    _, converged = running.respond(folder / "case.toml", None, list(changes), report=tell, **more)
+    return told, converged
+
+
+def computed(told: list[str]) -> list[str]:
+    return [t for t in told if "frequencies" in t or "peak near" in t]
+
+
+def test_interrupted_and_resumed(folder: Path) -> None:
+    """Ctrl-C at the sixth point: five are kept, and readable; the next call computes four, and the peak."""
+
+    def impatient(text: str) -> None:
+        if text.startswith("6 of 9"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        respond(folder, report=impatient)
+    build = folder / "build" / "vane"
+    half = read_response(build / "response.h5")
+    assert not half.finished and len(half.series[0].key) == 5 and not (build / "response.json").exists()
+    told, converged = respond(folder)
+    assert converged and [t.split()[0] for t in computed(told)] == ["6", "7", "8", "9", "normal"]
+    whole = read_response(build / "response.h5")
+    assert whole.finished and whole.mode == "marched" and len(whole.series[0].key) == 10
+    kept = np.isin(whole.series[0].key, half.series[0].key)
+    np.testing.assert_array_equal(whole.series[0].arrays["x"][kept], half.series[0].arrays["x"])
+    assert computed(respond(folder)[0]) == []  # up to date
+
+
+@pytest.mark.slow
+def test_killed_and_resumed_from_the_command_line(folder: Path) -> None:
+    """SIGKILL after a few points, three times; the command then ends with the response of one go, 1e-6."""
+    command = [sys.executable, "-m", "microslip", "respond", str(folder), "--set", "sweep.points=33"]
+    points = folder / "build" / "vane" / "response.points"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    for more in (3, 8, 14):
+        process = subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.DEVNULL)
+        while process.poll() is None and count(points) < more:
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+        assert more <= count(points) < 34
+    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    resumed = read_response(points.with_name("response.h5")).series[0]
+    respond(folder, "sweep.points=33", force=True)
+    whole = read_response(points.with_name("response.h5")).series[0]
+    grid = whole.arrays["peak"] == 0
+    np.testing.assert_array_equal(resumed.key[resumed.arrays["peak"] == 0], whole.key[grid])
+    a, b = (s.monitor("probe")[s.arrays["peak"] == 0] for s in (resumed, whole))
+    np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(b).max())
+
+
+def count(points: Path) -> int:
+    """Points that a journal holds, whatever becomes of it."""
+    try:
+        return sum(len(s.key) for s in read_response(points).series)
+    except UserError:
+        return 0
+
+
+def test_another_normal_force_adds_and_another_friction_begins_anew(folder: Path) -> None:
+    respond(folder)
+    told, _ = respond(folder, "sweep.normal_forces=[50.0, 100.0]", "material_limits.fatigue_strength=2e8")
+    assert len(computed(told)) in (9, 10)
+    found = read_response(folder / "build/vane/response.h5")
+    assert [s.parameters for s in found.series] == [{"normal_force": 50.0}, {"normal_force": 100.0}]
+    (folder / "case.toml").write_text(CASE.replace("friction = 0.2", "friction = 0.21"))
+    assert len(computed(respond(folder)[0])) == 10
+
+
+def test_what_stands_in_the_folder(folder: Path) -> None:
+    """Table, HDF5, summary, pictures, VTU, log; the coordinates in the file give what the table says."""
+    respond(folder, log=True)
+    build = folder / "build" / "vane"
+    summary = json.loads((build / "response.json").read_text())
+    (row,) = summary["resonances"]
+    assert row["vibration_may_grow"] == pytest.approx(250e6 / row["stress_amplitude_Pa"], rel=1e-3)
+    assert set(summary["pictures"]) == {
+        "friction response", "stress over frequency", "Haigh diagram", "contacts at resonance",
+    }  # fmt: skip
+    assert all((build / "pictures" / p).stat().st_size > 5000 for p in summary["pictures"].values())
+    made = {"response.h5", "response.csv", "response.html", "operating_shape.vtu", "contact_right.vtu"}
+    assert made == set(summary["files"])
+    page = (build / "response.html").read_text()
+    assert page.count("<img") == 4 and "vibration may grow" in page and "stress amplitude in MPa" in page
+    log = (build / "convergence.csv").read_text().splitlines()
+    assert len(log) == 11 and log[0].startswith("sweep,frequency_Hz") and ",converged," in log[5]
+    found, basis = read_response(build / "response.h5"), read_basis(folder / "basis.h5")
+    motion = found.motion(found.series[0], basis)
+    from microslip.operating.motion import read_out
+
+    probe = read_out(motion, "probe")[:, 1, 0]
+    top = int(np.argmax(found.series[0].arrays["peak"]))
+    assert abs(probe[top]) == pytest.approx(row["amplitude_m"], rel=1e-3)  # but for the bulk beside the modes
+    assert found.series[0].frequency[top] == row["frequency_Hz"]
+
+
+def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sweep goes on, the table and the summary tell, and the case counts as not converged."""
+    from microslip.harmonic_balance import solver
+
+    newton = solver.newton
+
+    def stubborn(at: Any, x: np.ndarray, **more: Any) -> Any:
+        found = newton(at, x, **more)
+        return replace(found, status="no convergence") if abs(at.Omega - 2 * np.pi * 360.0) < 1e-6 else found
+
+    monkeypatch.setattr(solver, "newton", stubborn)
+    told, converged = respond(folder)
+    assert not converged and any("1 of 9 points did not converge" in t for t in told)
+    series = read_response(folder / "build/vane/response.h5").series[0]
+    assert [s for s in series.status if s != "converged"] == ["no convergence"]
+    assert json.loads((folder / "build/vane/response.json").read_text())["failed_points"] == 1
+    monkeypatch.setattr(solver, "newton", newton)
+    told, converged = respond(folder, force=True)
+    assert converged
+
+
+def test_closed_form_has_coordinates_and_stresses_too(folder: Path) -> None:
+    """Jenkins elements: coordinates in the file give the stress, no contact is marched for maps."""
+    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace("points = 9", "points = 60")
+    (folder / "case.toml").write_text(text)
+    respond(folder)
+    found = read_response(folder / "build/vane/response.h5")
+    assert found.mode == "jenkins" and not (folder / "build/vane/response.points").exists()
+    from microslip.operating.motion import read_out
+
+    series, basis = found.series[0], read_basis(folder / "basis.h5")
+    probe = read_out(found.motion(series, basis), "probe")[:, 1, 0]
+    np.testing.assert_allclose(probe, series.monitor("probe")[:, 0, 1], rtol=2e-3)
+    summary = json.loads((folder / "build/vane/response.json").read_text())
+    assert summary["resonances"][0]["stress_amplitude_Pa"] > 1e5 and "contacts at resonance" not in summary["pictures"]
+
+
+RING = """
+name = "ring"
+body = "sector"
+excitation = "gas"
+amplitude = 200.0
+monitor = "tip"
+direction = "y"
+harmonics = 3
+samples = 48
+
+[ring]
+blades = 6
+engine_order = 5
+
+[[contacts]]
+interface = "rim"
+law = "smooth"
+points = [3, 2]
+normal_stiffness = 2e8
+tangential_stiffness = 2e8
+friction = 0.3
+
+[sweep]
+start = 4000.0
+stop = 6000.0
+points = 3
+normal_forces = [60.0]
+"""
+
+
+def test_coordinates_of_a_cyclic_sector_read_in_their_own_waves(folder: Path) -> None:
+    """Engine order 5 on six sectors is nodal diameter 1 the other way round, its third harmonic 3: 1e-9 of the monitor.
+
+    The mean and the harmonics move in groups of their own, those above N/2 with conjugate rows.
+    """
+    from sector import basis
+
+    from microslip.basis import write_basis
+    from microslip.operating.motion import read_out
+    from microslip.operating.shape import on_sector
+
+    write_basis(folder / "basis.h5", basis())
+    (folder / "case.toml").write_text(RING)
+    respond(folder)
+    found = read_response(folder / "build/ring/response.h5")
+    assert found.bodies["sector"].harmonics == ((0, False), (1, True), (2, True), (3, False))
+    series, held = found.series[0], read_basis(folder / "basis.h5")
+    motion = found.motion(series, held)
+    told, read = series.monitor("tip")[:, 0], read_out(motion, "tip")[:, :, 1]
+    np.testing.assert_allclose(read, told, rtol=0, atol=1e-9 * np.abs(told).max())
+    assert np.abs(told[:, 3]).max() > 1e-4 * np.abs(told[:, 1]).max()  # it slides: there are higher harmonics
+    here, there = (on_sector(motion, held, j) for j in (0, 2))
+    np.testing.assert_allclose(np.linalg.norm(there, axis=-1), np.linalg.norm(here, axis=-1), rtol=1e-9)
+    summary = json.loads((folder / "build/ring/response.json").read_text())
+    assert summary["pictures"].keys() == {"friction response"}  # the file has no stress modes
+
+
+SLED = (
+    CASE.replace('name = "vane"', 'name = "sled"').replace('"vane-eigenmodes"', '"sled"').replace("magnet", "push")
+    .replace('"probe"', '"middle"').replace('"right"', '"sole"').replace("[2, 2]", "[1, 1]").replace("2e5", "3e6")
+    .replace("4e5", "1e6").replace("friction = 0.2", "friction = 0.3").replace("start = 300.0", "start = 80.0")
+    .replace("stop = 380.0", "stop = 140.0").replace("points = 9", "points = 7").replace("[50.0]", "[20.0]")
+    .replace("harmonics = 1", 'harmonics = "auto"\nharmonics_error = 4e-4').replace("samples = 24", "samples = 48")
+)  # fmt: skip
+
+
+def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
+    """The sweep begins with three harmonics, and once more with those that the resonance needs. Summary, table and
+    response file say how many; interrupted, the next run begins with them. What is followed takes as many."""
+    write_basis(folder / "basis.h5", sled())
+    (folder / "case.toml").write_text(SLED)
+    begun: list[str] = []
+
+    def impatient(text: str) -> None:
+        begun.append(text)
+        if any("once more with" in t for t in begun) and text.startswith("4 of"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(UserError, match=r'"auto" is found by microslip respond .*; run it first, or give a number'):
+        survey_stage(folder / "case.toml", None, "load")
+    with pytest.raises(KeyboardInterrupt):
+        respond(folder, report=impatient)
+    (said,) = [t for t in begun if "harmonics leave an error of about" in t]
+    told, _ = respond(folder)
+    assert computed(told)[0].startswith("4 of")
+    build = folder / "build" / "sled"
+    summary, found = json.loads((build / "response.json").read_text()), read_response(build / "response.h5").series[0]
+    H = summary["harmonics"]
+    assert H > 3 and any(t.endswith(f"all once more with {H}") for t in [said, *told])
+    assert summary["estimated_error_of_harmonics"] <= 4e-4
+    assert (found.arrays["harmonics"] == H).all() and found.monitor("middle").shape[2] == H + 1
+    assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
+    assert f"<td>{H}</td>" in (build / "response.html").read_text()
+    opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
+    assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.samples >= 8 * H
+
+
+@pytest.mark.parametrize(("keys", "words"), [
+    ("harmonics = 3\nharmonics_error = 0.01", 'harmonics_error: belongs to harmonics = "auto"'),
+    ('harmonics = "auto"\nharmonics_error = 0.0', "harmonics_error"),
+    ('harmonics = "many"', "harmonics"),
+    ('harmonics = "auto"\n[ring]\nblades = 4\nmodel = "full"', 'harmonics: "auto" needs ring.model = "sector"'),
+])  # fmt: skip
+def test_mistakes_about_harmonics(folder: Path, keys: str, words: str) -> None:
+    (folder / "case.toml").write_text(CASE.replace("harmonics = 1\nsamples = 24", keys))
+    with pytest.raises(UserError, match=words):
+        respond(folder)
+
+
+@pytest.mark.parametrize("verb", [running.respond, running.run_case_file])
+def test_a_modal_file_that_is_not_there(folder: Path, monkeypatch: pytest.MonkeyPatch, verb: Any) -> None:
+    """What to type follows from what is there: another folder, another name, another path, or nothing at all."""
+    (folder / "build/vane-eigenmodes").mkdir(parents=True)
+    (folder / "basis.h5").rename(folder / "build/vane-eigenmodes/basis.h5")
+    (folder / "mine").mkdir()
+    (folder / "case.toml").rename(folder / "mine/vane.toml")
+    several = 'bodies = [{name = "vane", file = "gone.h5"}]'
+
+    def said(path: str, *changes: tuple[str, str]) -> str:
+        text = CASE
+        for old, new in changes:
+            text = text.replace(old, new)
+        (folder / "mine/vane.toml").write_text(text)
+        with pytest.raises(UserError) as caught:
+            verb(Path(path), None) if verb is running.respond else verb(Path(path))
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    assert "is 'vane-eigenmodes' meant?" in said("mine/vane.toml", ("vane-eigenmodes", "vane-eigenmode"))
+    assert "the bodies here are vane-eigenmodes" in said("mine/vane.toml", ("vane-eigenmodes", "fan"))
+    nowhere = said("mine/vane.toml", ('body = "vane-eigenmodes"', several), ('= "magnet"', '= "vane:magnet"'))
+    assert "no file mine/gone.h5; paths in a case start in the folder of the case" in nowhere
+    monkeypatch.chdir(folder / "mine")
+    moved = said("vane.toml")
+    assert f"it is in {folder}: go there (cd {folder}) and give the case as mine/vane.toml" in moved
+    assert str(folder / "mine") in moved.split(";")[0]
+
+
+def test_a_body_that_can_be_made_is(folder: Path) -> None:
+    (folder / "basis.h5").unlink()
+    (folder / "geometry/vane-eigenmodes").mkdir(parents=True)
+    (folder / "geometry/vane-eigenmodes/body.toml").write_text('name = "vane-eigenmodes"\n')
+    with pytest.raises(UserError, match="no .*basis.h5 .*; microslip run .*case.toml makes it"):
+        running.respond(folder / "case.toml", None)
+
+
+def test_resonances_at_which_contacts_would_lift_off_are_marked(folder: Path) -> None:
+    """The closed form under 0.05 N, whose contact is too weakly pressed, and under 500 N; and nothing to log of it."""
+    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace("[50.0]", "[0.05, 500.0]")
+    (folder / "case.toml").write_text(text.replace("start = 300.0", "start = 250.0"))
+    told, _ = respond(folder, log=True)
+    assert any("there is nothing to log" in t for t in told) and not (folder / "build/vane/convergence.csv").exists()
+    summary = json.loads((folder / "build/vane/response.json").read_text())
+    notes = {row["normal_force_N"]: row["note"] for row in summary["resonances"]}
+    assert notes == {0.05: "contacts would lift off: not valid", 500.0: ""}
+    assert any("0.05 N" in t and "not valid" in t for t in told)
+    assert any("does not follow" in remark for remark in summary["remarks"])
+
+
+def test_a_contact_is_named_by_its_interface(folder: Path) -> None:
+    (folder / "case.toml").write_text(CASE.replace("friction = 0.2", "frction = 0.2"))
+    with pytest.raises(UserError, match=r"contacts.right.frction: unknown key; did you mean 'friction'\?"):
+        running.respond(folder / "case.toml", None)
+
+
+def test_a_speed_that_is_not_stored(folder: Path) -> None:
+    with pytest.raises(UserError, match="has one speed, number 0; correct it"):
+        running.respond(folder / "case.toml", None, ["speed=3"])
+
+
+def test_a_coarse_sweep_is_told_where_it_matters(folder: Path) -> None:
+    """A remark beside a resonance in the band, none where the band has none."""
+    assert any("is wide against a resonance with sticking" in t for t in respond(folder, "sweep.points=3")[0])
+    assert not any("is wide" in t for t in respond(folder, "sweep.points=3", "sweep.start=370.0")[0])

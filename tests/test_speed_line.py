@@ -1,0 +1,109 @@
+"""Rotation speed and frequency tied along an engine-order line, bodies and contacts those of every speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_speed_range import TOP, ranged, solved
+
+from microslip.campbell import crossings, track_basis
+from microslip.contact.friction import Coulomb
+from microslip.contact.normal import Penalty
+from microslip.contact.patch import Patch, grid
+from microslip.contact.point import PointContact
+from microslip.data import Rows, UserError
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance import response, speed_line
+from microslip.harmonic_balance.solver import solve
+from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+
+FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
+ORDER = 4
+
+
+def rubbing(push: float = 1e4) -> Assembly:
+    """A blade whose tip rubs on a wall, pushed by a pressure."""
+    places, areas = grid(0.02, 0.003, (3, 1))
+    law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
+    wall = touching("wall", Patch("tip", places, areas, law), Side("blade", "tip"), None, normal=1.0)
+    member = Member("blade", {0: ranged().groups[0, 0]})
+    return Assembly((member,), (wall,), (Load("blade", "gas", push),), (Watch("blade", "end", "u_x"),))
+
+
+def pressed(rpm: float) -> float:
+    """Grows with the square of the speed."""
+    return 2e-7 * rpm**2
+
+
+def at_speed(rpm: float) -> Assembly:
+    return speed_line.assembly_at(rubbing(), {"blade": ranged()}, rpm, {"wall": pressed(rpm)})
+
+
+def speeds(count: int = 12) -> np.ndarray:
+    """About the crossing of the line with the first mode that sticks."""
+    return np.linspace(0.55 * TOP, 0.95 * TOP, count)
+
+
+def test_every_speed_is_the_response_of_the_body_at_that_speed() -> None:
+    """Against a problem built for three of the speeds alone, from groups of the range and forces by hand, started
+    cold: 1e-7 of the amplitude. The contact slides at some and sticks at others."""
+    found = speed_line.along(at_speed, speeds(), ORDER, **FINE)
+    assert found.converged.all()
+    np.testing.assert_allclose(found.frequency, ORDER * speeds() / 60, rtol=1e-14)
+    np.testing.assert_allclose(found.normal[:, 0], pressed(speeds()), rtol=1e-3)  # the means of friction bend the blade
+    assert found.slipping.max() == 1.0 and found.slipping.min() == 0.0
+    for i in (0, 5, 11):
+        problem = balance.of(at_speed(float(speeds()[i])), **FINE)
+        point = solve(problem, 2 * np.pi * ORDER * speeds()[i] / 60, [])
+        alone = response.operating(problem, point).watched[0]
+        np.testing.assert_allclose(found.harmonics[i], alone, rtol=0, atol=1e-7 * np.abs(alone).max())
+    assert list(found.columns())[0] == "speed_rpm" and "normal_force_1_N" in found.columns()
+
+
+def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
+    """Without a contact the largest answer along the line stands at the crossing of engine order and mode, within a
+    step of the speeds (0.05 %); a body held at rest's modes would resonate elsewhere."""
+    tracks = track_basis(ranged())
+    meets = [c for c in crossings(tracks, [ORDER]) if c.curve == 0][0]
+    free = Assembly(rubbing().members, (), rubbing().loads, rubbing().watches)
+    near = meets.speed * 30 / np.pi * (1 + np.linspace(-0.01, 0.01, 41))
+    amplitude = []
+    for n in near:
+        at = speed_line.assembly_at(free, {"blade": ranged()}, float(n))
+        part = at.part(at.members[0], 1)
+        w = 2 * np.pi * float(speed_line.frequency(ORDER, n))
+        amplitude.append(abs((part.watch @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
+    assert near[int(np.argmax(amplitude))] == pytest.approx(meets.speed * 30 / np.pi, rel=5e-4)
+    at_rest = ranged().groups[0, 0].frequency[0] * 60 / ORDER
+    assert abs(at_rest / near[20] - 1) > 0.05
+
+
+def test_the_stored_speeds_of_the_file_are_taken_as_they_are() -> None:
+    """At a speed of the range the member is the body solved for there: frequencies to the range's tolerance, 1e-4."""
+    member = speed_line.member_at(Member("blade", {}), ranged(), 9000.0)
+    np.testing.assert_allclose(member.groups[0].omega[:6], solved(9000.0).omega[:6], rtol=1e-4)
+
+
+def test_centrifugal_loads_grow_with_the_square_of_the_speed() -> None:
+    g = ranged().groups[0, 0]
+    rows = {**g.excitations, "spin": Rows(np.ones((1, g.n_modes)), ("centrifugal",), "rad2/s2", np.zeros(3))}
+    member = Member("damper", {0: replace(g, excitations=rows)})
+    loads = (Load("damper", "spin", 1.0, 0), Load("damper", "gas", 3.0, 1))
+    spun = speed_line.loads_at(loads, (member,), 3000.0)
+    assert spun[0].amplitude == pytest.approx((100 * np.pi) ** 2) and spun[1] == loads[1]
+
+
+def test_mistakes_are_told() -> None:
+    for words, call in (
+        ("one or more speeds", lambda: speed_line.along(at_speed, np.zeros(0), 2)),
+        ("all above 0", lambda: speed_line.along(at_speed, np.array([0.0, 10.0]), 2)),
+        ("stand in no ring", lambda: speed_line.along(at_speed, np.array([8000.0]))),
+        ("0 is steady", lambda: speed_line.along(at_speed, np.array([8000.0]), 0)),
+        ("outside the speed range", lambda: speed_line.along(at_speed, np.array([2 * TOP]), 4)),
+        ("no closure", lambda: speed_line.static_normal_force(ranged().groups[0, 0], "tip")),
+    ):
+        with pytest.raises(UserError, match=words):
+            call()

@@ -1,0 +1,205 @@
+"""Surveys from the command line: engine orders, speeds, ranges, identification; each against what it is made of."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_assembly import blade
+from test_speed_range import ranged
+
+from microslip.basis import write_basis
+from microslip.case import load_case
+from microslip.case.assemble import build
+from microslip.case.run import problem_of
+from microslip.cli import main
+from microslip.harmonic_balance import identification, response
+from microslip.surveying import survey_stage
+
+RING = """
+name = "ring"
+body = "blade"
+excitation = "gas"
+monitor = "tip"
+harmonics = 1
+samples = 16
+cycles = 10
+[ring]
+blades = 6
+[[contacts]]
+interface = "right"
+against = "left"
+against_sector = 1
+normal_stiffness = 2e6
+tangential_stiffness = 1e6
+friction = 0.5
+points = [2, 2]
+width = 0.02
+height = 0.01
+[sweep]
+start = 150.0
+stop = 600.0
+points = 31
+normal_forces = [10000.0]
+"""
+
+
+@pytest.fixture
+def ring(tmp_path, monkeypatch) -> Path:
+    """A case of six blades that stick."""
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "basis.h5", blade())
+    (tmp_path / "case.toml").write_text(RING)
+    return tmp_path / "case.toml"
+
+
+def rows(path: str) -> dict[str, np.ndarray]:
+    with Path(path).open() as file:
+        table = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in table]) for name in table[0]}
+
+
+def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
+    """Frequencies of a ring with c_N = 3e6 N/m, c_T half of it, as if measured: found to 1e-6, the others predicted to
+    1e-6; the file says which was fitted."""
+    made = build(load_case(ring)[0], {"blade": blade()}, ring)
+    f = identification.nodal_diagram(made.assembly, 3e6, 0.5).frequency[:, 0]
+    others = "".join(
+        f"[[identification.measured]]\nnodal_diameter = {k}\nfrequency = {float(f[k])!r}\n" for k in (1, 2)
+    )
+    fit = f"[identification.fit]\nnodal_diameter = 3\nfrequency = {float(f[3])!r}\n"
+    ring.write_text(RING + "[identification]\nratio = 0.5\nstiffnesses = [1e6, 1e7]\n" + fit + others)
+    assert main(["identify", "case.toml"]) == 0
+    said = capsys.readouterr().out
+    assert "c_N = 3e+06 N/m and c_T = 1.5e+06 N/m" in said and "identification.csv" in said
+    found = rows("build/ring/identification.csv")
+    assert np.abs(found["relative_error"]).max() < 1e-6 and found["fitted"].tolist() == [1, 0, 0]
+    np.testing.assert_allclose(rows("build/ring/nodal_diameters.csv")["mode_1_Hz"], f, rtol=1e-6)
+    assert Path("build/ring/pictures/nodal_diameters_stuck.png").stat().st_size > 10000
+    assert main(["identify", "case.toml"]) == 0  # again: nothing to do, the same words
+    again = capsys.readouterr()
+    assert "is up to date" in again.out + again.err and "c_N = 3e+06 N/m" in again.out
+
+
+def test_respond_over_orders(ring: Path, capsys) -> None:
+    """Each order's largest resonance stands where the linear ring has it (contacts stick)."""
+    ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\n")
+    assert main(["respond", "case.toml", "--over", "orders", "-q"]) == 0
+    found = rows("build/ring/orders.csv")
+    np.testing.assert_allclose(found["resonance_Hz_F_N_10000_N"], found["stuck_Hz_F_N_10000_N"], rtol=2e-3)
+    assert found["engine_order"].tolist() == [1, 2]
+    assert Path("build/ring/pictures/orders.png").is_file()
+    page = Path("build/ring/orders.html").read_text()
+    assert "<h1>ring: orders</h1>" in page and "data:image/png" in page and page.count("<tr>") == 3
+
+
+def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> None:
+    """Ctrl-C at the second engine order, combination: a table of the first, and nothing that says it is whole."""
+    ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\npoints = 11\n[ranges]\nload = [1.0, 2.0]\n")
+    for kind, words in (("orders", "engine order 2, F_N = 10000 N, 2 of 2"), ("ranges", "combination 2 of 2")):
+
+        def report(text: str, words: str = words) -> None:
+            if text.startswith(words):
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            survey_stage(ring, None, kind, ["sweep.points=5"], report=report)
+        assert not Path(f"build/ring/{kind}.txt").exists()
+    assert rows("build/ring/orders.csv")["engine_order"].tolist() == [1]
+    assert rows("build/ring/ranges_combinations.csv")["combination"].tolist() == [1]
+
+
+def test_respond_over_ranges(ring: Path) -> None:
+    """Sticking contacts: twice the load, twice the amplitude; the damping of the case decides the resonance."""
+    near = RING.replace("start = 150.0\nstop = 600.0", "start = 225.0\nstop = 235.0")  # a resonance that sticks
+    ring.write_text(near + "[ranges]\ndamping_ratio = [0.01, 0.02]\nload = [1.0, 2.0]\nfriction = [0.5]\n")
+    assert main(["respond", "case.toml", "--over", "ranges", "-q"]) == 0
+    all_of = rows("build/ring/ranges_combinations.csv")
+    peak = {(d, x): p for d, x, p in zip(*(all_of[k] for k in ("damping_ratio", "load", "peak_m")), strict=True)}
+    assert peak[0.01, 2.0] == pytest.approx(2 * peak[0.01, 1.0], rel=1e-6)
+    assert peak[0.01, 1.0] > 1.5 * peak[0.02, 1.0]
+    table = rows("build/ring/ranges.csv")
+    settings, _ = load_case(ring)
+    alone = response.harmonic_response(
+        problem_of(build(settings, {"blade": blade()}, ring), 1e4), table["frequency_Hz"], np.zeros(1)
+    )
+    np.testing.assert_allclose(table["combination_1_m"], np.abs(alone.monitor), rtol=1e-6)  # 1 % as in its modal file
+    assert (table["high_m"] >= table["combination_3_m"]).all()
+
+
+SPEEDS = """
+name = "line"
+body = "{body}"
+monitor = "end"
+harmonics = 1
+samples = 16
+[[excitations]]
+row = "gas"
+amplitude = 1e4
+engine_order = 4
+[[contacts]]
+interface = "tip"
+law = "smooth"
+normal_stiffness = 1e6
+tangential_stiffness = 5e5
+friction = 0.3
+points = [4, 2]
+[sweep]
+start = 500.0
+stop = 900.0
+normal_forces = [20.0]
+[speeds]
+start_rpm = 9000
+stop_rpm = 15000
+points = 5
+"""
+
+
+def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
+    """Normal forces as told over the square of the speed, frequencies e n / 60; one speed against a case at that
+    speed and frequency, 1e-6."""
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "basis.h5", ranged())
+    path = tmp_path / "case.toml"
+    text = SPEEDS.format(body=ranged().name)
+    path.write_text(text + "normal_force = [[0, 0.0], [20000, 80.0]]\n")
+    assert main(["respond", "case.toml", "--over", "speeds"]) == 0
+    assert "Largest amplitude" in capsys.readouterr().out
+    found = rows("build/line/speeds.csv")
+    np.testing.assert_allclose(found["frequency_Hz"], found["speed_rpm"] * 4 / 60, rtol=1e-10)
+    np.testing.assert_allclose(found["normal_force_1_N"], 80 * (found["speed_rpm"] / 20000) ** 2, rtol=1e-2)
+    settings, _ = load_case(path, ["speed_rpm=12000"])
+    made = build(settings, {settings.members[0].name: ranged()}, path)
+    alone = response.harmonic_response(problem_of(made, 80 * 0.6**2), np.array([800.0]), np.zeros(1))
+    assert found["amplitude_m"][2] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
+    for change, words in (
+        ("normal_force = [[10000, 0.0], [20000, 80.0]]", "is known from 10000 to 20000 rpm, not at 9000 rpm"),
+        ("normal_force = [[10000, 0.0]]", "two or more pairs"),
+        ('normal_force = "static"', "no closure on interface"),
+    ):
+        path.write_text(text + change)
+        assert main(["respond", "case.toml", "--over", "speeds"]) == 2
+        assert words in "".join(capsys.readouterr())
+    path.write_text(text.replace("engine_order = 4\n", ""))
+    assert main(["respond", "case.toml", "--over", "speeds"]) == 2
+    assert "no engine order is named" in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize(("change", "command", "words"), [
+    ("", ["respond", "--over", "orders"], "orders: is not asked for in this case; add [orders]"),
+    ("[orders]\nengine_orders = [0]", ["respond", "--over", "orders"], "other than 0"),
+    ("[ranges]", ["respond", "--over", "ranges"], "give values of damping_ratio, load, friction or normal_force"),
+    ("[speeds]\nstart_rpm = 10\nstop_rpm = 10", ["respond", "--over", "speeds"], "give two different speeds"),
+    ("[speeds]\nstart_rpm = 10\nstop_rpm = 20", ["respond", "--over", "speeds"], "no engine order is named"),
+    ("[identification.fit]\nnodal_diameter = 4\nfrequency = 100.0", ["identify"], "the ring has 0 to 3"),
+    ("[identification.fit]\nnodal_diameter = 3\nfrequency = 1.0", ["identify"], "no stiffness gives the measured 1 Hz"),
+    ("[identification.fit]\nnodal_diameter = 3", ["identify"], "frequency"),
+])  # fmt: skip
+def test_mistakes_are_one_sentence(ring: Path, capsys, change: str, command: list[str], words: str) -> None:
+    ring.write_text(RING + change)
+    assert main([command[0], "case.toml", *command[1:]]) == 2
+    said = "".join(capsys.readouterr())
+    assert words in said and "Traceback" not in said
+    assert not Path("build/ring").exists()
