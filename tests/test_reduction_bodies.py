@@ -30,11 +30,7 @@ HALF_PIPE = {
 
 
 def static_error(g) -> float:
-    """Of the compliance held over all contacts; 1.2e-8 measured on the blade.
-
-    With |K| 1e13 times lambda |M| rounding may take eps 1e13 = 2e-3 of it in one static answer; 1e-8 holds on stocky
-    bodies (`test_reduction.py`).
-    """
+    """Of the compliance held over all contacts; 5e-10 measured on the blade, |K| being 1e13 times lambda |M| there."""
     c = g.compliance
     at = [i for i, label in enumerate(c.labels) if label.startswith("interface:")]
     size = np.sqrt(np.diag(c.static))[at]
@@ -51,11 +47,11 @@ def test_soft_to_stiff_contacts_against_the_full_model(name, size, count, limits
     mesh, _ = load_mesh(job, mesh_stage(job))
     groups = {m: modal_basis(mesh, job.settings.model_copy(update={"reduction": m})).groups[0, 0] for m in METHODS}
     for method in ("rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"):
-        assert static_error(groups[method]) < 1e-7, method
+        assert static_error(groups[method]) < 1e-8, method
     exact = full_frequencies(mesh, job.settings, patch_statics(groups["rubin"]), RATIOS, 3)
     for method, g in groups.items():
         found = np.array([reduced_frequencies(g, method, ratio, 3) for ratio in RATIOS])
         errors = np.abs(found / exact - 1).max(axis=1)
         assert (errors < limits[method]).all(), (method, errors)
     same = [reduced_frequencies(groups[m], m, 1e4, 3) for m in ("macneal", "massless-boundary")]
-    np.testing.assert_allclose(*same, rtol=1e-6)  # one flexibility
+    np.testing.assert_allclose(*same, rtol=1e-9)  # one flexibility
