@@ -40,6 +40,9 @@ SLOPES = 1e-6
 """Share of the largest tangent of a memory within which tangents are taken for periodic."""
 
 _LAPS = 6  # cycles of tangents at most
+# Anything from 0.2 and 0.5 to 0.9 and 0.99 does: of 4000 random paths, 1500 of them slow, none took above 20 cycles.
+_STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
+_GAIN = 0.9  # share of it above which the step was in vain
 _STILL = 1e-13  # share of the largest force within which two marched cycles are the same
 
 
@@ -219,13 +222,13 @@ class _Laps:
         left = _length(missing)
         step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
 
-        across = at.solved & (left > 0.5 * at.tried)  # the step is straight, the circle is not: a cycle brings it back
+        across = at.solved & (left > _STRAIGHT * at.tried)  # the step is straight, the circle is not: a cycle brings it back
         ready = ~across & (at.wait == 0)
-        vain = ready & ~at.solved & (left > 0.9 * at.tried)
+        vain = ready & ~at.solved & (left > _GAIN * at.tried)
         failed = at.failed + vain
         wait = jnp.where(vain, failed, jnp.maximum(at.wait - 1, 0))
         use = ready & ~vain & newton.regular & (self.settled > 0)
-        tried = jnp.where(use | vain, left, at.tried)
+        tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
         marched = jnp.where(self.settled > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
         settled = (self.settled > 0) & (jnp.abs(step).max() <= self.settled * size)
