@@ -170,6 +170,9 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "turned": (two({"turn": 40.0}), "their normals are 40 degrees from opposite"),
     "one face twice": (TWICE, "interface 'right' stands in contacts 1 and 2 (counted from 1), but a face has one"),
     "two neighbours": (BETWEEN, "interface 'a:right' stands in contacts 1 and 2"),
+    "whose face": (two(against="left"), "contacts: 'left' says not of which body; write one of a:left, b:left"),
+    "whose load": (two() | {"excitation": "shaker"}, "excitations: 'shaker' says not of which body"),
+    "whose monitor": (two() | {"monitor": "tip-probe"}, "write one of a:tip-probe, b:tip-probe"),
     "same side": (two(against="b:right"), "their normals are 180 degrees from opposite"),
 }  # fmt: skip
 

@@ -309,11 +309,15 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
 @pytest.mark.parametrize(("keys", "words"), [
     ("harmonics = 3\nharmonics_error = 0.01", 'harmonics_error: belongs to harmonics = "auto"'),
     ('harmonics = "auto"\nharmonics_error = 0.0', "harmonics_error"),
-    ('harmonics = "many"', "harmonics"),
+    ('harmonics = "many"', "harmonics: must be a whole number, or 'auto'"),
+    ("harmonics = 0", "harmonics: must not be less than 1, or 'auto'"),
+    ("harmonics = 3\nsweep = {start = 1.0, stop = 2.0, normal_forces = [inf]}",
+     "sweep.normal_forces: entry 1 of the list must be a finite number"),
     ('harmonics = "auto"\n[ring]\nblades = 4\nmodel = "full"', 'harmonics: "auto" needs ring.model = "sector"'),
 ])  # fmt: skip
 def test_mistakes_about_harmonics(folder: Path, keys: str, words: str) -> None:
-    (folder / "case.toml").write_text(CASE.replace("harmonics = 1\nsamples = 24", keys))
+    text = CASE.replace("harmonics = 1\nsamples = 24", keys)
+    (folder / "case.toml").write_text(text.replace("[sweep]", "[rest]") if "sweep" in keys else text)
     with pytest.raises(UserError, match=words):
         respond(folder)
 

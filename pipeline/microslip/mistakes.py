@@ -152,6 +152,9 @@ def _sentence(key: tuple[Any, ...], found: list[tuple[tuple[Any, ...], Any]], ra
     if "value_error" in kinds:
         text = next(str(error["ctx"]["error"]) for _, error in found if error["type"] == "value_error")
         return (f"{where}: " if key else "") + text + ("" if ";" in text else "; correct it")
+    literal = [f for f in found if f[1]["type"] == "literal_error"]
+    words = literal if len(literal) < len(found) else []  # a word or something else: the something is the mistake
+    found = [f for f in found if f not in words]
     place, error = _most_telling(found, value)
     if error["type"].startswith("union_tag"):
         return _kind_mistake(where, value, error)
@@ -159,7 +162,13 @@ def _sentence(key: tuple[Any, ...], found: list[tuple[tuple[Any, ...], Any]], ra
         return f"{where}: {table}"
     given = _at(raw, place)
     entry = f"entry {place[-1] + 1} of the list " if len(place) > len(key) else ""
-    return f"{where}: {entry}{_words(found, error, given)} (it is {_shown(given)}); {_remedy(error, given)}"
+    said = _words(found, error, given) + (f", or {_expected(words)}" if words and not entry else "")
+    return f"{where}: {entry}{said} (it is {_shown(given)}); {_remedy(error, given)}"
+
+
+def _expected(found: list[tuple[tuple[Any, ...], Any]]) -> str:
+    """The words that a setting may be instead, as complaints name them."""
+    return " or ".join(error["ctx"]["expected"] for _, error in found)
 
 
 def _kind_mistake(where: str, value: Any, error: Any) -> str:

@@ -248,6 +248,8 @@ class CaseSettings(Model):
         names = [b.name for b in self.members]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
+        if said := self._whose():
+            raise ValueError(said)
         laws = {self.law_of(c) == "jenkins" for c in self.contacts}
         if len(laws) > 1:
             raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')
@@ -275,6 +277,18 @@ class CaseSettings(Model):
         if self.harmonics == "auto" and self.ring is not None and self.ring.model == "full":
             raise ValueError('harmonics: "auto" needs ring.model = "sector"; the whole ring needs as many: give them')
         return self
+
+    def _whose(self) -> str:
+        """A sentence where there are several bodies and a name does not say which of them has it; else nothing."""
+        named = [("contacts", end) for c in self.contacts for end in (c.interface, c.against) if end != GROUND]
+        named += [("excitations", x.row or x.face or "") for x in self.loads]
+        named += [("monitors", m.monitor) for m in self.watches]
+        open_ = [(key, name) for key, name in named if ":" not in name]
+        if not open_ or len(self.members) == 1:
+            return ""
+        key, name = open_[0]
+        choices = ", ".join(f"{b.name}:{name}" for b in self.members[:3]) + (", ..." if len(self.members) > 3 else "")
+        return f"{key}: '{name}' says not of which body; write one of {choices}"
 
     def _met_twice(self) -> str:
         """A sentence where an interface stands in two contacts, which would count its area twice; else nothing."""
