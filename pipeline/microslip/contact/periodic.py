@@ -222,7 +222,8 @@ class _Laps:
         left = _length(missing)
         step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
 
-        across = at.solved & (left > _STRAIGHT * at.tried)  # the step is straight, the circle is not: a cycle brings it back
+        # the step is straight, the circle is not: a cycle brings it back
+        across = at.solved & (left > _STRAIGHT * at.tried)
         ready = ~across & (at.wait == 0)
         vain = ready & ~at.solved & (left > _GAIN * at.tried)
         failed = at.failed + vain

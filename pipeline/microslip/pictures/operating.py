@@ -229,6 +229,8 @@ def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path
 
 
 def _energy(joules: float) -> str:
+    if abs(joules) < 1e-15:  # rounding of forces that give back what they took
+        return "0 J"
     scale, unit = next(((s, u) for s, u in ((1.0, "J"), (1e3, "mJ"), (1e6, "µJ")) if joules * s >= 0.5), (1e9, "nJ"))
     return f"{joules * scale:.3g} {unit}"
 
