@@ -103,15 +103,12 @@ def survey_stage(
     if raw.get("harmonics") == "auto":
         raw = raw | {"harmonics": settings.harmonics}
     inputs = {"case": raw, "basis": hashes, "code": code, "files": beside}
-    if not force and store.is_up_to_date(folder / said, inputs):
+    if not force and (done := _done(folder / said, inputs)) is not None:
         report(f"{folder / said} is up to date")
-        first, *sentences = (folder / said).read_text().splitlines()
-        listed, failed = first.split(": ")
-        made = [folder / name for name in listed.split(", ")]
-        if all(p.is_file() for p in made):
-            return made, sentences, int(failed) == 0
+        return done
     named = {name: str(file) for name, file in files.items()}
     kept = Kept(folder / f"over_{kind}.points", raw, hashes, named, beside, force)
+
     def write(tables: Tables) -> None:
         (folder / said).unlink(missing_ok=True)
         for name, columns in tables.items():
@@ -120,6 +117,26 @@ def survey_stage(
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, kept)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, report)
     write(found.tables)
+    names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
+    if not found.whole:
+        raise KeyboardInterrupt
+    store.write_text(folder / said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
+    store.note_product(folder / said, inputs)
+    return [folder / name for name in names], found.sentences, found.failed == 0
+
+
+def _done(said: Path, inputs: Any) -> tuple[list[Path], list[str], bool] | None:
+    """What `survey_stage` returned when it wrote a file of sentences from the same inputs; None if it is no more."""
+    if not store.is_up_to_date(said, inputs):
+        return None
+    first, *sentences = said.read_text().splitlines()
+    listed, failed = first.split(": ")
+    made = [said.parent / name for name in listed.split(", ")]
+    return (made, sentences, int(failed) == 0) if all(p.is_file() for p in made) else None
+
+
+def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
+    """Pictures and the page of a survey; the name of the page."""
     for name, draw in found.draw.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         draw(folder / name)
@@ -127,13 +144,8 @@ def survey_stage(
     if kind not in KINDS:
         page, words = f"over_{kind}.html", f"over the {kind.replace('_', ' ')}"
     pictures = [folder / name for name in found.draw]
-    survey_page(f"{settings.name}: {words}", found.sentences, found.tables, pictures, folder / page)
-    names = [*found.tables, *found.draw, page]
-    if not found.whole:
-        raise KeyboardInterrupt
-    store.write_text(folder / said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
-    store.note_product(folder / said, inputs)
-    return [folder / name for name in names], found.sentences, found.failed == 0
+    survey_page(f"{case}: {words}", found.sentences, found.tables, pictures, folder / page)
+    return page
 
 
 def table(columns: Mapping[str, Array]) -> str:
