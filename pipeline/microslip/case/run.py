@@ -211,14 +211,19 @@ def _book_can(built: Built, path: Path | str) -> None:
 
 
 def _by_the_book(built: Built) -> list[str]:
+    """That it is the book's mode, and how far its tables are off."""
     if built.settings.mode != "book":
         return []
-    from ..harmonic_balance.orbits import TOLERANCE
-
+    models = _book_models(built.assembly, built.settings.strips)
+    errors: dict[str, str] = {}  # of every table, by the hash of its law
+    for i, c in enumerate(built.assembly.contacts):
+        for table in models[i].tables:
+            of = f"the stiffness (normal law of {c.name})" if table.kind == "normal" else "what friction holds (orbits)"
+            errors.setdefault(table.law, f"{table.error:.2g} of {of}")
     return [
         "Book mode (Sextro 5.2): one harmonic, normal forces that do not change friction within a cycle, elliptic "
-        f"orbits from a table good to {100 * TOLERANCE:g} % of what friction holds; microslip respond CASE "
-        "--compare-book shows what that leaves out."
+        f"orbits; its tables are off by at most {' and '.join(errors.values())}. microslip respond CASE --compare-book "
+        "shows what the mode leaves out."
     ]
 
 
