@@ -187,6 +187,28 @@ def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
     assert "no engine order is named" in "".join(capsys.readouterr())
 
 
+def test_speeds_of_a_body_without_a_range_in_the_books_mode(tmp_path, monkeypatch, capsys) -> None:
+    """The normal force alone follows the speed; one speed against the book's mode at that force and frequency, 1e-6."""
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "basis.h5", blade())
+    path = tmp_path / "case.toml"
+    text = (
+        SPEEDS.format(body=blade().name).replace("harmonics = 1", 'mode = "book"').replace("points = 5", "points = 2")
+    )
+    text = text.replace('"tip"', '"right"').replace('"end"', '"tip"')
+    text = text.replace("rpm = 9000", "rpm = 3000").replace("rpm = 15000", "rpm = 3600")
+    text = text.replace("points = [4, 2]", "points = [2, 2]\nwidth = 0.02\nheight = 0.01").replace("1e4", "80.0")
+    path.write_text(text + "normal_force = [[0, 0.0], [20000, 800.0]]\n")
+    assert main(["respond", "case.toml", "--over", "speeds"]) == 0
+    said = capsys.readouterr().out
+    assert "Book mode" in said and f"The same at all speeds: {blade().name}" in said
+    found, (settings, _) = rows("build/line/speeds.csv"), load_case(path)
+    made = build(settings, {settings.members[0].name: blade()}, path)
+    alone = response.harmonic_response(problem_of(made, 800 * 0.18**2), np.array([240.0]), np.zeros(1))
+    assert alone.slipping.max() > 0
+    assert found["amplitude_m"][1] == pytest.approx(abs(alone.monitor[0]), rel=1e-6)
+
+
 @pytest.mark.parametrize(("change", "command", "words"), [
     ("", ["respond", "--over", "orders"], "orders: is not asked for in this case; add [orders]"),
     ("[orders]\nengine_orders = [0]", ["respond", "--over", "orders"], "other than 0"),

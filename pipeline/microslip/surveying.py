@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,8 @@ Write = Callable[[Tables], None]
 """Writes what there is of the tables of a survey, which may be interrupted."""
 
 _DRAWN_BY = ("pictures/coupled.py", "pictures/following.py", "report.py")
+
+_BY_THE_BOOK = "Book mode (Sextro 5.2): one harmonic, constant normal forces, elliptic orbits."
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,8 @@ def survey_stage(
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, kept)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, report)
+    if settings.mode == "book" and kind != "identification":
+        found = replace(found, sentences=[*found.sentences, _BY_THE_BOOK])
     write(found.tables)
     names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
     if not found.whole:
@@ -185,6 +189,8 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     title = f"{settings.name}: along engine order {r.order}"
     top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
     said = [f"Largest amplitude {amplitude[top]:.4g} m at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
+    if still := [b.name for b in settings.members if not bases[b.name].ranges]:
+        said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
     return Survey(
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(r.rpm, r.frequency, amplitude, r.normal, p, title)},

@@ -21,7 +21,7 @@ from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
     from ..harmonic_balance.book import BookPatch
-    from ..harmonic_balance.problem import Problem
+    from ..harmonic_balance.problem import Forces, Problem
     from ..harmonic_balance.response import HarmonicResponse
     from ..system.assembly import Assembly, Linear
 
@@ -175,10 +175,13 @@ def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
     from ..harmonic_balance import problem as balance
 
     s, assembly = built.settings, built.pressed(normal)
-    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching}
-    if s.mode == "book":
-        asked["models"] = _book_models(assembly, s.strips)
+    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching, "models": models_of(s, assembly)}
     return balance.of(assembly, **{**asked, **finer})
+
+
+def models_of(settings: CaseSettings, assembly: Assembly) -> dict[int, Forces] | None:
+    """What stands for the laws of the contacts: the book's contact in its mode, else nothing."""
+    return dict(_book_models(assembly, settings.strips)) if settings.mode == "book" else None
 
 
 def _book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:

@@ -50,7 +50,8 @@ class OrdersOfCase(Model):
 class SpeedsOfCase(Model):
     """Response along an engine-order line, f = e n / 60, by `respond --over speeds`.
 
-    Bodies whose modal files have a speed range take part in the speed; centrifugal excitations (speed_rpm) follow it.
+    Bodies whose modal files have a speed range take part in the speed, others stay as they are; centrifugal excitations
+    (speed_rpm) follow it.
     normal_force: of the contacts that the sweep presses, ``static`` (the closures of the modal file), a number (N), or
     [[rpm, N], ...], straight lines in the square of the speed; if not given, the sweep's one.
     """
@@ -231,19 +232,20 @@ def over_speeds(
 ) -> SpeedResponse:  # fmt: skip
     """The response along the engine-order line of a case. keep: is given what there is after every speed.
 
+    Bodies without a range of speeds are the same at all of them.
+
     Raises:
-        UserError: no engine order, no body with a range of speeds, or a speed outside of it.
+        UserError: no engine order, or a speed outside of a body's range.
     """
     from ..harmonic_balance import speed_line
     from .assemble import build
+    from .run import models_of
 
     asked = _asked(settings, "speeds", path)
     named = settings.ring is not None and settings.ring.engine_order is not None
     if not named and not any(x.orders for x in settings.loads):
         raise UserError(f"{path}: speeds: no engine order is named; give engine_order in the excitations or in [ring]")
     turning = [b.name for b in settings.members if bases[b.name].ranges]
-    if not turning:
-        raise UserError(f"{path}: speeds: no modal file has a range of speeds; write rotation.range_rpm in a body.toml")
 
     def at(rpm: float) -> Assembly:
         built = build(_at_speed(settings, turning, rpm), bases, path)
@@ -251,7 +253,8 @@ def over_speeds(
 
     rpm = np.linspace(asked.start_rpm, asked.stop_rpm, asked.points)
     order = abs(settings.base_order)
-    return speed_line.along(at, rpm, order, report, keep, harmonics=settings.number_of_harmonics, **settings.marching)
+    models = partial(models_of, settings)
+    return speed_line.along(at, rpm, order, report, keep, models, harmonics=settings.balanced, **settings.marching)
 
 
 def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:

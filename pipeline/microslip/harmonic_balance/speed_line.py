@@ -17,6 +17,7 @@ from ..speed_range import basis_at
 from ..system.assembly import Assembly, Load, Member
 from . import problem as balance
 from . import response
+from .problem import Forces
 from .response import HarmonicResponse
 from .solver import Point, Report, solve
 
@@ -48,14 +49,16 @@ def frequency(order: int, rpm: Array) -> Array:
 
 def along(
     build: Build, rpm: Array, order: int | None = None, report: Report = lambda _: None,
-    keep: Callable[[SpeedResponse], None] = lambda _: None, **settings: Any,
+    keep: Callable[[SpeedResponse], None] = lambda _: None,
+    models: Callable[[Assembly], dict[int, Forces] | None] = lambda _: None, **settings: Any,
 ) -> SpeedResponse:  # fmt: skip
     """Steady vibration at every speed, each started from the one or two before it.
 
     Args:
         build: see `Build`; contacts that stay the same keep their `Patch`, so that nothing is compiled twice. rpm: (s,)
             in the order in which they are run through. order: base engine order, of the first harmonic; the ring's if
-            None. keep: is given what there is after every speed. settings: of `problem.of`.
+            None. keep: is given what there is after every speed. models: of an assembly's contacts, see `problem.of`;
+            the marched laws if None. settings: others of `problem.of`.
 
     Raises:
         UserError: no speed, one that is not above 0, no engine order.
@@ -66,7 +69,8 @@ def along(
     found: list[HarmonicResponse] = []
     normal, done = [], list[Point]()
     for i, n in enumerate(speeds):
-        problem = balance.of(build(float(n)), **settings)
+        assembly = build(float(n))
+        problem = balance.of(assembly, models=models(assembly), **settings)
         settings.setdefault("length", problem.length)  # one unit for the unknowns of all speeds
         base = _order(problem.assembly, order)
         point = solve(problem, 2 * np.pi * float(frequency(base, n)), _starts(done, float(frequency(base, n))))
