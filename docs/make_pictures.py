@@ -1300,6 +1300,51 @@ def ring() -> None:
     fill("ring_case.md", "mesh", table(head, rows))
 
 
+def rig() -> None:
+    """The rig of three bodies: responses and resonances of both arrangements over the normal force."""
+    import coupled_study as study
+
+    def body(name: str) -> ModalBasis:
+        folder, _, rest = name.removeprefix("rig-").partition("-")
+        path = {"blade": "blade", "neighbour": "rig-neighbour"}[folder]
+        coarse = ["mesh.size=16"] if folder == "blade" else []
+        return made(f"{name}-coarse", path + (f"/{rest}.toml" if rest else ""), *LIGHT, *coarse)
+
+    forces = (780.0, 300.0, 100.0, 50.0, 20.0, 10.0)
+    first = study.over_forces("rig", forces, body, "harmonics=3", "settled=1e-6")
+    second = study.over_forces("rig-second", forces, body, "harmonics=3", "settled=1e-6")
+    fig = figure(10.0, 4.0)
+    study.rig_picture(first, second, *fig.subplots(1, 2))
+    save(drawn(fig), "rig_forces")
+    rows = [
+        [f"{a.normal:g}", *(x for r in (a, b) for x in (f"{r.frequency:.2f}", f"{1e6 * r.amplitude:.3g}"))]
+        for a, b in zip(first, second, strict=True)
+    ]
+    rows = [[x.replace("nan", "none") for x in row] for row in rows]
+    head = ["F_N, N", "first: resonance, Hz", "amplitude, um", "second: resonance, Hz", "amplitude, um"]
+    fill("rig_case.md", "forces", table(head, rows))
+
+
+def multicoupling() -> None:
+    """Shrouds and dampers between the blades of a ring: responses and stress over the damper's normal force."""
+    import coupled_study as study
+    import ring_study
+
+    stress = ("output.gauss=false", "mesh.size=16")
+    found, curves = study.dampers(made("blade-damped-16", "blade/damped.toml", *stress))
+    r = ring_study.ring(made("blade-stress-16", "blade", *stress), ring_study.COARSE, samples=32)
+    alone = r.problem(800.0)
+    without = ring_study.highest(alone, r.basis, np.linspace(100.0, 130.0, 13))
+    fig = figure(10.0, 4.0)
+    axes = fig.subplots(1, 2)
+    study.dampers_picture(found, curves, np.abs(ring_study.frf(alone, study.SHOWN).monitor), *axes)
+    save(drawn(fig), "multicoupling")
+    rows = [study.row("no damper", without), *(study.row(f"{n:g}", h) for n, h in found)]
+    head = ["damper's normal force, N", "resonance, Hz", "amplitude, um", "stress at the foot, MPa",
+            "damper open, largest share"]  # fmt: skip
+    fill("multicoupling.md", "forces", table(head, rows))
+
+
 def bolted_pipes() -> None:
     """The half pipes of section 5.7: bending and torsion over the tangential stiffness, fit and prediction."""
     import bolted_study as study
@@ -1332,7 +1377,7 @@ STUDIES = {
         arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
         stiffness_sources, rough, laws, microslip, continuation, followed, book_mode, patches, results,
-        ring, bolted_pipes,
+        ring, rig, multicoupling, bolted_pipes,
     )  # fmt: skip
 }
 
