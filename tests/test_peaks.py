@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +14,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.continuation import Settings, lowest, peak, ridge
+from microslip.continuation import Peak, Ridge, Settings, lowest, peak, ridge
+from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.response import of_body, operating
@@ -268,6 +269,30 @@ def test_optimal_normal_force_against_sweeps():
     here, beside = swept(best.parameter), [swept(best.parameter * share) for share in (0.9, 0.96, 1.04, 1.1)]
     assert best.resonance.amplitude == pytest.approx(here, rel=2e-4)
     assert min(beside) > here * (1 - 2e-4) and beside[0] > 1.01 * here and beside[3] > 1.002 * here
+
+
+def test_ridges_that_meet_are_followed_from_their_own_sides(monkeypatch):
+    """Heights exp(v) from 0 up and exp(2 - v) from 2 down are the same at 1. Followed up from 0, the second one is lost
+    to a third, a little above the first; ridges that join, apart by rounding, do not cross at all."""
+
+    def at(v, rate):
+        return Peak(np.zeros(1), 1.0, float(np.exp(v if rate > 0 else 2 - v)), False, "converged", np.zeros(2), 0, rate)
+
+    def followed(family, first, values):
+        found = at(values[-1], first.rate)
+        if first.rate < 0 and values[-1] > values[0]:
+            found = replace(at(values[-1], 1.0), value=1.01 * at(values[-1], 1.0).value)
+        return Ridge(np.array(values), (first, found), "complete")
+
+    monkeypatch.setattr(peaks, "ridge", followed)
+    ends = np.array([0.0, 2.0])
+    forward = Ridge(ends, tuple(at(v, 1.0) for v in ends), "complete")
+    back = Ridge(ends[::-1], tuple(at(v, -1.0) for v in ends[::-1]), "complete")
+    found = peaks._crossing(None, forward, back)
+    assert found.status == "two peaks" and found.parameter == pytest.approx(1.0, rel=1e-8)
+    apart = zip(forward.peaks, (1 + 1e-13, 1 - 1e-13), strict=True)
+    twice = tuple(replace(one, value=one.value * factor) for one, factor in apart)
+    assert peaks._crossing(None, forward, Ridge(ends, twice, "complete")) is None
 
 
 def test_where_one_resonance_takes_over_from_another():

@@ -22,6 +22,9 @@ from .solver import Report, sweep
 SAME = 5e-3
 """Relative difference of the frequencies of what counts as one resonance."""
 
+ROUNDING = 1e-9
+"""Relative difference of the heights of one peak that is found twice."""
+
 Make = Callable[[float], Problem]
 """The problem at a value of the parameter; its scales must not depend on the value (give `length` to `problem.of`)."""
 
@@ -126,28 +129,47 @@ def optimum(
 
 
 def _crossing(family: Callable[[float], Watched], forward: Ridge, back: Ridge) -> Lowest | None:
-    """Where a falling peak meets a rising one, if they do at parameters that both reach."""
+    """Where a falling peak meets a rising one, if they do at parameters that both reach.
+
+    Each is followed from where its own ridge came, as between the same two values another peak may lie nearer.
+    """
     ways = [dict(zip(one.parameter.tolist(), one.peaks, strict=True)) for one in (forward, back)]
     common = [value for value in ways[0] if value in ways[1]]
-    rows = [(ways[0][value], ways[1][value]) for value in common]
-    gap = np.array([np.log(a.value / b.value) for a, b in rows])
+    kept = {value: (ways[0][value], ways[1][value]) for value in common}
+    gap = np.array([_gap(*kept[value]) for value in common])
     change = np.flatnonzero(gap[:-1] * gap[1:] < 0)
     if not len(change):
         return None
-    i = int(change[0])
-    kept = {}
+    low, high = common[change[0]], common[change[0] + 1]
 
     def difference(value: float) -> float:
-        pair = [ridge(family, one, [common[i], value]).peaks[-1] for one in rows[i]]
-        kept[value] = pair
-        return float(np.log(pair[0].value / pair[1].value))
+        if value not in kept:
+            pair = ridge(family, kept[low][0], [low, value]), ridge(family, kept[high][1], [high, value])
+            if any(one.status != "complete" for one in pair):
+                raise _Ended
+            kept[value] = (pair[0].peaks[-1], pair[1].peaks[-1])
+        return _gap(*kept[value])
 
-    value = float(scipy.optimize.brentq(difference, common[i], common[i + 1], rtol=1e-9))
-    difference(value)
+    try:
+        value = float(scipy.optimize.brentq(difference, low, high, rtol=1e-9))
+        difference(value)
+    except _Ended:
+        return None
     rates = [one.rate for one in kept[value]]
     if min(rates) > 0 or max(rates) < 0:  # both rise or both fall: no lowest place
         return None
-    return Lowest(value, kept[value][0], "two peaks", sum(p.evaluations for pair in kept.values() for p in pair))
+    spent = sum(p.evaluations for pair in list(kept.values())[len(common) :] for p in pair)
+    return Lowest(value, kept[value][0], "two peaks", spent)
+
+
+class _Ended(Exception):
+    """A peak is not found on the way to where it meets another (never leaves this module)."""
+
+
+def _gap(one: Peak, other: Peak) -> float:
+    """Logarithm of the ratio of two heights; nothing where both are one peak, found twice."""
+    gap = float(np.log(one.value / other.value))
+    return 0.0 if abs(gap) <= ROUNDING else gap
 
 
 def _beside(problem: Problem, Omega: Array, peak: Peak, watch: int, report: Report) -> tuple[float, float]:
