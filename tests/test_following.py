@@ -13,6 +13,7 @@ from microslip import cli, following
 from microslip.basis import write_basis
 from microslip.case import load_case, run_case
 from microslip.cli import main
+from microslip.harmonic_balance import peak
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +103,17 @@ def test_no_optimum_says_where_to_look(capsys: pytest.CaptureFixture[str]) -> No
     assert "lowest at 20 N, an end; look beyond it with --low below 20" in err
 
 
+def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Angles in equal steps from below 0 to above it; everything else in equal ratios."""
+    asked = []
+    monkeypatch.setattr(peak, "optimum", lambda make, values, *_, **__: asked.append(values))
+    case = cli._followed(Path("case.toml"), None, ())
+    following.optimum_over(case, "bodies.sled.turn", -4.0, 4.0, 5)
+    following.optimum_over(case, "friction", 0.1, 0.4, 3)
+    np.testing.assert_allclose(asked[0], [-4, -2, 0, 2, 4])
+    np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
+
+
 def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
     """The response of a sliding block is stable; small growth factors of every point are in the table."""
     assert main(["respond", "case.toml", "--stability"]) == 0
@@ -114,7 +126,8 @@ def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "said"),
     [
         (["backbone", "case.toml", "--mode", "99"], "mode: number 99"),
-        (["optimum", "case.toml", "--over", "friction"], "give --low and --high"),
+        (["optimum", "case.toml", "--over", "friction"], "give --low and --high, two positive numbers"),
+        (["optimum", "case.toml", "--over", "bodies.sled.turn", "--low", "5", "--high", "-5"], "the first one smaller"),
         (["optimum", "case.toml", "--over", "contacts.sole.mu", "--low", "0.1", "--high", "0.5"], "mu"),
         (["backbone", "case.toml", "--set", 'contacts.sole.law="jenkins"'], "contacts"),
     ],

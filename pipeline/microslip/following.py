@@ -36,6 +36,8 @@ OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughnes
 """Keys of a contact that `optimum` may change in all of them at once."""
 
 NORMAL_FORCE = "normal_force"
+_SIGNED = ("turn", "phase", "place")
+"""Keys of angles, which may pass through 0; all others are followed in equal ratios."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ def optimum_over(
 
     Args:
         over: ``normal_force``; a key of the contacts, changed in all of them; or any key of the case, dotted.
-        low, high: of that value; the sweep's normal forces if not given. points: through which the peak is followed.
+        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: through which the peak is followed.
             ``optimum.csv`` holds the peaks as they are found.
 
     Raises:
@@ -172,8 +174,10 @@ def optimum_over(
     forces = [n for n in normal_forces(built) if n is not None]
     if over == NORMAL_FORCE and len(forces) > 1:
         low, high = low or min(n for n in forces if n > 0), high or max(forces)
-    if low is None or high is None or not 0 < low < high:
-        raise UserError(f"{over}: give --low and --high, two positive numbers between which its optimum is looked for")
+    signed = over.rpartition(".")[2] in _SIGNED
+    if low is None or high is None or not low < high or not (low > 0 or signed):
+        kind = "numbers, the first one smaller" if signed else "positive numbers"
+        raise UserError(f"{over}: give --low and --high, two {kind}, between which its optimum is looked for")
     if over == NORMAL_FORCE and not forces:
         raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
     length = problem_of(built, forces[0] if forces else None).length
@@ -191,7 +195,8 @@ def optimum_over(
         rows.append(_peak_row(number, value, peak))
         store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
 
-    return optimum(make, [float(v) for v in np.geomspace(low, high, points)], band, report=report, keep=keep)
+    values = np.linspace(low, high, points) if signed else np.geomspace(low, high, points)
+    return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
 def _peak_row(number: int, value: float, peak: Peak) -> str:
