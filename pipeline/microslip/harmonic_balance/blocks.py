@@ -25,6 +25,10 @@ class Matrix(Protocol):
         ...
 
 
+SINGULAR = 1e-10
+"""Share of the largest pivot or singular value below which one stands for nothing but rounding."""
+
+
 @dataclass(frozen=True, eq=False)
 class Dense:
     """Attributes: A: (size, size)."""
@@ -44,11 +48,12 @@ class Dense:
         """See `Matrix`: the mean place of a free body that slides is nowhere, and takes the shortest step."""
         if not np.isfinite(self.A).all():
             return np.full_like(right, np.nan)
-        if np.abs(np.diag(self._factors[0])).min(initial=1.0) > 0:
+        pivots = np.abs(np.diag(self._factors[0]))
+        if pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=0.0):
             step = scipy.linalg.lu_solve(self._factors, right, check_finite=False)
             if np.abs(step).max(initial=0.0) < 1e10 * np.abs(right).max(initial=1e-300):
                 return step
-        return np.linalg.lstsq(self.A, right, rcond=1e-10)[0]
+        return np.linalg.lstsq(self.A, right, rcond=SINGULAR)[0]
 
 
 @dataclass(frozen=True, eq=False)

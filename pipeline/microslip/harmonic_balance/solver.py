@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .. import continuation
 from ..data import Array
+from . import slow
 from .problem import AtFrequency, Problem
 
 Report = Callable[[str], None]
 CONVERGED = "converged"
+AWAY = "slides away"
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,11 @@ class Point:
     @property
     def converged(self) -> bool:
         return self.status == CONVERGED
+
+    @property
+    def away(self) -> bool:
+        """Whether a body slides away, so that there is no periodic motion to be found."""
+        return AWAY in self.status
 
 
 CONTRACTION = 0.1
@@ -89,18 +97,81 @@ def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) ->
 
 
 def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
-    """Newton's method from one start after the other, then from the sticking contact, then along the load."""
+    """Newton's method from one start after the other, then from the sticking contact, then along the load.
+
+    Where nothing but contacts holds a body, it comes from rest in slow time before it follows the load.
+    """
     began, at, spent = time.perf_counter(), problem.at(Omega), 0
     history: tuple[float, ...] = ()
-    for x in [*starts, at.reference]:
-        point = newton(at, x, slope=slope)
+    for way in _ways(problem, at, [*starts, at.reference], slope):
+        point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
-        if point.converged:
+        if point.converged or point.away:
             break
-    else:
-        point = _raised(problem, Omega)
-        spent, history = spent + point.iterations, (*history, *point.history)
     return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
+
+
+def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
+    yield from (partial(newton, at, x, slope=slope) for x in starts)
+    if slow.held_by_contacts(problem):
+        yield partial(from_rest, problem, at.Omega)
+    yield partial(_raised, problem, at.Omega)
+
+
+def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
+    """The vibration that the assembly comes to from rest, in slow time with steps that grow (`slow`).
+
+    Where the place of a body remains undetermined, the one that it came to is taken, if the mean forces balance there.
+
+    Args:
+        most: steps of slow time.
+    """
+    at, spent, rate = problem.at(Omega), 0, FIRST * Omega
+    q, point = slow.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
+    for count in range(most):
+        step = slow.slowly(at, rate, q)
+        trial = newton(step, point.x, TOLERANCE, most=20, slope=point.slope)
+        spent += trial.iterations
+        if not trial.converged:
+            rate, point = 4 * rate, replace(point, slope=None)
+            continue
+        point, q = trial, step.modal(trial.x, step.force(trial.x))
+        rate *= 0.5
+        if rate < LAST * Omega and count % 3 == 0:
+            found = _ended(at, point, q)
+            spent += found.iterations
+            if found.converged or found.away:
+                return replace(found, iterations=spent)
+    error = float(np.abs(at.residual(point.x)).max() / max(np.abs(point.x).max(), 1e-300))
+    return Point(Omega, point.x, f"no rest in {most} steps of slow time", error, spent)
+
+
+FIRST = 0.3
+"""Rate of the first step of slow time over the frequency of the vibration."""
+
+LAST = 1e-3
+"""Rate over frequency from which on Newton's method is tried."""
+
+TOLERANCE = 1e-9
+"""Of the balances on the way."""
+
+
+def _ended(at: AtFrequency, point: Point, q: slow.Places) -> Point:
+    """Newton's method where slow time ends; where that fails, with the place of what nothing holds left as it is."""
+    found = newton(at, point.x, most=20, slope=point.slope)
+    if found.converged or not slow.unheld(at.problem):
+        return found
+    held = slow.in_place(at, q)
+    fixed = newton(held, point.x, most=20)
+    spent = found.iterations + fixed.iterations
+    if not fixed.converged:
+        return replace(found, iterations=spent)
+    last = newton(at, fixed.x, most=1)
+    if last.converged:
+        return replace(last, iterations=spent)
+    force, whom = slow.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
+    words = f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body hold or a spring"
+    return replace(last, status=words, iterations=spent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +235,7 @@ def sweep(
         done.append(replace(point, slope=None))
         keep(done[-1])
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
-        if not done[i].converged and done[i + 1].converged:
+        if not done[i].converged and not done[i].away and done[i + 1].converged:
             report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
