@@ -53,7 +53,7 @@ class BodyOfCase(Model):
     direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
     modes: how many of the stored eigenmodes are used, all if not given.
     hold: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body that
-    slides in all of its contacts has no place of its own; without hold its mean position is anywhere.
+    slides in all of its contacts has no place of its own; without hold it slides away where mean forces do not balance.
     """
 
     name: Name
