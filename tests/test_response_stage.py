@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
@@ -304,6 +305,22 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
     opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
     assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.samples >= 8 * H
+
+
+def test_a_strain_gauge_in_closed_form(folder: Path) -> None:
+    """The strain that its row reads from the coordinates in the response file, 1e-6; said to be one."""
+    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace('monitor = "probe"', 'monitor = "root"')
+    (folder / "case.toml").write_text(text)
+    told, converged = respond(folder)
+    assert converged and any("'root' is a strain gauge" in t for t in told)
+    row = read_basis(folder / "basis.h5").groups[0, 0].gauges["root"].rows[0]
+    with (folder / "build/vane/response.csv").open(newline="") as file:
+        strain = {float(r["frequency_Hz"]): float(r["amplitude_m_FN_50_N"]) for r in csv.DictReader(file)}
+    series = read_response(folder / "build/vane/response.h5").series[0]
+    pairs = zip(series.frequency, np.abs(series.arrays["bodies/vane-eigenmodes/q"][:, 1] @ row), strict=True)
+    found = [(strain[f], own) for f, own in pairs if f in strain]
+    assert len(found) == 9 and min(found)[0] > 0
+    np.testing.assert_allclose(*zip(*found, strict=True), rtol=1e-6)
 
 
 @pytest.mark.parametrize(("keys", "words"), [

@@ -162,8 +162,8 @@ def optimum_over(
 
     Args:
         over: ``normal_force``; a key of the contacts, changed in all of them; or any key of the case, dotted.
-        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: through which the peak is followed.
-            ``optimum.csv`` holds the peaks as they are found.
+        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: through
+            which the peak is followed. ``optimum.csv`` holds the peaks as they are found.
 
     Raises:
         UserError: no range, or contacts that the sweep does not press.

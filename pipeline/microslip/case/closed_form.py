@@ -33,9 +33,8 @@ def in_closed_form(
     group, load, watch = member.groups[0], a.loads[0], a.watches[0]
     amplitude = float(load.amplitude.real)
     force = amplitude * group.excitations[load.row].rows[0]
-    monitored = group.monitors[watch.monitor]
-    row = monitored.rows[monitored.labels.index(watch.label)]
-    residual = None if member.brings is None else _residual(built, member.brings)
+    row = member.at(0).monitor(watch.monitor, watch.label)
+    residual = None if member.brings is None else _residual(built)
     for normal in forces:
         report(f"friction response at a normal force of {normal:g} N")
         pressed = [jenkins_contact(c, normal, s) for c, s in zip(built.contacts, built.springs, strict=True)]
@@ -51,17 +50,17 @@ def in_closed_form(
     return responses, resonances, stuck, _lift_off(responses)
 
 
-def _residual(built: Built, brings: Array) -> Residual:
-    """Residual flexibility among contacts, excitation and monitor."""
+def _residual(built: Built) -> Residual:
+    """Residual flexibility among contacts, excitation and monitor; none of a gauge's, which the modes alone strain."""
     a = built.assembly
-    group, load, watched = a.members[0].groups[0], a.loads[0], a.watches[0]
-    names = list(group.compliance.labels)
-    left = group.compliance.residual * np.outer(brings, brings)
+    member, load, watched = a.members[0].at(0), a.loads[0], a.watches[0]
     six = [f"interface:{c.interface}:{row}" for c in built.contacts for row in INTERFACE_ROWS]
-    at = [names.index(row) for row in six]
-    force = next(i for i, n in enumerate(names) if n.startswith(f"excitation:{load.row}:"))
-    watch = names.index(f"monitor:{watched.monitor}:{watched.label}")
-    return Residual(left[np.ix_(at, at)], left[at, force], left[watch, at], float(left[watch, force]))
+    force = [n for n in member.group.compliance.labels if n.startswith(f"excitation:{load.row}:")]
+    watch = [f"monitor:{watched.monitor}:{watched.label}"]
+    return Residual(
+        member.residual(six, six), member.residual(six, force)[:, 0], member.residual(watch, six)[0],
+        float(member.residual(watch, force)[0, 0]),
+    )  # fmt: skip
 
 
 def _lift_off(responses: dict[float, FrequencyResponse]) -> list[str]:

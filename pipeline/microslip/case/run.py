@@ -117,6 +117,7 @@ def _run(
     free = free_response(built, frequency)
     remarks = [
         *built.remarks,
+        *_of_a_gauge(built),
         *_by_the_book(built),
         *_between(built),
         *remarks,
@@ -211,6 +212,15 @@ def _book_can(built: Built, path: Path | str) -> None:
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
             raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "marched"') from error
+
+
+def _of_a_gauge(built: Built) -> list[str]:
+    """That what is drawn is a strain, which columns and axes made for displacements give in m."""
+    watch = built.assembly.watches[0]
+    gauges = built.bodies[watch.member].group.gauges
+    if watch.monitor not in gauges or watch.label != gauges[watch.monitor].labels[0]:
+        return []
+    return [f"'{watch.monitor}' is a strain gauge: amplitudes and means of the response are strain, and no m."]
 
 
 def _by_the_book(built: Built) -> list[str]:
