@@ -418,5 +418,5 @@ def test_bad_aerodynamic_tables_are_refused_in_a_sentence(tmp_path) -> None:
         path.write_text(text)
         with pytest.raises(UserError, match=words):
             damping.read_aerodynamics(path, 3)
-    with pytest.raises(UserError, match="cannot be read"):
+    with pytest.raises(UserError, match="there is no such table; correct the name"):
         damping.read_aerodynamics(tmp_path / "nowhere.csv", 3)

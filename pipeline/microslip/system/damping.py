@@ -76,6 +76,8 @@ def _table(path: Path) -> list[dict[str, str]]:
             reader = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(k).strip(): str(v or "").strip() for k, v in row.items()} for row in reader]
             names = [str(n).strip() for n in reader.fieldnames or ()]
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: there is no such table; correct the name") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read as comma-separated values ({error})") from error
     missing = [c for c in COLUMNS if c not in names]
