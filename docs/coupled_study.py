@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from damper_study import Bases, opened
-from ring_study import QUICK, Highest, frf, highest
+from ring_study import Highest, frf, highest
 
 from microslip.case.run import problem_of
 from microslip.data import Array, ModalBasis
@@ -66,7 +66,7 @@ def rig_picture(first: Sequence[Resonance], second: Sequence[Resonance], left: A
 def dampers(basis: ModalBasis) -> tuple[list[tuple[float, Highest]], list[tuple[float, Array]]]:
     """The ring with shrouds and dampers: highest resonances over the damper's force, and three of the responses (m)."""
     built = opened("multicoupling", lambda _: basis)
-    problems = {normal: problem_of(built, normal, **QUICK) for normal in DAMPER}
+    problems = {normal: problem_of(built, normal) for normal in DAMPER}
     found = [(normal, highest(p, basis, WIDE)) for normal, p in problems.items()]
     return found, [(normal, np.abs(frf(problems[normal], SHOWN).monitor)) for normal in (10.0, 30.0, 300.0)]
 

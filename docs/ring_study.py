@@ -27,11 +27,6 @@ CASE = Path(__file__).parents[1] / "pipeline/cases/ring.toml"
 FOOT = 0.1
 """Share of the height that counts as the foot."""
 
-QUICK = {"settled": 1e-4, "cycles": 10}
-"""Marched until forces settle to this: the highest resonances agree with those of 1e-10 in five digits, seven times
-faster."""
-
-
 @dataclass(frozen=True)
 class Ring:
     """The case of the ring and its blade. points: of a contact along t1 and t2, those of the file if None."""
@@ -45,7 +40,7 @@ class Ring:
         s = self.settings.model_copy(
             update={"ring": self.settings.ring.model_copy(update={"engine_order": order}), "modes": modes}
         )
-        return problem_of(build(s, {"blade": self.basis}, CASE), normal, **{**QUICK, **finer})
+        return problem_of(build(s, {"blade": self.basis}, CASE), normal, **finer)
 
 
 def ring(basis: ModalBasis, points: tuple[int, int] | None = None, **changes: Any) -> Ring:
@@ -126,7 +121,7 @@ def inclined(r: Ring, degrees: float, normal: float, order: int) -> Problem:
 
     contacts = tuple(replace(c, first=turned(c.first), second=turned(c.second)) for c in built.assembly.contacts)
     pressed = replace(built, assembly=replace(built.assembly, contacts=contacts)).pressed(normal)
-    return balance.of(pressed, harmonics=s.harmonics, samples=s.samples, **QUICK)
+    return balance.of(pressed, harmonics=s.harmonics, samples=s.samples)
 
 
 # pictures ------------------------------------------------------------------------------------------------------------

@@ -43,6 +43,7 @@ _LAPS = 6  # cycles of tangents at most
 # Anything from 0.2 and 0.5 to 0.9 and 0.99 does: of 4000 random paths, 1500 of them slow, none took above 20 cycles.
 _STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
 _GAIN = 0.9  # share of it above which the step was in vain
+_SOLVED = 1e-8  # share of the largest force to which sliders are solved for at least: derivatives are of the solution
 _STILL = 1e-13  # share of the largest force within which two marched cycles are the same
 
 
@@ -232,7 +233,7 @@ class _Laps:
         tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
         marched = jnp.where(self.settled > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
-        settled = (self.settled > 0) & (jnp.abs(step).max() <= self.settled * size)
+        settled = (self.settled > 0) & (jnp.abs(step).max() <= jnp.minimum(self.settled, _SOLVED) * size)
         found = Periodic(force, after, at.found.cycles + 1)
         start = self.law.recalled(after, held)
         return _At(found, at.start, start, held, at.change, tried, use, failed, wait, at.first, settled)
