@@ -361,6 +361,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "bodies.damping_ratio": ("", "instead of the file's: one, or one a mode, the last one for all that follow"),
     "bodies.aerodynamics": ("", "a table (.csv) of [what the flow adds](excitation.md#damping) to every wave"),
     "bodies.modes": ("", "how many of those that the modal file stores"),
+    "bodies.mass": ("kg", "of the same shape and stiffness at rest, made of another density"),
     "bodies.turn": ("degrees", "about the body's rotation axis, from where its file has it"),
     "bodies.hold": ("Hz", "weak springs that hold a body which nothing else does: frequency of its rigid motions"),
     "bodies.shift": ("m", "from where its file has it, after the turn"),

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp, UserError
+from .data import (
+    CENTRIFUGAL, Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp, UserError,
+)  # fmt: skip
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
@@ -86,6 +88,28 @@ def first_modes(g: ModalGroup, count: int) -> ModalGroup:
         compliance=replace(g.compliance, modal=modal),
         gyroscopic=None,
     )
+
+
+def of_density(g: ModalGroup, share: float) -> ModalGroup:
+    """The same body at rest, of a material `share` times as dense: shape, stiffness and damping ratios stay.
+
+    Inertia and centrifugal excitations grow with the density; integrals for large rigid motion are left out.
+
+    Raises:
+        UserError: the body rotates, so that its prestress would change too.
+    """
+    if g.speed:
+        raise UserError("the body rotates, and its prestress would change with its mass; make it of another material")
+    heavy = {
+        name: replace(r, rows=share * r.rows) if r.unit == CENTRIFUGAL else r for name, r in g.excitations.items()
+    }
+    dense = replace(
+        g, M_r=share * g.M_r, C_r=np.sqrt(share) * g.C_r, omega=g.omega / np.sqrt(share), excitations=heavy,
+        run_up=None, invariants=None, gyroscopic=None,
+    )  # fmt: skip
+    if g.to_diagonal is None:
+        return in_coordinates(dense, np.eye(g.n_modes) / np.sqrt(share))
+    return replace(dense, to_diagonal=g.to_diagonal / np.sqrt(share))
 
 
 def own_kind(g: ModalGroup) -> tuple[str, ...]:

@@ -204,6 +204,10 @@ class StressSet:
     weights: Array
 
 
+CENTRIFUGAL = "rad2/s2"
+"""Unit of excitations by the body's own centrifugal force: N per (rad/s)^2."""
+
+
 @dataclass(frozen=True)
 class Rows:
     """Named rows on the generalised coordinates: ``values = rows @ q`` for read-outs, ``rows.conj().T @ f`` for forces.

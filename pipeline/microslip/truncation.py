@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .coordinates import compliance_row
-from .data import Array, ModalGroup
+from .data import CENTRIFUGAL, Array, ModalGroup
 
 ROUNDING = 1e-8
 """Share of the static compliance below which a basis holds all of it: slender bodies round off by as much."""
@@ -123,7 +123,7 @@ def describe(group: ModalGroup, label: str) -> tuple[str, str, str]:
         turns, kinds = row.startswith("phi"), {"u": "translation", "p": "rotation", "c": "shape"}
         return f"{name} {row}", kinds[row[0]], "rad/(N m)" if turns else "m/N"
     unit = group.excitations[name].unit if kind == "excitation" else "N"
-    return f"{name} {row}", kind, {"Pa": "m3/Pa", "rad2/s2": "J s4"}.get(unit, "m/N")  # work per square of the load
+    return f"{name} {row}", kind, {"Pa": "m3/Pa", CENTRIFUGAL: "J s4"}.get(unit, "m/N")  # work per square of the load
 
 
 def ring_pairs(group: ModalGroup) -> list[tuple[str, str]]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..compliance import SURFACE, statics_beside
-from ..coordinates import first_modes, in_modes
-from ..data import Array, Interface, ModalBasis, ModalGroup, UserError
+from ..coordinates import first_modes, in_modes, of_density
+from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserError
 from ..frames import rotation
 from ..speed_range import basis_at
 from .counting import Face, Springs, brought, counted_once
@@ -119,11 +119,27 @@ def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path
     stored = _at_speed(b, basis, path, key)
     beside = statics_beside(stored[min(stored)], basis.reduction)
     groups = {k: in_modes(g) for k, g in stored.items()} if beside else stored
+    if b.mass is not None:
+        groups, stored = (_of_mass(g, b.mass, basis, f"{path}: {key}mass") for g in (groups, stored))
     if b.damping_ratio is not None:
         groups = damped(groups, b.damping_ratio, f"{path}: {key}damping_ratio")
     if b.hold is not None:
         groups = {k: held(g, b.hold, f"{path}: {key}hold") for k, g in groups.items()}
     return Loaded(b, basis, stored, groups)
+
+
+def _of_mass(groups: dict[int, ModalGroup], mass: float, basis: ModalBasis, key: str) -> dict[int, ModalGroup]:
+    """The groups of the body with another mass (kg).
+
+    Raises:
+        UserError: its modal file does not know its mass, or it rotates.
+    """
+    if basis.mass <= 0:
+        raise UserError(f"{key}: the modal file of '{basis.name}' does not know the body's mass; leave it out")
+    try:
+        return {k: of_density(g, mass / basis.mass) for k, g in groups.items()}
+    except UserError as error:
+        raise UserError(f"{key}: {error}") from error
 
 
 def held(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
@@ -410,7 +426,7 @@ def _loads(
             said.append(sentence)
         else:
             _among(b.group.excitations, row, path, "excitation")
-            if x.speed_rpm is not None and b.group.excitations[row].unit != "rad2/s2":
+            if x.speed_rpm is not None and b.group.excitations[row].unit != CENTRIFUGAL:
                 raise UserError(f"{path}: excitations.{row}.speed_rpm: the excitation is no centrifugal load; write "
                                 "centrifugal = true in the body, or leave speed_rpm out")  # fmt: skip
         try:

@@ -52,6 +52,7 @@ class BodyOfCase(Model):
     aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,
     direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
     modes: how many of the stored eigenmodes are used, all if not given.
+    mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
     hold: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body that
     slides in all of its contacts has no place of its own; without hold it slides away where mean forces do not balance.
     """
@@ -64,6 +65,7 @@ class BodyOfCase(Model):
     damping_ratio: NotNegative | Numbers | None = None
     aerodynamics: str | None = None
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
+    mass: Positive | None = None
     turn: Number = 0.0
     hold: Positive | None = None
     shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, ModalBasis, ModalGroup, UserError
+from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
 from ..speed_range import basis_at
 from ..system.assembly import Assembly, Load, Member
 from . import problem as balance
@@ -140,7 +140,7 @@ def loads_at(loads: tuple[Load, ...], members: tuple[Member, ...], rpm: float) -
     groups = {m.name: next(iter(m.groups.values())) for m in members}
 
     def at(x: Load) -> Load:
-        centrifugal = groups[x.member].excitations[x.row].unit == "rad2/s2"
+        centrifugal = groups[x.member].excitations[x.row].unit == CENTRIFUGAL
         return replace(x, amplitude=(rpm * np.pi / 30) ** 2) if centrifugal else x
 
     return tuple(at(x) for x in loads)

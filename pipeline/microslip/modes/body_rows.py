@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..body import BodySettings, Excitation, InterfaceSettings, Monitor
-from ..data import INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
+from ..data import CENTRIFUGAL, INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
 from ..fem.discretise import face_blocks
 from ..fem.loads import centrifugal, pressure, traction
 from .boundary import AXES, require_face
@@ -95,7 +95,7 @@ def with_centrifugal(rows: BodyRows, model: BodyModel, settings: BodySettings) -
     points, M = model.d.mesh.points, model.M_full
     force = centrifugal(M, points, model.axis, model.point).reshape(1, -1)
     centre = (M @ points).sum(axis=0) / M.sum()
-    whole = NamedRows(sp.csr_matrix(force), ("centrifugal",), "rad2/s2", centre, 0.0)
+    whole = NamedRows(sp.csr_matrix(force), ("centrifugal",), CENTRIFUGAL, centre, 0.0)
     every = {e.name: whole if e.centrifugal else rows.excitations[e.name] for e in settings.excitations}
     return replace(rows, excitations=every)
 

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..data import Array, ComplexArray, ModalGroup, UserError
+from ..data import CENTRIFUGAL, Array, ComplexArray, ModalGroup, UserError
 from ..ring import BACKWARD, FORWARD, STANDING
 from .assembly import Load, Ring
 
@@ -241,7 +241,7 @@ def centrifugal_load(member: str, row: str, group: ModalGroup, speed: float) -> 
     Raises:
         UserError: a row that is no centrifugal load.
     """
-    if group.excitations[row].unit != "rad2/s2":
+    if group.excitations[row].unit != CENTRIFUGAL:
         raise UserError(
             f"{member}: excitation '{row}' is no centrifugal load; write centrifugal = true in its body.toml"
         )

@@ -1,0 +1,132 @@
+"""`mass` of a body in a case: the same body made of another density."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small import beam, table
+
+from microslip.basis import read_basis
+from microslip.body import BodySettings
+from microslip.case import load_case, run_case
+from microslip.case.assemble import load_bodies
+from microslip.cli import main
+from microslip.coordinates import of_density
+from microslip.data import CENTRIFUGAL, ModalBasis, UserError
+from microslip.modes import modal_basis
+from microslip.running import respond
+
+SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
+BODIES = """
+excitation = "magnet"
+amplitude = 2.0
+monitor = "probe"
+name = "vane"
+[[bodies]]
+name = "vane"
+body = "vane-eigenmodes"
+MORE
+[[contacts]]
+interface = "right"
+law = "jenkins"
+normal_stiffness = 2e5
+tangential_stiffness = 4e5
+friction = 0.2
+includes = "surface"
+[sweep]
+start = 315.0
+stop = 355.0
+points = 5
+normal_forces = [50.0]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copy(SAMPLES / "basis.h5", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def case(folder: Path, more: str) -> Path:
+    (folder / "case.toml").write_text(BODIES.replace("MORE", more))
+    return folder / "case.toml"
+
+
+@pytest.fixture(scope="module")
+def sample() -> ModalBasis:
+    return read_basis(SAMPLES / "basis.h5")
+
+
+def test_the_free_response_is_that_of_the_denser_body(sample: ModalBasis, folder: Path) -> None:
+    """By hand from the modes of the stored one, of three times the mass: 1e-10."""
+    path = case(folder, f"mass = {3 * sample.mass!r}")
+    settings, _ = load_case(path)
+    free = run_case(settings, {"vane": sample}, path).free
+    g = sample.groups[0, 0]
+    Omega = 2 * np.pi * free.frequency[:, None]
+    watched = g.monitors["probe"]
+    row = watched.rows[watched.labels.index("u_x")]
+    gain = row * 2.0 * g.excitations["magnet"].rows[0]
+    names = g.compliance.labels
+    whole = 2.0 * g.compliance.static[names.index("monitor:probe:u_x"), names.index("excitation:magnet:force")]
+    dynamic = g.omega**2 - 3 * Omega**2 + 2j * g.damping_ratio * g.omega * np.sqrt(3) * Omega
+    by_hand = whole - (gain / g.omega**2).sum() + (gain / dynamic).sum(axis=1)
+    np.testing.assert_allclose(free.monitor, by_hand, rtol=1e-10)
+
+
+def block(reduction: str, density: float) -> ModalBasis:
+    """A clamped beam with a centrifugal excitation."""
+    changed = table(
+        material={"density": density, "young": 2.1e11, "poisson": 0.3}, reduction=reduction,
+        excitations=[{"name": "spin", "centrifugal": True}], rotation={"speeds_rpm": [0.0], "point": [0.0, 0.0, -0.2]},
+        interfaces=[{"name": "tip", "face": "tip"}],
+    )  # fmt: skip
+    return modal_basis(beam(), BodySettings.model_validate(changed))
+
+
+@pytest.mark.parametrize("reduction", ["eigenmodes", "rubin", "craig-bampton", "massless-boundary"])
+def test_every_reduction_is_that_of_the_denser_material(reduction: str) -> None:
+    """Frequencies, matrices and centrifugal force in every coordinate system: 1e-8."""
+    light, heavy = (block(reduction, density).groups[0, 0] for density in (2000.0, 5000.0))
+    made = of_density(light, 2.5)
+    np.testing.assert_allclose(made.omega, heavy.omega, rtol=1e-8)
+    V, W = (np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal for g in (made, heavy))
+    for name in ("M_r", "K_r", "C_r"):
+        mine, other = V.T @ getattr(made, name) @ V, W.T @ getattr(heavy, name) @ W
+        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-8 * np.abs(other).max(), err_msg=name)
+    pull, wanted = made.excitations["spin"], heavy.excitations["spin"]
+    assert pull.unit == CENTRIFUGAL
+    mine, other = (np.abs(r.rows @ T) for r, T in ((pull, V), (wanted, W)))
+    np.testing.assert_allclose(mine, other, rtol=0, atol=1e-8 * other.max())
+
+
+def test_a_body_that_rotates_or_has_no_mass_is_refused(sample: ModalBasis, folder: Path) -> None:
+    with pytest.raises(UserError, match="the body rotates, and its prestress"):
+        of_density(replace(sample.groups[0, 0], speed=100.0), 2.0)
+    path = case(folder, "mass = 1.0")
+    settings, _ = load_case(path)
+    with pytest.raises(UserError, match=r"case.toml: bodies.vane.mass: the modal file of .* does not know"):
+        load_bodies(settings, {"vane": replace(sample, mass=0.0)}, path)
+    with pytest.raises(UserError, match=r"bodies.vane.mass"):
+        respond(path, None, ["bodies.vane.mass=-1"])
+
+
+def test_resonances_are_followed_over_the_mass(sample: ModalBasis, folder: Path) -> None:
+    """`optimum --over bodies.vane.mass`: sticking nearly, the first resonance falls with the root of the mass (2 %)."""
+    path = case(folder, "")
+    law = 'law = "smooth"\npoints = [2, 2]'
+    path.write_text(path.read_text().replace('law = "jenkins"', law).replace("amplitude = 2.0", "amplitude = 0.02"))
+    band = ["--set", "sweep.start=280", "--set", "sweep.stop=360", "--set", "samples=32"]
+    ends = ["--low", str(0.9 * sample.mass), "--high", str(1.2 * sample.mass), "--points", "3"]
+    assert main(["optimum", str(path), "--over", "bodies.vane.mass", *ends, *band]) == 1  # no lowest one between
+    with (folder / "build/vane/optimum.csv").open(newline="") as file:
+        rows = [(float(r["bodies.vane.mass"]), float(r["frequency_Hz"])) for r in csv.DictReader(file)]
+    mass, frequency = np.array(rows).T
+    assert len(mass) == 4  # three followed, and the lowest of them once more
+    np.testing.assert_allclose(frequency * np.sqrt(mass), (frequency * np.sqrt(mass))[0], rtol=0.02)
