@@ -8,8 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from .data import (
-    CENTRIFUGAL, Array, GyroscopicModes, Interface, Invariants, ModalBasis, ModalGroup, Rows, RunUp, UserError,
-)  # fmt: skip
+    CENTRIFUGAL,
+    Array,
+    GyroscopicModes,
+    Interface,
+    Invariants,
+    ModalBasis,
+    ModalGroup,
+    Rows,
+    RunUp,
+    UserError,
+)
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
