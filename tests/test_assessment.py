@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import basis as small_basis
 
-from microslip.assessment import assess, draw, families, has_stresses, over_engine_order, write_shape
+from microslip.assessment import Resonance, assess, draw, families, has_stresses, over_engine_order, over_force, write_shape
 from microslip.operating import MaterialLimits
 from microslip.operating.stress import cycle_stress
 from microslip.results import Body, Response, response_of
@@ -109,6 +109,24 @@ def test_resonances_are_followed_over_the_normal_force(response: Response) -> No
         "near 112 Hz": [112.0, 100.0, 90.0], "near 230 Hz": [230.0, 210.0, 200.0], "near 500 Hz": [500.0],
         "near 85 Hz": [85.0],
     }  # fmt: skip
+
+
+def test_the_most_stressed_resonance_is_never_left_out(response: Response) -> None:
+    """One that is there at a single normal force is drawn if it is the highest there, and left out if it is not."""
+    from dataclasses import replace
+
+    found = assess(response, small_basis(), "tip-probe")
+    one = found.resonances[0]
+
+    def at(normal: float, frequency: float, stress: float) -> Resonance:
+        worst = replace(one.worst, amplitude=stress)
+        return replace(one, normal_force=normal, frequency=frequency, worst=worst)
+
+    steady = [at(n, 240.0, 5e6) for n in (10.0, 100.0, 1000.0)]
+    few = (*steady, at(10.0, 23.0, 8e8), at(100.0, 120.0, 1e6))
+    lines = over_force(replace(found, resonances=few))
+    assert lines == {"near 240 Hz": [(1000.0, 5.0), (100.0, 5.0), (10.0, 5.0)], "near 23 Hz": [(10.0, 800.0)]}
+    assert over_force(replace(found, resonances=few[1:2])) == {}
 
 
 def test_stress_over_engine_orders(response: Response) -> None:

@@ -208,7 +208,7 @@ def draw(
         )
     out = ", ".join(f"{r.normal_force:g} N" for r in found.resonances if r.lifts)
     out = f"\n(left out: {out}, where contacts would lift off)" if out else ""
-    if lines := _over_force(found):
+    if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
             lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force{out}",
             folder / "stress_over_normal_force.png",
@@ -246,13 +246,22 @@ def families(found: Assessment) -> dict[str, list[Resonance]]:
     return {f"near {line[0].frequency:.4g} Hz": line for line in lines}
 
 
-def _over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
-    """Normal force, N, and stress amplitude, MPa, of every family of more than two resonances that are valid."""
+def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
+    """Normal force, N, and stress amplitude, MPa, of families of resonances that are valid.
+
+    Of more than two of them, or with one that is the highest at its normal force.
+    """
     valid = {name: [r for r in line if not r.lifts] for name, line in families(found).items()}
+    highest: dict[float, Resonance] = {}
+    for r in (r for line in valid.values() for r in line):
+        if r.normal_force not in highest or r.worst.amplitude > highest[r.normal_force].worst.amplitude:
+            highest[r.normal_force] = r
+    if len(highest) < 3:
+        return {}
     return {
         name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line]
         for name, line in valid.items()
-        if len(line) > 2
+        if len(line) > 2 or any(r is highest[r.normal_force] for r in line)
     }
 
 
