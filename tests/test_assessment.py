@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from small import basis as small_basis
 
-from microslip.assessment import Resonance, assess, draw, families, has_stresses, over_engine_order, over_force, write_shape
+from microslip.assessment import (
+    Resonance,
+    assess,
+    draw,
+    families,
+    has_stresses,
+    over_engine_order,
+    over_force,
+    write_shape,
+)
 from microslip.operating import MaterialLimits
 from microslip.operating.stress import cycle_stress
 from microslip.results import Body, Response, response_of
