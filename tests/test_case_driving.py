@@ -227,7 +227,7 @@ def test_aerodynamics_need_a_ring_of_waves(tmp_path) -> None:
     with pytest.raises(UserError, match='write model = "sector"'):
         load_case(path)
     path.write_text(text.replace("full", "sector"))
-    with pytest.raises(UserError, match=r"case.toml: bodies.blade.aerodynamics: .*cannot be read"):
+    with pytest.raises(UserError, match=r"case.toml: bodies.blade.aerodynamics: .*aero.csv: there is no such table"):
         build(load_case(path)[0], {"blade": blade()}, path)
 
 
