@@ -7,12 +7,15 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from microslip import running
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
+from microslip.case.run import _lifting
 from microslip.cli import main
 from microslip.data import UserError
 from microslip.harmonic_balance.orbits import orbits
@@ -114,6 +117,18 @@ def test_the_books_mode_says_where_contacts_would_lift_off(folder: Path, amplitu
     running.respond(folder / "case.toml", None, few)
     remarks = json.loads((folder / "build/vane/response.json").read_text())["remarks"]
     assert any("points of right would lift off" in r for r in remarks) == told
+
+
+def test_the_contact_of_a_whole_ring_that_lifts_off_is_named() -> None:
+    """The last of four, of which the case file names the first alone."""
+    contacts = [SimpleNamespace(name=f"right of {i}") for i in range(4)]
+    built = SimpleNamespace(settings=SimpleNamespace(mode="book"), assembly=SimpleNamespace(contacts=contacts[:1]))
+    ring = SimpleNamespace(assembly=SimpleNamespace(contacts=contacts))
+    share = np.zeros((3, 4))
+    share[1, 3] = 0.25
+    found = SimpleNamespace(converged=np.ones(3, dtype=bool), open=share, frequency=np.array([10.0, 20.0, 30.0]))
+    (said,) = _lifting(built, ring, found, 5.0)
+    assert "points of right of 3 would lift off, for 25 % of points and time at 20 Hz" in said
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,7 @@ def _by_laws(
         found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
         responses[key] = found
         remarks += _not_periodic(key, found.unsteady, built.settings)
-        remarks += _lifting(built, found, key)
+        remarks += _lifting(built, problem, found, key)
         remarks += left.out(problem, found, resonances[key], key) if left else _truncated(built, problem, found, key)
         if key == max(responses):
             k = [c.stiffness for c in problem.assembly.contacts]
@@ -359,14 +359,14 @@ OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a remark is made."""
 
 
-def _lifting(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
+def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
     """A remark where points would lift off in the book's mode, whose friction does not know of it."""
     share = np.where(found.converged[:, None], found.open, 0.0)
     if built.settings.mode != "book" or share.max(initial=0.0) <= OPEN:
         return []
     at, which = np.unravel_index(int(share.argmax()), share.shape)
     return [
-        f"At F_N = {normal:g} N points of {built.assembly.contacts[which].name} would lift off, for "
+        f"At F_N = {normal:g} N points of {problem.assembly.contacts[which].name} would lift off, for "
         f"{100 * share[at, which]:.2g} % of points and time at {found.frequency[at]:.6g} Hz; the book's mode takes "
         'their friction for that of a closed contact: compare with mode = "marched".'
     ]

@@ -314,11 +314,6 @@ def _length(memory: Array) -> Array:
     return jnp.sqrt(jnp.sum(memory**2, axis=-2))
 
 
-def _chosen(first: Array, one: State, other: State) -> State:
-    """One of two trees of the same form."""
-    return jax.tree_util.tree_map(lambda x, y: jnp.where(first, x, y), one, other)
-
-
 class _Newton:
     """((1 + d) I - P')^-1 of every slider, where it is regular, as it is of laws that dissipate; elsewhere I.
 
