@@ -19,6 +19,7 @@ from microslip.contact.law import history
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.periodic import cycles
 from microslip.contact.point import PointContact, PointState
+from microslip.harmonic_balance.orbits import exact
 
 MU, N0, K = 0.4, 100.0, 2e7
 LIMIT = MU * N0
@@ -83,8 +84,8 @@ def test_masing_the_way_back_is_the_first_loading_twice_as_large() -> None:
 
 
 def test_on_a_circle_the_force_lags_by_a_constant_angle_and_loses_its_sine() -> None:
-    """Radius a beyond the limit: lag arccos(mu N/(k a)), 2 pi a mu N sin(lag) a turn. Backward Euler meets both with
-    the first power of the step."""
+    """Radius a beyond the limit: lag arccos(mu N/(k a)), 2 pi a mu N sin(lag) a turn. Straight ways between the
+    samples meet both with the second power of the step."""
     a = 2 * LIMIT / K
     lag, errors, losses = np.arccos(0.5), [], []
     samples = (64, 256, 1024)
@@ -99,7 +100,47 @@ def test_on_a_circle_the_force_lags_by_a_constant_angle_and_loses_its_sine() -> 
             abs(contract.work(force[:, None], np.asarray(u[..., 1:]))[0][0] / (2 * np.pi * a * LIMIT) - np.sin(lag))
         )
     orders = [np.polyfit(np.log(samples), np.log(e), 1)[0] for e in (errors, losses)]
-    assert errors[-1] < 5e-3 and orders[0] == pytest.approx(-1, abs=0.1) and orders[1] < -0.9
+    assert errors[0] < 4e-3 and orders == pytest.approx([-2, -2], abs=0.1)
+
+
+def first_harmonics(law, motion, samples):
+    """(n, 3) complex first harmonics of the force of n points on periodic paths, motion(t) of (s, n, 3)."""
+    t = 2 * np.pi * np.arange(samples) / samples
+    force = np.asarray(CYCLES(law, jnp.asarray(motion(t[:, None])), 1.0, 60, 1e-12)[0])
+    return 2 / samples * np.einsum("snk,s->nk", force, np.exp(-1j * t))
+
+
+@pytest.mark.parametrize("axes", [(2.0, 1.0), (1.3, 0.9)], ids=["slides", "sticks twice"])
+def test_on_an_ellipse_the_force_is_of_second_order_in_the_samples(axes) -> None:
+    """Against the orbit's own tables (Sextro 5.2-15 to 5.2-30), made otherwise; 0.3 % of the limit with 64 samples."""
+    a, b = axes
+    K_eta, K_zeta = exact(np.array([a]), np.array([b]))[:, 0]
+    right = np.array([a * K_eta, -1j * b * K_zeta]) * LIMIT
+    samples, errors = (16, 32, 64, 128), []
+    for s in samples:
+        shape = LIMIT / K * np.array([0.0, a, b])
+        found = first_harmonics(JENKINS, lambda t, way=shape: np.stack([0 * t, np.cos(t), np.sin(t)], axis=-1) * way, s)
+        errors.append(np.abs(found[0, 1:] - right).max() / LIMIT)
+    assert errors[2] < 3e-3
+    assert np.polyfit(np.log(samples), np.log(errors), 1)[0] == pytest.approx(-2, abs=0.1)
+
+
+@pytest.mark.parametrize("swing", [0.8, 1.2], ids=["stays closed", "opens"])
+def test_a_rough_contact_whose_load_swings_is_of_second_order_in_the_samples(swing) -> None:
+    """It slides and comes back, and its area comes and goes: eight phases of the load, root mean square of the error
+    against 2048 samples."""
+    law, phase = PointContact(ROUGH, Coulomb(value(MU)), value(K)), np.arange(8) * np.pi / 4
+
+    def motion(t):
+        way = [1 + swing * np.cos(t + phase), 1.5 * np.cos(t) + 0.3 * np.sin(2 * t), np.sin(t) + 0 * phase]
+        return np.stack(np.broadcast_arrays(*way), axis=-1) * [12e-6, 3e-5, 2e-5]
+
+    samples = (32, 64, 128, 256)
+    right = first_harmonics(law, motion, 2048)
+    wrong = [np.abs(first_harmonics(law, motion, s) - right)[:, 1:] for s in samples]
+    errors = np.sqrt(np.mean(np.square(wrong), axis=(1, 2)) / np.mean(np.abs(right[:, 1:]) ** 2))
+    assert errors[1] < 2e-3
+    assert np.polyfit(np.log(samples), np.log(errors), 1)[0] == pytest.approx(-2, abs=0.1)
 
 
 def test_a_varying_normal_load_is_followed_while_sliding() -> None:
@@ -236,19 +277,19 @@ def test_without_preload_a_closed_contact_has_friction() -> None:
 
 def stretched(share, elastic):
     """State of one point that has been loaded."""
-    return PointState(
-        jnp.zeros((2, 1)), jnp.asarray([[elastic], [0.0]]), jnp.asarray([share]), jnp.zeros((2, 1)), jnp.zeros(1)
-    )
+    zero = jnp.zeros((2, 1))
+    held = jnp.asarray([elastic])
+    return PointState(zero, jnp.asarray([[elastic], [0.0]]), held, jnp.asarray([share]), zero, jnp.zeros(1))
 
 
 def test_area_that_is_lost_takes_its_force_with_it_and_area_that_comes_carries_nothing_yet() -> None:
-    """Half of the share: half of the force; more share: the same force, but a steeper increment."""
+    """Half of the share: half of the force; more share: the same force, but a steeper increment, of the mean share."""
     law = PointContact(ROUGH, Coulomb(value(50.0)), value(K))
     half, whole = 0.5 * 12e-6, 12e-6
     lifted = STEP(law, jnp.asarray([[half, 0, 0]]), jnp.zeros((1, 3)), 1.0, stretched(1.0, 10.0))[0]
     pressed = STEP(law, jnp.asarray([[whole, 0, 0]]), jnp.zeros((1, 3)), 1.0, stretched(0.5, 10.0))[0]
     moved = STEP(law, jnp.asarray([[whole, 1e-7, 0]]), jnp.zeros((1, 3)), 1.0, stretched(0.5, 10.0))[0]
-    assert np.allclose([lifted[0, 1], pressed[0, 1], moved[0, 1]], [5.0, 10.0, 10.0 + K * 1e-7], rtol=1e-12)
+    assert np.allclose([lifted[0, 1], pressed[0, 1], moved[0, 1]], [5.0, 10.0, 10.0 + 0.75 * K * 1e-7], rtol=1e-12)
 
 
 def test_the_printed_form_gives_energy_and_this_one_does_not() -> None:

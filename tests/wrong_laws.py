@@ -35,10 +35,11 @@ class Box(PointContact):
             super(Box, self).step(u.at[:, 3 - i].set(0.0), v, dt, self._only(i, state)) for i in (1, 2)
         )
         force = first.at[:, 2].set(second[:, 2])
-        both = [
-            jnp.stack([a[0], b[1]]) for a, b in zip(after_1[:2] + after_1[3:4], after_2[:2] + after_2[3:4], strict=True)
-        ]
-        return force, PointState(both[0], both[1], after_1.share, both[2], after_1.time)
+        both = {
+            key: jnp.stack([getattr(after_1, key)[0], getattr(after_2, key)[1]])
+            for key in ("tangential", "elastic", "slipped")
+        }
+        return force, after_1._replace(**both)
 
     def _only(self, i: int, state: PointState) -> PointState:
         keep = jnp.eye(2)[i - 1][:, None]

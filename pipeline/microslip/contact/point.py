@@ -19,10 +19,12 @@ from .normal import Normal
 
 
 class PointState(NamedTuple):
-    """State of n points: u_t (2, n) m, elastic force (2, n) N, share (n,), slip (2, n) m, time (n,) s."""
+    """State of n points: u_t (2, n) m, elastic force (2, n) N, what friction holds (n,) N, share (n,), slip (2, n) m,
+    time (n,) s."""
 
     tangential: Array
     elastic: Array
+    held: Array
     share: Array
     slipped: Array
     time: Array
@@ -37,6 +39,9 @@ class PointContact(Law):
     Here area that comes into contact carries nothing yet (the force grows by increments), and area that is lost takes
     its part of the force with it (the force is rescaled). With the energy F^2 / (2 k share) every step then
     dissipates or does nothing; on a constant area both forms are one.
+
+    With a constant coefficient, one stiffness and no damper a step is the exact one along a straight way (`dragged`),
+    of second order in the samples on a curved path. Otherwise it is the return map of the step's end, of first order.
 
     Attributes:
         normal: normal law. friction: characteristic. stiffness_1: tangential stiffness along t1 of the full area
@@ -53,23 +58,30 @@ class PointContact(Law):
     includes: str = static(default=BULK_AND_SURFACE)
 
     def init(self, n: int) -> PointState:
-        return PointState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n), jnp.zeros((2, n)), jnp.zeros(n))
+        pair, one = jnp.zeros((2, n)), jnp.zeros(n)
+        return PointState(pair, pair, one, one, pair, one)
 
     def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
         approach, tangential = u.T[0], u.T[1:]
         share = self.normal.share(approach)
         pressed = self._pressed(approach, v.T[0])
-        springs = self._springs(share)
-        relaxed = state.elastic * jnp.minimum(ratio(share, state.share), 1.0)
+        springs = self._springs(met(share, state.share))
+        left = jnp.minimum(ratio(share, state.share), 1.0)
+        relaxed = state.elastic * left
         stiffness = springs if self.damping is None else springs * (1 + self.damping / dt)
-        trial = relaxed + stiffness * (tangential - state.tangential)
+        way = stiffness * (tangential - state.tangential)
         time = state.time + dt
-        theta = self._kept(trial, stiffness, pressed, dt, time)
-        force = trial * weight(theta, self._relative(stiffness))
+        if self._straight:
+            held = self.friction.coefficient(jnp.zeros_like(pressed), pressed, time) * pressed
+            force = dragged(relaxed, way, state.held * left, held)
+        else:
+            held = state.held
+            theta = slide(relaxed + way, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
+            force = (relaxed + way) * weight(theta, self._relative(stiffness))
         stretched = ratio(force - relaxed, stiffness)
         elastic = force if self.damping is None else relaxed + springs * stretched
         slipped = state.slipped + jnp.where(share > 0, tangential - state.tangential - stretched, 0.0)
-        after = PointState(tangential, elastic, share, slipped, time)
+        after = PointState(tangential, elastic, held, share, slipped, time)
         return jnp.concatenate([pressed[None], force]).T, after
 
     def memory(self, force: Array, state: PointState) -> Array:
@@ -105,13 +117,53 @@ class PointContact(Law):
             return None
         return ratio(stiffness, jnp.max(stiffness, axis=0), 1.0)
 
-    def _kept(self, trial: Array, stiffness: Array, pressed: Array, dt: Array | float, time: Array) -> Array:
-        """(n,) theta of `weight` at which the force has come down to what friction can hold: 1 sticks."""
-        tried = norm(trial)
-        if self.stiffness_2 is None and self.friction.constant:
-            held = self.friction.coefficient(tried, pressed, time) * pressed
-            return jnp.where(tried > held, ratio(held, tried), 1.0)
-        return slide(trial, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
+    @property
+    def _straight(self) -> bool:
+        """Whether steps are those of `dragged`."""
+        return self.stiffness_2 is None and self.damping is None and self.friction.constant
+
+
+def met(after: Array, before: Array) -> Array:
+    """What a spring's stiffness counts over a step from ``before`` to ``after``: area that comes carries from then on.
+
+    Half of what came, on average; what goes takes its force with it, exactly as if it had been gone all the time. Of a
+    contact that was open it is all: where in the step it closed is not known.
+    """
+    return jnp.where(before > 0, 0.5 * (after + jnp.minimum(after, before)), after)
+
+
+def dragged(force: Array, way: Array, before: Array, held: Array) -> Array:
+    """The force of a spring after its slider was dragged along a straight way.
+
+    The spring takes up the way until its force is what friction holds, R. From there its angle beta to the way obeys
+    R d beta = -sin(beta) ds, because the slip has the direction of the force: tan(beta / 2) falls as exp(-s / R),
+    exact whatever the length of the way. R goes straight from one end of the way to the other, of which the fall of
+    the angle takes the mean.
+
+    Args:
+        force: (2, ...) N before, not longer than ``before``. way: (2, ...) stiffness times displacement, N. before,
+            held: (...) N, R at the beginning and at the end.
+
+    Returns:
+        (2, ...) N, not longer than ``held``.
+    """
+    trial = force + way
+    tried, length, grows = norm(trial), norm(way), held - before
+    room = jnp.maximum(before**2 - jnp.sum(force**2, axis=0), 0.0)
+    a, b = length**2 - grows**2, jnp.sum(force * way, axis=0) - before * grows
+    found = root(b**2 + a * room)  # where a s^2 + 2 b s = room the force reaches R
+    share = jnp.clip(jnp.where(b > 0, ratio(room, b + found), ratio(found - b, a)), 0.0, 1.0)
+    reached, on_cone = before + share * grows, force + share * way
+    e = ratio(way, length)
+    along, across = jnp.sum(e * on_cone, axis=0), e[0] * on_cone[1] - e[1] * on_cone[0]
+    left = jnp.exp(-ratio(2 * (1 - share) * length, reached + held))
+    ahead = along >= 0  # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
+    cosine, sine = jnp.where(ahead, reached + along, across), jnp.where(ahead, across, reached - along) * left
+    size = cosine**2 + sine**2
+    x, y = cosine**2 - sine**2, 2 * cosine * sine
+    turned = ratio(jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), size)
+    slid = held * jnp.where(size > 0, turned, ratio(trial, tried))
+    return jnp.where(tried > held, slid, trial)
 
 
 def weight(theta: Array, relative: Array | None) -> Array:

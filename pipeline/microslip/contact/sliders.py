@@ -18,18 +18,20 @@ from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
 from .friction import Coulomb
 from .heights import Heights, as_table
-from .law import Array, Law, ratio, root, settings, static
+from .law import Array, Law, ratio, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
-from .point import PointContact, slide, weight
+from .point import PointContact, dragged, met, slide, weight
 from .series import BULK
 
 
 class SliderState(NamedTuple):
-    """State of m sliders at n points: u_t (2, n) m, elastic forces (m, 2, n) N, springs (m, n) N/m, slip (2, n) m."""
+    """State of m sliders at n points: u_t (2, n) m, elastic forces (m, 2, n) N, their limits (m, n) N, springs (m, n)
+    N/m, slip (2, n) m."""
 
     tangential: Array
     elastic: Array
+    limits: Array
     springs: Array
     slipped: Array
 
@@ -53,19 +55,24 @@ class Sliders(Law):
         raise NotImplementedError
 
     def init(self, n: int) -> SliderState:
-        m = self.count()
-        return SliderState(jnp.zeros((2, n)), jnp.zeros((m, 2, n)), jnp.zeros((m, n)), jnp.zeros((2, n)))
+        pair, each = jnp.zeros((2, n)), jnp.zeros((self.count(), n))
+        return SliderState(pair, jnp.zeros((self.count(), 2, n)), each, each, pair)
 
     def step(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> tuple[Array, SliderState]:
         pressed, springs, limits = self.local(u.T[0])
         moved = u.T[1:] - state.tangential
-        relaxed = state.elastic * jnp.minimum(ratio(springs, state.springs), 1.0)[:, None]
-        both = self._both(springs)
-        trial = relaxed + both * moved
-        elastic = _held(trial, limits) if self.stiffness_ratio is None else _held_of_two(trial, both, limits)
-        slipped = state.slipped + ratio(jnp.sum(trial - elastic, axis=0), jnp.sum(both, axis=0))
+        left = jnp.minimum(ratio(springs, state.springs), 1.0)
+        relaxed = state.elastic * left[:, None]
+        both = self._both(met(springs, state.springs))
+        way = both * moved
+        if self.stiffness_ratio is None:
+            of_each = (jnp.moveaxis(part, 1, 0) for part in (relaxed, way))
+            elastic = jnp.moveaxis(dragged(*of_each, state.limits * left, limits), 0, 1)
+        else:
+            elastic = _held_of_two(relaxed + way, both, limits)
+        slipped = state.slipped + ratio(jnp.sum(relaxed + way - elastic, axis=0), jnp.sum(both, axis=0))
         force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
-        return force.T, SliderState(u.T[1:], elastic, springs, slipped)
+        return force.T, SliderState(u.T[1:], elastic, limits, springs, slipped)
 
     def memory(self, force: Array, state: SliderState) -> Array:
         return state.elastic
@@ -94,14 +101,9 @@ class Sliders(Law):
         return jnp.stack([springs, springs * self.stiffness_ratio], axis=1)
 
 
-def _held(trial: Array, limits: Array) -> Array:
-    """(m, 2, n) what friction holds of the trial forces: the radial return, the closest point for equal springs."""
-    tried = root(jnp.sum(trial**2, axis=1))
-    return trial * jnp.where(tried > limits, ratio(limits, tried), 1.0)[:, None]
-
-
 def _held_of_two(trial: Array, stiffness: Array, limits: Array) -> Array:
-    """The same for unequal springs (m, 2, n), with friction that opposes the slip (`point.weight`)."""
+    """(m, 2, n) what friction holds of the trial forces behind unequal springs (m, 2, n): it opposes the slip
+    (`point.weight`)."""
     forces, springs = (jnp.moveaxis(part, 1, 0).reshape(2, -1) for part in (trial, stiffness))
     relative, flat = ratio(springs, jnp.max(springs, axis=0), 1.0), limits.reshape(-1)
     theta = slide(forces, springs, relative, Coulomb(jnp.ones(())), flat, 1.0, jnp.zeros(()))
