@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +16,7 @@ from microslip.contact.point import PointContact
 from microslip.data import ModalBasis
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
+from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, across, touching
@@ -143,3 +145,25 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
         assert point.converged
         found.append(response.operating(problem, point))
     np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * np.abs(found[0].watched).max())
+
+
+@pytest.mark.parametrize("form", ["relative", "sides"])
+def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
+    """Every order of two bodies and of three read-outs, two of them of one body: each row is the read-out's own, and
+    so is the one that peaks are followed by (1e-9)."""
+    ring = sector(2, 1).unrolled()
+    kinds = (Watch("blade_0", "tip", "u_x"), Watch("blade_1", "tip", "u_y"), Watch("blade_0", "tip", "u_y"))
+    loads = (ring.loads[0],)  # on the first blade only, so that the two move differently
+    Omega, right = 2 * np.pi * 60.0, None
+    for members in permutations(ring.members):
+        for watches in permutations(kinds):
+            p = balance.of(Assembly(members, ring.contacts, loads, watches), form=form, **(FINE | {"harmonics": 1}))
+            point = newton(p.at(Omega), p.at(Omega).reference)
+            assert point.converged
+            rows = response.operating(p, point).watched[:, 1]
+            found, at = dict(zip(watches, rows, strict=True)), p.at(Omega)
+            right = right or found
+            for i, w in enumerate(watches):
+                assert found[w] == pytest.approx(right[w], rel=1e-9)
+                assert amplitude(at, point.x, *at.forces(point.x), watch=i).value == pytest.approx(right[w], rel=1e-9)
+    assert len({f"{abs(y):.3e}" for y in right.values()}) == 3

@@ -35,17 +35,14 @@ def amplitude(
     v, f = at.amplitudes(p.displacement(x))[h], at.amplitudes(force)[h]
     of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
     value, by_Omega = 0.0j, 0.0j
-    first = 0
     for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices(), strict=True):
-        if first <= watch < first + len(part.watch):
-            row, beside = part.watch[watch - first], part.watch_residual[watch - first]
-            excess = f[s] - k @ v[s]
-            driven = share * (row @ seen.modal + part.watch_given[watch - first])
-            value = complex(driven - row @ (seen.modal_compliance @ excess) - beside @ f[s])
-            by_Omega = complex(share * (row @ seen.modal_rate) - row @ (seen.modal_compliance_rate @ excess))
-            of_force[s] = -(row @ seen.modal_compliance + beside)
-            of_motion[s] = row @ seen.modal_compliance @ k
-        first += len(part.watch)
+        row, beside = part.watch[watch], part.watch_residual[watch]
+        excess = f[s] - k @ v[s]
+        driven = share * (row @ seen.modal + part.watch_given[watch])
+        value += complex(driven - row @ (seen.modal_compliance @ excess) - beside @ f[s])
+        by_Omega += complex(share * (row @ seen.modal_rate) - row @ (seen.modal_compliance_rate @ excess))
+        of_force[s] = -(row @ seen.modal_compliance + beside)
+        of_motion[s] = row @ seen.modal_compliance @ k
     by_v = _through(p, of_force, slopes, h)
     for wave, unit in _waves(h):
         by_v[wave] += unit * of_motion

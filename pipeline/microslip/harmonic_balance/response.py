@@ -57,7 +57,7 @@ def operating(problem: Problem, point: Point) -> Operating:
     for h, parts in enumerate(p.parts):
         each = list(zip(parts, q[h], [f[h][s] for s in p.slices()], strict=True))
         share = p.share if h else 1.0
-        watched.append(np.concatenate([reduced.monitored(part, own, F, share) for part, own, F in each]))
+        watched.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
         if h:
             work += np.sum([reduced.work(part, at.Omega, h, own, F, share) for part, own, F in each], axis=0)
     return Operating(

@@ -277,7 +277,8 @@ class Linear:
         M, K, C: (m, m); C with the gyroscopic matrix. rows: (c, m) motion along the contact coordinates.
         residual: (c, c) static compliance along them that the coordinates leave out, m/N.
         load: (m,) amplitude of the generalised force. given: (c,) motion by the loads beside the coordinates, m.
-        watch: (w, m) read-outs. watch_residual: (w, c) and watch_given: (w,) of them beside the coordinates.
+        watch: (w, m) all read-outs of the assembly in its order, zero where another member is read; those of several
+            parts add up. watch_residual: (w, c) and watch_given: (w,) of them beside the coordinates.
     """
 
     M: Array
@@ -329,7 +330,6 @@ class Assembly:
         index, at = self.index(harmonic), member.at(self.index(harmonic))
         sides = [s for _, _, s in self.sides(member.name)]
         loads = [x for x in self.loads if x.member == member.name and x.harmonic == harmonic]
-        watches = [w for w in self.watches if w.member == member.name]
         M, K, C = at.matrices
         m = len(M)
         T = [s.motion(at, index, self.blades) for s in sides]
@@ -341,8 +341,11 @@ class Assembly:
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]
         forced = [_load_label(at.group.excitations[x.row], x.row) for x in loads]
-        seen = [f"monitor:{w.monitor}:{w.label}" for w in watches]
-        watch = np.array([at.monitor(w.monitor, w.label) for w in watches]).reshape(-1, m)
+        own = [w.member == member.name for w in self.watches]
+        seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.watches, own, strict=True)]
+        zero = np.zeros(m)
+        watch = np.array([at.monitor(w.monitor, w.label) if mine else zero
+                          for w, mine in zip(self.watches, own, strict=True)]).reshape(-1, m)  # fmt: skip
         return Linear(
             M, K, C, rows, A @ at.residual(labels, labels) @ A.conj().T, f,
             A @ (at.residual(labels, forced) @ amplitudes), watch, at.residual(seen, labels) @ A.conj().T,
@@ -456,8 +459,8 @@ def join(parts: Sequence[Linear], E: Array) -> Linear:
         diag(*[p.M for p in parts]), diag(*[p.K for p in parts]), diag(*[p.C for p in parts]),
         E @ diag(*[p.rows for p in parts]), residual,
         np.concatenate([p.load for p in parts]), E @ np.concatenate([p.given for p in parts]),
-        diag(*[p.watch for p in parts]), diag(*[p.watch_residual for p in parts]) @ E.T,
-        np.concatenate([p.watch_given for p in parts]),
+        np.hstack([p.watch for p in parts]), np.hstack([p.watch_residual for p in parts]) @ E.T,
+        np.sum([p.watch_given for p in parts], axis=0),
     )  # fmt: skip
 
 
