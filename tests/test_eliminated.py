@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from test_harmonic_balance_time import group, held
+
+from microslip.contact.sliders import jenkins
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance import reduced, response
+from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.reduced import Eliminated, seen
+from microslip.harmonic_balance.solver import solve
 from microslip.system.assembly import Linear
 
 
@@ -57,4 +64,28 @@ def test_eigenvalues_that_tell_too_little_are_not_used() -> None:
     whole = Eliminated((free, free), np.eye(4))
     assert whole.poles is None
     with pytest.raises(np.linalg.LinAlgError):
-        whole.at(10.0)  # its mean is nowhere
+        whole.directly(10.0)  # its mean is nowhere
+
+
+@pytest.mark.parametrize("by_eigenvalues", [True, False])
+def test_without_damping_the_resonance_of_the_stuck_contact_is_a_point_as_any(by_eigenvalues, monkeypatch) -> None:
+    """Two masses on springs of 1 and 2.5, a slider of spring 3 on one of them, no damping, driven at the resonances of
+    the sticking contact: the excitation's work is the friction's loss, and what is read is between what is
+    read a thousandth beside it."""
+    if not by_eigenvalues:
+        monkeypatch.setattr(reduced, "POLES_AT_MOST", 0)
+    squares, tip = np.array([1.0, 2.5]), np.array([1.0, 0.6])
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], tip), "push": np.array([1.0, -0.4]), "tip": np.array([0.3, 1.0])}
+    one = held(group(np.sqrt(squares), rows, 0.0), jenkins(3.0, 0.25, 1.0), [1], np.zeros(1), np.zeros(1), 0.3)
+    p = balance.of(one, 3, 128, length=0.1)
+    for stuck in np.sqrt(np.linalg.eigvalsh(np.diag(squares) + 3.0 * np.outer(tip, tip))):
+        found = []
+        for Omega in stuck * np.array([0.999, 1.0, 1.001]):
+            point, at = solve(p, Omega, []), p.at(Omega)
+            assert point.converged
+            o = response.operating(p, point)
+            lost = sum(float(c.dissipated.sum()) for c in o.cycles.values())
+            assert o.supplied == pytest.approx(lost, rel=2e-3) and lost > 0  # the loss by the trapezoidal rule
+            assert amplitude(at, point.x, *at.forces(point.x)).value == pytest.approx(o.watched[0, 1], rel=1e-9)
+            found.append(abs(o.watched[0, 1]))
+        assert found[1] == pytest.approx(0.5 * (found[0] + found[2]), rel=1e-4)

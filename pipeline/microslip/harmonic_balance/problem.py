@@ -23,6 +23,9 @@ from .forces import Forces
 from .patch import Cycle
 from .reduced import Eliminated, Seen, View
 
+SOFTER = 0.7
+"""Share of the reference stiffness that serves where the assembly with all of it is at resonance without damping."""
+
 RELATIVE_AT_MOST = 8
 """Members up to which all are eliminated together."""
 
@@ -159,7 +162,16 @@ class Problem:
 
     def at(self, Omega: float) -> AtFrequency:
         """The problem at one frequency (rad/s)."""
-        return AtFrequency(self, Omega, tuple(one.at(Omega) for one in self.eliminated))
+        views = [one.at(Omega) for one in self.eliminated]
+        if all(views):
+            return AtFrequency(self, Omega, tuple(v for v in views if v))
+        softer = self._softer
+        return AtFrequency(softer, Omega, tuple(one.directly(Omega) for one in softer.eliminated))
+
+    @cached_property
+    def _softer(self) -> Problem:
+        """The same about other stiffnesses, for resonances that these make and no damping limits."""
+        return replace(self, stiffness=tuple(SOFTER * k for k in self.stiffness))
 
     def evaluate(self, x: Array, Omega: float) -> tuple[Array, Array, Array]:
         """R, dR/dx and dR/dOmega (Omega in rad/s); (k,), (k, k), (k,)."""

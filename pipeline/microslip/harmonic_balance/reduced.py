@@ -13,7 +13,8 @@ from the preloaded state. With a stiffness k of the contacts taken into the left
     d_h = d_ref,h - D_h g_h
 
 Any k gives the same answer. That of the sticking contact keeps everything finite: at resonances of the free body,
-for a body that nothing but its contacts holds, and the numbers subtracted are of the size of the result.
+for a body that nothing but its contacts holds, and the numbers subtracted are of the size of the result. At a
+resonance of the body with sticking contacts, without damping, another k does.
 """
 
 from __future__ import annotations
@@ -94,6 +95,11 @@ class Poles:
     static: ComplexArray
     given: ComplexArray
 
+    def met(self, Omega: float) -> bool:
+        """Whether a frequency (rad/s) or a harmonic of it is, within `MET`, an eigenvalue."""
+        distance = np.abs(1j * Omega * self.harmonics[:, None] - self.values)
+        return bool((distance <= MET * np.abs(self.values)).any())
+
     def fill(self, view: View, Omega: float) -> None:
         """What these harmonics are at a frequency (rad/s), into a view."""
         h = self.harmonics
@@ -116,10 +122,13 @@ class Eliminated:
     parts: Sequence[Linear]
     stiffness: Array
 
-    def at(self, Omega: float) -> View:
-        """As seen from the contacts at a frequency (rad/s)."""
+    def at(self, Omega: float) -> View | None:
+        """As seen from the contacts at a frequency (rad/s); None where it is that of a resonance without damping, so
+        that the numbers subtracted are without bounds."""
         if self.poles is None:
-            return self.directly(Omega)
+            return self._far(Omega)
+        if any(group.met(Omega) for group in self.poles):
+            return None
         H, c = len(self.parts), len(self.stiffness)
         view = View(*[np.empty((H, c, c)[:n], complex) for n in (2, 3, 2, 3)])
         for group in self.poles:
@@ -128,9 +137,20 @@ class Eliminated:
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
-        found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
-        names = ("reference", "compliance", "reference_rate", "compliance_rate")
-        return View(*[np.array([getattr(one, name) for one in found]) for name in names])
+        return _view([seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)])
+
+    def _far(self, Omega: float) -> View | None:
+        """`directly`, or None as `at` says: by how fast the coordinates change with the frequency."""
+        try:
+            found = [seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)]
+        except np.linalg.LinAlgError:
+            return None
+        for s in found:
+            moved = np.column_stack([s.modal, s.modal_compliance])
+            rates = np.column_stack([s.modal_rate, s.modal_compliance_rate])
+            if not Omega * np.abs(rates).max(initial=0.0) * MET <= np.abs(moved).max(initial=0.0):
+                return None
+        return _view(found)
 
     @cached_property
     def poles(self) -> list[Poles] | None:
@@ -185,8 +205,16 @@ class Eliminated:
         return True
 
 
+MET = 1e-6
+"""Distance of a frequency from a resonance, over it, that costs six of the sixteen digits of a double."""
+
 POLES_AT_MOST = 120
 """Coordinates up to which eigenvalues are found: their cost grows with the cube, and is that of some frequencies."""
+
+
+def _view(found: Sequence[Seen]) -> View:
+    names = ("reference", "compliance", "reference_rate", "compliance_rate")
+    return View(*[np.array([getattr(one, name) for one in found]) for name in names])
 
 
 def _alike(a: Linear, b: Linear) -> bool:

@@ -194,7 +194,7 @@ def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
     at, whole = problem.at(Omega), problem.share
     family = OverLoad(at, max(float(np.abs(at.reference).max(initial=0.0)), 1e-3))
     settings = continuation.Settings(low=0.0, high=whole, points=most, step=0.05, step_max=0.3, branch_points=False)
-    branch = continuation.trace(family, replace(at, problem=problem.loaded(0.0)).reference, 0.0, settings)
+    branch = continuation.trace(family, replace(at, problem=at.problem.loaded(0.0)).reference, 0.0, settings)
     spent = sum(p.evaluations for p in branch.points)
     if branch.points and branch.points[-1].lam == whole:
         point = newton(at, branch.points[-1].x)
