@@ -1,4 +1,4 @@
-"""The estimated error of a truncated balance against solutions with many harmonics."""
+"""The estimated error of a truncated balance against solutions with many harmonics and samples."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from test_harmonic_balance_laws import oscillator, point, three_dof, value
+from test_harmonic_balance_time import group, held
 
 from microslip.case.run import _truncated
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
+from microslip.contact.sliders import jenkins
+from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.accuracy import enough, error, finer
 from microslip.harmonic_balance.response import harmonic_response, of_body, operating
 from microslip.harmonic_balance.solver import solve
@@ -42,19 +45,74 @@ def readout(problem, f):
     return found, abs(operating(problem, found).watched[0, 1])
 
 
-@pytest.mark.parametrize(("make", "f"), [(opening, 22.0), (opening, 30.0), (sliding, 17.0)])
+@pytest.mark.parametrize(("make", "f"), [pytest.param(opening, 22.0, marks=pytest.mark.slow), (sliding, 17.0)])
 def test_the_estimate_is_of_the_size_of_the_error(make, f):
-    """Within a factor of three of the difference to 21 harmonics, wherever that is above 1e-4."""
+    """Of the difference to 21 harmonics it is at least that, and at most ten times, wherever that is above 1e-4."""
     exact = readout(make(MANY), f)[1]
     told = []
     for harmonics in (1, 3, 5):
         problem = make(harmonics)
         found, amplitude = readout(problem, f)
-        estimate, true = error(problem, found.x, found.Omega).readout, abs(amplitude / exact - 1)
-        told.append((harmonics, estimate, true))
+        e, true = error(problem, found.x, found.Omega), abs(amplitude / exact - 1)
+        told.append(e.readout)
         if true > 1e-4:
-            assert true / 3 < estimate < 3 * true
-    assert told[0][2] > 5 * told[2][2]
+            assert true < e.readout < 10 * true
+            assert e.by_harmonics > e.by_samples  # 256 samples
+    assert told[0] > 5 * told[2]
+
+
+def random_system(rng):
+    """One to four modes with a slider on a spring 0.3 to 300 times as stiff: body, spring, limit, rad/s."""
+    m = int(rng.integers(1, 5))
+    omega, tip = np.sort(rng.uniform(0.7, 6, m)), rng.uniform(0.3, 1, m) * rng.choice([-1, 1], m)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], tip), "push": rng.normal(size=m), "tip": rng.normal(size=m)}
+    spring = 10 ** rng.uniform(-0.5, 2.5)
+    body = group(omega, rows, 10 ** rng.uniform(-3, -1.5))
+    return body, spring, rng.uniform(0.05, 0.6), rng.uniform(0.5, 6)
+
+
+def judge(spring, limit, body, Omega, grids):
+    """(true error, estimate, of harmonics, of samples) of every (harmonics, samples), over the true amplitude."""
+    one = held(body, jenkins(spring, 1.0, limit), [1], np.zeros(1), np.zeros(1), 1.0)
+    fine = balance.of(one, 40, 2048, length=limit / spring)
+    exact = solve(fine, Omega, [])
+    right, found = abs(operating(fine, exact).watched[0, 1]), []
+    for harmonics, samples in grids:
+        p = balance.of(one, harmonics, samples, length=limit / spring)
+        point = solve(p, Omega, [exact.x[: p.size]])
+        assert exact.converged and point.converged
+        e = error(p, point.x, Omega)
+        parts = (e.amplitude - right, e.amplitude * e.readout, e.by_harmonics, e.by_samples)
+        found.append(np.abs(parts) / right)
+    return np.array(found)
+
+
+GRIDS = ((1, 64), (3, 64), (3, 32), (7, 64))
+
+
+@pytest.mark.parametrize("systems", [10, pytest.param(60, marks=pytest.mark.slow)])
+def test_the_estimate_covers_the_error_of_random_systems(systems):
+    """Against 40 harmonics and 2048 samples, wherever the error is above 1e-4: in 99 of 100; and more of both leave
+    less."""
+    rng = np.random.default_rng(7)
+    told = np.array(
+        [judge(k, limit, body, w, GRIDS) for body, k, limit, w in (random_system(rng) for _ in range(systems))]
+    )
+    true, estimate, by_harmonics, by_samples = np.moveaxis(told, -1, 0)
+    counts = true > 1e-4
+    assert (estimate >= true)[counts].mean() >= 0.99 and counts.sum() >= systems
+    assert np.median(estimate[counts] / true[counts]) < 4
+    mean = np.sqrt(np.mean(by_harmonics**2, axis=0)), np.sqrt(np.mean(by_samples**2, axis=0))
+    assert mean[0][3] < mean[0][1] < mean[0][0] and mean[1][1] < mean[1][2]
+
+
+def test_where_every_sample_steps_over_the_phases_that_stick_the_estimate_is_not_zero():
+    """A spring 1e4 times as stiff as the body's: it sticks for a hundredth of a cycle. The derivative of the force is
+    zero with 32 samples and with 64. (Of three harmonics the next four change little, and those beyond more.)"""
+    body = group(np.array([1.0, 2.7]), {"face": np.outer([0, 1, 0, 0, 0, 0], [1.0, 0.8]), "push": np.array([1.0, 0.5]),
+                                        "tip": np.array([0.2, 1.0])}, 0.01)  # fmt: skip
+    told = judge(1e4, 0.4, body, 0.9, ((1, 32), (3, 32), (3, 64)))
+    assert (told[:, 0] > 1e-2).all() and (told[:, 1] > 0.7 * told[:, 0]).all()
 
 
 def test_more_harmonics_are_the_same_problem():
@@ -64,6 +122,7 @@ def test_more_harmonics_are_the_same_problem():
     Omega = 2 * np.pi * 22.0
     np.testing.assert_array_equal(many.at(Omega).residual(x), made.at(Omega).residual(x))
     assert few.harmonics == 2 and finer(few, 200).groups[0].model.samples == 1600
+    assert finer(few, 2, 512).groups[0].model.samples == 512
 
 
 def test_harmonics_are_added_until_the_tolerance_is_met():
@@ -71,7 +130,7 @@ def test_harmonics_are_added_until_the_tolerance_is_met():
     found = enough(problem, readout(problem, 22.0)[0], tolerance=2e-3)
     exact = readout(opening(MANY), 22.0)[1]
     amplitude = abs(operating(found.problem, found.point).watched[0, 1])
-    assert found.reached and [e.harmonics for e in found.errors] == [1, 3, 6, 12][: len(found.errors)]
+    assert found.reached and [e.harmonics for e in found.errors] == [1, 5, 10, 20][: len(found.errors)]
     assert abs(amplitude / exact - 1) < 2e-3 < found.errors[-2].readout
     assert not enough(problem, readout(problem, 22.0)[0], tolerance=1e-9, most=4).reached
 
@@ -79,9 +138,9 @@ def test_harmonics_are_added_until_the_tolerance_is_met():
 def test_a_case_says_where_its_harmonics_are_too_few():
     """One harmonic at a contact that slides and opens is remarked on; seven are not."""
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="marched"))
-    for harmonics, count in ((1, 1), (7, 0)):
+    for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
         found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
-        remarks = _truncated(built, problem, found, 8.0)
+        remarks = _truncated(built, problem, found, [], 8.0)
         assert len(remarks) == count
-        assert all(re.match(r"At F_N = 8 N the amplitude at 22 Hz is uncertain by about [\d.]+ %", r) for r in remarks)
+        assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in remarks)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from test_harmonic_balance_time import group, held
 
 from microslip.contact.sliders import jenkins

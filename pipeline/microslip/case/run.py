@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,7 +149,8 @@ def _by_laws(
         responses[key] = found
         remarks += _not_periodic(key, found.unsteady, built.settings)
         remarks += _lifting(built, problem, found, key)
-        remarks += left.out(problem, found, resonances[key], key) if left else _truncated(built, problem, found, key)
+        few = left.out if left else partial(_truncated, built)
+        remarks += few(problem, found, resonances[key], key)
         if key == max(responses):
             k = [c.stiffness for c in problem.assembly.contacts]
             stiff = stuck(problem.assembly.joined(1), scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)))
@@ -294,7 +296,7 @@ TRUNCATION = 0.01
 
 
 class _Left:
-    """What harmonics that are left out would change at the resonances. tolerance, most: shares of the amplitude."""
+    """What harmonics and samples that are left out would change. tolerance, most: shares of the amplitude."""
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance, self.most = tolerance, 0.0
@@ -302,29 +304,21 @@ class _Left:
     def out(
         self, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
     ) -> list[str]:
-        """A remark where no number of harmonics is enough at a resonance, or at the highest point where there is none.
+        """A remark where no number of harmonics is enough at a place that is judged (`accuracy.judged`).
 
         Raises:
             _TooFew: more of them are.
         """
-        from ..harmonic_balance.accuracy import enough
-        from ..harmonic_balance.solver import solve
+        from ..harmonic_balance.accuracy import FLOOR, enough, judged
 
-        good, worst = np.flatnonzero(found.converged), (0.0, 0.0)
-        if not len(good) or not problem.groups:
-            return []
-        places = [f for f, _ in peaks] or [float(found.frequency[good[np.argmax(np.abs(found.monitor[good]))]])]
-        for f in places:
-            near = good[np.argmin(np.abs(found.frequency[good] - f))]
-            point = solve(problem, 2 * np.pi * f, [found.x[near]])
-            if not point.converged:
-                continue
-            e = enough(problem, point, self.tolerance)
+        floor, worst = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0)), (0.0, 0.0)
+        for point, estimate, share in judged(problem, found, [f for f, _ in peaks]) if problem.groups else []:
+            f, e = point.Omega / (2 * np.pi), enough(problem, point, self.tolerance, floor=floor, first=estimate)
             if e.problem.harmonics > problem.harmonics:
                 n = e.problem.harmonics
                 said = f"at F_N = {normal:g} N and {f:.6g} Hz {problem.harmonics} harmonics leave an error of about "
-                raise _TooFew(n, said + f"{100 * e.errors[0].readout:.2g} %; all once more with {n}")
-            worst = max(worst, (e.errors[-1].readout, f))
+                raise _TooFew(n, said + f"{100 * share:.2g} %; all once more with {n}")
+            worst = max(worst, (share, f))
         self.most = max(self.most, worst[0])
         if worst[0] <= self.tolerance:
             return []
@@ -334,24 +328,29 @@ class _Left:
         ]
 
 
-def _truncated(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
-    """A remark where the harmonics are too few at the highest point, see `harmonic_balance.accuracy`.
+def _truncated(
+    built: Built, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
+) -> list[str]:
+    """A remark where harmonics or samples are too few, see `harmonic_balance.accuracy`.
 
     Not of the book's mode, which is one harmonic by what it is, nor of a whole ring, whose sector says the same.
     """
-    from ..harmonic_balance.accuracy import error
+    from ..harmonic_balance.accuracy import judged
 
-    good, settings = np.flatnonzero(found.converged), built.settings
+    settings = built.settings
     whole = settings.ring is not None and settings.ring.model == "full"
-    if not len(good) or not problem.groups or settings.mode == "book" or whole:
+    if not problem.groups or settings.mode == "book" or whole:
         return []
-    top = int(good[np.argmax(np.abs(found.monitor[good]))])
-    estimate = error(problem, found.x[top], 2 * np.pi * float(found.frequency[top])).readout
-    if estimate <= TRUNCATION:
+    point, e, share = max(judged(problem, found, [f for f, _ in peaks]), key=lambda one: one[2], default=(None,) * 3)
+    if point is None or share <= TRUNCATION:
         return []
+    where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
+    if not np.isfinite(share):
+        return [f"{where}: with twice the harmonics ({e.harmonics}) and samples ({e.samples}) no solution was found."]
+    what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
     return [
-        f"At F_N = {normal:g} N the amplitude at {found.frequency[top]:.6g} Hz is uncertain by about "
-        f"{100 * estimate:.2g} % for want of harmonics ({problem.harmonics}); raise harmonics and samples."
+        f"{where} by about {100 * share:.2g} %, mostly for want of {what}: there are {e.harmonics} harmonics and "
+        f"{e.samples} samples; raise {what}."
     ]
 
 

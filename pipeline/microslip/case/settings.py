@@ -230,7 +230,7 @@ class CaseSettings(Model):
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
-    samples: Annotated[int, Field(ge=8, le=100000)] = 64
+    samples: Annotated[int, Field(ge=8, le=100000)] = 48
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
     settled: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
@@ -346,8 +346,9 @@ class CaseSettings(Model):
         return self.harmonics == "auto" and self.mode == "marched" and (self.has_laws or not self.contacts)
 
     def with_harmonics(self, count: int) -> CaseSettings:
-        """The case with a number of harmonics, and samples enough for them."""
-        return self.model_copy(update={"harmonics": count, "samples": max(self.samples, SAMPLES_EACH * count)})
+        """The case with a number of harmonics, and of samples that grow with them: both errors fall."""
+        grown = -(-self.samples * count // FIRST_HARMONICS)
+        return self.model_copy(update={"harmonics": count, "samples": max(grown, SAMPLES_EACH * count)})
 
     @property
     def marching(self) -> dict[str, Any]:
