@@ -263,3 +263,23 @@ def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:
         assert load_toml(root / "geometry" / name / "body.toml")["name"] == name
     makefile = (root / "Makefile").read_text()
     assert set(makefile.split("BODIES   := ")[1].splitlines()[0].split()) <= set(bodies)
+
+
+def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> None:
+    """Two ends by two boxes of one name: both ends, as rules of a CAD file add up; a name of the mesh file is refused."""
+    from small import SIZE, beam, table
+
+    from microslip.body import BodySettings
+
+    x, y, z = SIZE
+    ends = [{"name": "ends", "box": [0, 0, h, x, y, h]} for h in (0.0, z)]
+
+    def faces(rules: list[dict]) -> dict:
+        settings = BodySettings.model_validate(table(geometry={"mesh": "small.msh", "faces": rules}))
+        job = workflow.Job(tmp_path / "body.toml", settings, {}, tmp_path)
+        return workflow._faces_by_rule(job, beam()).faces
+
+    own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
+    assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
+    with pytest.raises(UserError, match=r"body.toml: geometry.faces.tip: "):
+        faces([{**ends[0], "name": "tip"}])

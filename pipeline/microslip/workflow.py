@@ -25,7 +25,7 @@ from .basis import read_basis, write_basis
 from .body import BodySettings, MaterialSettings, MatrixFiles, implausible, load_body, load_toml
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
+from .data import Array, GyroscopicModes, Indices, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, part_numbers, read_mesh
 from .quality import sentences
@@ -306,21 +306,30 @@ def strange_material(m: Material, system: str) -> str:
 
 
 def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
-    """Faces of a user's own mesh given by a box (named sets of the file are there already)."""
+    """Faces of a user's own mesh given by boxes, those of one name added up; named sets of the file are there already.
+
+    Raises:
+        UserError: a rule by anything but a box, nothing in its box, the name of a set of the file.
+    """
     from .mesh import boundary_facets, faces_from_points
 
-    faces = dict(mesh.faces)
+    made: dict[str, dict[str, Indices]] = {}
     for rule in job.settings.geometry.faces:
+        place = f"{job.path}: geometry.faces.{rule.name}"
         if rule.box is None:
-            raise UserError(f"{job.path}: geometry.faces.{rule.name}: a mesh file has no labels or colours; use box")
+            raise UserError(f"{place}: a mesh file has no labels or colours; use box")
+        if rule.name in mesh.faces:
+            raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
         slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
         found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
         if not found:
-            raise UserError(f"{job.path}: geometry.faces.{rule.name}: no facet of the surface is in the box; widen it")
-        faces[rule.name] = found
-    return replace(mesh, faces=faces)
+            raise UserError(f"{place}: no facet of the surface is in the box; widen it")
+        face = made.setdefault(rule.name, {})
+        for kind, facets in found.items():
+            face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
+    return replace(mesh, faces={**mesh.faces, **made})
 
 
 # modes -----------------------------------------------------------------------------------------------------------

@@ -421,7 +421,7 @@ def _loads(
         body, row = settings.address(x.row or x.face or "")
         b = _body(bodies, body, path, "excitation")
         if x.field is not None:
-            row, face = f"field-{i + 1}", row
+            row, face = f"field {i + 1}", row  # no excitation of a body has a blank in its name
             named[body], sentence = with_field(named[body], x, row, face, path)
             said.append(sentence)
         else:
