@@ -455,20 +455,19 @@ def compare_book(
     case = keeping.as_found(case, folder, case_path)
     table, picture = folder / "book.csv", folder / "pictures" / "book.png"
     store.write_text(table, comparison_table(pairs))
-    marched, book = (_curves(f / "response.h5", case) for f, _ in ways.values())
+    marched, book = (_curves(f / "response.h5") for f, _ in ways.values())
     with store.complete_or_absent(picture) as temporary:
         comparison_picture(case, marched, book, temporary)
     return table, pairs, all(converged for _, converged in found.values())
 
 
-def _curves(file: Path, case: CaseSettings) -> dict[str, Array]:
-    """Normal force as text -> (2, f) Hz and amplitude (m) of the first read-out, in a response file."""
-    found, monitor = {}, case.address(case.watches[0].monitor)[1]
-    for s in read_response(file).series:
-        name = next(n for n in s.arrays if n.startswith("monitors/") and n.endswith(monitor))
-        amplitude = np.abs(s.arrays[name][:, 0, 1])
-        whole = np.stack([s.frequency, np.where(np.array(s.status) == "converged", amplitude, np.nan)])
-        found[f"{s.parameters['normal_force']:g}"] = whole[:, np.argsort(s.frequency, kind="stable")]
+def _curves(file: Path) -> dict[float, Array]:
+    """Normal force (N) -> (2, f) Hz and amplitude of the first read-out, in a response file."""
+    found, response = {}, read_response(file)
+    first = next(iter(response.labels))  # whose first row is the first read-out, see `harmonic_balance.kept.labels`
+    for s in response.series:
+        whole = np.stack([s.frequency, np.where(s.converged, np.abs(s.arrays[first][:, 0, 1]), np.nan)])
+        found[s.parameters["normal_force"]] = whole[:, np.argsort(s.frequency, kind="stable")]
     return found
 
 

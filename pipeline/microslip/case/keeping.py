@@ -12,6 +12,7 @@ import numpy as np
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..results import Body
+from ..results.names import exact
 from .assemble import Built, Loaded
 from .settings import CaseSettings
 
@@ -43,8 +44,8 @@ def of_a_point(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def series_name(normal: float) -> str:
-    """Name of the sweep under a normal force, N."""
-    return f"normal force {normal:g} N"
+    """Name of the sweep under a normal force, N; another one for every other number."""
+    return f"normal force {exact(normal)} N"
 
 
 def head_of(
