@@ -6,7 +6,6 @@ Each stage knows the inputs its product depends on and does nothing when they ha
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shlex
@@ -28,6 +27,7 @@ from .coordinates import own_kind
 from .data import Array, GyroscopicModes, Indices, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, part_numbers, read_mesh
+from .mesh.inp import files_of
 from .quality import sentences
 from .report import contact_sentence
 from .resonances import (
@@ -57,6 +57,7 @@ _MODES_CODE = (
     "units.py", "hostile.py",
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
+_SYSTEM_CODE = ("data.py", "body.py", "canonical.py", "frames.py", "system/lumped.py", "basis")
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
     "compliance.py", "quality.py", "basis/checks.py",
@@ -121,12 +122,6 @@ def code_hash(parts: tuple[str, ...]) -> str:
     return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
 
 
-def touch(product: Path) -> None:
-    """Tell make that a product is as new as what it was made from (others' products stay as they are)."""
-    with contextlib.suppress(OSError):
-        os.utime(product)
-
-
 # mesh ------------------------------------------------------------------------------------------------------------
 
 
@@ -159,9 +154,7 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "source": store.hash_file(source),
         "code": code_hash(_MESH_CODE),
     }
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     report(f"meshing {source.name}")
     for line in _run_mesher(job, source, product):
@@ -347,9 +340,7 @@ def modes_stage(
     mesh_file = mesh_stage(job, report=report) if matrices is None else job.path
     product = output or job.basis_file
     inputs = modes_inputs(job, mesh_file) if matrices is None else matrices_inputs(job, matrices)
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product, []
     if matrices is None:
         basis, warnings = _assembled_here(job, mesh_file, report)
@@ -479,6 +470,8 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
     inputs = {"settings": settings, "mesh": store.hash_file(mesh_file), "code": code_hash(_MODES_CODE)}
+    if mesh_file.suffix.lower() == ".inp" and (read := files_of(mesh_file)[1:]):
+        inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
     if job.settings.temperature.file:
@@ -583,11 +576,10 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         "remarks": remarks,
         "code": code_hash(_REPORT_CODE),
     }
-    if not force and store.is_up_to_date(product, inputs) and _all_there(product):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     basis = read_basis(job.basis_file)
+    store.unfinished(product)
     report("starting PyVista")
     reason = pictures.can_draw()
     if reason is not None:
@@ -595,22 +587,18 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         remarks.append(f"The pictures of the body are missing: {reason}")
     engine_orders = list(job.settings.rotation.engine_orders)
     drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
+    tables: list[Path] = []
     if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
         found = resonances(basis, engine_orders)
-        store.write_text(job.build_folder / "resonances.csv", resonance_csv(found))
+        tables = [job.build_folder / "resonances.csv"]
+        store.write_text(tables[0], resonance_csv(found))
     if response is not None:
         drawn |= {title: folder / name for title, name in shown.items()}
     report("writing the report")
     write_report(basis, drawn, product, remarks, response)
     if reason is None:  # else the next run tries again
-        store.note_product(product, inputs, pictures=sorted(p.name for p in drawn.values()))
+        store.note_product(product, inputs, [*drawn.values(), *tables])
     return product
-
-
-def _all_there(page: Path) -> bool:
-    """True if the pictures that were drawn for a page still exist."""
-    names = json.loads(store.sidecar_path(page).read_text()).get("pictures", [])
-    return all((page.parent / "pictures" / name).is_file() for name in names)
 
 
 def _remarks(job: Job) -> list[str]:
@@ -647,10 +635,8 @@ def system_stage(
 
     system = load_system(path, assignments)
     product = output or root / "build" / system.name / "basis.h5"
-    inputs = {"settings": dict(system.settings), "code": code_hash(("data.py", "system/lumped.py", "basis"))}
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    inputs = {"settings": dict(system.settings), "code": code_hash(_SYSTEM_CODE)}
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     write_basis(product, system_basis(path, assignments))
     store.note_product(product, inputs)

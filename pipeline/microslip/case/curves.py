@@ -182,6 +182,11 @@ def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tupl
         return asked.band or (built.settings.sweep.start, built.settings.sweep.stop)
     if not any(swept(c) for c in built.contacts):
         raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
+    for i in built.fitted:
+        raise UserError(
+            f"{path}: contacts.{built.contacts[i].interface}.fitted_at: is missing; along a curve over its force "
+            "a curved contact has one law, so give the force (N) at which it is fitted"
+        )
     forces = normal_forces(built, path)
     if asked.normal_force is None and len(set(forces)) < 2:
         raise UserError(f"{path}: curve.normal_force: give [first, last] in N; the sweep has one normal force alone")

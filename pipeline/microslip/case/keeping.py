@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,19 +14,12 @@ from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..results import Body
 from ..results.names import exact
+from ..store import fingerprint
 from .assemble import Built, Loaded
 from .settings import CaseSettings
 
 if TYPE_CHECKING:
     from ..operating.patches import ContactMap
-
-SELECTS = ("start", "stop", "points", "normal_forces")
-"""Keys of the sweep that say which points are asked for, and not what they are."""
-
-NOT_OF_A_POINT = (
-    "name", "description", "material_limits", "orders", "speeds", "ranges", "curve", "identification",
-)  # fmt: skip
-"""Keys of a case that no point depends on."""
 
 MOST_MAPS = 4
 """Patches that are drawn."""
@@ -37,10 +31,29 @@ def without_defaults(raw: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in raw.items() if k not in fields or v != fields[k].default}
 
 
-def of_a_point(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """A case file without what its points do not depend on."""
-    kept = {k: v for k, v in without_defaults(raw).items() if k not in NOT_OF_A_POINT}
-    return kept | {"sweep": {k: v for k, v in raw.get("sweep", {}).items() if k not in SELECTS}}
+def of_points(built: Built) -> str:
+    """Hash of all that the points of a case depend on beside their frequency and the sweep's normal force.
+
+    That is the equation of motion itself, down to the last bit of its matrices, rows, loads and laws, and how finely it
+    is balanced. What fits a curved contact at the force of each sweep stands for its law.
+    """
+    a, s = built.assembly, built.settings
+    parts = [[a.part(m, h) for m in a.members] for h in range(s.balanced + 1)]
+    contacts: list[Any] = list(a.contacts)
+    for i in built.fitted:
+        contacts[i] = [built.contacts[i].model_dump(), contacts[i].first, contacts[i].second]
+    finely = [s.balanced, s.marching, s.mode, s.strips, s.ring.model_dump() if s.ring else None]
+    return fingerprint([replace(m, groups={}) for m in a.members], parts, contacts, a.loads, a.watches, a.ring, finely)
+
+
+def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
+    """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
+    from ..contact.settings import files_of as of_contact
+
+    found = {name: path.parent / name for name in settings.files}
+    for name in [c.file for c in settings.contacts if c.file is not None]:
+        found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
+    return found
 
 
 def series_name(normal: float) -> str:
