@@ -197,15 +197,15 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     contacts, springs, made, remarks = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
     for i, c in enumerate(settings.contacts):
-        loads = fitting_forces(settings, c)
-        own, k, said = _stiffness(settings, bodies, c, loads[-1], path)
+        pressed = fitting_forces(settings, c)
+        own, k, said = _stiffness(settings, bodies, c, pressed[-1], path)
         contacts.append(own)
         springs.append(k)
         if settings.law_of(c) != "jenkins":  # which has a closed form, and needs no assembly of point contacts
             at, more = _contact(settings, bodies, members, own, k, path)
             said += more
-            for load in loads:
-                contact, more = at(load)
+            for force in pressed:
+                contact, more = at(force)
                 said += more
             made.append(contact)
             if follows_the_force(c):
