@@ -113,7 +113,7 @@ def test_a_curved_face_is_fitted_to_hertz() -> None:
     assert (p[np.abs(contact.patch.points[:, 1]) > 0.4 * HEIGHT] == 0).all()
 
 
-@pytest.mark.parametrize("contact", [{"points": [2, 60]}, {}, {"law": "hertz", "points": [5, 1]}])
+@pytest.mark.parametrize("contact", [{}, {"law": "hertz", "points": [5, 1]}])
 def test_the_answer_under_one_force_knows_of_no_other(contact: dict[str, Any]) -> None:
     """A curved contact is fitted at the force that presses it: to the last bit the same, whatever forces stand beside
     it; nor do the points that are kept of it depend on them. Loads of 150 and 800 N give springs that differ."""

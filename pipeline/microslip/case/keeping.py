@@ -34,16 +34,19 @@ def without_defaults(raw: Mapping[str, Any]) -> dict[str, Any]:
 def of_points(built: Built) -> str:
     """Hash of all that the points of a case depend on beside their frequency and the sweep's normal force.
 
-    That is the equation of motion itself, down to the last bit of its matrices, rows, loads and laws, and how finely it
-    is balanced. What fits a curved contact at the force of each sweep stands for its law.
+    That is the balance itself, down to the last bit of its matrices, rows, loads and laws; what else the bodies hold is
+    told by their files. For a contact that is fitted at the force of each sweep stands what fits it.
     """
-    a, s = built.assembly, built.settings
-    parts = [[a.part(m, h) for m in a.members] for h in range(s.balanced + 1)]
-    contacts: list[Any] = list(a.contacts)
-    for i in built.fitted:
-        contacts[i] = [built.contacts[i].model_dump(), contacts[i].first, contacts[i].second]
-    finely = [s.balanced, s.marching, s.mode, s.strips, s.ring.model_dump() if s.ring else None]
-    return fingerprint([replace(m, groups={}) for m in a.members], parts, contacts, a.loads, a.watches, a.ring, finely)
+    from .run import problem_of
+
+    a, own = built.assembly, built.fitted
+    as_they_are = [i for i in range(len(a.contacts)) if i not in own]
+    rest = replace(a, contacts=tuple(a.contacts[i] for i in as_they_are))
+    settings = tuple(built.contacts[i] for i in as_they_are)
+    problem = problem_of(replace(built, assembly=rest, contacts=settings, fitted={}), None)
+    members = tuple(replace(m, groups={}) for m in problem.assembly.members)
+    fitted = [[built.contacts[i].model_dump(), a.contacts[i].first, a.contacts[i].second] for i in own]
+    return fingerprint(replace(problem, assembly=replace(problem.assembly, members=members)), fitted)
 
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
