@@ -412,7 +412,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.young": ("Pa", "E of both bodies, for a curved patch, instead of the stiffnesses"),
     "contacts.poisson": ("", "nu of both bodies"),
     "contacts.fit": ("", "in what the springs of a curved patch agree with Hertz"),
-    "contacts.fitted_at": ("N", "at which load; the contact's own or the largest of the sweep if not given"),
+    "contacts.fitted_at": ("N", "at which load; if not given the force that presses it: its own, or each of the sweep"),
     "contacts.isotropic": ("", "geometric mean of both tangential stiffnesses of a curved patch, as the book's mode "
                            "needs it"),
     "sweep.start": ("Hz", "first frequency"),

@@ -111,6 +111,7 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"interfaces__0__t2": [0, NAN, 1]}, "interfaces.right.t2: entry 2 of the list must be a finite number"),
     ({"interfaces__0__t2": "z"}, 'interfaces.right.t2: must be a list in [brackets] (it is "z")'),
     ({"interfaces__1__name": "right"}, "interfaces: the name 'right' is used twice; rename one"),
+    ({"gauges__0__name": "tip-probe"}, "gauges: the name 'tip-probe' is used twice"),
     ({"interfaces__0__name": "a b"}, "name: must begin with a letter or digit"),
     ({"interfaces__0__name": ".."}, "name: must begin with a letter or digit"),
     ({"interfaces__0__sector_shift": 2}, "interfaces.right.sector_shift: must be -1, 0 or 1 (it is 2)"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ import numpy as np
 import pytest
 import small
 
+from microslip import running, store
 from microslip.basis import write_basis
 from microslip.body import validate
 from microslip.case import CaseSettings, run_case
 from microslip.case.assemble import build
+from microslip.case.curves import curves
+from microslip.case.keeping import files_of, of_points
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
@@ -107,6 +111,87 @@ def test_a_curved_face_is_fitted_to_hertz() -> None:
     assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=0.02)
     p = pressure(contact.patch, contact.offset)
     assert (p[np.abs(contact.patch.points[:, 1]) > 0.4 * HEIGHT] == 0).all()
+
+
+@pytest.mark.parametrize("contact", [{}, {"law": "hertz", "points": [5, 1]}])
+def test_the_answer_under_one_force_knows_of_no_other(contact: dict[str, Any]) -> None:
+    """A curved contact is fitted at the force that presses it: to the last bit the same, whatever forces stand beside
+    it; nor do the points that are kept of it depend on them. Loads of 150 and 800 N give springs that differ."""
+    raw = table(**PIN, **contact)
+    found = {}
+    for forces in ([150.0], [150.0, 800.0], [800.0, 150.0, 400.0]):
+        raw["sweep"]["normal_forces"] = forces
+        one = built(raw)
+        found[len(forces)] = store.fingerprint(one.pressed(150.0).contacts), of_points(one)
+    assert found[1] == found[2] == found[3]
+    stiff = [contact.stiffness[0, 0] for n in (150.0, 800.0) for contact in one.pressed(n).contacts]
+    assert stiff[1] > 1.02 * stiff[0]
+    if "law" not in contact:
+        line = Line(Solid(2.1e11, 0.3), Solid(2.1e11, 0.3), RADIUS, DEPTH)
+        k = foundation_of_line(line, 150.0, HEIGHT).stiffness * DEPTH * HEIGHT
+        patch = one.pressed(150.0).contacts[0].patch
+        assert float(patch.law.normal.normal.stiffness_0) * len(patch.points) == pytest.approx(k, rel=1e-12)
+
+
+def test_no_force_fits_no_curve() -> None:
+    """Nothing to fit at: 0 N among the forces, and a curve over the force, along which the law is one."""
+    raw = table(**PIN)
+    raw["sweep"]["normal_forces"] = [0.0, 200.0]
+    with pytest.raises(UserError, match=r"case.toml: contacts.right: fitted_at"):
+        built(raw)
+    raw["sweep"]["normal_forces"] = [100.0, 200.0]
+    with pytest.raises(UserError, match=r"case.toml: contacts.right.fitted_at"):
+        curves(made(raw), {"small": small.basis()}, PATH, "normal_force", lambda _: nullcontext(), lambda _: None)
+
+
+CURVE = "0 0\n1 10\n2 30\n3 60\n4 100\n"
+
+
+def test_points_depend_on_every_file_that_a_file_names(tmp_path: Path) -> None:
+    """contact.toml names a curve: its force a hundred times larger is another contact, and another input."""
+    contact = 'name = "c"\n[stiffness]\nkind = "curve"\nfile = "curve.txt"\ntangential = 1e7\n'
+    (tmp_path / "contact.toml").write_text(f'{contact}[friction]\nkind = "coulomb"\nmu = 0.3\n')
+    raw, path = table(file="contact.toml", points=[2, 2]), tmp_path / "case.toml"
+    del raw["contacts"][0]["friction"]
+    settings, found = made(raw), []
+    for scale in (1, 100, 1):
+        rows = (line.split() for line in CURVE.splitlines())
+        (tmp_path / "curve.txt").write_text("".join(f"{u} {scale * float(f)}\n" for u, f in rows))
+        files = running.hashes_of(files_of(settings, path))
+        found.append((files, of_points(build(settings, {"small": small.basis()}, path))))
+    assert len(found[0][0]) == 2 and found[0] == found[2]
+    assert found[0][0] != found[1][0] and found[0][1] != found[1][1]
+
+
+def rubbing(**contact: Any) -> dict[str, Any]:
+    return {"contacts": table(**{**STIFF, "law": "smooth", **contact})["contacts"]}
+
+
+CHANGES: dict[str, tuple[dict[str, Any], bool]] = {
+    "friction": (rubbing(friction=0.31), True),
+    "stiffness": (rubbing(normal_stiffness=1.0000001e9), True),
+    "roughness": (rubbing(law="rough", roughness=1e-5), True),
+    "amplitude": ({"amplitude": 1.1}, True),
+    "load": ({"excitation": "gas"}, True),
+    "read-out": ({"direction": "y"}, True),
+    "modes": ({"modes": 4}, True),
+    "harmonics": ({"harmonics": 2}, True),
+    "samples": ({"samples": 17}, True),
+    "settled": ({"settled": 1e-8}, True),
+    "cycles": ({"cycles": 21}, True),
+    "mode": ({"mode": "book"}, True),
+    "name": ({"name": "other", "description": "x"}, False),
+    "sweep": ({"sweep": {"start": 300.0, "stop": 500.0, "points": 7, "normal_forces": [1.0, 7.0]}}, False),
+    "limits": ({"material_limits": {"fatigue_strength": 2e8, "tensile_strength": 9e8}}, False),
+    "curve": ({"curve": {"points": 10}}, False),
+}
+
+
+@pytest.mark.parametrize("change, matters", CHANGES.values(), ids=list(CHANGES))
+def test_points_depend_on_what_enters_the_balance(change: dict[str, Any], matters: bool) -> None:
+    """Whatever key of the case changes it, and on nothing else."""
+    raw = table() | rubbing()
+    assert (of_points(built(raw)) != of_points(built(raw | change))) == matters
 
 
 def test_a_line_of_contact_in_pieces() -> None:

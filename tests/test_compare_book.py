@@ -15,11 +15,14 @@ import pytest
 
 from microslip import running
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
+from microslip.case.keeping import series_name
 from microslip.case.run import _lifting
 from microslip.cli import main
 from microslip.data import UserError
+from microslip.harmonic_balance import FrequencyResponse, response_table
 from microslip.harmonic_balance.orbits import orbits
-from microslip.results import read_response
+from microslip.results import read_response, response_of, write_response
+from microslip.results.names import exact
 
 pytest.importorskip("matplotlib")
 SAMPLES = Path(running.__file__).parent / "samples"
@@ -176,3 +179,47 @@ def test_resonances_are_paired_by_frequency() -> None:
     assert pairs[0].differences() == pytest.approx((0.01, 0.1))
     assert "+1 % in frequency, +10 % in amplitude" in sentence(pairs[0]) and "no resonance" in sentence(pairs[2])
     assert comparison_table(pairs).splitlines()[3] == "20,110,,,1e-06,,"
+
+
+def test_the_first_read_out_is_compared(tmp_path: Path) -> None:
+    """Whatever others are called: bodies with equal monitors, names that end alike, directions, gauges; by normal
+    force, also those that agree in six digits."""
+    labels = {"monitors/right:probe": ["u_y", "u_x"], "monitors/left:b-probe": ["u_x"], "monitors/left:probe": ["u_y"]}
+    gauges = {"gauges/root": ["strain"], "monitors/probe": ["u_x"]}
+    forces = [100.0, 100.00001]
+    for told in (labels, gauges):
+        head = {"case": "c", "labels": told, "parameters": {series_name(n): {"normal_force": n} for n in forces}}
+        values = {name: 1.0 + np.arange(len(rows))[:, None] * np.ones(2) for name, rows in told.items()}
+        values[next(iter(told))][0] = 0.25
+        points = {
+            series_name(n): {f: {"frequency": f, "status": "converged", **values} for f in (10.0, 20.0)} for n in forces
+        }
+        write_response(tmp_path / "response.h5", response_of(head, points))
+        found = running._curves(tmp_path / "response.h5")
+        assert list(found) == forces
+        np.testing.assert_array_equal(found[100.0], [[10.0, 20.0], [0.25, 0.25]])
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([100.0, 0.25, 1e6, 0.0], ["100", "0.25", "1e+06", "0"]),
+        ([100.0, 100.00001], ["100", "100.00001"]),
+        ([1234567.0, 1234568.0], ["1234567", "1234568"]),
+    ],
+)
+def test_normal_forces_have_names_of_their_own(values: list[float], texts: list[str]) -> None:
+    """Those that differ have series and columns that differ; usual ones the names that they always had."""
+    assert [series_name(v) for v in values] == [f"normal force {t} N" for t in texts]
+    assert [float(exact(v)) for v in (1 / 3, np.nextafter(1.0, 2.0))] == [1 / 3, np.nextafter(1.0, 2.0)]
+    r = [frequency_response_of(v) for v in values]
+    heads = response_table(dict(zip(values, r, strict=True))).splitlines()[0].split(",")
+    assert len(set(heads)) == len(heads)
+    assert response_table({1 / 3: r[0]}).startswith("frequency_Hz,amplitude_m_FN_0.333333_N")
+
+
+def frequency_response_of(amplitude: float) -> FrequencyResponse:
+    none = np.zeros((1, 0))
+    return FrequencyResponse(
+        np.ones(1), np.full(1, amplitude + 0j), none, np.zeros(1), np.ones(1, dtype=bool), np.zeros(0), none
+    )  # fmt: skip

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from small import beam, table
@@ -11,16 +14,22 @@ from test_assembly import FINE, sector
 
 from microslip.body import BodySettings
 from microslip.compliance import statics_beside
+from microslip.contact.friction import Coulomb
+from microslip.contact.normal import Preload
+from microslip.contact.patch import Patch
+from microslip.contact.point import PointContact
 from microslip.coordinates import in_modes
+from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance import response
 from microslip.harmonic_balance.kept import beside, kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
 from microslip.results import open_journal, response_of
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+from microslip.system.assembly import Contact as Rub
 
 FREQUENCY = np.linspace(180.0, 270.0, 16)
 SERIES = "normal force 20 N"
@@ -116,3 +125,54 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     np.testing.assert_allclose(read, found.watched, rtol=0, atol=1e-9 * np.abs(found.watched).max())
     alone = displacement(motion_of(point.Omega, np.array(found.q["small"]), group), node)[0, :, 0].T
     assert np.abs(alone - found.watched).max() > 1e-4 * np.abs(found.watched).max()  # it would be missed
+
+
+READ = (("p0", "u_x"), ("p1", "u_x"), ("p0", "u_y"), ("p0", "u_x"))
+
+
+def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None:
+    """Read-outs p0 x, p1 x, p0 y, and p0 x once more: each row under its own name, that of (K + i Omega C - Omega^2 M)
+    q = f with the contact's springs to 1e-9; a second run with more points reads the first one's rows back."""
+    group = System(
+        "pair", [Body("a", 1.0, free="xy"), Body("b", 2.0, (1, 0, 0), free="xy")],
+        [Spring("ground", "a", [1e4, 3e4, 0.0]), Spring("a", "b", [2e4, 5e3, 0.0])],
+        [Contact("sole", "b", (0, 0, -1))], [Force("f", "b", (1, 2, 0))], [Monitor("p0", "a"), Monitor("p1", "b")],
+        ratio=0.02,
+    ).basis().groups[0, 0]  # fmt: skip
+    law = PointContact(Preload(jnp.asarray(1e4)), Coulomb(jnp.asarray(0.5)), jnp.asarray(5e3))  # which sticks
+    along, T = np.array([[[0.0], [1.0], [0.0]]]), group.interfaces["sole"].rows[1:2]
+    patch, none = Patch("sole", np.zeros((1, 2)), np.ones(1), law, along), np.zeros(1)
+    rub = Rub("rub", patch, Side("pair", "sole", np.eye(6)[1:2], rows={0: T}), None, none, none)
+    watches = tuple(Watch("pair", name, label) for name, label in READ)
+    pair = Assembly((Member("pair", {0: group}),), (rub,), (Load("pair", "f"),), watches)
+    problem = balance.of(pair, harmonics=1, samples=16)
+    head = HEAD | {"labels": labels(problem)}
+    for count in (2, 4):
+        with open_journal(tmp_path / "points", "abc", head) as journal:
+            found, _ = kept_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
+            told = response_of(journal.head, journal.series)
+    assert told.labels == {"monitors/p0": ("u_x", "u_y"), "monitors/p1": ("u_x",)}
+    for f, watched in zip(found.frequency, found.watched, strict=True):
+        Omega = 2 * np.pi * f
+        A = group.K_r + 5e3 * T.T @ T - Omega**2 * group.M_r + 1j * Omega * group.C_r
+        q = np.linalg.solve(A, group.excitations["f"].rows[0])
+        exact = {w: group.monitors[w[0]].rows[("u_x", "u_y").index(w[1])] @ q for w in READ}
+        np.testing.assert_allclose(watched[:, 1], [exact[w] for w in READ], rtol=1e-9)
+        (series,) = told.series
+        for name, rows in told.labels.items():
+            held = series.arrays[name][np.argmin(np.abs(series.key - f)), :, 1]
+            np.testing.assert_allclose(held, [exact[name.split("/")[1], label] for label in rows], rtol=1e-9)
+
+
+def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
+    """Read in turns, they are kept under the member's name and come back in the order of the assembly."""
+    held = [Spring("ground", "m", [1e4, 3e4, 0.0])]
+    group = System("one", [Body("m", 1.0, free="xy")], held, monitors=[Monitor("tip", "m")]).basis().groups[0, 0]
+    members = tuple(Member(name, {0: group}) for name in ("left", "right"))
+    asked = [("left", "u_x"), ("right", "u_x"), ("left", "u_y"), ("right", "u_y")]
+    assembly = Assembly(members, (), (), tuple(Watch(m, "tip", label) for m, label in asked))
+    problem: Any = SimpleNamespace(assembly=assembly, harmonics=1)
+    watched = np.arange(8.0).reshape(4, 2) + 0j
+    row = {name: watched[list(rows.values())] for name, rows in kept._watches(problem).items()}
+    np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
+    np.testing.assert_array_equal(kept._watched(problem, row), watched)

@@ -104,6 +104,89 @@ def test_interrupted_and_resumed(folder: Path) -> None:
     assert computed(respond(folder)[0]) == []  # up to date
 
 
+CLOSED = (
+    CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace("points = 9", "points = 4")
+    .replace("[50.0]\n", "[50.0]\n#")
+)  # fmt: skip
+"""In closed form, without margins: it costs nothing."""
+
+
+def test_what_was_spoiled_is_made_again(folder: Path) -> None:
+    """A table cut short, edited, gone; pictures, pages, HDF5 and VTU alike: the same bytes as before, and no point is
+    computed twice."""
+    respond(folder, "sweep.points=3")
+    build = folder / "build" / "vane"
+    summary = json.loads((build / "response.json").read_text())
+    products = [build / n for n in summary["files"]] + [build / "pictures" / n for n in summary["pictures"].values()]
+    whole = {p: p.read_bytes() for p in [*products, build / "response.json"]}
+    assert {p.suffix for p in whole} == {".h5", ".csv", ".html", ".json", ".png", ".vtu"}
+    for path in products:  # and the summary, which they belong to, is as it was
+        path.write_bytes(whole[path][:-1] if path.suffix != ".csv" else whole[path].replace(b",1,", b",2,", 1))
+    told, _ = respond(folder, "sweep.points=3")
+    assert not any("up to date" in t for t in told) and computed(told) == []
+    assert {p.name for p, data in whole.items() if p.read_bytes() != data} == set()
+    assert any("up to date" in t for t in respond(folder, "sweep.points=3")[0])
+
+
+def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`respond`, `respond --set amplitude=4` killed at its first, second, ... write, `respond`: the first answer."""
+    (folder / "case.toml").write_text(CLOSED)
+    monkeypatch.setattr(running, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
+    monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"picture"))
+    respond(folder)
+    build, replaced, written = folder / "build" / "vane", os.replace, 0
+    whole = {p: p.read_bytes() for p in (build / "response.csv", build / "response.h5", build / "response.json")}
+
+    class Killed(BaseException):
+        pass
+
+    def killing(at: int) -> Any:
+        def replace(*paths: Any) -> None:
+            nonlocal written
+            written += 1
+            if written == at:
+                raise Killed
+            replaced(*paths)
+
+        return replace
+
+    for at in range(1, 100):
+        written = 0
+        monkeypatch.setattr(os, "replace", killing(at))
+        try:
+            respond(folder, "amplitude=4.0")
+        except Killed:
+            pass
+        ended = written < at
+        monkeypatch.setattr(os, "replace", replaced)
+        respond(folder)
+        assert {p.name for p, data in whole.items() if p.read_bytes() != data} == set(), at
+        if ended:
+            break
+    assert at > 5  # table, picture, HDF5, page, summary, sidecar
+
+
+@pytest.mark.slow
+def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
+    """SIGKILL at the response file of another case, whose table is written already: `respond` gives its own again."""
+    (folder / "case.toml").write_text(CLOSED)
+    respond(folder)
+    build = folder / "build" / "vane"
+    table, points = (build / "response.csv").read_bytes(), read_response(build / "response.h5").series[0].arrays
+    code = (
+        "import os, signal, sys; from microslip.cli import main; own = os.replace\n"
+        "def kill(a, b):\n    if str(b).endswith('response.h5'): os.kill(os.getpid(), signal.SIGKILL)\n    own(a, b)\n"
+        "os.replace = kill; main(['respond', '.', '--set', 'amplitude=4.0'])"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True)
+    assert done.returncode == -9 and (build / "response.csv").read_bytes() != table
+    again = subprocess.run([sys.executable, "-m", "microslip", "respond", "."], cwd=folder, env=environment)
+    assert again.returncode == 0 and (build / "response.csv").read_bytes() == table
+    found = read_response(build / "response.h5").series[0].arrays
+    assert found.keys() == points.keys() and all(np.array_equal(found[n], points[n]) for n in points)
+
+
 @pytest.mark.slow
 def test_killed_and_resumed_from_the_command_line(folder: Path) -> None:
     """SIGKILL after a few points, three times; the command then ends with the response of one go, 1e-6."""

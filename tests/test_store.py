@@ -10,14 +10,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import small
 
 from microslip import store
 from microslip.basis import check_basis, read_basis, write_basis
+from microslip.contact.examples import EXAMPLES
 from microslip.data import UserError
 from microslip.exchange.mat import write_mat
 
@@ -116,6 +119,7 @@ LIMITED = """
 import resource, sys
 import small
 from microslip.basis import read_basis, write_basis
+from microslip.contact.examples import EXAMPLES
 from microslip.data import UserError
 from microslip.exchange.mat import write_mat
 from microslip.store import write_text
@@ -237,6 +241,27 @@ def test_up_to_date_means_same_inputs_and_untouched_product(tmp_path: Path) -> N
     assert not store.is_up_to_date(product, inputs)
 
 
+def test_every_file_of_a_product_counts(tmp_path: Path) -> None:
+    """Changed, cut short or gone, wherever it stands below; and without a sidecar nothing is finished."""
+    product, files = tmp_path / "response.json", [tmp_path / "response.csv", tmp_path / "pictures/response.png"]
+    for path in (product, *files):
+        store.write_text(path, "content")
+    store.note_product(product, {}, files)
+    for path in files:
+        for text in ("Content", "conten", "", None):
+            path.unlink() if text is None else path.write_text(text)
+            assert not store.is_up_to_date(product, {})
+            store.write_text(path, "content")
+            assert store.is_up_to_date(product, {})
+    told: list[str] = []
+    os.utime(product, (0, 0))
+    assert store.nothing_to_do(product, {}, report=told.append) and len(told) == 1 and product.stat().st_mtime > 0
+    assert not store.nothing_to_do(product, {}, force=True) and not store.nothing_to_do(product, {"more": 1})
+    store.unfinished(product)
+    store.unfinished(product)
+    assert not store.is_up_to_date(product, {})
+
+
 @pytest.mark.parametrize("note", ["", "{", "[]", "3", '{"inputs": 3}', '"x"', "null", "\udcff"])
 def test_a_damaged_sidecar_means_out_of_date(tmp_path: Path, note: str) -> None:
     store.write_text(tmp_path / "p", "x")
@@ -257,3 +282,24 @@ def test_hashes() -> None:
     assert store.hash_settings({"a": 1}) != store.hash_settings({"a": 1.5})
     assert store.hash_settings({"a": np.float64(2).item()}) == store.hash_settings({"a": 2.0})
     assert len(store.hash_settings([])) == 64
+
+
+@dataclass(frozen=True)
+class Held:
+    name: str
+    values: object
+
+
+def test_a_fingerprint_is_of_every_bit_and_of_nothing_else() -> None:
+    """Arrays of jax are those of numpy, the order of a mapping does not count; kind, shape, place and last bit do."""
+    law = next(iter(EXAMPLES.values()))
+    same = Held("a", {"x": np.arange(3.0), "y": [None, law]}), Held("a", {"y": [None, law], "x": jnp.arange(3.0)})
+    assert len({store.fingerprint(v) for v in same}) == 1
+    x = np.arange(3.0)
+    others = [
+        x, x[:2], x.reshape(3, 1), np.nextafter(x, 9.0), x.astype(int), [*x], [[*x]], {"x": x}, Held("a", x),
+        Held("b", x), law, *EXAMPLES.values(), "x", None, ["x", None], [["x"], None], "None",
+    ]  # fmt: skip
+    assert len({store.fingerprint(v) for v in others}) == len({id(v) for v in others})
+    with pytest.raises(TypeError):
+        store.fingerprint(lambda: 0)

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -189,7 +190,7 @@ def test_matrices_in_a_file(tmp_path: Path) -> None:
         ('"m2", "m3"', '"m2", "m7"', "no member 'm7'"),
         ('on = "m3"', 'on = "m4"', "no member 'm4'"),
         ("[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]", "parallel to the normal"),
-        ('name = "m2"', 'name = "m1"', "taken"),
+        ('name = "m2"', 'name = "m1"', "masses: .*'m1'"),
         ('name = "m2"', 'name = "m2"\nwheight = 2', "wheight"),
         ("damping_ratio = 0.005", "damping_ratio = true", "damping_ratio"),
         ("damping_ratio = 0.005", "[matrices]\nmass = [[1.0]]\nstiffness = [[1.0]]", "free to move in 3 directions"),
@@ -201,6 +202,34 @@ def test_mistakes_are_named(tmp_path: Path, old: str, new: str, words: str) -> N
     with pytest.raises(UserError, match=words) as found:
         system_basis(path)
     assert str(path) in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "entry"),
+    [
+        ("contacts", 'name = "rub"\non = "m1"\nnormal = [0.0, 1.0, 0.0]'),
+        ("forces", 'name = "shaker"\non = "m2"\ndirection = [1.0, 0.0, 0.0]'),
+        ("monitors", 'name = "end"\non = "m1"'),
+        ("bodies", 'name = "m2"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]'),
+    ],
+)
+def test_a_name_used_twice_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], key: str, entry: str
+) -> None:
+    """The second entry would take the place of the first: exit code 2, file, key and name told, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    name = entry.split('"')[1]
+    assert f'name = "{name}"' in THREE
+    Path("system.toml").write_text(f"{THREE}\n[[{key}]]\n{entry}\n")
+    assert main(["run", "system.toml", "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert f"system.toml: {key}: " in said and f"'{name}'" in said and not Path("build").exists()
+    more = Monitor("end", "m1"), Force("shaker", "m2", (1, 0, 0)), Contact("rub", "m1", normal=(0, 0, 1))
+    keys = ("monitors", "forces", "contacts")
+    for kind, twice in zip(keys, more, strict=True):
+        system = replace(chain(), **{kind: [*getattr(chain(), kind), twice]})
+        with pytest.raises(UserError, match=f"chain: {kind}: .*'{twice.name}'"):
+            system.basis()
 
 
 def test_matrices_that_no_system_has() -> None:

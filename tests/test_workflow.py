@@ -118,7 +118,15 @@ def test_what_changes_between_runs_stands_in_the_sidecar_only(box: Path) -> None
     assert not any(str(box) in text for text in provenance.values())
 
 
-def test_products_of_the_whole_chain_are_complete(box: Path) -> None:
+class Stopped(Exception):
+    pass
+
+
+def stopped(*_: object, **__: object) -> None:
+    raise Stopped
+
+
+def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = workflow.open_job(box, root=box)
     page, converged = running.run_body(job)
     assert converged and page == box / "build/box/report.html"
@@ -127,18 +135,20 @@ def test_products_of_the_whole_chain_are_complete(box: Path) -> None:
     assert text.rstrip().endswith("</html>") and "Hz" in text and 'src="http' not in text
     for name in ("basis.h5", "response.csv", "response.json", "pictures/response.png"):
         assert (build / name).stat().st_size > 100, name
-    drawn = json.loads(store.sidecar_path(page).read_text()).get("pictures", [])
-    assert not drawn or {"mesh.png", "interfaces.png", "compliance.png"} <= set(drawn)
-    assert all((build / "pictures" / name).stat().st_size > 1000 for name in drawn)
+    drawn = json.loads(store.sidecar_path(page).read_text())["files"] if store.sidecar_path(page).is_file() else {}
+    assert not drawn or {f"pictures/{name}.png" for name in ("mesh", "interfaces", "compliance")} <= set(drawn)
+    assert all((build / name).stat().st_size > 1000 for name in drawn)
     assert not [p for p in box.rglob(".*") if p.is_file()], "temporary files are left"
     if not drawn:
         pytest.skip("pictures of bodies cannot be drawn on this machine")
     told: list[str] = []
     running.run_body(job, report=told.append)
     assert len(told) == 4 and all("is up to date" in t for t in told)
-    assert workflow._all_there(page)
-    (build / "pictures" / "mesh.png").unlink()
-    assert not workflow._all_there(page)
+    mesh = build / "pictures" / "mesh.png"
+    mesh.write_bytes(mesh.read_bytes()[:-1])
+    monkeypatch.setattr("microslip.pictures.draw_all", stopped)
+    with pytest.raises(Stopped):  # it is about to draw them anew
+        running.run_body(job)
 
 
 def test_a_case_of_another_name_has_its_own_folder(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,3 +273,43 @@ def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:
         assert load_toml(root / "geometry" / name / "body.toml")["name"] == name
     makefile = (root / "Makefile").read_text()
     assert set(makefile.split("BODIES   := ")[1].splitlines()[0].split()) <= set(bodies)
+
+
+def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> None:
+    """Two boxes of one name: both ends, as rules of a CAD file add up; a name of the mesh file is refused."""
+    from small import SIZE, beam, table
+
+    from microslip.body import BodySettings
+
+    x, y, z = SIZE
+    ends = [{"name": "ends", "box": [0, 0, h, x, y, h]} for h in (0.0, z)]
+
+    def faces(rules: list[dict]) -> dict:
+        settings = BodySettings.model_validate(table(geometry={"mesh": "small.msh", "faces": rules}))
+        job = workflow.Job(tmp_path / "body.toml", settings, {}, tmp_path)
+        return workflow._faces_by_rule(job, beam()).faces
+
+    own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
+    assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
+    with pytest.raises(UserError, match=r"body.toml: geometry.faces.tip: "):
+        faces([{**ends[0], "name": "tip"}])
+
+
+def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
+    """A deck in three files: a node moved in the innermost is another mesh."""
+    from small import table
+
+    from microslip.body import BodySettings
+
+    (tmp_path / "sets").mkdir()
+    deck, inner = tmp_path / "part.inp", tmp_path / "sets" / "nodes.inp"
+    deck.write_text("*NODE, INPUT=sets/all.inp\n** *INCLUDE, INPUT=none.inp\n*STEP\n")
+    (tmp_path / "sets" / "all.inp").write_text("*include, input=nodes.inp\n")
+    settings = BodySettings.model_validate(table(geometry={"mesh": "part.inp"}))
+    job = workflow.Job(tmp_path / "body.toml", settings, {"geometry": {}}, tmp_path)
+    inner.write_text("1, 0, 0, 0\n")
+    first = workflow.modes_inputs(job, deck)
+    inner.write_text("1, 0, 0, 1\n")
+    assert workflow.modes_inputs(job, deck) != first
+    inner.write_text("1, 0, 0, 0\n")
+    assert workflow.modes_inputs(job, deck) == first

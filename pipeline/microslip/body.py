@@ -113,6 +113,24 @@ def only_one(model: Model, *keys: str, what: str = "") -> None:
         raise ValueError(f"{what}needs exactly one of {', '.join(keys)}, and has {has}; {do} one")
 
 
+def named_once(settings: Any, *groups: str) -> None:
+    """Refuse two entries of lists of tables under one name: the second would take the place of the first.
+
+    Args:
+        groups: keys of lists whose entries have a name; several in one text, apart by blanks, share their names.
+
+    Raises:
+        ValueError: with the list and the name.
+    """
+    for group in groups:
+        names: set[str] = set()
+        for key in group.split():
+            for item in getattr(settings, key):
+                if item.name in names:
+                    raise ValueError(f"{key}: the name '{item.name}' is used twice; rename one")
+                names.add(item.name)
+
+
 GROUND = "ground"
 """Name of the rigid plane a face may press on."""
 
@@ -590,11 +608,7 @@ class BodySettings(Model):
 
     @model_validator(mode="after")
     def _names_once(self) -> BodySettings:
-        for kind in ("closures", "bolts", "interfaces", "excitations", "monitors", "gauges"):
-            names = [item.name for item in getattr(self, kind)]
-            twice = {n for n in names if names.count(n) > 1}
-            if twice:
-                raise ValueError(f"{kind}: the name '{min(twice)}' is used twice; rename one")
+        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges")
         if self.geometry.matrices is not None:
             self._only_what_matrices_can()
         elif isinstance(self.material, ForeignMaterial):

@@ -9,7 +9,7 @@ import json
 import re
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,22 +20,25 @@ from . import assessment, store
 from .basis import read_basis
 from .body import load_toml
 from .case import CaseResult, CaseSettings, keeping, load_case, run_case
+from .case.assemble import Built, build
 from .case.comparison import Pair, comparison_table, paired
 from .case.settings import FIRST_HARMONICS
 from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
-from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage, touch
+from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage
 
 if TYPE_CHECKING:
-    from .case.assemble import Built
     from .case.settings import BodyOfCase
     from .operating.patches import ContactMap
 
 CASE_CODE = (
-    "speed_range.py", "harmonic_balance", "contact", "system", "compliance.py", "truncation.py", "case",
+    "speed_range.py", "harmonic_balance", "contact", "system", "compliance.py", "truncation.py", "case", "continuation",
+    "coordinates.py", "frames.py",
 )  # fmt: skip
-_ASSESSMENT_CODE = ("pictures/response.py", "pictures/operating.py", "operating", "assessment.py", "results")
+_ASSESSMENT_CODE = (
+    "pictures/response.py", "pictures/operating.py", "operating", "assessment.py", "results", "report.py", "running.py",
+)  # fmt: skip
 
 # response --------------------------------------------------------------------------------------------------------
 
@@ -57,20 +60,19 @@ def response_stage(
     settings, raw = load_case(case_path, assignments)
     summary_file = folder / "response.json"
     hashes = {name: store.hash_file(file) for name, file in files.items()}
-    beside = hashes_of({f: case_path.parent / f for f in settings.files})
+    beside = hashes_of(keeping.files_of(settings, case_path))
     case = keeping.without_defaults(raw)
     inputs = {"case": case, "basis": hashes, "files": beside, "code": code_hash(CASE_CODE + _ASSESSMENT_CODE)}
-    if not force and store.is_up_to_date(summary_file, inputs) and _all_drawn(folder):
-        report(f"{summary_file} is up to date")
-        touch(summary_file)
+    if store.nothing_to_do(summary_file, inputs, force, report):
         if log:
             _write_log(read_response(folder / "response.h5"), folder, report)
         summary = json.loads(summary_file.read_text())
         return summary, summary["failed_points"] == 0
     bases = {name: read_basis(file) for name, file in files.items()}
-    keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force, beside)
+    keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force)
     try:
-        result = run_case(settings, bases, case_path, report, keeper.journal, keeper.harmonics())
+        begin = keeper.harmonics(settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
+        result = run_case(settings, bases, case_path, report, keeper.journal, begin)
     except KeyboardInterrupt:
         keeper.unfinished()
         raise
@@ -80,7 +82,8 @@ def response_stage(
     for remark in result.remarks:
         report(f"warning: {remark}")
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
-    store.note_product(summary_file, inputs)
+    pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
+    store.note_product(summary_file, inputs, [*pictures, *(folder / name for name in summary["files"])])
     return summary, summary["failed_points"] == 0
 
 
@@ -89,26 +92,23 @@ def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
     return {name: store.hash_file(file) for name, file in files.items() if file.is_file()}
 
 
-def _all_drawn(folder: Path) -> bool:
-    """Whether the pictures and files that a summary names are there."""
-    try:
-        summary = json.loads((folder / "response.json").read_text())
-        pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
-        return all(p.is_file() for p in [*pictures, *(folder / name for name in summary["files"])])
-    except (OSError, ValueError, KeyError, AttributeError):
-        return False
+def inputs_of_points(built: Built, hashes: Mapping[str, str]) -> str:
+    """Hash of all that the points of an assembly depend on. hashes: body of the case -> SHA-256 of its modal file."""
+    return store.fingerprint(keeping.of_points(built), hashes, code_hash(CASE_CODE))
 
 
 @dataclass
 class Keeper:
-    """Where the points of a case are kept while it runs: `journal` opens ``response.points``."""
+    """Where the points of a case are kept while it runs: `journal` opens ``response.points``.
+
+    Before anything of a response is written its sidecar goes, see `store.unfinished`.
+    """
 
     folder: Path
     raw: dict[str, Any]
     hashes: Mapping[str, str]
     files: Mapping[str, str]
     fresh: bool
-    beside: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def points(self) -> Path:
@@ -117,33 +117,29 @@ class Keeper:
     @contextlib.contextmanager
     def journal(self, built: Built) -> Iterator[Journal]:
         """The journal of an assembly; see `results.open_journal`."""
-        inputs = self._inputs(built.settings.balanced)
         head = keeping.head_of(built, self.raw, self.hashes, self.files) | {"finished": False}
-        with open_journal(self.points, inputs, head, self.fresh) as journal:
+        self.begin()
+        with open_journal(self.points, inputs_of_points(built, self.hashes), head, self.fresh) as journal:
             self.fresh = False
             yield journal
 
-    def harmonics(self) -> int:
+    def harmonics(self, settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path) -> int:
         """With how many to begin where their number is looked for: those of the points that are kept."""
         with contextlib.suppress(UserError, KeyError, ValueError, TypeError):
             head, _ = read_journal(self.points)
-            if not self.fresh and head["inputs"] == self._inputs(int(head["harmonics"])):
-                return int(head["harmonics"])
+            kept = int(head["harmonics"])
+            built = build(settings.with_harmonics(kept), bases, path)
+            if not self.fresh and head["inputs"] == inputs_of_points(built, self.hashes):
+                return kept
         return FIRST_HARMONICS
 
-    def _inputs(self, harmonics: int) -> str:
-        """Hash of all that a point depends on."""
-        given = {
-            "case": keeping.of_a_point(self.raw),
-            "basis": self.hashes,
-            "files": dict(self.beside),
-            "code": code_hash(CASE_CODE),
-        }
-        looked_for = self.raw.get("harmonics") == "auto"
-        return store.hash_settings(given | ({"harmonics": harmonics} if looked_for else {}))
+    def begin(self) -> None:
+        """What stands in the folder counts no more."""
+        store.unfinished(self.folder / "response.json")
 
     def unfinished(self) -> None:
         """``response.h5`` of what there is so far."""
+        self.begin()
         if self.points.is_file():
             with contextlib.suppress(UserError):
                 write_response(self.folder / "response.h5", read_response(self.points))
@@ -155,6 +151,7 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
     from .pictures.response import response_picture
 
     folder, summary = keeper.folder, summarise(result)
+    keeper.begin()
     store.write_text(folder / "response.csv", response_table(result.responses))
     picture = folder / "pictures" / "response.png"
     with store.complete_or_absent(picture) as temporary:
@@ -455,20 +452,19 @@ def compare_book(
     case = keeping.as_found(case, folder, case_path)
     table, picture = folder / "book.csv", folder / "pictures" / "book.png"
     store.write_text(table, comparison_table(pairs))
-    marched, book = (_curves(f / "response.h5", case) for f, _ in ways.values())
+    marched, book = (_curves(f / "response.h5") for f, _ in ways.values())
     with store.complete_or_absent(picture) as temporary:
         comparison_picture(case, marched, book, temporary)
     return table, pairs, all(converged for _, converged in found.values())
 
 
-def _curves(file: Path, case: CaseSettings) -> dict[str, Array]:
-    """Normal force as text -> (2, f) Hz and amplitude (m) of the first read-out, in a response file."""
-    found, monitor = {}, case.address(case.watches[0].monitor)[1]
-    for s in read_response(file).series:
-        name = next(n for n in s.arrays if n.startswith("monitors/") and n.endswith(monitor))
-        amplitude = np.abs(s.arrays[name][:, 0, 1])
-        whole = np.stack([s.frequency, np.where(np.array(s.status) == "converged", amplitude, np.nan)])
-        found[f"{s.parameters['normal_force']:g}"] = whole[:, np.argsort(s.frequency, kind="stable")]
+def _curves(file: Path) -> dict[float, Array]:
+    """Normal force (N) -> (2, f) Hz and amplitude of the first read-out, in a response file."""
+    found, response = {}, read_response(file)
+    first = next(iter(response.labels))  # whose first row is the first read-out, see `harmonic_balance.kept.labels`
+    for s in response.series:
+        whole = np.stack([s.frequency, np.where(s.converged, np.abs(s.arrays[first][:, 0, 1]), np.nan)])
+        found[s.parameters["normal_force"]] = whole[:, np.argsort(s.frequency, kind="stable")]
     return found
 
 

@@ -1,7 +1,8 @@
 """Files that are complete or absent, their hashes, and the rule that decides whether a product is up to date.
 
 A product ``X`` may have a sidecar ``X.json`` with the hash of exactly the inputs and settings it was made from
-(key ``inputs``) and with what changes from run to run (time, commit). The product itself holds nothing volatile.
+(key ``inputs``), of the product itself, of every further file that was written with it (``files``), and with what
+changes from run to run (time, commit). The product itself holds nothing volatile.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .data import UserError
 
@@ -133,27 +137,103 @@ def hash_settings(settings: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def fingerprint(*values: Any) -> str:
+    """SHA-256 of values down to the last bit of every number, whatever holds them.
+
+    Args:
+        values: arrays (jax arrays too), numbers, texts, None; dataclasses, mappings (in any order) and sequences of
+            them, at any depth.
+
+    Raises:
+        TypeError: something else, which could hide what changes.
+    """
+    sha = hashlib.sha256()
+    for value in values:
+        _add(sha, value)
+    return sha.hexdigest()
+
+
+def _add(sha: Any, value: Any) -> None:
+    """Into the hash, each part with its kind and size before it, so that no two values look alike."""
+    kind = type(value)
+    if is_dataclass(value):
+        _add(sha, [f"{kind.__module__}.{kind.__qualname__}"])
+        _add(sha, {f.name: getattr(value, f.name) for f in fields(value)})
+    elif isinstance(value, Mapping):
+        sha.update(f"mapping {len(value)};".encode())
+        for key in sorted(value, key=repr):
+            _add(sha, key)
+            _add(sha, value[key])
+    elif isinstance(value, list | tuple):
+        sha.update(f"sequence {len(value)};".encode())
+        for item in value:
+            _add(sha, item)
+    elif value is None or isinstance(value, str):
+        text = repr(value).encode()
+        sha.update(b"text %d;" % len(text) + text)
+    else:
+        array = np.asarray(value)
+        if array.dtype.kind not in "biufcSU":
+            raise TypeError(f"{kind.__name__} cannot be told from others of its kind")
+        sha.update(f"{array.dtype.str} {array.shape};".encode() + np.ascontiguousarray(array).tobytes())
+
+
 def sidecar_path(product: Path | str) -> Path:
     """Where the sidecar of a product stands."""
     product = Path(product)
     return product.with_name(product.name + ".json")
 
 
+def nothing_to_do(
+    product: Path | str, inputs: Mapping[str, Any], force: bool = False, report: Callable[[str], None] = lambda _: None
+) -> bool:  # fmt: skip
+    """Whether a stage has no work to do: `product` and all that was written with it is up to date. Said to `report`.
+
+    Make is told that the product is as new as what it was made from.
+    """
+    if force or not is_up_to_date(product, inputs):
+        return False
+    report(f"{product} is up to date")
+    with contextlib.suppress(OSError):  # others' products stay as they are
+        os.utime(product)
+    return True
+
+
 def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
-    """True if `product` exists, is what its sidecar describes, and was made from these `inputs`."""
+    """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs`."""
     product = Path(product)
     try:
         note = json.loads(sidecar_path(product).read_text())
-        return note["inputs"] == hash_settings(inputs) and note["product"] == hash_file(product)
-    except (OSError, ValueError, KeyError, TypeError):
+        made = {product.name: note["product"], **note["files"]}
+        same = note["inputs"] == hash_settings(inputs)
+        return same and all(hash_file(product.parent / name) == digest for name, digest in made.items())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 
-def note_product(product: Path | str, inputs: Mapping[str, Any], **more: Any) -> None:
-    """Write the sidecar of a finished product: hashes, and what is volatile (UTC time, git commit)."""
+def unfinished(product: Path | str) -> None:
+    """Take the sidecar of a product away, before the first of its files is written: a run that ends here is begun anew.
+
+    Raises:
+        UserError: no right to.
+    """
+    try:
+        sidecar_path(product).unlink(missing_ok=True)
+    except OSError as error:
+        raise UserError(refused(sidecar_path(product), error)) from error
+
+
+def note_product(product: Path | str, inputs: Mapping[str, Any], files: Iterable[Path] = (), **more: Any) -> None:
+    """Write the sidecar of a finished product: hashes, and what is volatile (UTC time, git commit).
+
+    Args:
+        files: written with the product, in its folder or below.
+    """
+    product = Path(product)
     note = {
         "inputs": hash_settings(inputs),
         "product": hash_file(product),
+        "files": {str(file.relative_to(product.parent)): hash_file(file) for file in sorted(set(files))},
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         **git_state(Path(__file__).parent),
         **more,

@@ -20,7 +20,7 @@ from .case.curves import Followed, curves
 from .data import Array, ModalBasis
 from .report import survey_page
 from .results import Journal, open_journal, read_journal, response_of, write_response
-from .running import CASE_CODE, existing_files, hashes_of
+from .running import CASE_CODE, existing_files, hashes_of, inputs_of_points
 from .workflow import Report, code_hash
 
 if TYPE_CHECKING:
@@ -59,24 +59,23 @@ class Kept:
     """Where the points of a curve are kept.
 
     Attributes:
-        file: their journal. raw: the case file. hashes, files: see `keeping.head_of`. beside: hashes of files beside
-            the case. fresh: forget what is there.
+        file: their journal. raw: the case file. hashes, files: see `keeping.head_of`. fresh: forget what is there.
+        begin: is called before anything is written.
     """
 
     file: Path
     raw: Mapping[str, Any]
     hashes: Mapping[str, str]
     files: Mapping[str, str]
-    beside: Mapping[str, str]
     fresh: bool
+    begin: Callable[[], None]
 
     @contextmanager
     def journal(self, built: Built) -> Iterator[Journal]:
         """See `results.open_journal`."""
-        inputs = {"case": keeping.of_a_point(self.raw), "basis": self.hashes, "files": self.beside,
-                  "code": code_hash(CASE_CODE)}  # fmt: skip
         head = keeping.head_of(built, self.raw, self.hashes, self.files) | {"finished": False}
-        with open_journal(self.file, store.hash_settings(inputs), head, self.fresh) as journal:
+        self.begin()
+        with open_journal(self.file, inputs_of_points(built, self.hashes), head, self.fresh) as journal:
             yield journal
 
 
@@ -100,19 +99,23 @@ def survey_stage(
     files = existing_files(settings, case_path, basis_file, root)
     folder, said = root / "build" / settings.name, f"{kind}.txt"
     settings = settings if kind == "identification" else keeping.as_found(settings, folder, case_path)
-    hashes, beside = hashes_of(files), hashes_of({f: case_path.parent / f for f in settings.files})
+    hashes, named = hashes_of(files), hashes_of(keeping.files_of(settings, case_path))
     code = code_hash((*CASE_CODE, *_DRAWN_BY, "surveying.py"))
     if raw.get("harmonics") == "auto":
         raw = raw | {"harmonics": settings.harmonics}
-    inputs = {"case": raw, "basis": hashes, "code": code, "files": beside}
-    if not force and (done := _done(folder / said, inputs)) is not None:
-        report(f"{folder / said} is up to date")
-        return done
-    named = {name: str(file) for name, file in files.items()}
-    kept = Kept(folder / f"over_{kind}.points", raw, hashes, named, beside, force)
+    inputs = {"case": raw, "basis": hashes, "code": code, "files": named}
+    if store.nothing_to_do(folder / said, inputs, force, report):
+        return _told(folder / said)
+    where = {name: str(file) for name, file in files.items()}
+
+    def begin() -> None:
+        store.unfinished(folder / said)
+        (folder / said).unlink(missing_ok=True)
+
+    kept = Kept(folder / f"over_{kind}.points", raw, hashes, where, force, begin)
 
     def write(tables: Tables) -> None:
-        (folder / said).unlink(missing_ok=True)
+        begin()
         for name, columns in tables.items():
             store.write_text(folder / name, table(columns))
 
@@ -125,18 +128,16 @@ def survey_stage(
     if not found.whole:
         raise KeyboardInterrupt
     store.write_text(folder / said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
-    store.note_product(folder / said, inputs)
+    beside = [kept.file.with_suffix(".h5")] if kind not in KINDS else []
+    store.note_product(folder / said, inputs, [folder / name for name in names] + beside)
     return [folder / name for name in names], found.sentences, found.failed == 0
 
 
-def _done(said: Path, inputs: Any) -> tuple[list[Path], list[str], bool] | None:
-    """What `survey_stage` returned when it wrote a file of sentences from the same inputs; None if it is no more."""
-    if not store.is_up_to_date(said, inputs):
-        return None
+def _told(said: Path) -> tuple[list[Path], list[str], bool]:
+    """What `survey_stage` returned when it wrote a file of sentences."""
     first, *sentences = said.read_text().splitlines()
     listed, failed = first.split(": ")
-    made = [said.parent / name for name in listed.split(", ")]
-    return (made, sentences, int(failed) == 0) if all(p.is_file() for p in made) else None
+    return [said.parent / name for name in listed.split(", ")], sentences, int(failed) == 0
 
 
 def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:

@@ -6,7 +6,6 @@ Each stage knows the inputs its product depends on and does nothing when they ha
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shlex
@@ -25,9 +24,10 @@ from .basis import read_basis, write_basis
 from .body import BodySettings, MaterialSettings, MatrixFiles, implausible, load_body, load_toml
 from .compliance import sentence
 from .coordinates import own_kind
-from .data import Array, GyroscopicModes, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
+from .data import Array, GyroscopicModes, Indices, Material, Mesh, ModalBasis, ModalGroup, SpeedRange, UserError
 from .gyroscopic import stability_sentence
 from .mesh import UNITS, mesh_problems, part_numbers, read_mesh
+from .mesh.inp import files_of
 from .quality import sentences
 from .report import contact_sentence
 from .resonances import (
@@ -57,6 +57,7 @@ _MODES_CODE = (
     "units.py", "hostile.py",
 )  # fmt: skip
 _FOREIGN_CODE = (*_MODES_CODE, "exchange/matrices")
+_SYSTEM_CODE = ("data.py", "body.py", "canonical.py", "frames.py", "system/lumped.py", "basis")
 _REPORT_CODE = (
     "pictures", "campbell.py", "speed_range.py", "ring.py", "resonances.py", "report.py", "truncation.py",
     "compliance.py", "quality.py", "basis/checks.py",
@@ -121,12 +122,6 @@ def code_hash(parts: tuple[str, ...]) -> str:
     return store.hash_settings([[str(f.relative_to(PACKAGE)), store.hash_file(f)] for f in files])
 
 
-def touch(product: Path) -> None:
-    """Tell make that a product is as new as what it was made from (others' products stay as they are)."""
-    with contextlib.suppress(OSError):
-        os.utime(product)
-
-
 # mesh ------------------------------------------------------------------------------------------------------------
 
 
@@ -159,9 +154,7 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "source": store.hash_file(source),
         "code": code_hash(_MESH_CODE),
     }
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     report(f"meshing {source.name}")
     for line in _run_mesher(job, source, product):
@@ -306,21 +299,30 @@ def strange_material(m: Material, system: str) -> str:
 
 
 def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
-    """Faces of a user's own mesh given by a box (named sets of the file are there already)."""
+    """Faces of a user's own mesh given by boxes, those of one name added up; named sets of the file are there already.
+
+    Raises:
+        UserError: a rule by anything but a box, nothing in its box, the name of a set of the file.
+    """
     from .mesh import boundary_facets, faces_from_points
 
-    faces = dict(mesh.faces)
+    made: dict[str, dict[str, Indices]] = {}
     for rule in job.settings.geometry.faces:
+        place = f"{job.path}: geometry.faces.{rule.name}"
         if rule.box is None:
-            raise UserError(f"{job.path}: geometry.faces.{rule.name}: a mesh file has no labels or colours; use box")
+            raise UserError(f"{place}: a mesh file has no labels or colours; use box")
+        if rule.name in mesh.faces:
+            raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
         slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
         found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
         if not found:
-            raise UserError(f"{job.path}: geometry.faces.{rule.name}: no facet of the surface is in the box; widen it")
-        faces[rule.name] = found
-    return replace(mesh, faces=faces)
+            raise UserError(f"{place}: no facet of the surface is in the box; widen it")
+        face = made.setdefault(rule.name, {})
+        for kind, facets in found.items():
+            face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
+    return replace(mesh, faces={**mesh.faces, **made})
 
 
 # modes -----------------------------------------------------------------------------------------------------------
@@ -338,9 +340,7 @@ def modes_stage(
     mesh_file = mesh_stage(job, report=report) if matrices is None else job.path
     product = output or job.basis_file
     inputs = modes_inputs(job, mesh_file) if matrices is None else matrices_inputs(job, matrices)
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product, []
     if matrices is None:
         basis, warnings = _assembled_here(job, mesh_file, report)
@@ -470,6 +470,8 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
     """What a modal file depends on: settings but those of the drawing and the prose, the mesh, the code."""
     settings = {k: v for k, v in job.raw.items() if k not in ("geometry", "mesh", "description", "note")}
     inputs = {"settings": settings, "mesh": store.hash_file(mesh_file), "code": code_hash(_MODES_CODE)}
+    if mesh_file.suffix.lower() == ".inp" and (read := files_of(mesh_file)[1:]):
+        inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
     if job.settings.temperature.file:
@@ -574,11 +576,10 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         "remarks": remarks,
         "code": code_hash(_REPORT_CODE),
     }
-    if not force and store.is_up_to_date(product, inputs) and _all_there(product):
-        report(f"{product} is up to date")
-        touch(product)
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     basis = read_basis(job.basis_file)
+    store.unfinished(product)
     report("starting PyVista")
     reason = pictures.can_draw()
     if reason is not None:
@@ -586,22 +587,18 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         remarks.append(f"The pictures of the body are missing: {reason}")
     engine_orders = list(job.settings.rotation.engine_orders)
     drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
+    tables: list[Path] = []
     if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
         found = resonances(basis, engine_orders)
-        store.write_text(job.build_folder / "resonances.csv", resonance_csv(found))
+        tables = [job.build_folder / "resonances.csv"]
+        store.write_text(tables[0], resonance_csv(found))
     if response is not None:
         drawn |= {title: folder / name for title, name in shown.items()}
     report("writing the report")
     write_report(basis, drawn, product, remarks, response)
     if reason is None:  # else the next run tries again
-        store.note_product(product, inputs, pictures=sorted(p.name for p in drawn.values()))
+        store.note_product(product, inputs, [*drawn.values(), *tables])
     return product
-
-
-def _all_there(page: Path) -> bool:
-    """True if the pictures that were drawn for a page still exist."""
-    names = json.loads(store.sidecar_path(page).read_text()).get("pictures", [])
-    return all((page.parent / "pictures" / name).is_file() for name in names)
 
 
 def _remarks(job: Job) -> list[str]:
@@ -638,10 +635,8 @@ def system_stage(
 
     system = load_system(path, assignments)
     product = output or root / "build" / system.name / "basis.h5"
-    inputs = {"settings": dict(system.settings), "code": code_hash(("data.py", "system/lumped.py", "basis"))}
-    if not force and store.is_up_to_date(product, inputs):
-        report(f"{product} is up to date")
-        touch(product)
+    inputs = {"settings": dict(system.settings), "code": code_hash(_SYSTEM_CODE)}
+    if store.nothing_to_do(product, inputs, force, report):
         return product
     write_basis(product, system_basis(path, assignments))
     store.note_product(product, inputs)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,14 +17,14 @@ from ..frames import rotation
 from ..speed_range import basis_at
 from .counting import Face, Springs, brought, counted_once
 from .driving import damped, flow_of, loads_of, remarks_of, with_field
-from .patches import curved_springs, load_of, nodal_patch, patch_of, resolved, waves
+from .patches import curved_springs, fitting_forces, follows_the_force, nodal_patch, patch_of, resolved, waves
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
     from ..contact.law import Law
-    from ..contact.patch import Patch
     from ..system.assembly import Assembly, Contact, Load, Member, Side, Watch
     from ..system.meeting import Met, Place
+    from ..system.nodal import Nodal
 
 T = TypeVar("T")
 
@@ -66,6 +67,8 @@ class Built:
         settings. bodies: by name. contacts: with their sizes, in the assembly's order. springs: of
             each along n, t1, t2, N/m, without what the bodies hold. assembly: its contacts pressed by
             nothing where the sweep presses them. remarks: what a reader must know.
+        fitted: number of a curved contact that is fitted at the force (N) which presses it -> the contact fitted at a
+            force; `springs` and `assembly` have it as fitted at the largest of the sweep.
     """
 
     settings: CaseSettings
@@ -74,6 +77,7 @@ class Built:
     springs: tuple[Springs, ...]
     assembly: Assembly
     remarks: tuple[str, ...]
+    fitted: Mapping[int, Callable[[float], Contact]] = field(default_factory=dict)
 
     @property
     def speed(self) -> float:
@@ -82,12 +86,11 @@ class Built:
 
     def pressed(self, normal: float | None) -> Assembly:
         """The assembly with a normal force (N) in every contact that the sweep presses; all of its ring if asked."""
-        a = self.assembly
-        contacts = tuple(
-            c.pressed(normal) if swept(s) and normal is not None else c
-            for c, s in zip(a.contacts, self.contacts, strict=True)
-        )
-        whole = replace(a, contacts=contacts)
+        whole = self.assembly
+        if normal is not None:
+            own = [self.fitted[i](normal) if i in self.fitted else c for i, c in enumerate(whole.contacts)]
+            pairs = zip(own, self.contacts, strict=True)
+            whole = replace(whole, contacts=tuple(c.pressed(normal) if swept(s) else c for c, s in pairs))
         return whole.unrolled() if self.settings.ring and self.settings.ring.model == "full" else whole
 
 
@@ -191,22 +194,30 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     members = {
         name: Member(name, _by_index(b), b.basis.sectors, _brings(settings, name, b)) for name, b in bodies.items()
     }
-    contacts, springs, made, remarks = [], [], [], []
-    for c in settings.contacts:
-        own, k, said = _stiffness(settings, bodies, c, path)
+    contacts, springs, made, remarks = [], [], [], list[str]()
+    fitted: dict[int, Callable[[float], Contact]] = {}
+    for i, c in enumerate(settings.contacts):
+        pressed = fitting_forces(settings, c)
+        own, k, said = _stiffness(settings, bodies, c, pressed[-1], path)
         contacts.append(own)
         springs.append(k)
         if settings.law_of(c) != "jenkins":  # which has a closed form, and needs no assembly of point contacts
-            contact, more = _contact(settings, bodies, members, own, k, path)
-            made.append(contact)
+            at, more = _contact(settings, bodies, members, own, k, path)
             said += more
+            for force in pressed:
+                contact, more = at(force)
+                said += more
+            made.append(contact)
+            if follows_the_force(c):
+                fitted[i] = partial(_of_force, at)
         remarks += said
     flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in members.values())
     flowing, loads, said = _loads(settings, bodies, flowing, path)
     remarks += [*said, *remarks_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
     assembly = Assembly(flowing, tuple(made), loads, _watches(settings, bodies, path), ring)
-    return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(dict.fromkeys(remarks)))
+    said = list(dict.fromkeys(remarks))
+    return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
 
 
 def _by_index(b: Loaded) -> dict[int, ModalGroup]:
@@ -236,14 +247,14 @@ def _body(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str) -
 
 
 def _stiffness(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
+    settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, load: float | None, path: Path | str
 ) -> tuple[ContactSettings, Springs, list[str]]:
-    """A contact's settings with the size of its patch, its springs, and remarks."""
+    """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and remarks."""
     loaded, faces = _sides(settings, bodies, c, path)
     c = c if c.file is None else _of_file(c, path)[0]
     own = sized(c, faces[0], path)
     if c.young is not None:
-        springs, remark = _told(path, c, lambda: curved_springs(own, load_of(settings, c)))
+        springs, remark = _told(path, c, lambda: curved_springs(own, load))
     else:
         springs, remark = counted_once(c, _faces(settings, c, loaded), path)
     if c.file is not None and springs[0] != c.normal_stiffness:
@@ -263,11 +274,15 @@ def _sides(
     return loaded, [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
 
 
+At = Callable[[float | None], tuple["Contact", list[str]]]
+"""Load (N) that a contact is fitted for, or None -> the contact, and remarks."""
+
+
 def _contact(
     settings: CaseSettings, bodies: Mapping[str, Loaded], members: Mapping[str, Member], c: ContactSettings,
     springs: Springs, path: Path | str,
-) -> tuple[Contact, list[str]]:  # fmt: skip
-    """A contact, and remarks."""
+) -> tuple[At, list[str]]:  # fmt: skip
+    """A contact for any load, and remarks. springs: of one that is not curved."""
     from ..system.assembly import Side, touching
 
     ends, law = _ends(settings, c), settings.law_of(c)
@@ -277,23 +292,34 @@ def _contact(
         met = _told(path, c, lambda: _met(settings, c, loaded, faces))
         second = Side(*ends[1], met.frame, c.against_sector)
     whole = _of_file(c, path)[1] if c.file is not None else None
-    said, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None
+    said, found, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None, None
     if c.patch == "nodal":
-        patch, first, second, compliance, more = _told(
-            path, c, lambda: _nodal(settings, members, c, springs, (first, second), met, whole)
-        )
-        said += more
-    else:
-        patch = _told(path, c, lambda: patch_of(c, springs, law, faces[0], load_of(settings, c), whole))
-    said += _told(path, c, lambda: resolved(c, patch, load_of(settings, c)))
-    return touching(c.interface, patch, first, second, c.normal_force, c.interference or 0.0, compliance), said
+        found, first, second, compliance = _told(path, c, lambda: _nodal(settings, members, c, (first, second), met))
+        said.append(f"{c.interface}: the patch of {len(found.points)} points moves with {found.count - 6} deformations "
+                    "of the bodies besides its six rigid coordinates.")  # fmt: skip
+
+    @lru_cache(maxsize=64)
+    def at(load: float | None) -> tuple[Contact, list[str]]:
+        k, words = (springs, "") if c.young is None else _told(path, c, lambda: curved_springs(c, load))
+        if found is not None:
+            patch = nodal_patch(c, k, law, found, whole)
+        else:
+            patch = _told(path, c, lambda: patch_of(c, k, law, faces[0], load, whole))
+        more = [words] * bool(words) + _told(path, c, lambda: resolved(c, patch, load))
+        return touching(c.interface, patch, first, second, c.normal_force, c.interference or 0.0, compliance), more
+
+    return at, said
+
+
+def _of_force(at: At, normal: float) -> Contact:
+    return at(normal)[0]
 
 
 def _nodal(
-    settings: CaseSettings, members: Mapping[str, Member], c: ContactSettings, springs: Springs,
-    sides: tuple[Side, Side | None], met: Met | None, whole: Law | None,
-) -> tuple[Patch, Side, Side | None, Array, list[str]]:  # fmt: skip
-    """A patch that deforms, its sides, the compliance of the bodies along its coordinates, and remarks."""
+    settings: CaseSettings, members: Mapping[str, Member], c: ContactSettings, sides: tuple[Side, Side | None],
+    met: Met | None,
+) -> tuple[Nodal, Side, Side | None, Array]:  # fmt: skip
+    """A patch that deforms, its sides, and the compliance of the bodies along its coordinates."""
     from ..system.nodal import nodal, static_compliance
 
     faces = [(members[s.member], s.interface) for s in sides if s]
@@ -306,11 +332,7 @@ def _nodal(
     found = nodal(faces[0], faces[1] if len(faces) > 1 else None, met, waves(settings))
     first, second = found.sides(*sides)
     ends = [(members[s.member], s, sign) for s, sign in ((first, 1.0), (second, -1.0)) if s]
-    blades = settings.ring.blades if settings.ring else 0
-    said = (f"{c.interface}: the patch of {len(found.points)} points moves with {found.count - 6} deformations of the "
-            "bodies besides its six rigid coordinates.")  # fmt: skip
-    C = static_compliance(ends, 0, blades)
-    return nodal_patch(c, springs, settings.law_of(c), found, whole), first, second, C, [said]
+    return found, first, second, static_compliance(ends, 0, settings.ring.blades if settings.ring else 0)
 
 
 def _told(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
@@ -421,7 +443,7 @@ def _loads(
         body, row = settings.address(x.row or x.face or "")
         b = _body(bodies, body, path, "excitation")
         if x.field is not None:
-            row, face = f"field-{i + 1}", row
+            row, face = f"field {i + 1}", row  # no excitation of a body has a blank in its name
             named[body], sentence = with_field(named[body], x, row, face, path)
             said.append(sentence)
         else:

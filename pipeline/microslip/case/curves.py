@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array, UserError
+from ..results.names import exact
 from .assemble import Built, build, swept
 from .run import normal_forces, problem_of
 from .surveys import CurveOfCase, pointwise
@@ -78,9 +79,13 @@ class Followed:
 
     @property
     def label(self) -> str:
-        """What sets the curve apart from the others."""
-        said = [] if self.normal is None else [f"F_N = {self.normal:g} N"]
-        return ", ".join(said + ([] if self.frequency is None else [f"{self.frequency:.6g} Hz"])) or "as pressed"
+        """What sets the curve apart from the others, for people."""
+        return self.label_by("{:g}".format)
+
+    def label_by(self, number: Callable[[float], str]) -> str:
+        """`label` with numbers written in a way of one's own."""
+        said = [] if self.normal is None else [f"F_N = {number(self.normal)} N"]
+        return ", ".join(said + ([] if self.frequency is None else [f"{number(self.frequency)} Hz"])) or "as pressed"
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
@@ -152,7 +157,7 @@ def curves(
                 if over != "frequency":
                     at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
                     one = replace(one, frequency=at)
-                one = replace(one, name=f"{one.label}, {ends[0]:.10g} to {ends[1]:.10g} {UNITS[over]}")
+                one = replace(one, name=f"{one.label_by(exact)}, {exact(ends[0])} to {exact(ends[1])} {UNITS[over]}")
                 told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
                 journal.say({**journal.head, "parameters": told, "labels": labels(problem)})
                 report(f"curve over the {over.replace('_', ' ')}, {one.label}")
@@ -177,6 +182,11 @@ def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tupl
         return asked.band or (built.settings.sweep.start, built.settings.sweep.stop)
     if not any(swept(c) for c in built.contacts):
         raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
+    for i in built.fitted:
+        raise UserError(
+            f"{path}: contacts.{built.contacts[i].interface}.fitted_at: is missing; along a curve over its force "
+            "a curved contact has one law, so give the force (N) at which it is fitted"
+        )
     forces = normal_forces(built, path)
     if asked.normal_force is None and len(set(forces)) < 2:
         raise UserError(f"{path}: curve.normal_force: give [first, last] in N; the sweep has one normal force alone")
@@ -196,7 +206,7 @@ def _resonance(
 
     known = dict(journal.head.get("at", {}))
     s = built.settings.sweep
-    key = f"{normal}, {s.start:.10g} to {s.stop:.10g} Hz by {s.points}"
+    key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"
     if key not in known:
         report(f"resonance between {s.start:g} and {s.stop:g} Hz")
         f, _, _ = largest(problem, np.linspace(s.start, s.stop, s.points))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +13,13 @@ import numpy as np
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..results import Body
+from ..results.names import exact
+from ..store import fingerprint
 from .assemble import Built, Loaded
 from .settings import CaseSettings
 
 if TYPE_CHECKING:
     from ..operating.patches import ContactMap
-
-SELECTS = ("start", "stop", "points", "normal_forces")
-"""Keys of the sweep that say which points are asked for, and not what they are."""
-
-NOT_OF_A_POINT = (
-    "name", "description", "material_limits", "orders", "speeds", "ranges", "curve", "identification",
-)  # fmt: skip
-"""Keys of a case that no point depends on."""
 
 MOST_MAPS = 4
 """Patches that are drawn."""
@@ -36,15 +31,37 @@ def without_defaults(raw: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in raw.items() if k not in fields or v != fields[k].default}
 
 
-def of_a_point(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """A case file without what its points do not depend on."""
-    kept = {k: v for k, v in without_defaults(raw).items() if k not in NOT_OF_A_POINT}
-    return kept | {"sweep": {k: v for k, v in raw.get("sweep", {}).items() if k not in SELECTS}}
+def of_points(built: Built) -> str:
+    """Hash of all that the points of a case depend on beside their frequency and the sweep's normal force.
+
+    That is the balance itself, down to the last bit of its matrices, rows, loads and laws; what else the bodies hold is
+    told by their files. For a contact that is fitted at the force of each sweep stands what fits it.
+    """
+    from .run import problem_of
+
+    a, own = built.assembly, built.fitted
+    as_they_are = [i for i in range(len(a.contacts)) if i not in own]
+    rest = replace(a, contacts=tuple(a.contacts[i] for i in as_they_are))
+    settings = tuple(built.contacts[i] for i in as_they_are)
+    problem = problem_of(replace(built, assembly=rest, contacts=settings, fitted={}), None)
+    members = tuple(replace(m, groups={}) for m in problem.assembly.members)
+    fitted = [[built.contacts[i].model_dump(), a.contacts[i].first, a.contacts[i].second] for i in own]
+    return fingerprint(replace(problem, assembly=replace(problem.assembly, members=members)), fitted)
+
+
+def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
+    """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
+    from ..contact.settings import files_of as of_contact
+
+    found = {name: path.parent / name for name in settings.files}
+    for name in [c.file for c in settings.contacts if c.file is not None]:
+        found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
+    return found
 
 
 def series_name(normal: float) -> str:
-    """Name of the sweep under a normal force, N."""
-    return f"normal force {normal:g} N"
+    """Name of the sweep under a normal force, N; another one for every other number."""
+    return f"normal force {exact(normal)} N"
 
 
 def head_of(

@@ -123,14 +123,22 @@ def _law(c: ContactSettings, springs: Springs, law: str, areas: Array, whole: La
 # curved faces -------------------------------------------------------------------------------------------------------
 
 
-def load_of(settings: CaseSettings, c: ContactSettings) -> float | None:
-    """Normal force (N) for which a curved contact is fitted: its own, or the largest of the sweep; None: unknown."""
+def follows_the_force(c: ContactSettings) -> bool:
+    """Whether a curved contact is fitted at the very force of the sweep that presses it."""
+    return c.young is not None and c.fitted_at is None and c.normal_force is None and c.interference is None
+
+
+def fitting_forces(settings: CaseSettings, c: ContactSettings) -> tuple[float | None, ...]:
+    """Normal forces (N) at which a curved contact is fitted: its own, or those of the sweep, rising; None: unknown.
+
+    Of a contact whose law is the same under all of them the largest stands for them.
+    """
     swept = settings.sweep.normal_forces
-    if c.fitted_at is not None:
-        return c.fitted_at
-    if c.normal_force is not None:
-        return c.normal_force
-    return max(swept) if isinstance(swept, tuple) and c.interference is None else None
+    if c.fitted_at is not None or c.normal_force is not None:
+        return (c.fitted_at or c.normal_force,)
+    if not isinstance(swept, tuple) or c.interference is not None:
+        return (None,)
+    return tuple(sorted(set(swept))) if follows_the_force(c) else (max(swept),)
 
 
 def curved_springs(c: ContactSettings, load: float | None) -> tuple[Springs, str]:

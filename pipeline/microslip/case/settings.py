@@ -106,7 +106,7 @@ class ContactSettings(Model):
     patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
     relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
     young (Pa) and poisson of both bodies take the place of the two stiffnesses there: springs that agree with Hertz in
-    `fit`, at the load `fitted_at` (N; the contact's own normal force or the largest of the sweep if not given); or
+    `fit`, at the load `fitted_at` (N; if not given the force that presses it: its own, or each of the sweep); or
     law = ``hertz``: a line of contact in pieces, or one round contact, with its exact approach. isotropic: of both
     tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
     """

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..body import Model, NotNegative, Positive, _finite_vector, _tuple
 from ..data import Array, ModalBasis, UserError
+from ..results.names import apart
 from .keys import Orders, Positives
 
 if TYPE_CHECKING:
@@ -207,9 +208,10 @@ def over_orders(
 
     found: dict[str, OverOrders] = {}
     sweep = settings.sweep
-    for normal in normal_forces(at(orders[0]), path) or (None,):
-        label = "as pressed" if normal is None else f"$F_N$ = {normal:g} N"
-        under = "" if normal is None else f", F_N = {normal:g} N"
+    forces = normal_forces(at(orders[0]), path)
+    for normal, told in zip(forces or (None,), apart(forces) or [""], strict=True):
+        label = "as pressed" if normal is None else f"$F_N$ = {told} N"
+        under = "" if normal is None else f", F_N = {told} N"
 
         def problem(order: int, normal: float | None = normal) -> Problem:
             return problem_of(at(order), normal)

@@ -498,3 +498,12 @@ def beside(path: Path, name: str, key: str) -> Path:
     if not found.is_file():
         raise UserError(f"{path}: {key}: there is no file {found}; correct the name (it is sought beside this file)")
     return found
+
+
+def files_of(path: Path) -> list[Path]:
+    """Files that a contact file names (curves, profiles, tables, a modal file), as far as it can be read."""
+    try:
+        tables = [table for table in load_toml(path).values() if isinstance(table, dict)]
+    except UserError:  # told where the contact is made
+        return []
+    return [path.parent / table["file"] for table in tables if isinstance(table.get("file"), str)]

@@ -17,6 +17,7 @@ import scipy.linalg
 import scipy.optimize
 
 from ..data import Array, ComplexArray, Indices, ModalGroup
+from ..results.names import apart
 
 Report = Callable[[str], None]
 
@@ -272,8 +273,8 @@ def refined_peaks(
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
     """CSV text: frequency and, per normal force, amplitude, phase, dissipated energy and what else a response has."""
     head, columns = ["frequency_Hz"], []
-    for force, r in responses.items():
-        head += [f"{name}_FN_{force:g}_N" for name in r.columns()]
+    for force, r in zip(apart(list(responses)), responses.values(), strict=True):
+        head += [f"{name}_FN_{force}_N" for name in r.columns()]
         columns += list(r.columns().values())
     first = next(iter(responses.values()))
     table = np.column_stack([first.frequency, *columns])

@@ -12,7 +12,7 @@ from ..continuation import Branch, Settings, State
 from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.journal import Journal
-from ..system.assembly import Member
+from ..system.assembly import Assembly, Member, Watch
 from .families import Family, followed
 from .jenkins import tops
 from .patch import Cycle
@@ -147,8 +147,8 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
     }  # fmt: skip
-    for (name, _), rows in zip(_watches(problem), _split(problem, found.watched), strict=True):
-        kept[name] = rows
+    for name, rows in _watches(problem).items():
+        kept[name] = found.watched[list(rows.values())]
     for member in problem.assembly.members:
         kept[f"bodies/{member.name}/q"] = _rectangle(found.q[member.name])
         forces = [beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
@@ -174,7 +174,6 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         history=tuple(row["history"]),
     )  # fmt: skip
     names = [c.name for c in problem.assembly.contacts]
-    watched = [row[name] for name, _ in _watches(problem)]
     cycles = {}
     for name in names:
         d, s, slips, opened = (
@@ -184,7 +183,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     found = Operating(
         point.Omega,
         {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
-        np.concatenate(watched) if watched else np.zeros((0, problem.harmonics + 1), dtype=complex),
+        _watched(problem, row),
         {name: row[f"contacts/{name}/displacement"] for name in names},
         {name: row[f"contacts/{name}/force"] for name in names},
         row["supplied"],
@@ -194,31 +193,34 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     return point, found
 
 
-def _watches(problem: Problem) -> list[tuple[str, list[str]]]:
-    """Name of an array and its rows for every monitor or gauge that is read, in the order of the assembly.
+def _named(a: Assembly, w: Watch) -> str:
+    """Name of the array of a read-out: the member's name stands before the monitor's where there are several."""
+    group = next(iter(next(m for m in a.members if m.name == w.member).groups.values()))
+    kind = "monitors" if w.monitor in group.monitors else "gauges"
+    return f"{kind}/" + (f"{w.member}:{w.monitor}" if len(a.members) > 1 else w.monitor)
 
-    The member's name stands before the monitor's where there are several.
+
+def _watches(problem: Problem) -> dict[str, dict[str, int]]:
+    """Name of an array -> label of each of its rows -> number of the read-out in the assembly; the first one first.
+
+    A read-out that is asked for twice is one row.
     """
-    a, out = problem.assembly, list[tuple[str, list[str]]]()
-    for w in a.watches:
-        group = next(iter(next(m for m in a.members if m.name == w.member).groups.values()))
-        kind = "monitors" if w.monitor in group.monitors else "gauges"
-        name = f"{kind}/" + (f"{w.member}:{w.monitor}" if len(a.members) > 1 else w.monitor)
-        if out and out[-1][0] == name:
-            out[-1][1].append(w.label)
-        else:
-            out.append((name, [w.label]))
+    out: dict[str, dict[str, int]] = {}
+    for i, w in enumerate(problem.assembly.watches):
+        out.setdefault(_named(problem.assembly, w), {}).setdefault(w.label, i)
     return out
 
 
 def labels(problem: Problem) -> dict[str, list[str]]:
-    """Name of an array -> its rows, for the head of a journal."""
-    return dict(_watches(problem))
+    """Name of an array -> its rows, for the head of a journal; the first row of the first one is the first read-out."""
+    return {name: list(rows) for name, rows in _watches(problem).items()}
 
 
-def _split(problem: Problem, watched: ComplexArray) -> list[ComplexArray]:
-    ends = np.cumsum([len(rows) for _, rows in _watches(problem)])
-    return np.split(watched, ends[:-1]) if len(ends) else []
+def _watched(problem: Problem, row: dict[str, Any]) -> ComplexArray:
+    """(w, H + 1) the read-outs in the order of the assembly, from a kept point."""
+    places, a = _watches(problem), problem.assembly
+    found = [row[name][list(places[name]).index(w.label)] for w in a.watches for name in [_named(a, w)]]
+    return np.array(found, dtype=complex).reshape(-1, problem.harmonics + 1)
 
 
 def _rectangle(rows: list[ComplexArray]) -> ComplexArray:

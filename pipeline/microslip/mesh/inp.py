@@ -138,6 +138,16 @@ def _lines(path: Path, depth: int) -> Iterator[str]:
             yield line
 
 
+def files_of(path: Path, depth: int = 0) -> list[Path]:
+    """An input file and all that it reads from others, at any depth; what is missing is told where it is read."""
+    data = path.read_bytes() if path.is_file() and depth <= 10 else b""
+    found = [path]
+    for line in re.findall(r"^\s*\*[^*\n].*$", data.decode(errors="replace"), re.M) if b"INPUT" in data.upper() else ():
+        if name := _parameters(line).get("INPUT"):
+            found += files_of(path.parent / name, depth + 1)
+    return list(dict.fromkeys(found))
+
+
 def _blocks(lines: Iterator[str]) -> Iterator[tuple[str, dict[str, str], list[str]]]:
     """(keyword, parameters, data lines) of each keyword that matters. A keyword line may go on after a comma."""
     head = ""

@@ -10,6 +10,7 @@ import numpy as np
 from ..case import CaseResult, CaseSettings
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
+from ..results.names import apart
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -20,10 +21,12 @@ def response_picture(result: CaseResult, path: Path) -> None:
     axes = figure.subplots()
     axes.semilogy(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
     colours, lifted = _colours(len(result.responses)), list[float]()
-    for colour, (normal, r) in zip(colours, sorted(result.responses.items(), reverse=True), strict=True):
+    forces = sorted(result.responses, reverse=True)
+    for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
+        r = result.responses[normal]
         f, amplitude, lifts = _with_peaks(r, result.resonances[normal], result.lifted(normal))
         sure = np.where(lifts, np.nan, amplitude)
-        axes.semilogy(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {normal:g} N")
+        axes.semilogy(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {said} N")
         if lifts.any():
             beside = lifts | np.append(lifts[1:], False) | np.append(False, lifts[:-1])  # up to the line that is sure
             axes.semilogy(f, np.where(beside, amplitude, np.nan), color=colour, lw=1.6, ls=":")
@@ -58,11 +61,13 @@ def _read(s: CaseSettings) -> str:
     return f"{first.monitor}, {first.direction}, in µm"
 
 
-def comparison_picture(case: CaseSettings, marched: Mapping[str, Array], book: Mapping[str, Array], path: Path) -> None:
+def comparison_picture(
+    case: CaseSettings, marched: Mapping[float, Array], book: Mapping[float, Array], path: Path
+) -> None:  # fmt: skip
     """Amplitude over frequency in both modes, a panel a normal force.
 
     Args:
-        marched, book: normal force as text -> (2, f) Hz and m, not a number where a point did not converge.
+        marched, book: normal force (N) -> (2, f) Hz and m, not a number where a point did not converge.
     """
     from matplotlib.figure import Figure
 
@@ -72,10 +77,10 @@ def comparison_picture(case: CaseSettings, marched: Mapping[str, Array], book: M
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for axes in panels.ravel()[len(marched) :]:
         axes.remove()
-    for axes, name in zip(panels.ravel(), marched, strict=False):
-        axes.semilogy(marched[name][0], 1e6 * marched[name][1], color="#1f4e79", lw=2.2, label="marched")
-        axes.semilogy(book[name][0], 1e6 * book[name][1], color="#d1603d", lw=1.4, ls="--", label="book")
-        axes.set_title(f"$F_N$ = {name} N", fontsize=10)
+    for axes, force, told in zip(panels.ravel(), marched, apart(list(marched)), strict=False):
+        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="marched")
+        axes.semilogy(book[force][0], 1e6 * book[force][1], color="#d1603d", lw=1.4, ls="--", label="book")
+        axes.set_title(f"$F_N$ = {told} N", fontsize=10)
         axes.grid(True, which="both", alpha=0.25)
     panels[0, 0].legend(fontsize=9, title=f"marched: H = {case.harmonics}", title_fontsize=8)
     figure.suptitle(f"{case.name}: the book's mode beside the marched laws", fontsize=11)

@@ -1,6 +1,7 @@
 """Results that survive interruption: every finished point is kept at once, the file people use is complete or absent.
 
 `journal`: points as they are found, appended to a file of complete records. `files`: ``response.h5``, made from it.
+`names`: numbers in the names of series and columns.
 """
 
 from .files import Body as Body

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy.linalg
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..body import (
     Direction,
@@ -32,6 +32,7 @@ from ..body import (
     _finite_vector,
     _tuple,
     load_toml,
+    named_once,
     override,
     validate,
 )
@@ -316,8 +317,12 @@ class System:
 
         Raises:
             UserError: a coordinate without mass, a stiffness that is not positive (semi)definite, a rigid motion that
-                a damper brakes.
+                a damper brakes, a name used twice.
         """
+        try:
+            named_once(self, "contacts", "forces", "monitors")
+        except ValueError as error:
+            raise UserError(f"{self.name}: {error}") from error
         M, C, K = self.matrices()
         values, X, rigid = _modes(self.name, M, K)
         faces = {c.name: self._face(c) for c in self.contacts}
@@ -548,6 +553,11 @@ class SystemSettings(Model):
     forces: Annotated[tuple[ForceSettings, ...], BeforeValidator(_tuple)] = ()
     monitors: Annotated[tuple[MonitorSettings, ...], BeforeValidator(_tuple)] = ()
     damping_ratio: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _names_once(self) -> SystemSettings:
+        named_once(self, "masses bodies", "contacts", "forces", "monitors")
+        return self
 
 
 def load_system(path: Path | str, assignments: list[str] | None = None) -> System:
