@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,12 +11,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..body import Model, NotNegative, Number, Numbers, Positive
-from ..data import ModalGroup, UserError
+from ..data import Array, ModalGroup, UserError
 from .keys import Address, Order
 
 if TYPE_CHECKING:
     from ..system.assembly import Load, Member
     from ..system.excitation import Turning
+    from .assemble import Loaded
 
 ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
 
@@ -192,6 +194,24 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
         return {k: with_ratios(g, ratios) for k, g in groups.items()}
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
+
+
+def as_asked(b: Loaded, kind: str) -> tuple[dict[int, ModalGroup], dict[int, Array], float]:
+    """Groups, H of their loss factors and that of the residual compliance, see `system.assembly.Member`.
+
+    Args:
+        kind: see `CaseSettings.damping_as`. Dampers and Rayleigh's damping of a modal file stay viscous.
+    """
+    from ..system.damping import as_loss, last_ratio
+
+    groups = dict(b.groups)
+    if kind == "stuck":
+        return {k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in groups.items()}, {}, 0.0
+    if kind == "modal" or b.viscous:
+        return groups, {}, 0.0
+    both = {k: as_loss(g) for k, g in groups.items()}
+    loss = {k: H for k, (_, H) in both.items()}
+    return {k: g for k, (g, _) in both.items()}, loss, 2 * last_ratio(b.group)
 
 
 def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:
