@@ -214,12 +214,9 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
 def _member(settings: CaseSettings, b: Loaded) -> Member:
     from ..system.assembly import Member
 
-    groups, loss, beside = as_asked(b, settings.damping_as)
-    if b.basis.sectors == 1:
-        first = min(groups)
-        groups, loss = {0: groups[first]}, {0: loss[first]} if loss else {}
-    name = b.settings.name
-    return Member(name, groups, b.basis.sectors, _brings(settings, name, b), loss=loss, residual_loss=beside)
+    name, groups = b.settings.name, dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
+    member = Member(name, groups, b.basis.sectors, _brings(settings, name, b))
+    return as_asked(member, settings.damping_as, b.viscous)
 
 
 def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:

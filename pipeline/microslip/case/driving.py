@@ -11,13 +11,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..body import Model, NotNegative, Number, Numbers, Positive
-from ..data import Array, ModalGroup, UserError
+from ..data import ModalGroup, UserError
 from .keys import Address, Order
 
 if TYPE_CHECKING:
     from ..system.assembly import Load, Member
     from ..system.excitation import Turning
-    from .assemble import Loaded
 
 ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
 
@@ -196,22 +195,17 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
         raise UserError(f"{where}: {error}") from error
 
 
-def as_asked(b: Loaded, kind: str) -> tuple[dict[int, ModalGroup], dict[int, Array], float]:
-    """Groups, H of their loss factors and that of the residual compliance, see `system.assembly.Member`.
+def as_asked(member: Member, kind: str, viscous: bool) -> Member:
+    """A member with its damping as a case asks, see `CaseSettings.damping_as`.
 
     Args:
-        kind: see `CaseSettings.damping_as`. Dampers and Rayleigh's damping of a modal file stay viscous.
+        viscous: its damping is that of dampers or Rayleigh's, which make no loss factor.
     """
-    from ..system.damping import as_loss, last_ratio
+    from ..system.damping import structural
 
-    groups = dict(b.groups)
     if kind == "stuck":
-        return {k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in groups.items()}, {}, 0.0
-    if kind == "modal" or b.viscous:
-        return groups, {}, 0.0
-    both = {k: as_loss(g) for k, g in groups.items()}
-    loss = {k: H for k, (_, H) in both.items()}
-    return {k: g for k, (g, _) in both.items()}, loss, 2 * last_ratio(b.group)
+        return replace(member, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in member.groups.items()})
+    return structural(member) if kind == "structural" and not viscous else member
 
 
 def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:
