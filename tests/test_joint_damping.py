@@ -20,6 +20,7 @@ from microslip.harmonic_balance.reduced import stuck, stuck_damping
 from microslip.harmonic_balance.solver import solve
 from microslip.results import read_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
+from microslip.system.assembly import stuck_modes
 
 N, STIFF, RATIO = 4, 1e6, 1e-3
 CASE = """
@@ -33,8 +34,10 @@ amplitude = 0.2
 monitor = "free:end"
 [[bodies]]
 name = "{first}"
+{each}
 [[bodies]]
 name = "{second}"
+{each}
 [[contacts]]
 interface = "clamped:joint"
 against = "free:joint"
@@ -43,6 +46,7 @@ normal_stiffness = {joint}
 tangential_stiffness = 1.0
 friction = 0.3
 points = [1, 1]
+includes = "surface"
 width = 0.01
 height = 0.01
 [sweep]
@@ -69,9 +73,10 @@ def strip(name: str) -> System:
 BASES = {name: strip(name).basis() for name in ("clamped", "free")}
 
 
-def strips(tmp_path: Path, more: str = "", joint: float = STIFF, order: tuple[str, str] = ("clamped", "free")) -> Built:
+def strips(tmp_path: Path, more: str = "", joint: float = STIFF, order: tuple[str, str] = ("clamped", "free"),
+           each: str = "") -> Built:  # fmt: skip
     path = tmp_path / "case.toml"
-    path.write_text(CASE.format(more=more, joint=joint, first=order[0], second=order[1]))
+    path.write_text(CASE.format(more=more, joint=joint, first=order[0], second=order[1], each=each))
     return build(load_case(path)[0], BASES, path)
 
 
@@ -104,11 +109,26 @@ def test_a_clamped_and_a_free_strip_stuck_together(tmp_path: Path) -> None:
     np.testing.assert_allclose(asked, [0.002, *[0.003] * (2 * N - 1)], rtol=1e-9)
 
 
-@pytest.mark.parametrize("more", ["", 'damping = "stuck"\ndamping_ratio = 0.001', 'damping = "modal"'])
-def test_half_power_width_of_a_computed_resonance(tmp_path: Path, more: str) -> None:
+def test_what_the_modes_leave_out_loses_its_share_too(tmp_path: Path) -> None:
+    """Two modes a bar, the rest of its compliance beside them: D times the energy that is not the joint's, 1e-9."""
+    b = strips(tmp_path, each="modes = 2")
+    a = b.pressed(1e3)
+    part, k = a.joined(1), a.stiffness
+    assert np.abs(part.residual).max() > 1e-8
+    values, shapes = stuck_modes(part, k)
+    d = np.linalg.solve(np.eye(len(k)) + part.residual @ k, part.rows @ shapes)
+    joint = np.einsum("im,ij,jm->m", d, k, d) / values
+    np.testing.assert_allclose(damping(b)[1], RATIO * (1 - joint), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "each"),
+    [("", ""), ("", "modes = 2"), ('damping = "stuck"\ndamping_ratio = 0.001', ""), ('damping = "modal"', "")],
+)
+def test_half_power_width_of_a_computed_resonance(tmp_path: Path, more: str, each: str) -> None:
     """|Im a| / |a|^2 of the read-out is 2 D (f/f_0) k, so the two frequencies of half the power are 2 D f apart: 1e-4,
     what the other modes and D^2 leave; the loads supply what the bodies lose: 1e-9."""
-    b = strips(tmp_path, more)
+    b = strips(tmp_path, more, each=each)
     f, D = (v[0] for v in damping(b))
     problem, half = problem_of(b, 1e3), f * (1 + D * np.linspace(-1.5, 1.5, 21))
     points = [solve(problem, 2 * np.pi * at, []) for at in half]
@@ -170,7 +190,7 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
         (tmp_path / "build" / name).mkdir(parents=True)
         write_basis(tmp_path / "build" / name / "basis.h5", basis)
     case = tmp_path / "case.toml"
-    case.write_text(CASE.format(more="", joint=STIFF, first="clamped", second="free"))
+    case.write_text(CASE.format(more="", joint=STIFF, first="clamped", second="free", each=""))
     assert main(["respond", "case.toml", "-q"]) == 0
     summary = json.loads((tmp_path / "build/strips/response.json").read_text())
     f, joint = chain()
