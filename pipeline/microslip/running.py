@@ -66,6 +66,7 @@ def response_stage(
         if log:
             _write_log(read_response(folder / "response.h5"), folder, report)
         summary = json.loads(summary_file.read_text())
+        _say_stuck_modes(summary, report)
         return summary, summary["failed_points"] == 0
     bases = {name: read_basis(file) for name, file in files.items()}
     keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force, beside)
@@ -77,14 +78,18 @@ def response_stage(
     summary = _finished(keeper, result, report)
     if log:
         _write_log(read_response(folder / "response.h5"), folder, report)
-    for i, mode in enumerate(summary["stuck_modes"], 1):
-        f, D, width = mode.values()
-        report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
+    _say_stuck_modes(summary, report)
     for remark in result.remarks:
         report(f"warning: {remark}")
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
     store.note_product(summary_file, inputs)
     return summary, summary["failed_points"] == 0
+
+
+def _say_stuck_modes(summary: Mapping[str, Any], report: Report) -> None:
+    for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
+        f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
+        report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
 
 
 def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
