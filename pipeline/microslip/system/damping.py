@@ -61,8 +61,8 @@ def structural(member: Member) -> Member:
     """The member with loss factors in the place of its modal damping, in every wave; see `as_loss`."""
     both = {k: as_loss(g) for k, g in member.groups.items()}
     last = 2 * last_ratio(member.groups[min(member.groups)])
-    groups, loss = ({k: pair[i] for k, pair in both.items()} for i in (0, 1))
-    return replace(member, groups=groups, loss=loss, residual_loss=last)
+    loss = {k: H for k, (_, H) in both.items()}
+    return replace(member, groups={k: g for k, (g, _) in both.items()}, loss=loss, residual_loss=last)
 
 
 def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> dict[int, complex]:
