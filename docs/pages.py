@@ -343,6 +343,11 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "monitor": ("", "short for one `[[monitors]]`"),
     "direction": ("", "of that monitor"),
     "mode": ("", "laws marched in time, or the [book's contact](book_mode.md)"),
+    "damping": ("", "[how the ratios are meant](excitation.md#damping): of each body's own modes (the book's), as loss "
+                "factors of the bodies, or of the modes with sticking contacts; if not given, `modal` for one body, "
+                "`structural` for several"),
+    "damping_ratio": ("", "of the bodies that give none themselves, or of the stuck modes: one, or one a mode, the "
+                      "last one for all that follow"),
     "strips": ("", "book's mode: into how many strips a patch's roughness makes microslip; 0: none"),
     "harmonics": ("", "H, besides the mean; `auto`: [as many as the error asks for]"
                   "(harmonic_balance.md#what-is-followed-instead-of-swept)"),
@@ -431,7 +436,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "speeds.points": ("", "equally spaced"),
     "speeds.normal_force": ("N", "`static`, one, or pairs [rpm, N], straight lines in the square of the speed; the "
                             "sweep's one if not given"),
-    "ranges.damping_ratio": ("", "of all modes of all bodies"),
+    "ranges.damping_ratio": ("", "of all modes of all bodies, or of the stuck modes with damping = `stuck`"),
     "ranges.load": ("", "factors on the loads that are not steady"),
     "ranges.friction": ("", "coefficients of all contacts"),
     "ranges.normal_force": ("N", "of the contacts that the sweep presses"),

@@ -23,6 +23,7 @@ from microslip.modes import modal_basis
 from microslip.neighbours import frame_change
 from microslip.neighbours import stuck as stuck_neighbours
 from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, touching
+from microslip.system.damping import structural
 from microslip.system.disc import whole
 from microslip.system.meeting import in_ring
 from microslip.system.nodal import nodal
@@ -84,6 +85,23 @@ def test_a_cyclic_sector_stands_for_the_whole_disc(basis: ModalBasis, order: int
     np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert y.supplied == pytest.approx(N * x.supplied, rel=1e-9)
     assert x.cycles["gap"].slipping.mean() > 0.01 or order == 0
+
+
+@pytest.mark.parametrize("kind", ["structural", "stuck"])
+def test_loss_factors_and_stuck_damping_of_a_cyclic_sector(basis: ModalBasis, kind: str) -> None:
+    """As above, for a wave against the numbers; with loss factors the sector alone has 2 D K, and its own D."""
+    one = sector(basis, -1, 50.0, 3e3)
+    if kind == "stuck":
+        one = replace(one, stuck_damping=(0.003,))
+    else:
+        one = replace(one, members=(structural(one.members[0]),))
+        part = one.part(one.members[0], 1)
+        np.testing.assert_allclose(part.loss, 0.004 * part.K, rtol=0, atol=1e-9 * np.abs(part.K).max())
+    a, b = (balance.of(x, **FINE) for x in (one, one.unrolled()))
+    x, y = (response.operating(p, solve(p, 2 * np.pi * 700.0, [])) for p in (a, b))
+    turned = x.watched[0] * np.exp(-2j * np.pi * np.arange(4) * np.arange(N)[:, None] / N)
+    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    assert y.damped == pytest.approx(N * x.damped, rel=1e-9)
 
 
 def test_the_whole_ring_has_the_modes_of_all_nodal_diameters(basis: ModalBasis) -> None:

@@ -15,7 +15,15 @@ from microslip.fem import discretise, displacement_gradient, green_strain, inter
 from microslip.fem.discretise import free_upper
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import equilibrium, linear_stiffness, make_model, softening, stress_of
+from microslip.modes.equilibrium import (
+    equilibrium,
+    heated,
+    linear_stiffness,
+    make_model,
+    softening,
+    stiffness_slope,
+    stress_of,
+)
 from microslip.reference.bars import box_frequencies
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
@@ -54,20 +62,24 @@ def unbalance(model, speed, u):
     """Internal minus outer forces with everything written out again: F S, Omega^2 M P (x + u), dead loads."""
     d = model.d
     H = [displacement_gradient(b, u) for b in d.blocks]
-    S = stress_of(model, [green_strain(h) for h in H])
+    S = stress_of(heated(model), [green_strain(h) for h in H])
     r = model.d.mesh.points + u
     pull = speed**2 * (model.M_full @ (r - np.outer(r @ model.axis, model.axis)))
     return (internal_force(d, S, H) - pull - model.dead_load).reshape(-1)[model.free.free]
 
 
-def test_forces_balance_and_the_tangent_is_their_derivative():
-    """Newton's end state of a twisted blade at 12000 rpm under a side load, and d(unbalance)/du = K."""
+@pytest.mark.parametrize("hot", ["", "steel", "orthotropic"])
+def test_forces_balance_and_the_tangent_is_their_derivative(hot):
+    """Newton's end state of a twisted blade at 12000 rpm under a side load (a twentieth on wood), heated or not, and
+    d(unbalance)/du = K, dK/dOmega^2 by differences of the equilibria."""
     rng = np.random.default_rng(0)
     load = np.zeros((BLADE.n_points, 3))
-    load[BLADE.face_points("z1")] = [30.0, -20.0, 5.0]
-    model = model_of(BLADE, body(**ROOT), load)
-    speed = 12000 * np.pi / 30
-    state = equilibrium(model, speed, "nonlinear", eigen.new_solver("superlu"))
+    load[BLADE.face_points("z1")] = np.array([30.0, -20.0, 5.0]) / (20 if hot == "orthotropic" else 1)
+    material = {"": STEEL, "steel": HOT, "orthotropic": TURNED}[hot]
+    T = 293.15 + 2000 * BLADE.points[:, 2] if hot else None
+    model = model_of(BLADE, body(**ROOT, material=material), load, temperature=T)
+    speed, solver = 12000 * np.pi / 30, eigen.new_solver("superlu")
+    state = equilibrium(model, speed, "nonlinear", solver)
     scale = np.abs(internal_force(model.d, state.stress, state.H)).max()
     assert np.abs(unbalance(model, speed, state.u)).max() < 1e-7 * scale
     assert state.iterations <= 9
@@ -78,6 +90,9 @@ def test_forces_balance_and_the_tangent_is_their_derivative():
     )
     Kv = (model.d.pattern.full(state.K) @ v.reshape(-1))[model.free.free]
     assert np.abs(Kv - difference).max() < 1e-6 * np.abs(Kv).max()
+    _, dK = stiffness_slope(model, speed, state, solver)
+    low, high = (equilibrium(model, np.sqrt(speed**2 + s), "nonlinear", solver, state) for s in (-2e3, 2e3))
+    assert np.abs((high.K - low.K) / 4e3 - dK).max() < 1e-5 * np.abs(dK).max()
 
 
 def test_linear_state_is_one_linear_solution():
@@ -224,7 +239,8 @@ TURNED = {
 @pytest.mark.parametrize("prestress", ["linear", "nonlinear"])
 @pytest.mark.parametrize("material", [HOT, TURNED], ids=["steel", "orthotropic"])
 def test_uniform_heat_makes_no_stress_in_a_body_free_to_expand(prestress, material):
-    """Statically determinate, orthotropic expansion in turned axes too; the box grows by alpha dT."""
+    """Statically determinate, orthotropic expansion in turned axes too; the box grows by alpha dT, every distance in
+    it by its own: 1e-9, where Newton ends."""
     mesh, supports = three_points(brick("tetra10", (2, 2, 2), (0.3, 0.2, 0.1)))
     group = the_group(
         mesh, np.full(mesh.n_points, 493.15), material=material, supports=supports, output={},
@@ -235,8 +251,42 @@ def test_uniform_heat_makes_no_stress_in_a_body_free_to_expand(prestress, materi
         assert np.abs(stresses.static_stress).max() < 1e-9 * stiff * 1e-3
     if material is HOT:
         corner = nearest(mesh, (0.3, 0.2, 0.1))
-        stretch = 1.2e-5 * 200 if prestress == "linear" else np.sqrt(1 + 2 * 1.2e-5 * 200) - 1
-        np.testing.assert_allclose(group.u_static[corner], np.array([0.3, 0.2, 0.1]) * stretch, rtol=1e-6)
+        np.testing.assert_allclose(group.u_static[corner], np.array([0.3, 0.2, 0.1]) * 1.2e-5 * 200, rtol=1e-9)
+    elif prestress == "nonlinear":
+        axes = np.array(TURNED["axes"])
+        U = np.eye(3) + 200 * axes.T @ np.diag(TURNED["expansion"]) @ axes
+        apart, stretched = mesh.points - mesh.points[0], mesh.points + group.u_static
+        distance = np.linalg.norm(stretched - stretched[0], axis=1)
+        np.testing.assert_allclose(distance, np.linalg.norm(apart @ U, axis=1), rtol=1e-9)
+
+
+ALONG = {k: v for k, v in TURNED.items() if k != "axes"}
+
+
+@pytest.mark.parametrize(("material", "kelvin"), [(HOT, 400.0), (HOT, 2000.0), (ALONG, 2000.0)])
+def test_a_heated_body_in_rotation_is_the_same_drawn_at_its_heated_size(material, kelvin):
+    """Mass stays, Hooke's law holds for the heated body: drawn by U larger with rho / det U, without heat, it has the
+    same places, frequencies, Cauchy stress and stress modes at speed: 1e-8, where Newton ends."""
+    mesh, supports = three_points(brick("tetra10", (2, 2, 2), (0.3, 0.2, 0.1)))
+    U = 1 + kelvin * np.broadcast_to(material["expansion"], 3)
+    larger = replace(mesh, points=mesh.points * U)
+    cold = {**material, "density": material["density"] / U.prod()}
+    what = {"supports": supports, "rotation": at_rpm(12000, axis=[0, 1, 0], point=[-0.5, 0, 0]), "output": {}}
+    hot = the_group(mesh, np.full(mesh.n_points, 293.15 + kelvin), material=material, **what)
+    drawn = the_group(larger, material=cold, **what)
+    np.testing.assert_allclose(hot.omega, drawn.omega, rtol=1e-8)
+    pulled = np.abs(drawn.u_static).max()
+    np.testing.assert_allclose(mesh.points + hot.u_static, larger.points + drawn.u_static, rtol=0, atol=1e-8 * pulled)
+    a, b = hot.stresses["gauss"], drawn.stresses["gauss"]
+    np.testing.assert_allclose(a.static_stress, b.static_stress, rtol=0, atol=1e-7 * np.abs(b.static_stress).max())
+    np.testing.assert_allclose(a.stress, b.stress, rtol=0, atol=1e-6 * np.abs(b.stress).max())
+
+
+def test_a_heated_free_bar_sounds_higher_by_the_root_of_its_stretch():
+    """omega^2 ~ E L A / (m L^2) grows with 1 + alpha dT as the bar grows and its mass stays: 1e-9."""
+    mesh, supports = three_points(brick("hexahedron20", (4, 1, 1), (1.0, 0.1, 0.1)))
+    hot, cold = (the_group(mesh, T, material=HOT, supports=supports) for T in (np.full(mesh.n_points, 793.15), None))
+    np.testing.assert_allclose(hot.omega / cold.omega, np.sqrt(1 + 1.2e-5 * 500), rtol=1e-9)
 
 
 def test_a_linear_temperature_bends_without_stress():
@@ -257,13 +307,14 @@ def test_a_linear_temperature_bends_without_stress():
 
 @pytest.mark.parametrize("dT", [60.0, -80.0])
 def test_heated_between_walls_the_eigenvalues_fall_by_the_stress(dT):
-    """Rollers on all faces: u = 0, S = -3 K alpha dT in all directions, lambda changes by S |k|^2 / rho exactly."""
-    size = (0.5, 0.4, 0.3)
+    """Rollers on all faces: F = 1, so that the material is compressed by 1 / U, with U = 1 + alpha dT:
+    S = -3 K (U - 1/U) / 2 in all directions, the waves see the moduli over U, and lambda changes by S |k|^2 / rho."""
+    size, U = (0.5, 0.4, 0.3), 1 + 1.2e-5 * dT
     mesh = brick("hexahedron20", (4, 4, 4), size)
-    stress = -(3 * LAME + 2 * SHEAR) * 1.2e-5 * dT
+    stress = -(3 * LAME + 2 * SHEAR) * (U - 1 / U) / 2
     cold = the_group(mesh, **roller_box())
     hot = the_group(mesh, np.full(mesh.n_points, 293.15 + dT), material=HOT, **roller_box(), output={})
-    exact = box_frequencies(RHO, LAME, SHEAR, size, 4, (stress,) * 3) / box_frequencies(
+    exact = box_frequencies(RHO, LAME / U, SHEAR / U, size, 4, (stress,) * 3) / box_frequencies(
         RHO, LAME, SHEAR, size, 4
     )
     np.testing.assert_allclose(hot.omega / cold.omega, exact, rtol=3e-6)  # the mesh errs by 6e-4 of the change

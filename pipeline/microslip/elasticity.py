@@ -46,6 +46,24 @@ def turned(C: Array, axes: Array) -> Array:
     return from_tensor(np.einsum("pi,qj,rk,sl,pqrs->ijkl", R, R, R, R, to_tensor(C), optimize=True))
 
 
+def strain_tensor(strain: Array) -> Array:
+    """(..., 6) strain with engineering shear -> (..., 3, 3) tensor."""
+    return (strain * np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5]))[..., PAIR]
+
+
+def pushed(C: Array, F: Array) -> Array:
+    """(..., 6, 6) Hooke matrix in the deformed body: c_ijkl = F_iA F_jB F_kC F_lD C_ABCD / det F.
+
+    Args:
+        F: (..., 3, 3) deformation gradient.
+    """
+    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+    # sigma = L S in Voigt components; L^T takes engineering strain back
+    L = F[..., i[:, None], i[None]] * F[..., j[:, None], j[None]]
+    L[..., 3:] += F[..., i[:, None], j[None, 3:]] * F[..., j[:, None], i[None, 3:]]
+    return np.matmul(np.matmul(L, C), np.swapaxes(L, -1, -2)) / np.linalg.det(F)[..., None, None]
+
+
 def turned_strain(along: Array, axes: Array | None) -> Array:
     """(6,) strain in body axes with engineering shear, of normal strains (3,) along the rows of `axes`."""
     R = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
@@ -54,8 +72,8 @@ def turned_strain(along: Array, axes: Array | None) -> Array:
 
 
 def to_tensor(C: Array) -> Array:
-    """(6, 6) Hooke matrix -> (3, 3, 3, 3) elasticity tensor."""
-    return C[PAIR[:, :, None, None], PAIR[None, None]]
+    """(..., 6, 6) Hooke matrix -> (..., 3, 3, 3, 3) elasticity tensor."""
+    return C[..., PAIR[:, :, None, None], PAIR[None, None]]
 
 
 def from_tensor(C: Array) -> Array:

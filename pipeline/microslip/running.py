@@ -67,6 +67,7 @@ def response_stage(
         if log:
             _write_log(read_response(folder / "response.h5"), folder, report)
         summary = json.loads(summary_file.read_text())
+        _say_stuck_modes(summary, report)
         return summary, summary["failed_points"] == 0
     bases = {name: read_basis(file) for name, file in files.items()}
     keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force)
@@ -79,12 +80,19 @@ def response_stage(
     summary = _finished(keeper, result, report)
     if log:
         _write_log(read_response(folder / "response.h5"), folder, report)
+    _say_stuck_modes(summary, report)
     for remark in result.remarks:
         report(f"warning: {remark}")
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
     store.note_product(summary_file, inputs, [*pictures, *(folder / name for name in summary["files"])])
     return summary, summary["failed_points"] == 0
+
+
+def _say_stuck_modes(summary: Mapping[str, Any], report: Report) -> None:
+    for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
+        f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
+        report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
 
 
 def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
@@ -184,7 +192,7 @@ def _response(keeper: Keeper, result: CaseResult, summary: Mapping[str, Any]) ->
         low, high = result.settings.sweep.start, result.settings.sweep.stop
         found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
     told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
-    told |= {"resonances": summary["resonances"], "remarks": list(result.remarks)}
+    told |= {key: summary[key] for key in ("resonances", "stuck_modes", "remarks")}
     return response_of({**head, **told}, found)
 
 
@@ -294,11 +302,21 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "description": result.settings.description,
         "rotation_speed_rpm": result.speed * 30 / np.pi,
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
+        "damping": result.settings.damping_as,
+        "stuck_modes": _stuck_modes(result),
         **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
         "resonances": rows,
         "failed_points": failed,
         "remarks": list(result.remarks),
     }
+
+
+def _stuck_modes(result: CaseResult) -> list[dict[str, float]]:
+    """Damping of every mode with sticking contacts that the excited harmonics reach, and of the first one beyond."""
+    most = result.settings.sweep.stop * result.settings.balanced
+    count = int(np.searchsorted(result.stuck, most)) + 1
+    pairs = zip(result.stuck[:count].tolist(), result.stuck_damping[:count].tolist(), strict=True)
+    return [{"frequency_Hz": f, "damping_ratio": D, "half_power_width_Hz": 2 * D * f} for f, D in pairs]
 
 
 # chains ------------------------------------------------------------------------------------------------------------

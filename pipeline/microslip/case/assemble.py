@@ -16,7 +16,7 @@ from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserEr
 from ..frames import rotation
 from ..speed_range import basis_at
 from .counting import Face, Springs, brought, counted_once
-from .driving import damped, flow_of, loads_of, remarks_of, with_field
+from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
 from .patches import curved_springs, fitting_forces, follows_the_force, nodal_patch, patch_of, resolved, waves
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 
@@ -34,12 +34,14 @@ class Loaded:
     """A body of a case: its settings, its modal file at the speed asked for, groups in the coordinates to be used.
 
     stored: the groups as the file has them, by nodal diameter. groups: in modes where statics stand beside them.
+    viscous: their damping is that of dampers or Rayleigh's, and no ratio of each mode.
     """
 
     settings: BodyOfCase
     basis: ModalBasis
     stored: Mapping[int, ModalGroup]
     groups: Mapping[int, ModalGroup]
+    viscous: bool = False
 
     @property
     def group(self) -> ModalGroup:
@@ -124,11 +126,13 @@ def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path
     groups = {k: in_modes(g) for k, g in stored.items()} if beside else stored
     if b.mass is not None:
         groups, stored = (_of_mass(g, b.mass, basis, f"{path}: {key}mass") for g in (groups, stored))
-    if b.damping_ratio is not None:
-        groups = damped(groups, b.damping_ratio, f"{path}: {key}damping_ratio")
+    ratios, whose = (b.damping_ratio, key) if b.damping_ratio is not None else (settings.damping_ratio, "")
+    viscous = ratios is None and basis.damping_source.startswith(("rayleigh", "matrix"))
+    if ratios is not None:
+        groups = damped(groups, ratios, f"{path}: {whose}damping_ratio")
     if b.hold is not None:
         groups = {k: held(g, b.hold, f"{path}: {key}hold") for k, g in groups.items()}
-    return Loaded(b, basis, stored, groups)
+    return Loaded(b, basis, stored, groups, viscous)
 
 
 def _of_mass(groups: dict[int, ModalGroup], mass: float, basis: ModalBasis, key: str) -> dict[int, ModalGroup]:
@@ -188,12 +192,10 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
             twice.
     """
-    from ..system.assembly import Assembly, Member, Ring
+    from ..system.assembly import Assembly, Ring
 
     bodies = load_bodies(settings, bases, path)
-    members = {
-        name: Member(name, _by_index(b), b.basis.sectors, _brings(settings, name, b)) for name, b in bodies.items()
-    }
+    members = {name: _member(settings, b) for name, b in bodies.items()}
     contacts, springs, made, remarks = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
     for i, c in enumerate(settings.contacts):
@@ -215,13 +217,17 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     flowing, loads, said = _loads(settings, bodies, flowing, path)
     remarks += [*said, *remarks_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
-    assembly = Assembly(flowing, tuple(made), loads, _watches(settings, bodies, path), ring)
+    assembly = Assembly(flowing, tuple(made), loads, _watches(settings, bodies, path), ring, settings.stuck_ratios)
     said = list(dict.fromkeys(remarks))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
 
 
-def _by_index(b: Loaded) -> dict[int, ModalGroup]:
-    return dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
+def _member(settings: CaseSettings, b: Loaded) -> Member:
+    from ..system.assembly import Member
+
+    name, groups = b.settings.name, dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
+    member = Member(name, groups, b.basis.sectors, _brings(settings, name, b))
+    return as_asked(member, settings.damping_as, b.viscous)
 
 
 def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:

@@ -13,20 +13,20 @@ from ..harmonic_balance import (
     Residual,
     frequency_response,
     refined_peaks,
-    stuck_frequencies,
+    stuck_resonances,
 )
 from .assemble import Built
 from .counting import Springs
 from .settings import ContactSettings
 
-Answer = tuple[dict[float, FrequencyResponse], dict[float, list[tuple[float, float]]], Array, list[str]]
+Answer = tuple[dict[float, FrequencyResponse], dict[float, list[tuple[float, float]]], tuple[Array, Array], list[str]]
 
 
 def in_closed_form(
     built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None],
     at_peaks: dict[float, FrequencyResponse],
 ) -> Answer:  # fmt: skip
-    """Responses and resonances by normal force, sticking frequencies, remarks; `at_peaks` is filled."""
+    """Responses and resonances by normal force, sticking frequencies and their damping, remarks; fills `at_peaks`."""
     responses: dict[float, FrequencyResponse] = {}
     resonances = {}
     a, member = built.assembly, built.assembly.members[0]
@@ -46,8 +46,7 @@ def in_closed_form(
         resonances[normal] = refined_peaks(responses[normal], respond)
         at_peaks[normal] = respond(np.array([f for f, _ in resonances[normal]]))
     closed = [jenkins_contact(c, max(forces), s) for c, s in zip(built.contacts, built.springs, strict=True)]
-    stuck = stuck_frequencies(group, closed, residual)
-    return responses, resonances, stuck, _lift_off(responses)
+    return responses, resonances, stuck_resonances(group, closed, residual), _lift_off(responses)
 
 
 def _residual(built: Built) -> Residual:

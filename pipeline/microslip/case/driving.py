@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -192,6 +193,19 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
         return {k: with_ratios(g, ratios) for k, g in groups.items()}
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
+
+
+def as_asked(member: Member, kind: str, viscous: bool) -> Member:
+    """A member with its damping as a case asks, see `CaseSettings.damping_as`.
+
+    Args:
+        viscous: its damping is that of dampers or Rayleigh's, which make no loss factor.
+    """
+    from ..system.damping import structural
+
+    if kind == "stuck":
+        return replace(member, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in member.groups.items()})
+    return structural(member) if kind == "structural" and not viscous else member
 
 
 def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:

@@ -33,6 +33,8 @@ Keep = Callable[[Built], AbstractContextManager[Journal]]
 class CaseResult:
     """Responses by normal force (N), the free response, and the eigenfrequencies with sticking contacts (Hz).
 
+    stuck_damping: ratio D of each of them, so that its half-power width is 2 D f.
+
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
     peaks. truncation: largest estimated error of a resonance for want of harmonics, where their number was looked for.
@@ -48,6 +50,7 @@ class CaseResult:
     built: Built
     at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
     truncation: float | None = None
+    stuck_damping: Array = field(default_factory=lambda: np.zeros(0))
 
     def lifted(self, normal: float) -> tuple[Array, Array]:
         """Whether contacts would lift off, which the closed form does not follow: (f,) of the sweep, (p,) of its peaks.
@@ -121,13 +124,14 @@ def _run(
         *_of_a_gauge(built),
         *_by_the_book(built),
         *_between(built),
+        *_of_stuck_modes(built, max(forces, default=None)),
         *remarks,
-        *_too_coarse(built, stuck),
+        *_too_coarse(settings, *stuck),
         *_not_converged(responses),
     ]
     return CaseResult(
-        settings, responses, free, stuck, resonances, built.speed, tuple(remarks), built, at_peaks,
-        left.most if left else None,
+        settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built, at_peaks,
+        left.most if left else None, stuck[1],
     )  # fmt: skip
 
 
@@ -136,10 +140,8 @@ def _by_laws(
     left: _Left | None,
 ) -> Answer:  # fmt: skip
     """With the laws of the contact room and as many harmonics as the case asks for."""
-    from ..harmonic_balance.reduced import stuck
-
     responses: dict[float, FrequencyResponse] = {}
-    resonances, stiff, remarks = {}, np.zeros(0), []
+    resonances, stiff, remarks = {}, (np.zeros(0), np.zeros(0)), []
     for normal in forces or (None,):
         problem = problem_of(built, normal)
         key = pressed_by(built, problem) if normal is None else normal
@@ -152,9 +154,16 @@ def _by_laws(
         few = left.out if left else partial(_truncated, built)
         remarks += few(problem, found, resonances[key], key)
         if key == max(responses):
-            k = [c.stiffness for c in problem.assembly.contacts]
-            stiff = stuck(problem.assembly.joined(1), scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)))
+            stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, remarks
+
+
+def _stuck(assembly: Assembly) -> tuple[Array, Array]:
+    """(m,) eigenfrequencies in Hz with sticking contacts, and their damping ratios."""
+    from ..harmonic_balance.reduced import stuck, stuck_damping
+
+    part = assembly.joined(1)
+    return stuck(part, assembly.stiffness), stuck_damping(part, assembly.stiffness)
 
 
 def _swept(
@@ -260,7 +269,10 @@ def free_response(built: Built, frequency: Array) -> FrequencyResponse:
     a = replace(built.assembly, contacts=())
     watch = a.watches[0]
     member = next(m for m in a.members if m.name == watch.member)
-    part = a.part(member, 1)
+    part = replace(
+        a, members=(member,), loads=tuple(x for x in a.loads if x.member == member.name),
+        watches=tuple(w for w in a.watches if w.member == member.name),
+    ).joined(1)  # fmt: skip
     frequency = np.union1d(frequency, _about_resonances(part, frequency))
     portions = np.array_split(2 * np.pi * frequency, len(frequency) // 256 + 1)
     q = np.concatenate([_moved(part, Omega) for Omega in portions])
@@ -272,7 +284,7 @@ def free_response(built: Built, frequency: Array) -> FrequencyResponse:
 def _moved(part: Linear, Omega: Array) -> ComplexArray:
     """(f, m) coordinates of a body alone under its loads, Omega in rad/s."""
     at = Omega[:, None, None]
-    A = part.K - at**2 * part.M + 1j * at * part.C
+    A = part.stiff - at**2 * part.M + 1j * at * part.C
     return np.linalg.solve(A, np.broadcast_to(part.load[:, None], (len(A), len(part.load), 1)))[..., 0]
 
 
@@ -283,7 +295,7 @@ def _about_resonances(part: Linear, frequency: Array) -> Array:
     """
     n, unit = len(part.M), np.sqrt(np.linalg.norm(part.K) / np.linalg.norm(part.M))  # rad/s
     zero, one = np.zeros((n, n)), np.eye(n)
-    A = np.block([[zero, one], [-part.K / unit**2, -part.C / unit]])
+    A = np.block([[zero, one], [-part.stiff / unit**2, -part.C / unit]])
     roots = unit * scipy.linalg.eigvals(A, scipy.linalg.block_diag(one, part.M))
     roots = roots[np.isfinite(roots) & (roots.imag > 0) & (roots.real < 0)]
     apart = np.sinh(np.linspace(-5.5, 5.5, 101))
@@ -423,6 +435,26 @@ def _static_force(interface: str, group: ModalGroup) -> float | None:
     return next((c.normal_force for c in group.contacts.values() if c.interface in {interface, partner} - {""}), None)
 
 
+def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
+    """How much more damping of the stuck modes takes where contacts slide or open. normal: N, see `Built.pressed`."""
+    from ..harmonic_balance.reduced import stuck, stuck_damping
+
+    asked = built.settings.stuck_ratios
+    if asked is None or not built.settings.contacts:
+        return []
+    part = built.pressed(normal).joined(1)
+    open_ = replace(part, rows=part.rows[:0], residual=part.residual[:0, :0])
+    f, D = (of(open_, np.zeros((0, 0))) for of in (stuck, stuck_damping))
+    inside = np.flatnonzero((D > 2 * max(asked)) & (f < built.settings.sweep.stop * built.settings.balanced))
+    if not len(inside):
+        return []
+    at = inside[D[inside].argmax()]
+    return [
+        f"Damping of the stuck modes takes more where contacts slide or open: {100 * D[at]:.3g} % at {f[at]:.5g} Hz, a "
+        'mode without contacts. There damping = "structural" keeps what the bodies have.'
+    ]
+
+
 def _between(built: Built) -> list[str]:
     """A remark where the static normal force is one between two equilibria of a speed range."""
     error = max(b.group.checks.get("normal_force_error", 0.0) for b in built.bodies.values())
@@ -431,19 +463,18 @@ def _between(built: Built) -> list[str]:
     return [f"The static normal force is interpolated between two equilibria of the speed range, to {error:.3g} N."]
 
 
-def _too_coarse(built: Built, stuck: Array) -> list[str]:
+def _too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[str]:
     """Where the step is wider than the resonances with sticking contacts (Hz), the narrowest ones that friction leaves.
 
     Peaks are searched for between the points, but one on the flank of another may show at none of them.
     """
-    sweep = built.settings.sweep
-    group = built.bodies[built.assembly.watches[0].member].group
+    sweep = settings.sweep
     step = (sweep.stop - sweep.start) / (sweep.points - 1)
-    inside = stuck[(stuck > sweep.start) & (stuck < sweep.stop)]
+    inside = np.flatnonzero((stuck > sweep.start) & (stuck < sweep.stop))
     if not len(inside):
         return []
-    at = float(inside.min())
-    width = 2 * group.damping_ratio[group.omega > 0].min(initial=1.0) * at
+    widths = 2 * damping[inside] * stuck[inside]
+    at, width = float(stuck[inside[widths.argmin()]]), float(widths.min())
     if step <= 4 * width:
         return []
     return [

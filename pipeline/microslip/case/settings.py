@@ -208,8 +208,11 @@ class CaseSettings(Model):
     cycles (marched at most until the sliders are periodic) and settled (within which share of the largest force
     they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
     (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
-    touching part of a rough surface, for microslip (5.2-33), 0 for none. material_limits: of the body whose monitor is
-    drawn, for the margins of its stresses.
+    touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
+    Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
+    every motion; or ``stuck``, the modes with sticking contacts. Not given: modal for one body, structural for several.
+    damping_ratio: of the bodies that give none themselves, or of the stuck modes. material_limits: of the body whose
+    monitor is drawn, for the margins of its stresses.
     """
 
     name: Name
@@ -228,6 +231,8 @@ class CaseSettings(Model):
     monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
     mode: Literal["marched", "book"] = "marched"
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
+    damping: Literal["modal", "structural", "stuck"] | None = None
+    damping_ratio: NotNegative | Numbers | None = None
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
     samples: Annotated[int, Field(ge=8, le=100000)] = 48
@@ -271,7 +276,28 @@ class CaseSettings(Model):
                 f"samples: {self.samples} are too few for {count} harmonics; take at least {4 * count}, better "
                 f"{16 * count}"
             )
-        return self._automatic()._book()._pressed()
+        return self._automatic()._book()._pressed()._damped()
+
+    def _damped(self) -> CaseSettings:
+        if self.damping == "stuck" and self.damping_ratio is None:
+            raise ValueError('damping_ratio: damping = "stuck" needs that of the stuck modes; give one, or one a mode')
+        if self.damping == "stuck" and any(b.damping_ratio is not None for b in self.bodies):
+            raise ValueError('bodies: damping = "stuck" leaves no damping_ratio of a body; give one of the two')
+        if self.damping in ("structural", "stuck") and self.contacts and not self.has_laws:
+            raise ValueError('damping: the closed form of law = "jenkins" knows "modal" alone; write law = "smooth"')
+        return self
+
+    @property
+    def damping_as(self) -> str:
+        """``modal``, ``structural`` or ``stuck``."""
+        return self.damping or ("modal" if len(self.members) == 1 else "structural")
+
+    @property
+    def stuck_ratios(self) -> tuple[float, ...] | None:
+        """Damping ratios of the modes with sticking contacts, if they are asked for."""
+        if self.damping_as != "stuck" or self.damping_ratio is None:
+            return None
+        return self.damping_ratio if isinstance(self.damping_ratio, tuple) else (self.damping_ratio,)
 
     def _automatic(self) -> CaseSettings:
         if self.harmonics_error is not None and self.harmonics != "auto":

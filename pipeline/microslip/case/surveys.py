@@ -76,9 +76,9 @@ class SpeedsOfCase(Model):
 class RangesOfCase(Model):
     """Envelope of the responses over all combinations of these values (Sextro Fig. 5.4-2), by `respond --over ranges`.
 
-    damping_ratio: of all modes of all bodies. load: factors on the loads that are not steady. friction: of all
-    contacts. normal_force: N, of the contacts that the sweep presses. Two values are the ends of a range; give more
-    where the smallest amplitude matters, which may lie between them.
+    damping_ratio: of all modes of all bodies, or of the stuck modes where damping = ``stuck``. load: factors on the
+    loads that are not steady. friction: of all contacts. normal_force: N, of the contacts that the sweep presses. Two
+    values are the ends of a range; give more where the smallest amplitude matters, which may lie between them.
     """
 
     damping_ratio: NotNegatives = ()
@@ -302,7 +302,10 @@ def over_ranges(
         changed: dict[str, Any] = {}
         if damping_ratio is not None:
             every = {"damping_ratio": damping_ratio}
-            changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.members)
+            if settings.damping_as == "stuck":
+                changed |= every
+            else:
+                changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.members)
         if friction is not None:
             changed["contacts"] = tuple(c.model_copy(update={"friction": friction}) for c in settings.contacts)
         return build(settings.model_copy(update=changed), bases, path)

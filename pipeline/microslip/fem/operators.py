@@ -178,20 +178,29 @@ def internal_force(d: Discretisation, stress: list[Array], H: list[Array] | None
 
 
 def tangent_tensor(elasticity: Array, factor: Array | None, H: Array | None, stress: Array) -> Array:
-    """(e, q, 3, 3, 3, 3) A_kIlJ = F_ki C_iIjJ F_lj + delta_kl S_IJ (St Venant-Kirchhoff; Bathe 6.2.3)."""
+    """(e, q, 3, 3, 3, 3) A_kIlJ = F_ki C_iIjJ F_lj + delta_kl S_IJ (St Venant-Kirchhoff; Bathe 6.2.3).
+
+    Args:
+        elasticity: (6, 6) Hooke matrix, or (e, q, 6, 6).
+    """
     C = to_tensor(elasticity)
     shape = stress.shape[:-1]
     if H is None:
         A = np.broadcast_to(C, (*shape, 3, 3, 3, 3)).copy()
     else:
         F = np.eye(3) + H
-        A = np.einsum("eqki,iIjJ,eqlj->eqkIlJ", F, C, F, optimize=True)
+        A = _between(F, C, F)
     if factor is not None:
         A *= factor[..., None, None, None, None]
     S = to_symmetric(stress)
     for k in range(3):
         A[..., k, :, k, :] += S
     return A
+
+
+def _between(F: Array, C: Array, G: Array) -> Array:
+    """(e, q, 3, 3, 3, 3) F_ki C_iIjJ G_lj; C one for all points or one a point."""
+    return np.einsum(f"eqki,{'iIjJ' if C.ndim == 4 else 'eqiIjJ'},eqlj->eqkIlJ", F, C, G, optimize=True)
 
 
 def tangent_tensor_slope(elasticity: Array, factor: Array | None, H: Array, dH: Array, stress_slope: Array) -> Array:
@@ -201,7 +210,7 @@ def tangent_tensor_slope(elasticity: Array, factor: Array | None, H: Array, dH: 
         H, dH: (e, q, 3, 3) displacement gradient and its change. stress_slope: (e, q, 6) change of the stress.
     """
     C, F = to_tensor(elasticity), np.eye(3) + H
-    half = np.einsum("eqki,iIjJ,eqlj->eqkIlJ", dH, C, F, optimize=True)
+    half = _between(dH, C, F)
     A = half + np.transpose(half, (0, 1, 4, 5, 2, 3))
     if factor is not None:
         A *= factor[..., None, None, None, None]

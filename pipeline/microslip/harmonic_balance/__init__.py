@@ -14,3 +14,4 @@ from .jenkins import peaks as peaks
 from .jenkins import refined_peaks as refined_peaks
 from .jenkins import response_table as response_table
 from .jenkins import stuck_frequencies as stuck_frequencies
+from .jenkins import stuck_resonances as stuck_resonances

@@ -228,13 +228,22 @@ def _newton_step(
 
 def stuck_frequencies(group: ModalGroup, contacts: list[JenkinsContact], residual: Residual | None = None) -> Array:
     """(m,) eigenfrequencies in Hz with every contact sticking; residual flexibility in series with the springs."""
+    return stuck_resonances(group, contacts, residual)[0]
+
+
+def stuck_resonances(
+    group: ModalGroup, contacts: list[JenkinsContact], residual: Residual | None = None
+) -> tuple[Array, Array]:
+    """(m,) `stuck_frequencies` and the damping ratios of these modes, see `reduced.stuck_damping`."""
     rows, springs, _ = contact_coordinates(group, contacts)
     flexibility = np.zeros((len(springs),) * 2) if residual is None else residual.contacts
     # springs in series with the residual flexibility, also where a spring is zero: k (1 + R k)^-1
     series = springs[:, None] * np.linalg.inv(np.eye(len(springs)) + flexibility * springs)
     K = group.K_r + rows.T @ series @ rows
-    values = scipy.linalg.eigh(0.5 * (K + K.T), group.M_r, eigvals_only=True)
-    return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
+    values, shapes = scipy.linalg.eigh(0.5 * (K + K.T), group.M_r)
+    omega = np.sqrt(np.maximum(values, 0.0))
+    lost = np.einsum("im,ij,jm->m", shapes, group.C_r, shapes)
+    return omega / (2 * np.pi), np.divide(lost, 2 * omega, out=np.zeros_like(omega), where=omega > 0)
 
 
 def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:

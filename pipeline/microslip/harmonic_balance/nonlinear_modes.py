@@ -19,10 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
 
 from ..continuation import Point, Settings, follow, start
 from ..data import Array, UserError
+from ..system import assembly
 from ..system.assembly import Linear
 from .problem import AtFrequency, Problem
 from .readout import amplitude
@@ -62,9 +62,7 @@ def stuck_modes(problem: Problem) -> tuple[Array, Array]:
         UserError: the problem eliminates its bodies one by one.
     """
     part, k = _only(problem), problem.stiffness[0]
-    held = k @ np.linalg.inv(np.eye(part.count) + part.residual @ k)
-    K = part.K + part.rows.conj().T @ held @ part.rows
-    values, shapes = scipy.linalg.eigh(0.5 * (K + K.conj().T), part.M)
+    values, shapes = assembly.stuck_modes(part, k)
     return np.sqrt(np.maximum(values, 0.0)), shapes
 
 
@@ -113,6 +111,8 @@ def strongest(problem: Problem, low: float, high: float, watch: int = 0) -> int:
     part, (omega, shapes) = _only(problem), stuck_modes(problem)
     seen, driven = np.abs(part.watch[watch] @ shapes), np.abs(shapes.conj().T @ part.load)
     loss = np.einsum("im,ij,jm->m", shapes.conj(), 0.5 * (part.C + part.C.conj().T), shapes).real * omega
+    if part.loss is not None:
+        loss += np.einsum("im,ij,jm->m", shapes.conj(), part.loss, shapes).real
     height = seen * driven / np.maximum(loss, 1e-12 * omega**2)
     inside = (omega >= low) & (omega <= high)
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
@@ -145,7 +145,7 @@ class _Curve:
         if abs(seen) < 1e-9 * np.abs(part.watch[self.watch]).max(initial=0.0) * np.abs(q).max():
             at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
             raise UserError(f"mode: number {at} does not move the read-out; take another")
-        C = 0.5 * (part.C + part.C.conj().T)
+        C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
         z = np.zeros((self.problem.waves, self.problem.count))
         z[1], z[2] = (d / seen).real, -(d / seen).imag

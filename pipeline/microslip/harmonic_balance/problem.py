@@ -371,10 +371,11 @@ def of(
     Args:
         harmonics: H. samples: of a cycle. cycles: marched at most. settled: see `forces.Marched`. length: m, see
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
-            the number of members if not given. models: first contact of a group of equal ones -> its force model, if
-            it is not the marched law.
+            the number of members if not given; always relative where damping couples them. models: first contact of a
+            group of equal ones -> its force model, if it is not the marched law.
     """
     together = len(assembly.members) <= RELATIVE_AT_MOST if form is None else form == "relative"
+    together = together or assembly.stuck_damping is not None
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
     groups = []

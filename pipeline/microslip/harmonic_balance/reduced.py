@@ -12,6 +12,8 @@ from the preloaded state. With a stiffness k of the contacts taken into the left
     (S_h + T^H k' T) q = f_h - T^H (k' e_h + W g),    k' = k (1 + B k)^-1,    W = (1 + k B)^-1
     d_h = d_ref,h - D_h g_h
 
+Bodies with a loss factor have K + i H and B - i S in the place of K and B there, in every harmonic but the mean.
+
 Any k gives the same answer. That of the sticking contact keeps everything finite: at resonances of the free body,
 for a body that nothing but its contacts holds, and the numbers subtracted are of the size of the result. At a
 resonance of the body with sticking contacts, without damping, another k does.
@@ -24,10 +26,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 
 from ..data import Array, ComplexArray
-from ..system.assembly import Linear
+from ..system.assembly import Linear, stuck_modes
 
 
 @dataclass(frozen=True)
@@ -52,12 +53,12 @@ class Seen:
 
 def seen(part: Linear, stiffness: Array, Omega: float, harmonic: int) -> Seen:
     """A part in one harmonic of Omega (rad/s). stiffness: (c, c) k."""
-    B, T, w = part.residual, part.rows, harmonic * Omega
-    P = np.linalg.inv(np.eye(part.count) + B @ stiffness)  # (1 + B k)^-1
+    B, T, w = part.yielding, part.rows, harmonic * Omega
+    P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ stiffness, stiffness @ B))
     held = stiffness @ P
-    A = part.K - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
+    A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
     driven = part.load - T.conj().T @ (held @ part.given)
-    X = np.linalg.solve(A, np.column_stack([driven, T.conj().T @ P.conj().T]))
+    X = np.linalg.solve(A, np.column_stack([driven, T.conj().T @ W]))
     slope = -2 * harmonic * w * part.M + 1j * harmonic * part.C
     Y = -np.linalg.solve(A, slope @ X).astype(complex)
     reference, D = P @ (T @ X[:, 0] + part.given), P @ (T @ X[:, 1:] + B)
@@ -174,17 +175,18 @@ class Eliminated:
         m = len(part.M)
         if not 0 < m <= POLES_AT_MOST:
             return None
-        T, P = part.rows, np.linalg.inv(np.eye(part.count) + part.residual @ k)
+        T, B = part.rows, part.yielding
+        P, right = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ k, k @ B))
         held = k @ P
-        below = -np.linalg.solve(part.M, np.hstack([part.K + T.conj().T @ held @ T, part.C]))
+        below = -np.linalg.solve(part.M, np.hstack([part.stiff + T.conj().T @ held @ T, part.C]))
         values, V = np.linalg.eig(np.block([[np.zeros((m, m)), np.eye(m)], [below]]))
         if np.abs(values).min() <= 1e-13 * np.abs(values).max():
             return None
         W = np.linalg.solve(V, np.vstack([np.zeros((m, m)), np.linalg.inv(part.M)]))
         loads = [self.parts[h].load - T.conj().T @ (held @ self.parts[h].given) for h in harmonics]
         poles = Poles(
-            np.array(harmonics), values, P @ T @ V[:m], W @ (T.conj().T @ P.conj().T), np.array(loads) @ W.T,
-            P @ part.residual, np.array([P @ self.parts[h].given for h in harmonics]),
+            np.array(harmonics), values, P @ T @ V[:m], W @ (T.conj().T @ right), np.array(loads) @ W.T,
+            P @ B, np.array([P @ self.parts[h].given for h in harmonics]),
         )  # fmt: skip
         return poles if self._right(poles) else None
 
@@ -219,8 +221,9 @@ def _view(found: Sequence[Seen]) -> View:
 
 def _alike(a: Linear, b: Linear) -> bool:
     """Equal but for the loads."""
-    pairs = ((a.M, b.M), (a.K, b.K), (a.C, b.C), (a.rows, b.rows), (a.residual, b.residual))
-    return all(x is y or np.array_equal(x, y) for x, y in pairs)
+    pairs = ((a.M, b.M), (a.K, b.K), (a.C, b.C), (a.rows, b.rows), (a.residual, b.residual),
+             (a.loss, b.loss), (a.residual_loss, b.residual_loss))  # fmt: skip
+    return all(x is y or (x is not None and y is not None and np.array_equal(x, y)) for x, y in pairs)
 
 
 def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
@@ -233,16 +236,38 @@ def work(
 ) -> tuple[float, float]:
     """Work of a share of the loads and loss in the bodies' own damping, J a cycle, in one harmonic that is not 0."""
     moved = share * (part.load.conj() @ q - part.given.conj() @ force)
-    lost = np.pi * harmonic * (q.conj() @ (Omega * harmonic * part.C) @ q).real
-    return -np.pi * harmonic * float(moved.imag), float(lost)
+    lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
+    if part.residual_loss is not None:
+        lost += (force.conj() @ part.residual_loss @ force).real
+    return -np.pi * harmonic * float(moved.imag), np.pi * harmonic * float(lost)
 
 
 def stuck(part: Linear, stiffness: Array) -> Array:
     """(m,) eigenfrequencies in Hz with contacts of a stiffness (c, c), damping and gyroscopic forces left out."""
-    k = stiffness @ np.linalg.inv(np.eye(part.count) + part.residual @ stiffness)
-    K = part.K + part.rows.conj().T @ k @ part.rows
-    values = scipy.linalg.eigh(0.5 * (K + K.conj().T), part.M, eigvals_only=True)
-    return np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
+    return np.sqrt(np.maximum(stuck_modes(part, stiffness)[0], 0.0)) / (2 * np.pi)
+
+
+def stuck_damping(part: Linear, stiffness: Array) -> Array:
+    """(m,) damping ratios that the modes of `stuck` have, from what they lose in a cycle: half-power widths 2 D f.
+
+    D = phi^H (omega C + H) phi / (2 omega^2) with phi^H M phi = 1, and what the compliance beside the coordinates
+    loses; 0 of motions that nothing holds.
+    """
+    values, shapes = stuck_modes(part, stiffness)
+    omega = np.sqrt(np.maximum(values, 0.0))
+    lost = omega * _of_each(part.C, shapes)
+    if part.loss is not None:
+        lost += _of_each(part.loss, shapes)
+    if part.residual_loss is not None:
+        force = np.linalg.solve(np.eye(part.count) + stiffness @ part.residual, stiffness @ (part.rows @ shapes))
+        lost += _of_each(part.residual_loss, force)
+    held = values > 1e-9 * np.abs(values).max(initial=0.0)
+    return np.divide(lost, 2 * values, out=np.zeros_like(lost), where=held)
+
+
+def _of_each(A: Array, shapes: Array) -> Array:
+    """(m,) real phi^H A phi of every column."""
+    return np.einsum("im,ij,jm->m", shapes.conj(), A, shapes, optimize=True).real
 
 
 def real_block(D: ComplexArray) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
 from ..speed_range import basis_at
 from ..system.assembly import Assembly, Load, Member
+from ..system.damping import structural
 from . import problem as balance
 from . import response
 from .problem import Forces
@@ -123,7 +124,7 @@ def _together(found: list[HarmonicResponse]) -> dict[str, Any]:
 def member_at(
     member: Member, basis: ModalBasis, rpm: float, made: Callable[[ModalGroup], ModalGroup] = lambda g: g
 ) -> Member:  # fmt: skip
-    """The member at a speed of its modal file or of its speed range.
+    """The member at a speed of its modal file or of its speed range; with loss factors if it has some.
 
     Args:
         made: what else is made of a group: other damping, rows of a pressure field.
@@ -132,7 +133,8 @@ def member_at(
         UserError: see `speed_range.basis_at`.
     """
     at = basis_at(basis, rpm)
-    return replace(member, groups={k: made(g) for (_, k), g in at.groups.items()})
+    there = replace(member, groups={k: made(g) for (_, k), g in at.groups.items()})
+    return structural(there) if member.loss else there
 
 
 def loads_at(loads: tuple[Load, ...], members: tuple[Member, ...], rpm: float) -> tuple[Load, ...]:

@@ -85,7 +85,7 @@ def orbit(problem: Problem, x: Array, Omega: float) -> Orbit:
     part = problem.parts[1][0] if len(problem.parts[1]) == 1 else problem.assembly.joined(1)
     models = {i: g.model for g in problem.groups for i in g.contacts}
     return Orbit(
-        part.M, part.C, part.K, part.rows, part.residual, tuple(c.patch.law for c in contacts),
+        part.M, part.viscous(Omega), part.K, part.rows, part.residual, tuple(c.patch.law for c in contacts),
         tuple(c.patch.kinematics for c in contacts), np.vstack([relative[i] for i in range(len(contacts))]), Omega,
         max(getattr(model, "cycles", 2) for model in models.values()),
     )  # fmt: skip

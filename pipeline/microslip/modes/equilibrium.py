@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
 from ..eigen import DirectSolver, Unstable, symmetric_product
+from ..elasticity import pushed, strain_tensor
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import Discretisation, FreeUpper
@@ -43,10 +44,11 @@ class BodyModel:
 
     Attributes:
         d: the discretisation. materials: one per block. factor: per block (e, q) modulus over the reference one, or
-        None. thermal_strain: per block (e, q, 6), or None. M: (p,) scalar mass over the pattern, kg. M_full: (n, n).
-        K0: (p, 3, 3) stiffness of the stress-free body, N/m. free: map to the free degrees of freedom.
+        None. thermal_strain: per block (e, q, 6) alpha dT, or None. M: (p,) scalar mass over the pattern, kg.
+        M_full: (n, n). K0: (p, 3, 3) stiffness of the stress-free body, N/m. free: map to the free degrees of freedom.
         dead_load: (n, 3) forces that act at every speed, N. axis, point: of rotation.
         spin_softening: whether -Omega^2 M P is part of K. contacts: faces that may touch in the static state.
+        hooke: per block (6, 6) or (e, q, 6, 6) that takes the place of the materials' (see `heated`), or None.
     """
 
     d: Discretisation
@@ -63,6 +65,11 @@ class BodyModel:
     point: Array
     spin_softening: bool = True
     contacts: tuple[ContactPair, ...] = ()
+    hooke: list[Array] | None = None
+
+    def elasticity(self, block: int) -> Array:
+        """(6, 6) or (e, q, 6, 6) Hooke matrix of a block's points, Pa, without `factor`."""
+        return self.materials[block].elasticity if self.hooke is None else self.hooke[block]
 
     @property
     def loaded(self) -> bool:
@@ -122,9 +129,38 @@ def stress_of(model: BodyModel, strain: list[Array]) -> list[Array]:
     out = []
     for i, e in enumerate(strain):
         elastic = e if model.thermal_strain is None else e - model.thermal_strain[i]
-        s = elastic @ model.materials[i].elasticity.T
+        s = _stress(model.elasticity(i), elastic)
         out.append(s if model.factor is None else s * model.factor[i][..., None])
     return out
+
+
+def _stress(C: Array, strain: Array) -> Array:
+    return strain @ C.T if C.ndim == 2 else np.matmul(C, strain[..., None])[..., 0]
+
+
+def thermal_stretch(model: BodyModel, block: int) -> Array:
+    """(e, q, 3, 3) U = 1 + alpha dT: what heat makes of the free material."""
+    assert model.thermal_strain is not None
+    return np.eye(3) + strain_tensor(model.thermal_strain[block])
+
+
+def heated(model: BodyModel) -> BodyModel:
+    """The model for finite displacements: heat stretches the material by U, and Hooke's law holds from there on.
+
+    F = F_e U with the energy 1/2 E_e : C : E_e of the unit of heated volume, E_e the Green-Lagrange strain of F_e
+    (V. A. Lubarda, Appl. Mech. Rev. 57, 2004). Then S = C' : (E - (U^2 - 1)/2), C'_IJKL = det U V_Ii V_Jj V_Kk V_Ll
+    C_ijkl with V = U^-1; where the material expands alike in all directions, by 1 + a, C' = C / (1 + a).
+    """
+    if model.thermal_strain is None:
+        return model
+    strain, hooke, factor = [], [], []
+    for i, (m, e) in enumerate(zip(model.materials, model.thermal_strain, strict=True)):
+        U, own = thermal_stretch(model, i), np.ones(e.shape[:-1]) if model.factor is None else model.factor[i]
+        strain.append(engineering(0.5 * (U @ U - np.eye(3))))
+        alike = np.array_equal(m.expansion, m.expansion[0] * np.array([1, 1, 1, 0, 0, 0]))
+        hooke.append(m.elasticity if alike else pushed(m.elasticity, np.linalg.inv(U)))
+        factor.append(own / U[..., 0, 0] if alike else own)
+    return replace(model, thermal_strain=strain, hooke=hooke, factor=factor)
 
 
 def softening(model: BodyModel, speed: float) -> Array:
@@ -189,7 +225,7 @@ def stiffness_slope(
     Args:
         fresh: the solver is as Newton left it, factorised within its last steps of K; else it is factorised here.
     """
-    free, n = model.free, model.d.mesh.n_points
+    model, free, n = heated(model), model.free, model.d.mesh.n_points
     K = free.matrix(state.K if model.spin_softening else state.K + softening(model, speed))
     if not (fresh and state.iterations):
         solver.factorise(K)
@@ -215,11 +251,12 @@ def _tangent_slope(model: BodyModel, state: StaticState, du: Array) -> Array:
     H = state.H or [np.zeros((*b.dx.shape, 3, 3)) for b in model.d.blocks]
     factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
     A = []
-    for b, m, f, h in zip(model.d.blocks, model.materials, factor, H, strict=True):
+    for i, (b, f, h) in enumerate(zip(model.d.blocks, factor, H, strict=True)):
+        C = model.elasticity(i)
         dH = displacement_gradient(b, du)
         strain = engineering(_symmetric_part(np.swapaxes(np.eye(3) + h, -1, -2) @ dH))
-        stress = strain @ m.elasticity.T
-        A.append(tangent_tensor_slope(m.elasticity, f, h, dH, stress if f is None else stress * f[..., None]))
+        stress = _stress(C, strain)
+        A.append(tangent_tensor_slope(C, f, h, dH, stress if f is None else stress * f[..., None]))
     return tangent(model.d, A)
 
 
@@ -229,8 +266,7 @@ def _symmetric_part(E: Array) -> Array:
 
 def _tangent(model: BodyModel, H: list[Array], stress: list[Array]) -> Array:
     factor: list[Array | None] = [None] * len(H) if model.factor is None else [*model.factor]
-    parts = zip(model.materials, factor, H, stress, strict=True)
-    A = [tangent_tensor(m.elasticity, f, h, s) for m, f, h, s in parts]
+    A = [tangent_tensor(model.elasticity(i), *one) for i, one in enumerate(zip(factor, H, stress, strict=True))]
     return tangent(model.d, A)
 
 
@@ -274,6 +310,7 @@ def _newton_at(
     soft = softening(model, omega)
     if model.thermal_strain is not None and level < 1:
         model = replace(model, thermal_strain=[level * e for e in model.thermal_strain])
+    model = heated(model)
     steps: list[float] = []
     points = model.d.mesh.points
     size = float(np.ptp(points, axis=0).max())

@@ -6,11 +6,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, StressSet
+from ..elasticity import pushed
 from ..fem.cyclic import CutFaces, CyclicUpper
 from ..fem.discretise import Block
 from ..fem.operators import engineering
 from ..topology import CELL_TYPES
-from .equilibrium import BodyModel, StaticState, cauchy
+from .equilibrium import BodyModel, StaticState, cauchy, thermal_stretch
 
 
 def modal_strain(block: Block, phi: Array, F: Array | None) -> Array:
@@ -28,19 +29,6 @@ def modal_strain(block: Block, phi: Array, F: Array | None) -> Array:
             g = np.matmul(g, inverse)
         out[..., j] = engineering(0.5 * (g + np.swapaxes(g, -1, -2)))
     return out
-
-
-def spatial_elasticity(elasticity: Array, F: Array) -> Array:
-    """(e, q, 6, 6) Hooke matrix in the axes of the deformed body: c_ijkl = F_iA F_jB F_kC F_lD C_ABCD / det F.
-
-    Stress modes made with it are the change of the Cauchy stress seen by the material (Truesdell's rate), so that
-    they add to the static Cauchy stress.
-    """
-    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
-    # sigma = L S in Voigt components; L^T takes engineering strain back
-    L = F[..., i[:, None], i[None]] * F[..., j[:, None], j[None]]
-    L[..., 3:] += F[..., i[:, None], j[None, 3:]] * F[..., j[:, None], i[None, 3:]]
-    return np.matmul(np.matmul(L, elasticity), np.swapaxes(L, -1, -2)) / np.linalg.det(F)[..., None, None]
 
 
 def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
@@ -68,8 +56,12 @@ def gauss_set(model: BodyModel, state: StaticState, phi: Array) -> StressSet:
 
 
 def _hooke(model: BodyModel, block: int, strain: Array, F: Array | None) -> Array:
+    """Stress of modal strain. About a nonlinear state with the Hooke matrix of the deformed body: the change of the
+    Cauchy stress seen by the material (Truesdell's rate), which adds to the static Cauchy stress. Heat alone does not
+    deform the material, so that its part in F is taken out."""
     C = model.materials[block].elasticity
-    C = C if F is None else spatial_elasticity(C, F)
+    if F is not None:
+        C = pushed(C, F if model.thermal_strain is None else F @ np.linalg.inv(thermal_stretch(model, block)))
     stress = np.matmul(C, strain)
     return stress if model.factor is None else stress * model.factor[block][:, :, None, None]
 

@@ -102,7 +102,8 @@ class Response:
         case: its name. description. mode: how the contacts were treated (``marched``, ``book``, ``jenkins``).
             settings: the case file. inputs: hash of all that a point depends on. bodies: member -> `Body`. labels: name
             of an array -> its rows. series: in the order they were computed. resonances: rows of a table. finished:
-            whether every point that was asked for is there. remarks: sentences a reader must know.
+            whether every point that was asked for is there. remarks: sentences a reader must know. stuck_modes: rows of
+            the modes with sticking contacts and their damping.
     """
 
     case: str
@@ -116,6 +117,7 @@ class Response:
     resonances: tuple[Mapping[str, Any], ...] = ()
     finished: bool = True
     remarks: tuple[str, ...] = ()
+    stuck_modes: tuple[Mapping[str, float], ...] = ()
 
     def one(self, **parameters: float) -> Series:
         """The series whose parameters have these values.
@@ -189,6 +191,7 @@ def response_of(head: Mapping[str, Any], series: Mapping[str, Mapping[float, Map
         resonances=tuple(head.get("resonances", ())),
         finished=bool(head.get("finished", False)),
         remarks=tuple(head.get("remarks", ())),
+        stuck_modes=tuple(head.get("stuck_modes", ())),
     )
 
 
@@ -247,7 +250,7 @@ def _write(file: h5py.File, r: Response) -> None:
     for name in _TEXTS:
         file.attrs[name] = getattr(r, name)
     file.attrs["finished"] = int(r.finished)
-    for name in ("settings", "labels", "resonances", "remarks"):
+    for name in ("settings", "labels", "resonances", "remarks", "stuck_modes"):
         _put_text(file, name, json.dumps(getattr(r, name)))
     bodies = {k: {**vars(b), "harmonics": [[n, int(c)] for n, c in b.harmonics]} for k, b in r.bodies.items()}
     _put_text(file, "bodies", json.dumps(bodies))
@@ -333,6 +336,7 @@ def _response(file: h5py.File) -> Response:
         resonances=tuple(told["resonances"]),
         finished=bool(file.attrs["finished"]),
         remarks=tuple(told["remarks"]),
+        stuck_modes=tuple(json.loads(file["stuck_modes"][()].tobytes())) if "stuck_modes" in file else (),
     )
 
 

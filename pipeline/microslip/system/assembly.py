@@ -54,6 +54,8 @@ class Member:
         brings: (r,) share of each compliance label's residual that is added to the modes; None: nothing.
         aerodynamic: index of a ring -> relative frequency shift + i times damping ratio that the flow adds to every
             mode, in the travelling wave of that index.
+        loss: index of a ring -> (m, m) H of a body with a loss factor, whose stiffness is K + i H in every harmonic but
+            the mean (see `damping.as_loss`). residual_loss: loss factor of the compliance that `brings` adds.
     """
 
     name: str
@@ -61,6 +63,8 @@ class Member:
     sectors: int = 1
     brings: Array | None = None
     aerodynamic: Mapping[int, complex] = field(default_factory=dict)
+    loss: Mapping[int, Array] = field(default_factory=dict)
+    residual_loss: float = 0.0
 
     def at(self, index: int) -> InWave:
         """Matrices and rows in the wave of a ring's index.
@@ -69,17 +73,21 @@ class Member:
             UserError: the modal file has no such nodal diameter.
         """
         if self.sectors == 1:
-            return InWave(self.groups[0], False, self.brings, self.aerodynamic.get(index, 0.0))
+            return self._wave(0, False, index)
         other = (self.sectors - index) % self.sectors
         if index in self.groups:
-            return InWave(self.groups[index], False, self.brings, self.aerodynamic.get(index, 0.0))
+            return self._wave(index, False, index)
         if other in self.groups:
-            return InWave(self.groups[other], True, self.brings, self.aerodynamic.get(index, 0.0))
+            return self._wave(other, True, index)
         known = ", ".join(str(k) for k in sorted(self.groups))
         raise UserError(
             f"{self.name}: the nodal diameter {min(index, other)} is needed, but the modal file holds {known}; add it "
             'to cyclic.nodal_diameters of the body, or write "all"'
         )
+
+    def _wave(self, stored: int, conjugate: bool, index: int) -> InWave:
+        loss = self.loss.get(stored)
+        return InWave(self.groups[stored], conjugate, self.brings, self.aerodynamic.get(index, 0.0), loss)
 
 
 @dataclass(frozen=True)
@@ -90,6 +98,7 @@ class InWave:
     conjugate: bool
     brings: Array | None
     aerodynamic: complex
+    own_loss: Array | None = None
 
     def _moving(self, values: Array) -> Array:
         return values.conj() if self.conjugate else values
@@ -105,6 +114,11 @@ class InWave:
             K = K + (P * (2 * self.aerodynamic.real * g.omega**2)) @ P.conj().T
             C = C + (P * (2 * self.aerodynamic.imag * g.omega)) @ P.conj().T
         return self._moving(M), self._moving(K), self._moving(C)
+
+    @property
+    def loss(self) -> Array | None:
+        """(m, m) H, see `Member`."""
+        return None if self.own_loss is None else self._moving(self.own_loss)
 
     def interface(self, name: str) -> Array:
         """(6, m) rows of an interface."""
@@ -279,6 +293,8 @@ class Linear:
         load: (m,) amplitude of the generalised force. given: (c,) motion by the loads beside the coordinates, m.
         watch: (w, m) all read-outs of the assembly in its order, zero where another member is read; those of several
             parts add up. watch_residual: (w, c) and watch_given: (w,) of them beside the coordinates.
+        loss: (m, m) H of bodies with a loss factor, residual_loss: (c, c) S: a vibration meets the stiffness K + i H
+            and the compliance residual - i S. None: nothing, as in the mean.
     """
 
     M: Array
@@ -291,6 +307,22 @@ class Linear:
     watch: Array
     watch_residual: Array
     watch_given: ComplexArray
+    loss: Array | None = None
+    residual_loss: Array | None = None
+
+    @property
+    def stiff(self) -> Array:
+        """(m, m) K + i H."""
+        return self.K if self.loss is None else self.K + 1j * self.loss
+
+    @property
+    def yielding(self) -> Array:
+        """(c, c) residual - i S."""
+        return self.residual if self.residual_loss is None else self.residual - 1j * self.residual_loss
+
+    def viscous(self, Omega: float) -> Array:
+        """(m, m) C that takes as much in a vibration of Omega (rad/s) as C and H together."""
+        return self.C if self.loss is None else self.C + self.loss / Omega
 
     @property
     def count(self) -> int:
@@ -304,6 +336,8 @@ class Assembly:
 
     Attributes:
         members, contacts, loads, watches. ring: if the members are one sector that stands for N, or N sectors.
+        stuck_damping: ratios of the modes with sticking contacts, one for all or one a mode from the lowest, the last
+            one for all that follow; None: what the members bring. It couples them, so they are eliminated together.
     """
 
     members: tuple[Member, ...]
@@ -311,6 +345,7 @@ class Assembly:
     loads: tuple[Load, ...]
     watches: tuple[Watch, ...]
     ring: Ring | None = None
+    stuck_damping: tuple[float, ...] | None = None
 
     def index(self, harmonic: int) -> int:
         """Index of the wave that the members move in, see `Ring.index`; 0 without a ring."""
@@ -346,10 +381,11 @@ class Assembly:
         zero = np.zeros(m)
         watch = np.array([at.monitor(w.monitor, w.label) if mine else zero
                           for w, mine in zip(self.watches, own, strict=True)]).reshape(-1, m)  # fmt: skip
+        B = A @ at.residual(labels, labels) @ A.conj().T
+        lost = (at.loss, member.residual_loss * B) if harmonic and at.loss is not None else (None, None)
         return Linear(
-            M, K, C, rows, A @ at.residual(labels, labels) @ A.conj().T, f,
-            A @ (at.residual(labels, forced) @ amplitudes), watch, at.residual(seen, labels) @ A.conj().T,
-            at.residual(seen, forced) @ amplitudes,
+            M, K, C, rows, B, f, A @ (at.residual(labels, forced) @ amplitudes), watch,
+            at.residual(seen, labels) @ A.conj().T, at.residual(seen, forced) @ amplitudes, *lost,
         )  # fmt: skip
 
     def unrolled(self) -> Assembly:
@@ -398,12 +434,19 @@ class Assembly:
             _all_round(self.members, N),
             tuple(met(c, j) for j in range(N) for c in self.contacts),
             tuple(load(x, j) for j in range(N) for x in self.loads),
-            tuple(watch(w, j) for j in range(N) for w in self.watches),
+            tuple(watch(w, j) for j in range(N) for w in self.watches), None, self.stuck_damping,
         )
 
     def joined(self, harmonic: int) -> Linear:
         """All members in one harmonic; the contact coordinates are the relative motions, contact by contact."""
-        return join([self.part(m, harmonic) for m in self.members], self.signs)
+        part = join([self.part(m, harmonic) for m in self.members], self.signs)
+        return part if self.stuck_damping is None else _damped(part, self.stiffness, self.stuck_damping)
+
+    @property
+    def stiffness(self) -> Array:
+        """(relative, relative) of the sticking contacts, contact by contact."""
+        k = [c.stiffness for c in self.contacts]
+        return scipy.linalg.block_diag(*k) if k else np.zeros((0, 0))
 
     @cached_property
     def coordinates(self) -> list[tuple[int, int, int, int]]:
@@ -455,13 +498,37 @@ def join(parts: Sequence[Linear], E: Array) -> Linear:
     """Several parts as one, their contact coordinates combined by E (c, all of theirs)."""
     diag = scipy.linalg.block_diag
     residual = E @ diag(*[p.residual for p in parts]) @ E.T
+    loss = S = None
+    if any(p.loss is not None for p in parts):
+        loss = diag(*[np.zeros_like(p.M) if p.loss is None else p.loss for p in parts])
+        S = diag(*[0.0 * p.residual if p.residual_loss is None else p.residual_loss for p in parts])
+        S = E @ S @ E.T
     return Linear(
         diag(*[p.M for p in parts]), diag(*[p.K for p in parts]), diag(*[p.C for p in parts]),
         E @ diag(*[p.rows for p in parts]), residual,
         np.concatenate([p.load for p in parts]), E @ np.concatenate([p.given for p in parts]),
         np.hstack([p.watch for p in parts]), np.hstack([p.watch_residual for p in parts]) @ E.T,
-        np.sum([p.watch_given for p in parts], axis=0),
+        np.sum([p.watch_given for p in parts], axis=0), loss, S,
     )  # fmt: skip
+
+
+def stuck_modes(part: Linear, stiffness: Array) -> tuple[Array, Array]:
+    """Modes with contacts of a stiffness (c, c), damping and gyroscopic forces left out.
+
+    Returns:
+        (m,) omega^2 in (rad/s)^2, and (m, m) shapes as columns, phi^H M phi = 1.
+    """
+    k = stiffness @ np.linalg.inv(np.eye(part.count) + part.residual @ stiffness)
+    K = part.K + part.rows.conj().T @ k @ part.rows
+    return scipy.linalg.eigh(0.5 * (K + K.conj().T), part.M)
+
+
+def _damped(part: Linear, stiffness: Array, ratios: Sequence[float]) -> Linear:
+    """With damping ratios of the modes with sticking contacts, C = sum 2 D omega (M phi)(M phi)^H, besides C."""
+    values, shapes = stuck_modes(part, stiffness)
+    omega, P = np.sqrt(np.maximum(values, 0.0)), part.M @ shapes
+    D = np.append(ratios, np.full(max(len(omega) - len(ratios), 0), ratios[-1]))[: len(omega)]
+    return replace(part, C=part.C + (P * (2 * D * omega)) @ P.conj().T)
 
 
 def _load_label(rows: Rows, name: str) -> str:

@@ -1,4 +1,4 @@
-"""Damping of members beside that of their modal files: ratios by mode, what the flow adds to each travelling wave."""
+"""Damping of members: ratios by mode, as a loss factor, of stuck modes, what the flow adds to each travelling wave."""
 
 from __future__ import annotations
 
@@ -36,6 +36,33 @@ def with_ratios(group: ModalGroup, ratios: Sequence[float] | float) -> ModalGrou
     D = np.where(group.omega > 0, padded[: len(group.omega)], 0.0)
     P = group.M_r @ (np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal)
     return replace(group, damping_ratio=D, C_r=(P * (2 * D * group.omega)) @ P.conj().T)
+
+
+def as_loss(group: ModalGroup) -> tuple[ModalGroup, Array]:
+    """The group without its modal damping, and (m, m) H that takes its place: the stiffness K + i H of a vibration.
+
+    H = sum_j 2 D_j omega_j^2 (M v_j)(M v_j)^H over the own modes v_j, and twice the last D of what K_r holds beside
+    them: 2 D K_r where all D_j are equal. At the resonance of an own mode this damps as Sextro Eq. (2.4-13) does;
+    elsewhere it takes the share 4 pi D of the elastic energy in every cycle, whatever the frequency.
+    """
+    V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
+    P, D, omega = group.M_r @ V, group.damping_ratio, group.omega
+    modal, elastic = (P * (2 * D * omega)) @ P.conj().T, (P * omega**2) @ P.conj().T
+    H = (P * (2 * D * omega**2)) @ P.conj().T + 2 * last_ratio(group) * (group.K_r - elastic)
+    return replace(group, C_r=group.C_r - modal), 0.5 * (H + H.conj().T)
+
+
+def last_ratio(group: ModalGroup) -> float:
+    """Damping ratio of the highest own mode, which serves what the modes leave out."""
+    return float(group.damping_ratio[-1]) if len(group.damping_ratio) and group.omega[-1] else 0.0
+
+
+def structural(member: Member) -> Member:
+    """The member with loss factors in the place of its modal damping, in every wave; see `as_loss`."""
+    both = {k: as_loss(g) for k, g in member.groups.items()}
+    last = 2 * last_ratio(member.groups[min(member.groups)])
+    loss = {k: H for k, (_, H) in both.items()}
+    return replace(member, groups={k: g for k, (g, _) in both.items()}, loss=loss, residual_loss=last)
 
 
 def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> dict[int, complex]:

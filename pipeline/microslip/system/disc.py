@@ -51,7 +51,9 @@ def whole(member: Member) -> Member:
         omega=np.sqrt(np.maximum(scipy.linalg.eigvalsh(K, M), 0.0)), damping_ratio=np.zeros(len(M)), **named,
     )  # fmt: skip
     brings = None if member.brings is None else np.tile(member.brings, N)
-    return Member(member.name, {0: group}, 1, brings)
+    H = [_real(w.loss, k, N) for k, w in enumerate(waves) if w.loss is not None]
+    loss = {0: scipy.linalg.block_diag(*H)} if H else {}
+    return Member(member.name, {0: group}, 1, brings, loss=loss, residual_loss=member.residual_loss)
 
 
 def _single(k: int, N: int) -> bool:
