@@ -173,6 +173,47 @@ def test_what_stands_in_the_folder(folder: Path) -> None:
     assert found.series[0].frequency[top] == row["frequency_Hz"]
 
 
+SLIDES = ("amplitude=20.0", "sweep.points=5")
+
+
+@pytest.mark.parametrize("more", [('mode="book"',), (), ("harmonics=3",)])
+def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
+    """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J a cycle, single
+    precision. The full law marched along the book's motion, or with other samples, takes more or less."""
+    import meshio
+
+    respond(folder, *SLIDES, *more)
+    build = folder / "build" / "vane"
+    data = {k: v[0] for k, v in meshio.read(build / "contact_right.vtu").cell_data.items()}
+    series = read_response(build / "response.h5").series[0]
+    top = int(np.flatnonzero(series.arrays["peak"])[0])
+    energy = series.arrays["contacts/right/dissipated"][top]
+    assert energy > 1e-5 and data["dissipated"] @ data["area"] == pytest.approx(energy, rel=1e-6)
+    pressed = data["pressure_mean"] @ data["area"]
+    assert pressed == pytest.approx(series.arrays["contacts/right/force"][top, 0, 0], rel=1e-6)
+
+
+def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Off by a hundred thousandth: neither picture nor VTU, a remark, and the response stays."""
+    from microslip.harmonic_balance import response
+
+    seen = response.traced
+
+    def other(problem: Any, found: Any) -> Any:
+        return {
+            name: one._replace(cycle=one.cycle._replace(dissipated=1.00001 * one.cycle.dissipated))
+            for name, one in seen(problem, found).items()
+        }
+
+    monkeypatch.setattr(response, "traced", other)
+    told, converged = respond(folder, *SLIDES)
+    summary = json.loads((folder / "build/vane/response.json").read_text())
+    assert converged and "contacts at resonance" not in summary["pictures"]
+    assert "contact_right.vtu" not in summary["files"] and "response.h5" in summary["files"]
+    assert any("right" in remark and "map" in remark for remark in summary["remarks"])
+    assert any(t.startswith("warning") and "map" in t for t in told)
+
+
 def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sweep goes on, the table and the summary tell, and the case counts as not converged."""
     from microslip.harmonic_balance import solver

@@ -166,6 +166,7 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
     if more is not None:
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
+        summary["remarks"] += more.remarks
     summary["response_sha256"] = store.hash_file(folder / "response.h5")
     summary["pictures"] = {title: path.name for title, path in drawn.items()}
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
@@ -196,6 +197,7 @@ class _Assessed:
     rows: list[dict[str, Any]]
     drawn: dict[str, Path]
     files: list[Path]
+    remarks: list[str]
 
 
 def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
@@ -207,20 +209,27 @@ def _assessed(result: CaseResult, response: Response, folder: Path, report: Repo
     lifted = {n: np.array([f for f, _ in peaks])[result.lifted(n)[1]] for n, peaks in result.resonances.items()}
     limits = result.settings.material_limits
     found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)
-    maps = {} if found.highest is None or result.at_peaks else {"contacts at resonance": _maps(result, found, report)}
+    maps, remarks = ({}, []) if found.highest is None or result.at_peaks else _maps(result, found, report)
     report("pictures of stresses")
     scenes = _can_draw() is None
     drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
-    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder))
+    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
 
 
-def _maps(result: CaseResult, found: assessment.Assessment, report: Report) -> list[ContactMap]:
+def _maps(
+    result: CaseResult, found: assessment.Assessment, report: Report
+) -> tuple[dict[str, list[ContactMap]], list[str]]:
+    """Title -> contacts at the worst resonance; nothing, and why, where they do not agree with the response."""
     top = found.highest
     assert top is not None
     report(f"contacts at {top.frequency:.6g} Hz")
     series = found.sweeps[top.normal_force][0]
     row = {name: values[top.index] for name, values in series.arrays.items()} | {"status": series.status[top.index]}
-    return keeping.maps_at(result.built, top.normal_force, row)
+    try:
+        return {"contacts at resonance": keeping.maps_at(result.built, top.normal_force, row)}, []
+    except UserError as error:
+        report(f"warning: {error}")
+        return {}, [str(error)]
 
 
 def _for_paraview(

@@ -15,7 +15,7 @@ from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
 from .jenkins import FrequencyResponse, tops
-from .patch import Cycle
+from .patch import Cycle, Traced
 from .problem import Problem
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
@@ -70,6 +70,13 @@ def operating(problem: Problem, point: Point) -> Operating:
         float(work[1]),
         _by_contact(p, cycles),
     )
+
+
+def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
+    """Contact -> what its force model makes of its points in the cycle of a solution."""
+    each = [np.stack([found.relative[problem.assembly.contacts[i].name] for i in g.contacts]) for g in problem.groups]
+    period = 2 * np.pi / found.Omega
+    return _by_contact(problem, [g.traced(u, period) for g, u in zip(problem.groups, each, strict=True)])
 
 
 def _by_contact(p: Problem, values: Sequence[Any]) -> dict[str, Any]:
