@@ -206,7 +206,7 @@ def _assessed(result: CaseResult, response: Response, folder: Path, report: Repo
     basis = result.built.bodies[result.built.assembly.watches[0].member].basis
     if not assessment.has_stresses(basis, response, member):
         return None
-    lifted = {n: np.array([f for f, _ in peaks])[result.lifted(n)[1]] for n, peaks in result.resonances.items()}
+    lifted = {n: _lifting_at(result, n) for n in result.resonances}
     limits = result.settings.material_limits
     found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)
     maps, remarks = ({}, []) if found.highest is None or result.at_peaks else _maps(result, found, report)
@@ -216,15 +216,22 @@ def _assessed(result: CaseResult, response: Response, folder: Path, report: Repo
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
 
 
+def _lifting_at(result: CaseResult, normal: float) -> Array:
+    """Hz of the points of a sweep and of its resonances at which contacts would lift off."""
+    at = result.responses[normal].frequency, np.array([f for f, _ in result.resonances[normal]])
+    return np.concatenate([f[lifts] for f, lifts in zip(at, result.lifted(normal), strict=True)])
+
+
 def _maps(
     result: CaseResult, found: assessment.Assessment, report: Report
 ) -> tuple[dict[str, list[ContactMap]], list[str]]:
     """Title -> contacts at the worst resonance; nothing, and why, where they do not agree with the response."""
     top = found.highest
     assert top is not None
-    report(f"contacts at {top.frequency:.6g} Hz")
+    report(f"contacts at {top.stressed_at:.6g} Hz")
     series = found.sweeps[top.normal_force][0]
-    row = {name: values[top.index] for name, values in series.arrays.items()} | {"status": series.status[top.index]}
+    at = top.stressed
+    row = {name: values[at] for name, values in series.arrays.items()} | {"status": series.status[at]}
     try:
         return {"contacts at resonance": keeping.maps_at(result.built, top.normal_force, row)}, []
     except UserError as error:

@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
-from .jenkins import FrequencyResponse, tops
+from .jenkins import FrequencyResponse, resonances, tops
 from .patch import Cycle, Traced
 from .problem import Problem
 from .solver import CONVERGED as CONVERGED
@@ -212,12 +212,13 @@ def of_body(
 
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
-    """(Hz, m) of every local maximum of the first read-out, searched for between its neighbours on the grid.
+    """(Hz, m) of every local maximum of the first read-out, searched for between its neighbours on the grid; of those
+    of one plateau the highest, see `jenkins.apart`.
 
     To a millionth of the distance between the two or in twelve steps; points that do not converge count as none.
     """
     found = [highest(problem, response, i) for i in tops(response)]
-    return [(p.Omega / (2 * np.pi), amplitude) for p, amplitude in found]
+    return resonances(response, [(p.Omega / (2 * np.pi), amplitude) for p, amplitude in found])
 
 
 def highest(problem: Problem, response: HarmonicResponse, top: int) -> tuple[Point, float]:
