@@ -308,6 +308,30 @@ def test_coordinates_of_a_cyclic_sector_read_in_their_own_waves(folder: Path) ->
     assert summary["pictures"].keys() == {"friction response"}  # the file has no stress modes
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_resonance_beyond_the_band_is_told_with_the_range_to_add(folder: Path, closed: bool) -> None:
+    """Cut off below it there is no row; terminal, summary, page and a warning name a range that shows it."""
+    if closed:
+        (folder / "case.toml").write_text(CASE.replace('law = "smooth"\npoints = [2, 2]\n', ""))
+    build = folder / "build" / "vane"
+    respond(folder)
+    (whole,) = json.loads((build / "response.json").read_text())["resonances"]
+    stop = round(whole["frequency_Hz"] - 6.0, 3)
+    told, _ = respond(folder, f"sweep.stop={stop}")
+    summary = json.loads((build / "response.json").read_text())
+    (end,) = summary["rising_at_the_edge"]
+    assert summary["resonances"] == [] and end["normal_force_N"] == 50.0 and end["frequency_Hz"] == stop
+    low, high = (float(x) for x in end["add"].removesuffix(" Hz").split(" to "))
+    assert low == stop and whole["frequency_Hz"] < high
+    assert any(end["add"] in t and not t.startswith("warning") for t in told)
+    assert any(end["add"] in t and t.startswith("warning") for t in told)
+    assert (build / "response.html").read_text().count(end["add"]) == 2
+    assert any(end["add"] in remark for remark in read_response(build / "response.h5").remarks)
+    respond(folder, f"sweep.stop={high}", "sweep.points=15")
+    again = json.loads((build / "response.json").read_text())
+    assert again["rising_at_the_edge"] == [] and len(again["resonances"]) == 1
+
+
 SLED = (
     CASE.replace('name = "vane"', 'name = "sled"').replace('"vane-eigenmodes"', '"sled"').replace("magnet", "push")
     .replace('"probe"', '"middle"').replace('"right"', '"sole"').replace("[2, 2]", "[1, 1]").replace("2e5", "3e6")

@@ -658,7 +658,7 @@ SHOWN = {
     "stress over normal force": "Stress at every resonance; a ring marks a lowest one between the ends.",
     "stress at resonance": "The resonance with the least margin, or the most stressed one where no limits are given.",
     "Haigh diagram": "Amplitude over mean stress of every place, and what the material endures.",
-    "contacts at resonance": "What the points of the contacts do in a cycle of that resonance, as the case's mode computed it.",
+    "contacts at resonance": "What the points of the contacts do in a cycle there, as the case's mode computed it.",
 }
 """Pictures of a response in their order, and what they show."""
 

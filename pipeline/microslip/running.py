@@ -315,6 +315,10 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
         **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
         "resonances": rows,
+        "rising_at_the_edge": [
+            {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, "amplitude_m": r.amplitude, "add": r.add}
+            for r in result.rising
+        ],
         "failed_points": failed,
         "remarks": list(result.remarks),
     }
@@ -438,6 +442,9 @@ def respond(
     for peak in summary["resonances"]:
         note = f" ({peak['note']})" if peak.get("note") else ""
         report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m{note}")
+    for end in summary["rising_at_the_edge"]:
+        at = f"{end['frequency_Hz']:.6g} Hz, {end['amplitude_m']:.4g} m"
+        report(f"F_N = {end['normal_force_N']:g} N: still rising at {at}; add {end['add']}")
     return folder / "response.csv", converged
 
 

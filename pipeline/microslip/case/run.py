@@ -14,8 +14,10 @@ import scipy.linalg
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..results import Journal
+from . import edges
 from .assemble import Built, build, swept
 from .closed_form import Answer, in_closed_form
+from .edges import Rising
 from .keeping import series_name
 from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
 
@@ -34,7 +36,8 @@ class CaseResult:
 
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
-    peaks. truncation: largest estimated error of a resonance for want of harmonics, where their number was looked for.
+    peaks. rising: ends of the band at which responses still rise. truncation: largest estimated error of a resonance
+    for want of harmonics, where their number was looked for.
     """
 
     settings: CaseSettings
@@ -46,6 +49,7 @@ class CaseResult:
     remarks: tuple[str, ...]
     built: Built
     at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
+    rising: tuple[Rising, ...] = ()
     truncation: float | None = None
 
     def lifted(self, normal: float) -> tuple[Array, Array]:
@@ -115,6 +119,7 @@ def _run(
     else:
         responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
     free = free_response(built, frequency)
+    at_the_ends = edges.rising(responses, resonances)
     remarks = [
         *built.remarks,
         *_of_a_gauge(built),
@@ -123,10 +128,11 @@ def _run(
         *remarks,
         *_too_coarse(built, stuck),
         *_not_converged(responses),
+        *edges.remarks(at_the_ends),
     ]
     return CaseResult(
         settings, responses, free, stuck, resonances, built.speed, tuple(remarks), built, at_peaks,
-        left.most if left else None,
+        tuple(at_the_ends), left.most if left else None,
     )  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def contact_map(
 
     Args:
         side: where it is drawn. force: (s, n, 3) N along n, t1, t2 in s samples of the cycle. dissipated: (n,) J a
-            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: by which the samples
+            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: by which samples
             are taken early, rad of the first harmonic.
     """
     p = force / patch.areas[None, :, None]
