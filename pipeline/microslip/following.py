@@ -228,12 +228,28 @@ def told(found: Optimum, over: str) -> str:
     lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
     if height > 1.001 * best.amplitude:
         lines += f"; another one, near {other / 2 / np.pi:.6g} Hz, is higher there: {height:.4g} m"
-    return lines
+    return lines + _hardly(found)
+
+
+HARDLY = 0.01
+"""Share by which a setting changes the highest resonance over its whole range, below which it is said to hardly matter:
+what two tops have to be apart to be two, `harmonic_balance.jenkins.DIP`."""
+
+
+def _hardly(found: Optimum) -> str:
+    """That the setting hardly matters, if it does not."""
+    if found.spread >= HARDLY:
+        return ""
+    values = np.concatenate([one.parameter for one in found.ridges])
+    return (
+        f"; the setting hardly matters: from {values.min():g} to {values.max():g} the highest resonance changes by "
+        f"{100 * found.spread:.2g} %"
+    )
 
 
 def is_optimum(found: Optimum) -> bool:
     """Whether the lowest place lies between the ends."""
-    return found.status in ("converged", "kink", "two peaks")
+    return found.status in ("converged", "kink", "two peaks", "followed")
 
 
 def missed(found: Optimum, over: str) -> str:
