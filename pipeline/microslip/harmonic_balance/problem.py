@@ -74,7 +74,7 @@ class Group:
         return self.model.watch(self._back(u), period)
 
     def traced(self, u: Array, period: float) -> list[Traced]:
-        """See `forces.Forces`; of a contact with a phase, whose samples are taken later by that, so are these."""
+        """See `forces.Forces`; where a wave leads by a phase, samples begin where it is at zero phase."""
         return self.model.traced(self._back(u), period)
 
     def _back(self, u: Array) -> Array:

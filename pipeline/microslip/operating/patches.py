@@ -69,13 +69,13 @@ def contact_map(
 
     Args:
         side: where it is drawn. force: (s, n, 3) N along n, t1, t2 in s samples of the cycle. dissipated: (n,) J a
-            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: by which samples
-            are taken early, rad of the first harmonic.
+            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: rad by which
+            the wave leads the samples in the first harmonic.
     """
     p = force / patch.areas[None, :, None]
     swing = p[..., 1:] - p[..., 1:].mean(axis=0)
     waves_of = np.moveaxis(np.fft.rfft(p, axis=0)[: harmonics + 1] * (2 / len(p)), 0, -1)
-    waves_of *= np.exp(-1j * phase * np.arange(harmonics + 1))
+    waves_of *= np.exp(1j * phase * np.arange(harmonics + 1))
     waves_of[..., 0] *= 0.5
     jumps = np.abs(p - np.roll(p, 1, axis=0)).max(initial=0.0)
     return ContactMap(
