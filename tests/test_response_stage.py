@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from test_harmonic_balance_laws import sled
@@ -372,20 +373,51 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.samples >= 8 * H
 
 
-def test_a_strain_gauge_in_closed_form(folder: Path) -> None:
-    """The strain that its row reads from the coordinates in the response file, 1e-6; said to be one."""
-    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace('monitor = "probe"', 'monitor = "root"')
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_strain_gauge_is_strain_everywhere(folder: Path, closed: bool) -> None:
+    """The strain that its row reads from the coordinates in the response file, 1e-6; one name and one unit in table,
+    CSV, terminal, page and HDF5, and metres nowhere."""
+    text = CASE.replace('monitor = "probe"', 'monitor = "root"')
+    text = text.replace('law = "smooth"\npoints = [2, 2]\n', "") if closed else text
     (folder / "case.toml").write_text(text)
     told, converged = respond(folder)
-    assert converged and any("'root' is a strain gauge" in t for t in told)
+    build = folder / "build" / "vane"
     row = read_basis(folder / "basis.h5").groups[0, 0].gauges["root"].rows[0]
-    with (folder / "build/vane/response.csv").open(newline="") as file:
-        strain = {float(r["frequency_Hz"]): float(r["amplitude_m_FN_50_N"]) for r in csv.DictReader(file)}
-    series = read_response(folder / "build/vane/response.h5").series[0]
+    with (build / "response.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    strain = {float(r["frequency_Hz"]): float(r["amplitude_strain_FN_50_N"]) for r in table}
+    assert converged and not any("_m_FN" in name for name in table[0])
+    series = read_response(build / "response.h5").series[0]
     pairs = zip(series.frequency, np.abs(series.arrays["bodies/vane-eigenmodes/q"][:, 1] @ row), strict=True)
     found = [(strain[f], own) for f, own in pairs if f in strain]
     assert len(found) == 9 and min(found)[0] > 0
-    np.testing.assert_allclose(*zip(*found, strict=True), rtol=1e-6)
+    np.testing.assert_allclose(*zip(*found, strict=True), rtol=1e-6 if closed else 2e-3)
+    (resonance,) = json.loads((build / "response.json").read_text())["resonances"]
+    assert "amplitude_m" not in resonance and resonance["amplitude_strain"] >= max(strain.values())
+    assert any(t.endswith(" m/m") for t in told) and "amplitude in µm/m" in (build / "response.html").read_text()
+    with h5py.File(build / "response.h5") as file:
+        assert file["series_0000/gauges/root"].attrs["unit"] == "1"
+
+
+def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The response's picture and the comparison with the book's mode."""
+    from matplotlib.figure import Figure
+
+    said: list[str] = []
+    saved = Figure.savefig
+
+    def look(figure: Figure, *more: Any, **how: Any) -> None:
+        said.extend(axes.get_ylabel() for axes in figure.axes)
+        said.append(getattr(figure, "_supylabel", None) and figure._supylabel.get_text() or "")
+        saved(figure, *more, **how)
+
+    (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', 'monitor = "root"'))
+    monkeypatch.setattr(Figure, "savefig", look)
+    table, pairs, _ = running.compare_book(folder / "case.toml", None, ["sweep.points=5"])
+    strains = [text for text in said if "amplitude of root" in text or "read-out" in text]
+    assert len(strains) == 3 and all("µm/m" in text for text in strains)
+    assert "marched_strain" in table.read_text().splitlines()[0]
+    assert all(p.quantity.unit == "1" for p in pairs)
 
 
 @pytest.mark.parametrize(("keys", "words"), [

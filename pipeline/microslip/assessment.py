@@ -18,6 +18,8 @@ from .operating.fatigue import Endurance, MaterialLimits, endurance
 from .operating.motion import Motion, amplitude, read_out
 from .operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from .results import Response, Series
+from .results.files import unit_of
+from .units import METRES, Quantity
 
 if TYPE_CHECKING:
     from .operating.patches import ContactMap
@@ -62,13 +64,14 @@ class Assessment:
     Attributes:
         member: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
             places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
-            None.
+            None. quantity: what the read-out measures.
     """
 
     member: str
     sweeps: Mapping[float, tuple[Series, Motion, Array, StressPeaks]]
     resonances: tuple[Resonance, ...]
     limits: MaterialLimits | None
+    quantity: Quantity = METRES
 
     @property
     def highest(self) -> Resonance | None:
@@ -90,7 +93,7 @@ class Assessment:
         row: dict[str, Any] = {
             "normal_force_N": r.normal_force,
             "frequency_Hz": r.frequency,
-            "amplitude_m": r.amplitude,
+            self.quantity.column("amplitude"): r.amplitude,
         }
         row |= {"stress_amplitude_Pa": r.worst.amplitude, "frequency_of_stress_Hz": r.stressed_at}
         row |= {"mean_stress_Pa": r.worst.mean}
@@ -124,7 +127,8 @@ def assess(
         motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
         size = abs(series.monitor(monitor)[:, 0, 1])
-        lifts = np.isclose(series.frequency[:, None], (lifted or {}).get(normal, np.zeros(0)), rtol=1e-9).any(axis=1)
+        invalid = (lifted or {}).get(normal, np.zeros(0))
+        lifts = np.asarray(np.isclose(series.frequency[:, None], invalid, rtol=1e-9).any(axis=1))
         chosen, at = drawn_points(series), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
         ranges = _ranges(size, series.converged, at)
@@ -138,7 +142,13 @@ def assess(
             worst = endurance(cycle_stress(motion, j), limits or ENDLESS, only)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
             found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst, bool(lifts[i])))
-    return Assessment(name, sweeps, tuple(found), limits)
+    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
+
+
+def _quantity(response: Response, monitor: str) -> Quantity:
+    """What an array of read-outs measures."""
+    names = {name for series in response.series for name in series.arrays}
+    return Quantity(unit_of(f"gauges/{monitor}" if f"gauges/{monitor}" in names else f"monitors/{monitor}"))
 
 
 def _ranges(size: Array, known: Array, at: Indices) -> list[Indices]:

@@ -8,7 +8,7 @@ import importlib.util
 import json
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -25,6 +25,8 @@ from .case.settings import FIRST_HARMONICS
 from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
+from .results.files import unit_of
+from .units import Quantity, amplitude_of
 from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage, touch
 
 if TYPE_CHECKING:
@@ -298,9 +300,10 @@ def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
     rows = []
     lifted = {normal: result.lifted(normal)[1] for normal in result.resonances}
+    name = result.quantity.column("amplitude")
     for normal, peaks in result.resonances.items():
         for (frequency, amplitude), lifts in zip(peaks, lifted[normal], strict=True):
-            row = {"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude}
+            row = {"normal_force_N": normal, "frequency_Hz": frequency, name: amplitude}
             rows.append(row | ({"note": assessment.LIFTS if lifts else ""} if any(map(any, lifted.values())) else {}))
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
     balanced: dict[str, float] = {"harmonics": result.settings.balanced} if result.settings.has_laws else {}
@@ -316,7 +319,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
         "resonances": rows,
         "rising_at_the_edge": [
-            {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, "amplitude_m": r.amplitude, "add": r.add}
+            {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
             for r in result.rising
         ],
         "failed_points": failed,
@@ -441,11 +444,16 @@ def respond(
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
     for peak in summary["resonances"]:
         note = f" ({peak['note']})" if peak.get("note") else ""
-        report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m{note}")
+        report(f"F_N = {peak['normal_force_N']:g} N: {_at(peak)}{note}")
     for end in summary["rising_at_the_edge"]:
-        at = f"{end['frequency_Hz']:.6g} Hz, {end['amplitude_m']:.4g} m"
-        report(f"F_N = {end['normal_force_N']:g} N: still rising at {at}; add {end['add']}")
+        report(f"F_N = {end['normal_force_N']:g} N: still rising at {_at(end)}; add {end['add']}")
     return folder / "response.csv", converged
+
+
+def _at(row: Mapping[str, Any]) -> str:
+    """Frequency and amplitude of a row of a table."""
+    amplitude, of = amplitude_of(row)
+    return f"{row['frequency_Hz']:.6g} Hz, {amplitude:.4g} {of.said}"
 
 
 def compare_book(
@@ -477,18 +485,33 @@ def compare_book(
     pairs = paired(*(summary["resonances"] for summary, _ in found.values()))
     case = keeping.as_found(case, folder, case_path)
     table, picture = folder / "book.csv", folder / "pictures" / "book.png"
-    store.write_text(table, comparison_table(pairs))
+    of = _read_out(folder / "response.h5", case)
+    store.write_text(table, comparison_table(pairs, of))
     marched, book = (_curves(f / "response.h5", case) for f, _ in ways.values())
     with store.complete_or_absent(picture) as temporary:
-        comparison_picture(case, marched, book, temporary)
+        comparison_picture(case, marched, book, temporary, of)
     return table, pairs, all(converged for _, converged in found.values())
+
+
+def _read_out(file: Path, case: CaseSettings) -> Quantity:
+    """What the first read-out of a case measures, by its array in the response file."""
+    return Quantity(unit_of(_first_array(next(iter(read_response(file).series)).arrays, case)))
+
+
+def _first_array(names: Iterable[str], case: CaseSettings) -> str:
+    """Name of the array of the first read-out, a monitor or a gauge; of a whole ring that of its first sector."""
+    body, monitor = case.address(case.watches[0].monitor)
+    kinds = ("monitors", "gauges")
+    exact = [f"{kind}/{own}{monitor}" for own in (f"{body}:", f"{body}_0:", "") for kind in kinds]
+    known = list(names)
+    return next(n for n in [*exact, *known] if n in known and n.startswith(kinds) and n.endswith(monitor))
 
 
 def _curves(file: Path, case: CaseSettings) -> dict[str, Array]:
     """Normal force as text -> (2, f) Hz and amplitude (m) of the first read-out, in a response file."""
-    found, monitor = {}, case.address(case.watches[0].monitor)[1]
+    found = {}
     for s in read_response(file).series:
-        name = next(n for n in s.arrays if n.startswith("monitors/") and n.endswith(monitor))
+        name = _first_array(s.arrays, case)
         amplitude = np.abs(s.arrays[name][:, 0, 1])
         whole = np.stack([s.frequency, np.where(np.array(s.status) == "converged", amplitude, np.nan)])
         found[f"{s.parameters['normal_force']:g}"] = whole[:, np.argsort(s.frequency, kind="stable")]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.readout import measured
 from ..results import Body
 from .assemble import Built, Loaded
 from .settings import CaseSettings
@@ -125,11 +126,12 @@ def closed_points(
 def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[str, Any]]:
     (member,) = built.assembly.members
     group, watch = member.groups[0], built.assembly.watches[0]
+    kind = "gauges" if measured(built.assembly).unit == "1" else "monitors"
     points: dict[float, dict[str, Any]] = {}
     for i, f in enumerate(map(float, r.frequency)):
         row: dict[str, Any] = {
             "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": peak,
-            f"monitors/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
+            f"{kind}/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
             f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
         }  # fmt: skip
         for c, six in zip(built.contacts, r.force[i].reshape(-1, 6), strict=True):

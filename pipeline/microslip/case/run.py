@@ -13,7 +13,9 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.readout import measured
 from ..results import Journal
+from ..units import Quantity
 from . import edges
 from .assemble import Built, build, swept
 from .closed_form import Answer, in_closed_form
@@ -51,6 +53,11 @@ class CaseResult:
     at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
     rising: tuple[Rising, ...] = ()
     truncation: float | None = None
+
+    @property
+    def quantity(self) -> Quantity:
+        """What the first read-out measures."""
+        return measured(self.built.assembly)
 
     def lifted(self, normal: float) -> tuple[Array, Array]:
         """Whether contacts would lift off, which the closed form does not follow: (f,) of the sweep, (p,) of its peaks.
@@ -122,7 +129,6 @@ def _run(
     at_the_ends = edges.rising(responses, resonances)
     remarks = [
         *built.remarks,
-        *_of_a_gauge(built),
         *_by_the_book(built),
         *_between(built),
         *remarks,
@@ -218,15 +224,6 @@ def _book_can(built: Built, path: Path | str) -> None:
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
             raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "marched"') from error
-
-
-def _of_a_gauge(built: Built) -> list[str]:
-    """That what is drawn is a strain, which columns and axes made for displacements give in m."""
-    watch = built.assembly.watches[0]
-    gauges = built.bodies[watch.member].group.gauges
-    if watch.monitor not in gauges or watch.label != gauges[watch.monitor].labels[0]:
-        return []
-    return [f"'{watch.monitor}' is a strain gauge: amplitudes and means of the response are strain, and no m."]
 
 
 def _by_the_book(built: Built) -> list[str]:

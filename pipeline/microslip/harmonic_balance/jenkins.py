@@ -17,6 +17,7 @@ import scipy.linalg
 import scipy.optimize
 
 from ..data import Array, ComplexArray, Indices, ModalGroup
+from ..units import METRES, Quantity
 
 Report = Callable[[str], None]
 
@@ -62,6 +63,7 @@ class FrequencyResponse:
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
         converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
             amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        quantity: what the monitored row measures; m stands for its unit.
         modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
             0-peak; of the closed form alone.
     """
@@ -73,13 +75,14 @@ class FrequencyResponse:
     converged: Array
     limit: Array
     normal_swing: Array
+    quantity: Quantity = field(kw_only=True, default=METRES)
     modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
     force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     def columns(self) -> dict[str, Array]:
         """What stands in a table beside the frequency, by name and unit."""
         return {
-            "amplitude_m": np.abs(self.monitor),
+            self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
             "converged": self.converged.astype(float),

@@ -17,6 +17,7 @@ from . import reduced
 from .jenkins import FrequencyResponse, resonances, tops
 from .patch import Cycle, Traced
 from .problem import Problem
+from .readout import measured
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -124,10 +125,11 @@ class HarmonicResponse(FrequencyResponse):
     seconds: Array
 
     def columns(self) -> dict[str, Array]:
-        more = {f"amplitude_{h}_m": np.abs(self.harmonics[:, h]) for h in range(2, self.harmonics.shape[1])}
+        of, name = range(2, self.harmonics.shape[1]), self.quantity.column
+        more = {name(f"amplitude_{h}"): np.abs(self.harmonics[:, h]) for h in of}
         return {
             **super().columns(),
-            "mean_m": self.harmonics[:, 0].real,
+            name("mean"): self.harmonics[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
             "supplied_J": self.supplied,
@@ -160,6 +162,7 @@ def of_points(
         error=np.array([p.error for p in points]),
         iterations=np.array([p.iterations for p in points]),
         seconds=np.array([p.seconds for p in points]),
+        quantity=measured(problem.assembly),
         **parts,
     )
 
