@@ -358,13 +358,13 @@ def spin_pit() -> None:
     for mass, colour in zip(damper_study.PRINTED, plots.COLOURS, strict=False):
         x = all_of["cottage-roof"][mass]
         left.semilogy(x.frequency, 1e6 * np.abs(x.watched[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
-    left.set(xlabel="frequency in Hz", ylabel="strain amplitude in 1e-6", title="cottage roof")
+    left.set(xlabel="frequency in Hz", ylabel="strain amplitude in µm/m", title="cottage roof")
     left.legend(fontsize=8)
     plain(right)
     for shape, colour in zip(shapes, plots.COLOURS, strict=False):
         largest = [1e6 * x.largest(damper_study.bending)[1] for x in all_of[shape].values()]
         right.loglog([1e3 * m for m in masses], largest, "o-", color=colour, label=shape, markersize=3)
-    right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in 1e-6")
+    right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in µm/m")
     right.set_xticks([16, 26, 42, 75, 117], labels=["16", "26", "42", "75", "117"], minor=False)
     right.set_xticks([], minor=True)
     right.legend(fontsize=8)
@@ -375,7 +375,7 @@ def spin_pit() -> None:
             f, strain = all_of[shape][mass].largest(damper_study.bending)
             normal = damper_study.wedged(damper_study.of_mass(companion(shapes[shape]), mass), damper_study.RPM)
             rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}"])
-    fill("dampers.md", "pit", table(["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, 1e-6"], rows))
+    fill("dampers.md", "pit", table(["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, µm/m"], rows))
 
 
 # static contact ----------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from small import basis as small_basis
 
 from microslip.assessment import (
-    Resonance,
+    Assessment,
     assess,
     draw,
     families,
@@ -19,7 +20,7 @@ from microslip.assessment import (
     write_shape,
 )
 from microslip.operating import MaterialLimits
-from microslip.operating.stress import cycle_stress
+from microslip.operating.stress import cycle_stress, stress_peaks
 from microslip.results import Body, Response, response_of
 
 LIMITS = MaterialLimits(fatigue_strength=300e6, tensile_strength=900e6)
@@ -68,7 +69,8 @@ def test_resonances_and_their_stresses(response: Response) -> None:
     motion, cycle = found.at(a[10.0])
     assert cycle.amplitude.max() == a[10.0].worst.amplitude == cycle_stress(motion).amplitude.max()
     assert [list(row) for row in found.table()][0] == [
-        "normal_force_N", "frequency_Hz", "amplitude_m", "stress_amplitude_Pa", "mean_stress_Pa", "at_mm",
+        "normal_force_N", "frequency_Hz", "amplitude_m", "stress_amplitude_Pa", "frequency_of_stress_Hz",
+        "mean_stress_Pa", "at_mm",
     ]  # fmt: skip
     with_limits = assess(response, small_basis(), "tip-probe", limits=LIMITS).table()[0]
     assert with_limits["vibration_may_grow"] == pytest.approx(300e6 / a[1.0].worst.amplitude, rel=1e-6)
@@ -105,43 +107,85 @@ def test_a_response_without_resonances(response: Response, tmp_path: Path) -> No
     assert set(draw(found, small_basis(), "beam", tmp_path, False)) == {"stress over frequency"}
 
 
-def test_resonances_are_followed_over_the_normal_force(response: Response) -> None:
-    """Two that rise by less than a quarter a step stay apart, the nearest go on; one that is there once is its own."""
-    from dataclasses import replace
-
-    found = assess(response, small_basis(), "tip-probe")
+def along(found: Assessment, places: dict[float, dict[float, tuple[float, float]]]) -> Assessment:
+    """Resonances by normal force: frequency -> the ends of its range."""
     one = found.resonances[0]
-    places = {10.0: (85.0, 90.0, 200.0), 100.0: (100.0, 210.0), 1000.0: (112.0, 230.0, 500.0)}
-    many = [replace(one, normal_force=n, frequency=f) for n, fs in places.items() for f in fs]
-    lines = {k: [r.frequency for r in v] for k, v in families(replace(found, resonances=tuple(many))).items()}
+    many = [
+        replace(one, normal_force=n, frequency=f, range=ends) for n, at in places.items() for f, ends in at.items()
+    ]
+    return replace(found, resonances=tuple(many))
+
+
+def test_resonances_are_followed_over_the_normal_force(response: Response) -> None:
+    """Each goes on in the range of another, the nearest first, however far it moves; one in no range is its own."""
+    found = along(assess(response, small_basis(), "tip-probe"), {
+        1000.0: {112.0: (50.0, 160.0), 230.0: (160.0, 400.0), 500.0: (400.0, 600.0)},
+        100.0: {100.0: (50.0, 150.0), 210.0: (150.0, 600.0)},
+        10.0: {62.0: (50.0, 68.0), 70.0: (68.0, 120.0), 200.0: (120.0, 600.0)},
+    })  # fmt: skip
+    lines = {k: [r.frequency for r in v] for k, v in families(found).items()}
     assert lines == {
-        "near 112 Hz": [112.0, 100.0, 90.0], "near 230 Hz": [230.0, 210.0, 200.0], "near 500 Hz": [500.0],
-        "near 85 Hz": [85.0],
+        "near 112 Hz": [112.0, 100.0, 70.0], "near 230 Hz": [230.0, 210.0, 200.0], "near 500 Hz": [500.0],
+        "near 62 Hz": [62.0],
     }  # fmt: skip
 
 
-def test_the_most_stressed_resonance_is_never_left_out(response: Response) -> None:
-    """One that is there at a single normal force is drawn if it is the highest there, and left out if it is not."""
-    from dataclasses import replace
+def test_no_resonance_is_left_out_over_the_normal_force(response: Response) -> None:
+    """Neither one that is there at a single normal force, nor one that a small force moves by more than a quarter."""
+    whole, low, high = (50.0, 400.0), (50.0, 180.0), (180.0, 400.0)
+    found = along(assess(response, small_basis(), "tip-probe"), {
+        1000.0: {240.0: whole}, 100.0: {120.0: low, 240.0: high}, 10.0: {80.0: low, 240.0: high},
+    })  # fmt: skip
+    lines = over_force(found)
+    assert {name: [n for n, _ in line] for name, line in lines.items()} == {
+        "near 240 Hz": [1000.0, 100.0, 10.0], "near 120 Hz": [100.0, 10.0],
+    }  # fmt: skip
+    assert over_force(along(found, {1.0: {5.0: whole}, 2.0: {5.0: whole}})) == {}
 
-    found = assess(response, small_basis(), "tip-probe")
-    one = found.resonances[0]
 
-    def at(normal: float, frequency: float, stress: float) -> Resonance:
-        worst = replace(one.worst, amplitude=stress)
-        return replace(one, normal_force=normal, frequency=frequency, worst=worst)
+def test_the_stress_of_a_resonance_is_the_largest_of_its_range(response: Response) -> None:
+    """Two modes, of which the probe sees the first one best and the second one strains the body more, on its flank:
+    the table's stress is that of the sweep's most stressed point, its frequency named, and the pictures are of it."""
+    tip, q = GROUP.monitors["tip-probe"].rows, np.zeros((2, GROUP.n_modes), dtype=complex)
+    first = np.abs(tip[0]).argmax()
+    second = next(i for i in range(GROUP.n_modes) if i != first and abs(tip[0, i]) < 0.3 * abs(tip[0, first]))
+    points = {}
+    for f in [*np.arange(90.0, 131.0), 100.5]:
+        a = q.copy()
+        a[1, first] = 1e-4 / (1 + 1j * (f - 100.5))
+        a[1, second] = 2e-4 / (1 + 1j * (f - 107))
+        own = {"frequency": f, "status": "converged", "peak": int(f == 100.5)}
+        points[float(f)] = own | {"bodies/beam/q": a, "monitors/tip-probe": tip @ a.T}
+    head = {"case": "beam", "bodies": {"beam": vars(response.bodies["beam"])}}
+    found = assess(response_of(head, {"one": points}), small_basis(), "tip-probe")
+    ((series, motion, *_),) = found.sweeps.values()
+    stress = stress_peaks(motion).amplitude
+    (r,) = found.resonances
+    assert r.frequency == 100.5 and r.stressed_at == 107.0 == series.frequency[stress.argmax()]
+    assert r.worst.amplitude == pytest.approx(stress.max(), rel=1e-6) and stress.max() > 1.5 * stress[
+        list(series.frequency).index(100.5)
+    ]
+    assert found.table()[0]["frequency_of_stress_Hz"] == 107.0
+    assert found.at(r)[1].amplitude.max() == pytest.approx(stress.max(), rel=1e-6)
 
-    steady = [at(n, 240.0, 5e6) for n in (10.0, 100.0, 1000.0)]
-    few = (*steady, at(10.0, 23.0, 8e8), at(100.0, 120.0, 1e6))
-    lines = over_force(replace(found, resonances=few))
-    assert lines == {"near 240 Hz": [(1000.0, 5.0), (100.0, 5.0), (10.0, 5.0)], "near 23 Hz": [(10.0, 800.0)]}
-    assert over_force(replace(found, resonances=few[1:2])) == {}
+
+@pytest.mark.parametrize(("between", "rows"), [(0.995, 1), (0.98, 2)])
+def test_a_plateau_has_one_row(response: Response, between: float, rows: int) -> None:
+    """Two peaks that were searched for, with a dip of 0.5 % or of 2 % of the lower one between them."""
+    base = next(iter(resonant(0.01).values()))
+    heights = {90.0: 0.5, 99.0: 1.0, 100.0: between, 101.0: 1.002, 110.0: 0.4}
+    points = {
+        f: base | {"frequency": f, "peak": int(a >= 1), "bodies/beam/q": a * base["bodies/beam/q"],
+                   "monitors/tip-probe": a * base["monitors/tip-probe"]}
+        for f, a in heights.items()
+    }  # fmt: skip
+    head = {"case": "beam", "bodies": {"beam": vars(response.bodies["beam"])}}
+    found = assess(response_of(head, {"one": points}), small_basis(), "tip-probe").table()
+    assert len(found) == rows and found[-1]["frequency_Hz"] == found[-1]["frequency_of_stress_Hz"] == 101.0
 
 
 def test_stress_over_engine_orders(response: Response) -> None:
     """Twice the coordinates, twice the stress and strain; the gauge at the root reads its row."""
-    from dataclasses import replace
-
     series = tuple(
         replace(s, arrays={**s.arrays, "bodies/beam/q": 2 * s.arrays["bodies/beam/q"]}) for s in response.series
     )

@@ -267,6 +267,19 @@ def test_stiffness_is_symmetric_and_makes_the_force(name: str, made: dict[str, b
         assert (work >= -1e-16).all() and work.sum() == pytest.approx(lost, rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_points_in_time_are_those_that_the_patch_is_made_of(name: str, made: dict[str, book.BookPatch]) -> None:
+    """Mean, cos and sin of the points' forces, contracted with the kinematics, are the patch's."""
+    contact = made[name]
+    u = np.concatenate([motion(1), motion(2)])
+    for one, F, seen in zip(contact.traced(u), contact.force(u), contact.watch(u), strict=True):
+        whole = np.einsum("nia,sni->sa", contact.patch.kinematics, one.force)
+        wave = np.fft.rfft(whole, axis=0)[:2] / len(whole)
+        found = np.stack([wave[0].real, 2 * wave[1].real, -2 * wave[1].imag], axis=1)
+        assert np.allclose(found, F, rtol=0, atol=1e-12 * np.abs(F).max())
+        np.testing.assert_array_equal(one.cycle.dissipated, seen.dissipated)
+
+
 def test_contacts_are_evaluated_on_their_own(made: dict[str, book.BookPatch]) -> None:
     u = np.concatenate([motion(1), motion(2), motion(3)])
     force, slope = made["rough"].forces(u)

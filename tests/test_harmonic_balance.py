@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from microslip.data import Compliance, Interface, ModalGroup
-from microslip.harmonic_balance import JenkinsContact, frequency_response, jenkins_harmonic, peaks, stuck_frequencies
+from microslip.harmonic_balance import (
+    FrequencyResponse,
+    JenkinsContact,
+    frequency_response,
+    jenkins_harmonic,
+    peaks,
+    stuck_frequencies,
+)
+from microslip.harmonic_balance.jenkins import resonances
 
 
 def oscillator(mass: float = 1.0, stiffness: float = 1e4, ratio: float = 0.0) -> ModalGroup:
@@ -123,3 +131,27 @@ def marched_amplitude(m: float, k: float, c: float, kt: float, limit: float, f: 
         previous, u = u, following
         last[i % steps] = previous
     return float(abs(2 / steps * np.sum(last * np.exp(-2j * np.pi * np.arange(steps) / steps))))
+
+
+def curve(f: np.ndarray, height: np.ndarray) -> FrequencyResponse:
+    zero, none = np.zeros(len(f)), np.zeros((len(f), 0))
+    return FrequencyResponse(f, height.astype(complex), none, zero, np.ones(len(f), bool), np.zeros(0), none)
+
+
+@pytest.mark.parametrize(("dip", "found"), [(0.003, [2.0]), (0.03, [1.0, 2.0])])
+def test_a_plateau_is_one_resonance_and_a_double_top_two(dip: float, found: list[float]) -> None:
+    """Tops at 1 (1.001) and 2 (1.002) with a dip between them, and ripples by 0.2 % on the way: 1 % parts them."""
+    f = np.linspace(0, 3, 301)
+    fall = np.where(f < 1, 1 - f, np.where(f > 2, f - 2, 0.0))
+    height = 1 + 0.001 * f - dip * np.sin(np.pi * (f - 1)) ** 2 * ((f > 1) & (f < 2)) - fall
+    height += 0.002 * np.cos(2 * np.pi * (f - 1) / 0.2) * ((f > 0.5) & (f < 2.5))
+    response = curve(f, height)
+    places = [place for place, _ in resonances(response, peaks(response))]
+    assert len(peaks(response)) >= 2 and places == pytest.approx(found, abs=0.02)
+
+
+def test_flat_tops_and_ledges() -> None:
+    """A top of equal points is one resonance, a ledge on the way up none."""
+    f = np.arange(9.0)
+    response = curve(f, np.array([0.0, 1.0, 2.0, 2.0, 3.0, 5.0, 5.0, 5.0, 1.0]))
+    assert resonances(response, peaks(response)) == [(5.0, 5.0)]

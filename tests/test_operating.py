@@ -342,19 +342,26 @@ def linear_patch(counts=(6, 2), normal=100.0, friction=0.3):
     return patch, equilibrium(patch, normal)
 
 
+def marched_map(patch, side, u, samples=256):
+    """The map of a patch whose law is marched through the cycle of its coordinates, 0.01 s long."""
+    from microslip.harmonic_balance.patch import traced
+    from microslip.operating.patches import contact_map
+
+    force, cycle = traced(patch.law, patch.kinematics, u, 0.01, samples, 4)
+    return contact_map(patch, side, np.asarray(force), cycle.dissipated, cycle.slipping, cycle.open, u.shape[1] // 2)
+
+
 def test_contact_map_of_a_patch_that_slides_under_constant_load():
     """Full slip along t1: 4 mu F (A - mu F/k) a cycle, traction mu p, slips while A is gone through less 2 mu F/k.
 
     Samples: the reversal is hit exactly (a cosine), the loss is that of the parallelogram to 1e-3 with 1024 samples;
     the share of slip is met to a sample.
     """
-    from microslip.operating.patches import contact_map
-
     patch, u0 = linear_patch()
     force, k, mu, A = 100.0, 8e6, 0.3, 2e-5
     u = np.zeros((6, 3))
     u[:, 0], u[1, 1] = u0, A
-    found = contact_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 0.01, 1024)
+    found = marched_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 1024)
     assert found.normal_force == pytest.approx(force, rel=1e-9)
     np.testing.assert_allclose(found.pressure_most, found.pressure_least, rtol=1e-9)
     assert found.loss == pytest.approx(4 * mu * force * (A - mu * force / k), rel=1e-3)
@@ -367,12 +374,10 @@ def test_contact_map_of_a_patch_that_slides_under_constant_load():
 
 def test_contact_map_of_a_patch_that_opens_at_one_edge():
     """Rocked about t2: points lift off for part of the cycle, the mean pressure is that of the clipped wave."""
-    from microslip.operating.patches import contact_map
-
     patch, u0 = linear_patch(normal=50.0)
     u = np.zeros((6, 3))
     u[:, 0], u[5, 1] = u0, 5e-3
-    found = contact_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 0.01, 2048)
+    found = marched_map(patch, small_basis().groups[0, 0].interfaces["right"], u, 2048)
     y = patch.points[:, 0]
     k = 1e7 / patch.areas.sum()
     t = 2 * np.pi * np.arange(4096) / 4096
@@ -383,17 +388,36 @@ def test_contact_map_of_a_patch_that_opens_at_one_edge():
     assert found.open.max() > 0.3 and found.open[np.argmin(np.abs(y))] == 0
 
 
+def test_tractions_of_a_contact_map_add_up_to_the_forces_of_its_group():
+    """Also where the wave leads by a phase, at whose zero the samples begin: mean and first harmonic, 1e-12."""
+    from microslip.harmonic_balance.forces import Marched
+    from microslip.harmonic_balance.problem import Group
+    from microslip.operating.patches import contact_map
+
+    patch, u0 = linear_patch()
+    zero, u = np.zeros((1, 6)), np.zeros((1, 6, 3))
+    u[0, :, 0], u[0, 1, 1:], u[0, 2, 1:] = u0, (1.5e-5, 4e-6), (-3e-6, 1e-5)
+    g = Group(Marched(patch, 1, 64, 100), np.arange(6)[None], None, zero, zero, np.array([0.7]), (0,))
+    (F,), ((force, cycle),) = g.force(u, 0.01), g.traced(u, 0.01)
+    side, shares = small_basis().groups[0, 0].interfaces["right"], (cycle.slipping, cycle.open)
+    found = contact_map(patch, side, np.asarray(force), cycle.dissipated, *shares, 1, 0.7)
+    whole = -np.einsum("n,nah->ah", patch.areas, found.tractions)
+    np.testing.assert_allclose(whole[:, 0], F[:3, 0], rtol=0, atol=1e-12 * np.abs(F).max())
+    np.testing.assert_allclose(whole[:, 1], F[:3, 1] - 1j * F[:3, 2], rtol=0, atol=1e-12 * np.abs(F).max())
+    assert found.loss == pytest.approx(g.watch(u, 0.01)[0].dissipated.sum(), rel=1e-12) and found.loss > 1e-4
+
+
 def test_contact_map_as_vtu(tmp_path):
     """Rectangles lie on the face and tile it; the mean traction on the body pushes it back, along minus its normal."""
     import meshio
 
-    from microslip.operating.patches import contact_map, grid_of, on_grid, write_contact_vtu
+    from microslip.operating.patches import grid_of, on_grid, write_contact_vtu
 
     patch, u0 = linear_patch()
     side = small_basis().groups[0, 0].interfaces["right"]
     u = np.zeros((6, 3))
     u[:, 0], u[1, 1] = u0, 2e-5
-    found = contact_map(patch, side, u, 0.01)
+    found = marched_map(patch, side, u)
     write_contact_vtu(found, tmp_path / "right.vtu")
     mesh = meshio.read(tmp_path / "right.vtu")
     quads = mesh.points[mesh.cells_dict["quad"]]

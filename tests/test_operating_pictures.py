@@ -67,16 +67,15 @@ def test_the_body_is_drawn_where_it_is_farthest_out(harmonics):
 
 def test_stressed_body_and_contact_maps(tmp_path):
     """Three tiles at speed with limits; nothing where the file has no shapes."""
-    from test_operating import linear_patch
+    from test_operating import linear_patch, marched_map
 
-    from microslip.operating.patches import contact_map
     from microslip.pictures import can_draw
 
     patch, u0 = linear_patch()
     u = np.zeros((6, 3))
     u[:, 0], u[1, 1] = u0, 2e-5
     side = small_basis().groups[0, 0].interfaces["right"]
-    found = contact_map(patch, side, u, 0.01)
+    found = marched_map(patch, side, u)
     scattered = replace(found, places=found.places + 1e-4 * np.sin(np.arange(24)).reshape(12, 2))
     assert dark(operating.contact_map_plot([found, scattered, found], "t", tmp_path / "m.png")) > 0.05
     if (reason := can_draw()) is not None:

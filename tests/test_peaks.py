@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -14,7 +15,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.continuation import Peak, Ridge, Settings, lowest, peak, ridge
+from microslip.continuation import Lowest, Peak, Ridge, Settings, lowest, peak, ridge
+from microslip.following import told
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
@@ -187,6 +189,43 @@ def test_optimal_friction_against_brute_force():
     assert best.evaluations < 300
 
 
+@dataclass(frozen=True)
+class Hill(Roof):
+    """x = h(p) - (lambda - 1)^2."""
+
+    height: Callable[[float], float] = abs
+
+    def evaluate(self, x, lam):
+        return np.array([x[0] - self.height(self.p) + (lam - 1) ** 2]), np.eye(1), np.array([2 * (lam - 1)])
+
+
+def hills(height):
+    """Hills of a height that depends on p, followed from 1 to 6, and the family."""
+
+    def family(p):
+        return Hill(p, height=height)
+
+    first = peak(family(1.0), np.array([height(1.0) - 0.09]), 0.7)
+    return ridge(family, first, np.linspace(1.0, 6.0, 6)), family
+
+
+def test_a_kink_that_an_end_beats_is_no_optimum():
+    """Falling all the way but for a nick between the first two values, where the derivative changes its sign."""
+    path, family = hills(lambda p: 2 - 0.01 * p + 0.03 * abs(p - 1.4) * (p < 2.2))
+    best = lowest(family, path)
+    assert path.rate[0] < 0 < path.rate[1] and path.status == "complete"
+    assert best.parameter == 6.0 and best.status.startswith("no optimum between the ends")
+
+
+@pytest.mark.parametrize("phase", np.linspace(0, 6, 7))
+def test_no_followed_peak_is_lower_than_the_optimum(phase):
+    """A shallow valley at 3.4 under ripples of the same size, as contacts that switch point by point make them."""
+    path, family = hills(lambda p: 2 + 0.01 * (p - 3.4) ** 2 + 0.004 * np.sin(17 * p + phase))
+    best = lowest(family, path)
+    assert best.status in ("converged", "kink")
+    assert best.peak.value <= path.value.min() and 2 < best.parameter < 5
+
+
 # with contacts --------------------------------------------------------------------------------------------------------
 
 
@@ -293,6 +332,36 @@ def test_ridges_that_meet_are_followed_from_their_own_sides(monkeypatch):
     apart = zip(forward.peaks, (1 + 1e-13, 1 - 1e-13), strict=True)
     twice = tuple(replace(one, value=one.value * factor) for one, factor in apart)
     assert peaks._crossing(None, forward, Ridge(ends, twice, "complete")) is None
+
+
+def ridge_of(heights):
+    """A ridge of amplitudes over 1, 2, ... that are flat at each of them."""
+    told = {True: "converged", False: "no start"}
+    tops = [Peak(np.zeros(1), 1.0, a**2, False, told[bool(np.isfinite(a))], np.zeros(2), 0, 0.0) for a in heights]
+    return Ridge(np.arange(1.0, len(tops) + 1), tuple(tops), "complete")
+
+
+def test_what_was_found_is_compared_with_all_that_was_followed():
+    """A kink of 4.2142 beside 4.2133 further on and 4.2109 at the end, as a blade had it whose friction does little;
+    beside a lower one between the ends; and of two resonances it is the higher one at each value that counts."""
+    kink = Lowest(1.5, ridge_of([4.2142]).peaks[0], "kink", 0)
+    first, inside, other = ridge_of([4.23, 4.2133, 4.2109]), ridge_of([4.23, 4.2133, 4.3]), ridge_of([4.0, 4.25, 4.25])
+    end, better = peaks._not_beaten(kink, (first,)), peaks._not_beaten(kink, (inside,))
+    assert (end.parameter, better.parameter) == (3.0, 2.0) and better.status == "followed"
+    assert end.status.startswith("no optimum between the ends")
+    assert peaks._not_beaten(kink, (first, other)) is kink
+    assert peaks._not_beaten(kink, (ridge_of([4.3, np.nan, 4.22]),)) is kink
+
+
+def test_a_setting_that_hardly_matters_is_said_to():
+    """The highest resonance changes by 0.45 % over the range, or by 5 %."""
+    for most, word in ((4.23, True), (4.42, False)):
+        ridges = (ridge_of([most, 4.2133, 4.2109]),)
+        found = peaks.Optimum(3.0, resonance(ridges[0].peaks[-1]), "kink", ridges, (0.0, 0.0))
+        assert found.spread == pytest.approx(most / 4.2109 - 1)
+        assert ("hardly matters" in told(found, "normal_force")) is word
+    few = ridge_of([4.2])
+    assert np.isinf(peaks.Optimum(1.0, resonance(few.peaks[0]), "kink", (few,), (0.0, 0.0)).spread)
 
 
 def test_where_one_resonance_takes_over_from_another():

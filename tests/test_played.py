@@ -39,6 +39,8 @@ def test_by_hand_and_marched_are_one(size: float) -> None:
             np.testing.assert_allclose(getattr(one, key), getattr(other, key), rtol=0, atol=1e-12 * 0.6 * size * width)
         assert one.slipping == pytest.approx(other.slipping, abs=1e-6)  # a mean in single precision
         assert one.open == other.open == one.unsteady == 0.0
+    for drawn, other in zip(hand.traced(u, 0.1), marched.traced(u, 0.1), strict=True):
+        np.testing.assert_allclose(drawn.force, other.force, rtol=0, atol=1e-12)  # of 2 N
 
 
 def test_derivative_against_differences() -> None:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from test_harmonic_balance_laws import sled
@@ -256,6 +257,47 @@ def test_what_stands_in_the_folder(folder: Path) -> None:
     assert found.series[0].frequency[top] == row["frequency_Hz"]
 
 
+SLIDES = ("amplitude=20.0", "sweep.points=5")
+
+
+@pytest.mark.parametrize("more", [('mode="book"',), (), ("harmonics=3",)])
+def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
+    """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J a cycle, single
+    precision. The full law marched along the book's motion, or with other samples, takes more or less."""
+    import meshio
+
+    respond(folder, *SLIDES, *more)
+    build = folder / "build" / "vane"
+    data = {k: v[0] for k, v in meshio.read(build / "contact_right.vtu").cell_data.items()}
+    series = read_response(build / "response.h5").series[0]
+    top = int(np.flatnonzero(series.arrays["peak"])[0])
+    energy = series.arrays["contacts/right/dissipated"][top]
+    assert energy > 1e-5 and data["dissipated"] @ data["area"] == pytest.approx(energy, rel=1e-6)
+    pressed = data["pressure_mean"] @ data["area"]
+    assert pressed == pytest.approx(series.arrays["contacts/right/force"][top, 0, 0], rel=1e-6)
+
+
+def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Off by a hundred thousandth: neither picture nor VTU, a remark, and the response stays."""
+    from microslip.harmonic_balance import response
+
+    seen = response.traced
+
+    def other(problem: Any, found: Any) -> Any:
+        return {
+            name: one._replace(cycle=one.cycle._replace(dissipated=1.00001 * one.cycle.dissipated))
+            for name, one in seen(problem, found).items()
+        }
+
+    monkeypatch.setattr(response, "traced", other)
+    told, converged = respond(folder, *SLIDES)
+    summary = json.loads((folder / "build/vane/response.json").read_text())
+    assert converged and "contacts at resonance" not in summary["pictures"]
+    assert "contact_right.vtu" not in summary["files"] and "response.h5" in summary["files"]
+    assert any("right" in remark and "map" in remark for remark in summary["remarks"])
+    assert any(t.startswith("warning") and "map" in t for t in told)
+
+
 def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sweep goes on, the table and the summary tell, and the case counts as not converged."""
     from microslip.harmonic_balance import solver
@@ -350,6 +392,30 @@ def test_coordinates_of_a_cyclic_sector_read_in_their_own_waves(folder: Path) ->
     assert summary["pictures"].keys() == {"friction response"}  # the file has no stress modes
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_resonance_beyond_the_band_is_told_with_the_range_to_add(folder: Path, closed: bool) -> None:
+    """Cut off below it there is no row; terminal, summary, page and a warning name a range that shows it."""
+    if closed:
+        (folder / "case.toml").write_text(CASE.replace('law = "smooth"\npoints = [2, 2]\n', ""))
+    build = folder / "build" / "vane"
+    respond(folder)
+    (whole,) = json.loads((build / "response.json").read_text())["resonances"]
+    stop = round(whole["frequency_Hz"] - 6.0, 3)
+    told, _ = respond(folder, f"sweep.stop={stop}")
+    summary = json.loads((build / "response.json").read_text())
+    (end,) = summary["rising_at_the_edge"]
+    assert summary["resonances"] == [] and end["normal_force_N"] == 50.0 and end["frequency_Hz"] == stop
+    low, high = (float(x) for x in end["add"].removesuffix(" Hz").split(" to "))
+    assert low == stop and whole["frequency_Hz"] < high
+    assert any(end["add"] in t and not t.startswith("warning") for t in told)
+    assert any(end["add"] in t and t.startswith("warning") for t in told)
+    assert (build / "response.html").read_text().count(end["add"]) == 2
+    assert any(end["add"] in remark for remark in read_response(build / "response.h5").remarks)
+    respond(folder, f"sweep.stop={high}", "sweep.points=15")
+    again = json.loads((build / "response.json").read_text())
+    assert again["rising_at_the_edge"] == [] and len(again["resonances"]) == 1
+
+
 SLED = (
     CASE.replace('name = "vane"', 'name = "sled"').replace('"vane-eigenmodes"', '"sled"').replace("magnet", "push")
     .replace('"probe"', '"middle"').replace('"right"', '"sole"').replace("[2, 2]", "[1, 1]").replace("2e5", "3e6")
@@ -390,20 +456,51 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.samples >= 8 * H
 
 
-def test_a_strain_gauge_in_closed_form(folder: Path) -> None:
-    """The strain that its row reads from the coordinates in the response file, 1e-6; said to be one."""
-    text = CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace('monitor = "probe"', 'monitor = "root"')
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_strain_gauge_is_strain_everywhere(folder: Path, closed: bool) -> None:
+    """The strain that its row reads from the coordinates in the response file, 1e-6; one name and one unit in table,
+    CSV, terminal, page and HDF5, and metres nowhere."""
+    text = CASE.replace('monitor = "probe"', 'monitor = "root"')
+    text = text.replace('law = "smooth"\npoints = [2, 2]\n', "") if closed else text
     (folder / "case.toml").write_text(text)
     told, converged = respond(folder)
-    assert converged and any("'root' is a strain gauge" in t for t in told)
+    build = folder / "build" / "vane"
     row = read_basis(folder / "basis.h5").groups[0, 0].gauges["root"].rows[0]
-    with (folder / "build/vane/response.csv").open(newline="") as file:
-        strain = {float(r["frequency_Hz"]): float(r["amplitude_m_FN_50_N"]) for r in csv.DictReader(file)}
-    series = read_response(folder / "build/vane/response.h5").series[0]
+    with (build / "response.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    strain = {float(r["frequency_Hz"]): float(r["amplitude_strain_FN_50_N"]) for r in table}
+    assert converged and not any("_m_FN" in name for name in table[0])
+    series = read_response(build / "response.h5").series[0]
     pairs = zip(series.frequency, np.abs(series.arrays["bodies/vane-eigenmodes/q"][:, 1] @ row), strict=True)
     found = [(strain[f], own) for f, own in pairs if f in strain]
     assert len(found) == 9 and min(found)[0] > 0
-    np.testing.assert_allclose(*zip(*found, strict=True), rtol=1e-6)
+    np.testing.assert_allclose(*zip(*found, strict=True), rtol=1e-6 if closed else 2e-3)
+    (resonance,) = json.loads((build / "response.json").read_text())["resonances"]
+    assert "amplitude_m" not in resonance and resonance["amplitude_strain"] >= max(strain.values())
+    assert any(t.endswith(" m/m") for t in told) and "amplitude in µm/m" in (build / "response.html").read_text()
+    with h5py.File(build / "response.h5") as file:
+        assert file["series_0000/gauges/root"].attrs["unit"] == "1"
+
+
+def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The response's picture and the comparison with the book's mode."""
+    from matplotlib.figure import Figure
+
+    said: list[str] = []
+    saved = Figure.savefig
+
+    def look(figure: Figure, *more: Any, **how: Any) -> None:
+        said.extend(axes.get_ylabel() for axes in figure.axes)
+        said.append(getattr(figure, "_supylabel", None) and figure._supylabel.get_text() or "")
+        saved(figure, *more, **how)
+
+    (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', 'monitor = "root"'))
+    monkeypatch.setattr(Figure, "savefig", look)
+    table, pairs, _ = running.compare_book(folder / "case.toml", None, ["sweep.points=5"])
+    strains = [text for text in said if "amplitude of root" in text or "read-out" in text]
+    assert len(strains) == 3 and all("µm/m" in text for text in strains)
+    assert "marched_strain" in table.read_text().splitlines()[0]
+    assert all(p.quantity.unit == "1" for p in pairs)
 
 
 @pytest.mark.parametrize(("keys", "words"), [

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .data import Array, ModalBasis, UserError
+from .data import Array, Indices, ModalBasis, UserError
+from .harmonic_balance.jenkins import prominent
 from .operating.fatigue import Endurance, MaterialLimits, endurance
 from .operating.motion import Motion, amplitude, read_out
 from .operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from .results import Response, Series
+from .results.files import unit_of
+from .units import METRES, Quantity
 
 if TYPE_CHECKING:
     from .operating.patches import ContactMap
@@ -31,20 +34,27 @@ ENDLESS = MaterialLimits(fatigue_strength=1e300, tensile_strength=1e301)
 
 @dataclass(frozen=True)
 class Resonance:
-    """A local maximum of a sweep.
+    """A local maximum of a sweep, and the range about it, between the lowest points next to it.
 
     Attributes:
-        normal_force: N. index: of the point in its series. frequency: Hz. amplitude: m, of the read-out that is drawn.
-            worst: place of the body whose vibration may grow least (largest amplitude without limits). lifts: contacts
-            would lift off, which the closed form that gave it does not follow.
+        normal_force: N. frequency: Hz. amplitude: m, of the read-out that is drawn. range: Hz. stressed: number, in its
+            series, of the point of that range at which the body's stress amplitude is largest, stressed_at: Hz there.
+            worst: place of the body whose vibration may grow least there (largest amplitude without limits). lifts:
+            contacts would lift off, which the closed form that gave it does not follow.
     """
 
     normal_force: float
-    index: int
     frequency: float
     amplitude: float
+    range: tuple[float, float]
+    stressed: int
+    stressed_at: float
     worst: Endurance
     lifts: bool = False
+
+    def holds(self, frequency: float) -> bool:
+        """Whether a frequency (Hz) lies in its range."""
+        return self.range[0] <= frequency <= self.range[1]
 
 
 @dataclass(frozen=True)
@@ -54,13 +64,14 @@ class Assessment:
     Attributes:
         member: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
             places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
-            None.
+            None. quantity: what the read-out measures.
     """
 
     member: str
     sweeps: Mapping[float, tuple[Series, Motion, Array, StressPeaks]]
     resonances: tuple[Resonance, ...]
     limits: MaterialLimits | None
+    quantity: Quantity = METRES
 
     @property
     def highest(self) -> Resonance | None:
@@ -70,8 +81,8 @@ class Assessment:
         return min(valid or self.resonances, key=key, default=None)
 
     def at(self, r: Resonance) -> tuple[Motion, CycleStress]:
-        """Motion and stress at a resonance."""
-        motion = self.sweeps[r.normal_force][1].at(r.index)
+        """Motion and stress where a resonance stresses the body most."""
+        motion = self.sweeps[r.normal_force][1].at(r.stressed)
         return motion, cycle_stress(motion)
 
     def table(self) -> list[dict[str, Any]]:
@@ -82,9 +93,10 @@ class Assessment:
         row: dict[str, Any] = {
             "normal_force_N": r.normal_force,
             "frequency_Hz": r.frequency,
-            "amplitude_m": r.amplitude,
+            self.quantity.column("amplitude"): r.amplitude,
         }
-        row |= {"stress_amplitude_Pa": r.worst.amplitude, "mean_stress_Pa": r.worst.mean}
+        row |= {"stress_amplitude_Pa": r.worst.amplitude, "frequency_of_stress_Hz": r.stressed_at}
+        row |= {"mean_stress_Pa": r.worst.mean}
         if self.limits is not None:
             row["vibration_may_grow"] = r.worst.vibration
         row |= {"at_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
@@ -95,12 +107,13 @@ def assess(
     response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
     only: Array | None = None, report: Report = lambda _: None, lifted: Mapping[float, Array] | None = None,
 ) -> Assessment:  # fmt: skip
-    """The stresses of a body at every point of a response.
+    """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
+    where the read-out is largest: another mode may stress the body on its flank.
 
     Args:
         monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
             where there is one body. only: numbers of the stress places that count, all if None. lifted: normal force
-            (N) -> resonances (Hz) that are not valid because contacts would lift off.
+            (N) -> points (Hz) that are not valid because contacts would lift off.
 
     Raises:
         UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
@@ -113,15 +126,55 @@ def assess(
         report(f"stresses of {name}: {series.name}")
         motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
-        chosen, at = drawn_points(series), tops(series)
-        sweeps[normal] = (series, motion, chosen, stress_peaks(motion.at(chosen), only=only, largest=False))
-        for i in at:
-            worst = endurance(cycle_stress(motion, i), limits or ENDLESS, only)
-            size = float(abs(series.monitor(monitor)[i, 0, 1]))
-            f = float(series.frequency[i])
-            lifts = bool(np.isclose((lifted or {}).get(normal, np.zeros(0)), f, rtol=1e-9).any())
-            found.append(Resonance(normal, i, f, size, worst, lifts))
-    return Assessment(name, sweeps, tuple(found), limits)
+        size = abs(series.monitor(monitor)[:, 0, 1])
+        invalid = (lifted or {}).get(normal, np.zeros(0))
+        lifts = np.asarray(np.isclose(series.frequency[:, None], invalid, rtol=1e-9).any(axis=1))
+        chosen, at = drawn_points(series), tops(series, size)
+        peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+        ranges = _ranges(size, series.converged, at)
+        most = [_most_stressed(motion, r[lifts[r] == lifts[i]], chosen, peaks, only)
+                for i, r in zip(at, ranges, strict=True)]  # fmt: skip
+        if not np.isin(most, chosen).all():
+            chosen = np.union1d(chosen, most)
+            peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+        sweeps[normal] = (series, motion, chosen, peaks)
+        for i, r, j in zip(at, ranges, most, strict=True):
+            worst = endurance(cycle_stress(motion, j), limits or ENDLESS, only)
+            f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
+            found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst, bool(lifts[i])))
+    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
+
+
+def _quantity(response: Response, monitor: str) -> Quantity:
+    """What an array of read-outs measures."""
+    names = {name for series in response.series for name in series.arrays}
+    return Quantity(unit_of(f"gauges/{monitor}" if f"gauges/{monitor}" in names else f"monitors/{monitor}"))
+
+
+def _ranges(size: Array, known: Array, at: Indices) -> list[Indices]:
+    """Points about each of the resonances `at`, in order, that belong to it: between the lowest ones beside it."""
+    if not len(at):
+        return []
+    points = np.flatnonzero(known)
+    ends = [points[0], *at, points[-1]]
+    lows = []
+    for a, b in zip(ends[:-1], ends[1:], strict=True):
+        between = points[(points >= a) & (points <= b)]
+        lows.append(between[size[between].argmin()])
+    return [points[(points >= a) & (points <= b)] for a, b in zip(lows[:-1], lows[1:], strict=True)]
+
+
+def _most_stressed(
+    motion: Motion, around: Indices, chosen: Indices, peaks: StressPeaks, only: Array | None
+) -> int:  # fmt: skip
+    """The point of a range with the largest stress amplitude: of those chosen, whose peaks are known, then of all
+    beside it."""
+    inside = np.flatnonzero(np.isin(chosen, around))
+    if len(inside):
+        k = inside[peaks.amplitude[inside].argmax()]
+        low, high = chosen[max(k - 1, 0)], chosen[min(k + 1, len(chosen) - 1)]
+        around = around[(around >= low) & (around <= high)]
+    return int(around[stress_peaks(motion.at(around), only=only, largest=False).amplitude.argmax()])
 
 
 MOST_DRAWN, BESIDE_A_PEAK = 400, 20
@@ -133,15 +186,23 @@ def drawn_points(series: Series) -> Array:
     count = len(series.key)
     chosen = np.zeros(count, dtype=bool)
     chosen[np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)] = True
-    for i in tops(series):
+    for i in _searched(series):
         chosen[max(i - BESIDE_A_PEAK, 0) : i + BESIDE_A_PEAK + 1] = True
     return np.flatnonzero(chosen)
 
 
-def tops(series: Series) -> list[int]:
-    """Points of a series that are resonances: those that were searched for between the others."""
+def _searched(series: Series) -> Indices:
+    """Points of a series that were searched for between the others."""
     flags = series.arrays.get("peak", np.zeros(len(series.key)))
-    return [int(i) for i in np.flatnonzero(flags) if series.converged[i]]
+    return np.flatnonzero((np.asarray(flags) != 0) & series.converged)
+
+
+def tops(series: Series, size: Array) -> Indices:
+    """Points of a series that are resonances: those that were searched for between the others, and of those of one
+    plateau the highest, see `jenkins.prominent`. size: (f,) m, of the read-out."""
+    points = np.flatnonzero(series.converged)
+    at = np.flatnonzero(np.isin(points, _searched(series)))
+    return points[prominent(np.asarray(size)[points], at)]
 
 
 def over_engine_order(
@@ -218,25 +279,30 @@ def draw(
         drawn |= _at_worst(found, top, basis, case, folder, scenes)
     for title, patches in (maps or {}).items():
         path = folder / f"{title.replace(' ', '_')}.png"
-        where = f", {top.frequency:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
+        where = f", {top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
         drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}", path)
     return drawn
 
 
-APART = 1.25
-"""Factor between the frequencies of a resonance at two neighbouring normal forces beyond which it is another one."""
-
-
 def families(found: Assessment) -> dict[str, list[Resonance]]:
-    """Resonances followed over the normal force, from the largest down, the nearest in frequency paired first."""
+    """Resonances followed over the normal force, from the largest down.
+
+    A resonance goes on in one that lies in its range, or in whose range it lies: none other of its sweep is meant by
+    that part of the band, however far the normal force has moved it. Of several the nearest in frequency; what is left
+    begins a line of its own.
+    """
     lines: list[list[Resonance]] = []
     for normal in sorted({r.normal_force for r in found.resonances}, reverse=True):
         new = [r for r in found.resonances if r.normal_force == normal]
-        pairs = [(abs(np.log(line[-1].frequency / r.frequency)), i, j)
-                 for i, line in enumerate(lines) for j, r in enumerate(new)]  # fmt: skip
+        pairs = [
+            (abs(np.log(line[-1].frequency / r.frequency)), i, j)
+            for i, line in enumerate(lines)
+            for j, r in enumerate(new)
+            if line[-1].holds(r.frequency) or r.holds(line[-1].frequency)
+        ]
         taken: dict[int, int] = {}
-        for away, i, j in sorted(pairs):
-            if away < np.log(APART) and i not in taken.values() and j not in taken:
+        for _, i, j in sorted(pairs):
+            if i not in taken.values() and j not in taken:
                 taken[j] = i
         for j, r in enumerate(new):
             if j in taken:
@@ -247,22 +313,12 @@ def families(found: Assessment) -> dict[str, list[Resonance]]:
 
 
 def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
-    """Normal force, N, and stress amplitude, MPa, of families of resonances that are valid.
-
-    Of more than two of them, or with one that is the highest at its normal force.
-    """
+    """Normal force, N, and stress amplitude, MPa, of families of resonances that are valid, none left out; nothing
+    where there are fewer than three normal forces to look over."""
     valid = {name: [r for r in line if not r.lifts] for name, line in families(found).items()}
-    highest: dict[float, Resonance] = {}
-    for r in (r for line in valid.values() for r in line):
-        if r.normal_force not in highest or r.worst.amplitude > highest[r.normal_force].worst.amplitude:
-            highest[r.normal_force] = r
-    if len(highest) < 3:
+    if len({r.normal_force for line in valid.values() for r in line}) < 3:
         return {}
-    return {
-        name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line]
-        for name, line in valid.items()
-        if len(line) > 2 or any(r is highest[r.normal_force] for r in line)
-    }
+    return {name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line] for name, line in valid.items() if line}
 
 
 def _at_worst(
@@ -273,7 +329,7 @@ def _at_worst(
 
     drawn: dict[str, Path] = {}
     motion, cycle = found.at(top)
-    where = f"{top.frequency:.5g} Hz, $F_N$ = {top.normal_force:g} N"
+    where = f"{top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N"
     if found.limits is not None:
         drawn["Haigh diagram"] = operating.haigh_plot(
             cycle, found.limits, top.worst, f"{case}: {where}", folder / "haigh.png"
@@ -285,7 +341,7 @@ def _at_worst(
         quiet_vtk()
         studio = open_studio(basis)
         try:
-            title = f"{case}: resonance at {top.frequency:.5g} Hz under {top.normal_force:g} N"
+            title = f"{case}: most stressed at {top.stressed_at:.5g} Hz under {top.normal_force:g} N"
             image = operating.stress_picture(studio, motion, cycle, title, found.limits, top.worst.place)
         finally:
             studio.stage.close()
@@ -304,7 +360,7 @@ def write_shape(found: Assessment, basis: ModalBasis, path: Path) -> Path | None
     if top is None or not basis.mesh.n_cells:
         return None
     try:
-        write_shape_vtu(found.sweeps[top.normal_force][1].at(top.index), basis, path, found.limits)
+        write_shape_vtu(found.sweeps[top.normal_force][1].at(top.stressed), basis, path, found.limits)
     except UserError:
         return None
     return path

@@ -334,7 +334,8 @@ def backbone(
         basis: see respond.
         mode: number of the mode with sticking contacts, 1 the lowest; the one that answers the excitation most in the
             band of the sweep if not given.
-        low: smallest amplitude of the first monitor, m; a thirtieth of where the contacts begin to slide if not given.
+        low: smallest amplitude of the first read-out, m (m/m of a gauge); a thirtieth of where the contacts begin to
+            slide if not given.
         high: largest amplitude, m; thirty times that if not given.
     """
     from . import following
@@ -373,7 +374,7 @@ def optimum(
         opened = _followed(case, basis, set_)
         found = following.optimum_over(opened, over, low, high, points, report)
         files = following.write_optimum(found, over, opened)
-    _say(following.told(found, over), quiet)
+    _say(following.told(found, over, opened.quantity), quiet)
     for file in files:
         _say(file, quiet)
     if not following.is_optimum(found):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +21,10 @@ from .case import CaseSettings, keeping
 from .case.assemble import Built, build
 from .case.run import problem_of
 from .data import ModalBasis, UserError
+from .harmonic_balance.readout import measured
 from .mistakes import validate
 from .results import read_response
+from .units import METRES, Quantity
 from .workflow import Report
 
 if TYPE_CHECKING:
@@ -48,6 +50,11 @@ class Case:
     raw: dict[str, Any]
     bases: Mapping[str, ModalBasis]
     folder: Path
+
+    @cached_property
+    def quantity(self) -> Quantity:
+        """What the first read-out measures."""
+        return measured(self.with_({}).assembly)
 
     def with_(self, changes: Mapping[str, float]) -> Built:
         """The assembly, some keys of the case changed."""
@@ -108,7 +115,7 @@ def backbones(
     from .harmonic_balance.nonlinear_modes import backbone, sliding_amplitude, strongest
 
     found: dict[float, Backbone] = {}
-    built = case.with_({})
+    built, of = case.with_({}), case.quantity
     band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
     forces = normal_forces(built)
     for i, normal in enumerate(forces):
@@ -123,8 +130,8 @@ def backbones(
         if len(one.amplitude):
             i = int(np.argmax(one.damping))
             said += (
-                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} m; damping at most "
-                f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} m"
+                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} {of.said}; damping at most "
+                f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} {of.said}"
             )
         report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
     return found
@@ -135,11 +142,11 @@ def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
     from .pictures.following import backbone_plot
 
     picture = case.folder / "pictures" / "backbone.png"
-    return [_backbone_table(found, case), backbone_plot(found, _title(case, "nonlinear mode"), picture)]
+    return [_backbone_table(found, case), backbone_plot(found, _title(case, "nonlinear mode"), picture, case.quantity)]
 
 
 def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
-    rows = ["normal_force_N,amplitude_m,frequency_Hz,damping_ratio"]
+    rows = [f"normal_force_N,{case.quantity.column('amplitude')},frequency_Hz,damping_ratio"]
     for normal, one in sorted(found.items()):
         order = zip(one.amplitude, one.Omega / (2 * np.pi), one.damping, strict=True)
         rows += [f"{normal:g},{a:.8g},{f:.10g},{d:.8g}" for a, f, d in order]
@@ -189,7 +196,7 @@ def optimum_over(
 
     sweep = built.settings.sweep
     band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
-    rows = [f"{over},frequency_Hz,amplitude_m,what"]
+    rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
 
     def keep(number: int, value: float, peak: Peak) -> None:
         rows.append(_peak_row(number, value, peak))
@@ -207,7 +214,7 @@ def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
     """``optimum.csv``: the peaks followed and the optimum; ``pictures/optimum.png``."""
     from .pictures.following import optimum_plot
 
-    rows = [f"{over},frequency_Hz,amplitude_m,what"]
+    rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
     best = found.resonance
     for i, ridge in enumerate(found.ridges):
         for value, peak in zip(ridge.parameter, ridge.peaks, strict=True):
@@ -216,24 +223,41 @@ def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
     store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
     label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
     picture = case.folder / "pictures" / "optimum.png"
-    return [case.folder / "optimum.csv", optimum_plot(found, label, _title(case, "resonance and optimum"), picture)]
+    title = _title(case, "resonance and optimum")
+    return [case.folder / "optimum.csv", optimum_plot(found, label, title, picture, case.quantity)]
 
 
-def told(found: Optimum, over: str) -> str:
-    """The optimum in a sentence."""
+def told(found: Optimum, over: str, of: Quantity = METRES) -> str:
+    """The optimum of what is read in a sentence."""
     best, (other, height) = found.resonance, found.other
     unit = " N" if over == NORMAL_FORCE else ""
-    where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} m at "
+    where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} {of.said} at "
     lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
     lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
     if height > 1.001 * best.amplitude:
-        lines += f"; another one, near {other / 2 / np.pi:.6g} Hz, is higher there: {height:.4g} m"
-    return lines
+        lines += f"; another one, near {other / 2 / np.pi:.6g} Hz, is higher there: {height:.4g} {of.said}"
+    return lines + _hardly(found)
+
+
+HARDLY = 0.01
+"""Share by which a setting changes the highest resonance over its whole range, below which it is said to hardly matter:
+what two tops have to be apart to be two, `harmonic_balance.jenkins.DIP`."""
+
+
+def _hardly(found: Optimum) -> str:
+    """That the setting hardly matters, if it does not."""
+    if found.spread >= HARDLY:
+        return ""
+    values = np.concatenate([one.parameter for one in found.ridges])
+    return (
+        f"; the setting hardly matters: from {values.min():g} to {values.max():g} the highest resonance changes by "
+        f"{100 * found.spread:.2g} %"
+    )
 
 
 def is_optimum(found: Optimum) -> bool:
     """Whether the lowest place lies between the ends."""
-    return found.status in ("converged", "kink", "two peaks")
+    return found.status in ("converged", "kink", "two peaks", "followed")
 
 
 def missed(found: Optimum, over: str) -> str:

@@ -39,6 +39,7 @@ from .resonances import rows as resonance_rows
 from .ring import aliased, certificate_words, certify_ring, ring_checks
 from .store import write_text
 from .truncation import percent, verdict
+from .units import Quantity
 
 STYLE = """
 :root { color-scheme: light; --ink: #1f242d; --faint: #667; --line: #d9dde5; --tint: #f4f6f9; --accent: #0b4f9c; }
@@ -658,7 +659,7 @@ SHOWN = {
     "stress over normal force": "Stress at every resonance; a ring marks a lowest one between the ends.",
     "stress at resonance": "The resonance with the least margin, or the most stressed one where no limits are given.",
     "Haigh diagram": "Amplitude over mean stress of every place, and what the material endures.",
-    "contacts at resonance": "What the points of the contacts do in a cycle of that resonance, each by its whole law.",
+    "contacts at resonance": "What the points of the contacts do in a cycle there, as the case's mode computed it.",
 }
 """Pictures of a response in their order, and what they show."""
 
@@ -752,14 +753,21 @@ def _rows_of(key: str, rows: Sequence[Mapping[str, Any]]) -> str:
     return f"<h3>{text(_label(key))}</h3>\n" + _table(head, body)
 
 
-_FACTORS = (("amplitude_m", (1e6, "µm")), ("_Pa", (1e-6, "MPa")))
+_FACTORS = (
+    *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
+    ("_Pa", (1e-6, "MPa")),
+)
 """Ends of names of numbers that are shown in another unit."""
+
+
+_UNITS = ("N", "Hz", "m", "mm", "µm", "m/m", "µm/m", "rad", "µrad", "s", "Pa", "MPa", "rpm", "W", "J", "K")
 
 
 def _label(key: str) -> str:
     """``normal_force_N`` -> ``normal force in N``."""
     words = key.split("_")
-    if len(words) > 1 and words[-1] in ("N", "Hz", "m", "mm", "µm", "s", "Pa", "MPa", "rpm", "W", "J", "K"):
+    words = [*words[:-1], "m/m"] if words[-1] == "strain" and len(words) > 1 else words
+    if len(words) > 1 and words[-1] in _UNITS:
         return " ".join(words[:-1]) + f" in {words[-1]}"
     return " ".join(words)
 

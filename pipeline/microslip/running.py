@@ -26,6 +26,8 @@ from .case.settings import FIRST_HARMONICS
 from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
+from .results.files import unit_of
+from .units import Quantity, amplitude_of
 from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage
 
 if TYPE_CHECKING:
@@ -171,6 +173,7 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
     if more is not None:
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
+        summary["remarks"] += more.remarks
     summary["response_sha256"] = store.hash_file(folder / "response.h5")
     summary["pictures"] = {title: path.name for title, path in drawn.items()}
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
@@ -201,6 +204,7 @@ class _Assessed:
     rows: list[dict[str, Any]]
     drawn: dict[str, Path]
     files: list[Path]
+    remarks: list[str]
 
 
 def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
@@ -209,23 +213,37 @@ def _assessed(result: CaseResult, response: Response, folder: Path, report: Repo
     basis = result.built.bodies[result.built.assembly.watches[0].member].basis
     if not assessment.has_stresses(basis, response, member):
         return None
-    lifted = {n: np.array([f for f, _ in peaks])[result.lifted(n)[1]] for n, peaks in result.resonances.items()}
+    lifted = {n: _lifting_at(result, n) for n in result.resonances}
     limits = result.settings.material_limits
     found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)
-    maps = {} if found.highest is None or result.at_peaks else {"contacts at resonance": _maps(result, found, report)}
+    maps, remarks = ({}, []) if found.highest is None or result.at_peaks else _maps(result, found, report)
     report("pictures of stresses")
     scenes = _can_draw() is None
     drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
-    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder))
+    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
 
 
-def _maps(result: CaseResult, found: assessment.Assessment, report: Report) -> list[ContactMap]:
+def _lifting_at(result: CaseResult, normal: float) -> Array:
+    """Hz of the points of a sweep and of its resonances at which contacts would lift off."""
+    at = result.responses[normal].frequency, np.array([f for f, _ in result.resonances[normal]])
+    return np.concatenate([f[lifts] for f, lifts in zip(at, result.lifted(normal), strict=True)])
+
+
+def _maps(
+    result: CaseResult, found: assessment.Assessment, report: Report
+) -> tuple[dict[str, list[ContactMap]], list[str]]:
+    """Title -> contacts at the worst resonance; nothing, and why, where they do not agree with the response."""
     top = found.highest
     assert top is not None
-    report(f"contacts at {top.frequency:.6g} Hz")
+    report(f"contacts at {top.stressed_at:.6g} Hz")
     series = found.sweeps[top.normal_force][0]
-    row = {name: values[top.index] for name, values in series.arrays.items()} | {"status": series.status[top.index]}
-    return keeping.maps_at(result.built, top.normal_force, row)
+    at = top.stressed
+    row = {name: values[at] for name, values in series.arrays.items()} | {"status": series.status[at]}
+    try:
+        return {"contacts at resonance": keeping.maps_at(result.built, top.normal_force, row)}, []
+    except UserError as error:
+        report(f"warning: {error}")
+        return {}, [str(error)]
 
 
 def _for_paraview(
@@ -287,9 +305,10 @@ def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
     rows = []
     lifted = {normal: result.lifted(normal)[1] for normal in result.resonances}
+    name = result.quantity.column("amplitude")
     for normal, peaks in result.resonances.items():
         for (frequency, amplitude), lifts in zip(peaks, lifted[normal], strict=True):
-            row = {"normal_force_N": normal, "frequency_Hz": frequency, "amplitude_m": amplitude}
+            row = {"normal_force_N": normal, "frequency_Hz": frequency, name: amplitude}
             rows.append(row | ({"note": assessment.LIFTS if lifts else ""} if any(map(any, lifted.values())) else {}))
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
     balanced: dict[str, float] = {"harmonics": result.settings.balanced} if result.settings.has_laws else {}
@@ -306,6 +325,10 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "stuck_modes": _stuck_modes(result),
         **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
         "resonances": rows,
+        "rising_at_the_edge": [
+            {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
+            for r in result.rising
+        ],
         "failed_points": failed,
         "remarks": list(result.remarks),
     }
@@ -436,8 +459,16 @@ def respond(
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
     for peak in summary["resonances"]:
         note = f" ({peak['note']})" if peak.get("note") else ""
-        report(f"F_N = {peak['normal_force_N']:g} N: {peak['frequency_Hz']:.6g} Hz, {peak['amplitude_m']:.4g} m{note}")
+        report(f"F_N = {peak['normal_force_N']:g} N: {_at(peak)}{note}")
+    for end in summary["rising_at_the_edge"]:
+        report(f"F_N = {end['normal_force_N']:g} N: still rising at {_at(end)}; add {end['add']}")
     return folder / "response.csv", converged
+
+
+def _at(row: Mapping[str, Any]) -> str:
+    """Frequency and amplitude of a row of a table."""
+    amplitude, of = amplitude_of(row)
+    return f"{row['frequency_Hz']:.6g} Hz, {amplitude:.4g} {of.said}"
 
 
 def compare_book(
@@ -469,10 +500,11 @@ def compare_book(
     pairs = paired(*(summary["resonances"] for summary, _ in found.values()))
     case = keeping.as_found(case, folder, case_path)
     table, picture = folder / "book.csv", folder / "pictures" / "book.png"
-    store.write_text(table, comparison_table(pairs))
+    of = Quantity(unit_of(next(iter(read_response(folder / "response.h5").labels))))
+    store.write_text(table, comparison_table(pairs, of))
     marched, book = (_curves(f / "response.h5") for f, _ in ways.values())
     with store.complete_or_absent(picture) as temporary:
-        comparison_picture(case, marched, book, temporary)
+        comparison_picture(case, marched, book, temporary, of)
     return table, pairs, all(converged for _, converged in found.values())
 
 

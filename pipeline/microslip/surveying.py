@@ -189,12 +189,14 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     amplitude = np.where(r.converged, np.abs(r.monitor), np.nan)
     title = f"{settings.name}: along engine order {r.order}"
     top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
-    said = [f"Largest amplitude {amplitude[top]:.4g} m at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
+    drawn = r.rpm, r.frequency, amplitude, r.normal
+    size = f"{amplitude[top]:.4g} {r.quantity.said}"
+    said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
     if still := [b.name for b in settings.members if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
     return Survey(
         tables(r),
-        {"pictures/speeds.png": lambda p: speed_line_picture(r.rpm, r.frequency, amplitude, r.normal, p, title)},
+        {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
         said, int((~r.converged).sum()),
     )  # fmt: skip
 
@@ -207,7 +209,8 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
 
     e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
-    said = [f"Largest amplitude between {e.peaks.min():.4g} and {e.peaks.max():.4g} m on the grid of the sweep."]
+    most = f"{e.peaks.min():.4g} and {e.peaks.max():.4g} {e.quantity.said}"
+    said = [f"Largest amplitude between {most} on the grid of the sweep."]
     return Survey(
         tables(e),
         {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)},

@@ -1,6 +1,10 @@
-"""Consistent systems of units in which other programs' numbers stand."""
+"""Consistent systems of units in which other programs' numbers stand; the units of read-outs, one name for each."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 SYSTEMS: dict[str, tuple[float, float, float]] = {
     "m-kg-s": (1.0, 1.0, 1.0),
@@ -26,3 +30,38 @@ def density(system: str) -> float:
     """kg/m3 of the system's unit of density."""
     length, mass, _ = SYSTEMS[system]
     return mass / length**3
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a read-out measures. Attributes: unit: SI, as rows of the modal file name it: "m", "rad", "1" of a strain.
+
+    Numbers stand in it in files and columns; people see them a million times as large, in µm, µrad or µm/m.
+    """
+
+    unit: str = "m"
+
+    def column(self, name: str) -> str:
+        """Name of a column: ``amplitude`` -> ``amplitude_m``, ``amplitude_rad``, ``amplitude_strain``."""
+        return f"{name}_{_COLUMNS.get(self.unit, self.unit)}"
+
+    @property
+    def said(self) -> str:
+        """The unit behind a number: m, rad, m/m."""
+        return "m/m" if self.unit == "1" else self.unit
+
+    @property
+    def micro(self) -> str:
+        """That of a millionth: µm, µrad, µm/m."""
+        return f"µ{self.said}"
+
+
+_COLUMNS = {"1": "strain"}
+METRES = Quantity()
+
+
+def amplitude_of(row: Mapping[str, Any]) -> tuple[float, Quantity]:
+    """The amplitude in a row of a table of resonances, whatever it measures."""
+    name = next(key for key in row if key.startswith("amplitude_"))
+    unit = name.removeprefix("amplitude_")
+    return float(row[name]), Quantity(next((u for u, column in _COLUMNS.items() if column == unit), unit))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..harmonic_balance import (
     refined_peaks,
     stuck_resonances,
 )
+from ..harmonic_balance.readout import measured
 from .assemble import Built
 from .counting import Springs
 from .settings import ContactSettings
@@ -32,6 +34,7 @@ def in_closed_form(
     a, member = built.assembly, built.assembly.members[0]
     group, load, watch = member.groups[0], a.loads[0], a.watches[0]
     amplitude = float(load.amplitude.real)
+    of = measured(a)
     force = amplitude * group.excitations[load.row].rows[0]
     row = member.at(0).monitor(watch.monitor, watch.label)
     residual = None if member.brings is None else _residual(built)
@@ -40,7 +43,8 @@ def in_closed_form(
         pressed = [jenkins_contact(c, normal, s) for c, s in zip(built.contacts, built.springs, strict=True)]
 
         def respond(at: Array, pressed: list[JenkinsContact] = pressed) -> FrequencyResponse:
-            return frequency_response(group, pressed, force, row, at, residual=residual, amplitude=amplitude)
+            found = frequency_response(group, pressed, force, row, at, residual=residual, amplitude=amplitude)
+            return replace(found, quantity=of)
 
         responses[normal] = respond(frequency)
         resonances[normal] = refined_peaks(responses[normal], respond)

@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..units import METRES, Quantity, amplitude_of
+
 
 @dataclass(frozen=True)
 class Pair:
-    """A resonance under a normal force (N) in both modes: (Hz, m), or None where one of them has none there."""
+    """A resonance under a normal force (N) in both modes: (Hz, amplitude), or None where one of them has none there.
+    quantity: what the amplitude measures."""
 
     normal_force: float
     marched: tuple[float, float] | None
     book: tuple[float, float] | None
+    quantity: Quantity = METRES
 
     def differences(self) -> tuple[float, float] | None:
         """The book's frequency and amplitude over the marched ones, less 1."""
@@ -26,10 +30,11 @@ def paired(marched: Sequence[Mapping[str, Any]], book: Sequence[Mapping[str, Any
     """Resonances of two summaries, nearest first.
 
     Args:
-        marched, book: rows with normal_force_N, frequency_Hz and amplitude_m. reach: of the frequency, beyond which two
-            peaks are not one.
+        marched, book: rows with normal_force_N, frequency_Hz and an amplitude. reach: of the frequency, beyond which
+            two peaks are not one.
     """
     found = []
+    of = next((amplitude_of(row)[1] for row in [*marched, *book]), METRES)
     forces = dict.fromkeys(row["normal_force_N"] for row in [*marched, *book])
     for normal in forces:
         one, two = (_peaks(rows, normal) for rows in (marched, book))
@@ -38,23 +43,20 @@ def paired(marched: Sequence[Mapping[str, Any]], book: Sequence[Mapping[str, Any
         for distance, i, j in ways:
             if distance <= reach and i not in met and j not in met.values():
                 met[i] = j
-        found += [Pair(normal, a, two[met[i]] if i in met else None) for i, a in enumerate(one)]
-        found += [Pair(normal, None, b) for j, b in enumerate(two) if j not in met.values()]
+        found += [Pair(normal, a, two[met[i]] if i in met else None, of) for i, a in enumerate(one)]
+        found += [Pair(normal, None, b, of) for j, b in enumerate(two) if j not in met.values()]
     return found
 
 
 def _peaks(rows: Sequence[Mapping[str, Any]], normal: float) -> list[tuple[float, float]]:
-    return [(r["frequency_Hz"], r["amplitude_m"]) for r in rows if r["normal_force_N"] == normal]
+    return [(r["frequency_Hz"], amplitude_of(r)[0]) for r in rows if r["normal_force_N"] == normal]
 
 
-HEAD = (
-    "normal_force_N", "marched_Hz", "book_Hz", "difference_Hz_percent", "marched_m", "book_m", "difference_m_percent"
-)  # fmt: skip
-
-
-def comparison_table(pairs: Sequence[Pair]) -> str:
-    """CSV text; a resonance that one mode does not have leaves its cells empty."""
-    rows = [",".join(HEAD)]
+def comparison_table(pairs: Sequence[Pair], of: Quantity = METRES) -> str:
+    """CSV text; a resonance that one mode does not have leaves its cells empty. of: what the amplitudes measure."""
+    amplitudes_of = [of.column(name) for name in ("marched", "book", "difference")]
+    head = ["normal_force_N", "marched_Hz", "book_Hz", "difference_Hz_percent", *amplitudes_of[:2]]
+    rows = [",".join([*head, f"{amplitudes_of[2]}_percent"])]
     for p in pairs:
         frequencies, amplitudes = ([one[k] if one else None for one in (p.marched, p.book)] for k in (0, 1))
         apart = p.differences()
@@ -66,7 +68,7 @@ def comparison_table(pairs: Sequence[Pair]) -> str:
 
 def sentence(p: Pair) -> str:
     """A line for a terminal."""
-    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} m" if x else "no resonance" for x in (p.marched, p.book))
+    one, two = (f"{x[0]:.6g} Hz, {x[1]:.4g} {p.quantity.said}" if x else "no resonance" for x in (p.marched, p.book))
     apart = p.differences()
     more = "" if apart is None else f" ({100 * apart[0]:+.2g} % in frequency, {100 * apart[1]:+.2g} % in amplitude)"
     return f"F_N = {p.normal_force:g} N: marched {one}; book {two}{more}"

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Array, UserError
 from ..results.names import exact
+from ..units import METRES, Quantity
 from .assemble import Built, build, swept
 from .run import normal_forces, problem_of
 from .surveys import CurveOfCase, pointwise
@@ -40,7 +41,8 @@ class Followed:
     Attributes:
         over: of `OVER`. normal: N of the contacts that the sweep presses; None where it presses none, or is what
             varies. frequency: Hz at which the others vary, or None. ends: of the parameter, as asked for. name: of its
-            series. rows: points in order, see `harmonic_balance.kept.kept_curve`. status: why it ended.
+            series. rows: points in order, see `harmonic_balance.kept.kept_curve`. status: why it ended. quantity: what
+            is read; m stands for its unit.
     """
 
     over: str
@@ -50,6 +52,7 @@ class Followed:
     name: str
     rows: Sequence[Mapping[str, Any]]
     status: str
+    quantity: Quantity = METRES
 
     @cached_property
     def parameter(self) -> Array:
@@ -94,9 +97,9 @@ class Followed:
         return {
             **{name: np.full(len(self.rows), value) for name, value in first.items()},
             COLUMNS[self.over]: self.parameter,
-            "amplitude_m": self.amplitude,
+            self.quantity.column("amplitude"): self.amplitude,
             "phase_deg": np.degrees(np.angle(self.monitor[:, 1])),
-            "mean_m": self.monitor[:, 0].real,
+            self.quantity.column("mean"): self.monitor[:, 0].real,
             "slipping": self._share("slipping"),
             "open": self._share("open"),
             "fold": self.fold.astype(float),
@@ -116,7 +119,7 @@ class Followed:
             key = "band" if self.over == "frequency" else self.over
             return [f"{self.label}: {self.status}; begin elsewhere than at {begin:.6g} {unit} (curve.{key})."]
         top, folds = int(np.argmax(self.amplitude)), self.parameter[self.fold]
-        said = f"{self.label}: {len(self.rows)} points, at most {self.amplitude[top]:.4g} m at "
+        said = f"{self.label}: {len(self.rows)} points, at most {self.amplitude[top]:.4g} {self.quantity.said} at "
         said += f"{self.parameter[top]:.6g} {unit}; "
         if len(folds) > 4:
             said += f"{len(folds)} folds between {folds.min():.6g} and {folds.max():.6g} {unit}."
@@ -143,15 +146,17 @@ def curves(
         UserError: ends that are missing, no resonance to begin at.
     """
     from ..harmonic_balance.kept import kept_curve, labels, points_of_curve
+    from ..harmonic_balance.readout import measured
 
     pointwise(settings, "curve", path)
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
+    of = measured(built.assembly)
     ends, how = _ends(built, asked, over, path), _settings(asked)
     found: list[Followed] = []
     with keep(built) as journal:
         for normal in _forces(built, over, ends, path):
             own = None if over == "normal_force" else normal
-            one = Followed(over, own, None, ends, "", (), "interrupted")
+            one = Followed(over, own, None, ends, "", (), "interrupted", of)
             try:
                 problem = problem_of(built, normal)
                 if over != "frequency":

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.readout import measured
 from ..results import Body
 from ..results.names import exact
 from ..store import fingerprint
@@ -142,11 +143,12 @@ def closed_points(
 def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[str, Any]]:
     (member,) = built.assembly.members
     group, watch = member.groups[0], built.assembly.watches[0]
+    kind = "gauges" if measured(built.assembly).unit == "1" else "monitors"
     points: dict[float, dict[str, Any]] = {}
     for i, f in enumerate(map(float, r.frequency)):
         row: dict[str, Any] = {
             "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": peak,
-            f"monitors/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
+            f"{kind}/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
             f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
         }  # fmt: skip
         for c, six in zip(built.contacts, r.force[i].reshape(-1, 6), strict=True):
@@ -172,19 +174,42 @@ def _beside(built: Built, group: ModalGroup, force: Array) -> Array:
 # contacts ----------------------------------------------------------------------------------------------------------
 
 
+SAME_ENERGY = 1e-6
+"""Share of a point's dissipated energy by which that of a contact may differ from map to response file: both are made
+of the same numbers. Rounding of a sticking contact, which dissipates nothing, is counted against the work supplied."""
+
+
 def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[ContactMap]:
-    """The first patches of a case over the cycle of a point that a journal kept."""
+    """The first patches of a case over the cycle of a point that a journal kept, as its force models see them.
+
+    Raises:
+        UserError: a map whose energy is not the one kept.
+    """
     from ..harmonic_balance.kept import restored
+    from ..harmonic_balance.response import traced
     from ..operating.patches import contact_map
     from .run import problem_of
 
     problem = problem_of(built, normal)
-    point, found = restored(problem, dict(row))
-    maps = []
+    _, found = restored(problem, dict(row))
+    seen, maps = traced(problem, found), []
     for contact in problem.assembly.contacts[:MOST_MAPS]:
         member = next(m for m in problem.assembly.members if m.name == contact.first.member)
         side = next(iter(member.groups.values())).interfaces[contact.first.interface]
-        u = found.relative[contact.name]
-        s = built.settings
-        maps.append(contact_map(contact.patch, side, u, 2 * np.pi / point.Omega, 256, s.cycles, s.settled))
+        c, force = seen[contact.name].cycle, np.asarray(seen[contact.name].force)
+        what = c.dissipated, c.slipping, c.open
+        maps.append(contact_map(contact.patch, side, force, *what, problem.harmonics, contact.phase))
+    _check_energy([c.name for c in problem.assembly.contacts], maps, row)
     return maps
+
+
+def _check_energy(names: list[str], maps: list[ContactMap], row: Mapping[str, Any]) -> None:
+    """That the maps of the first contacts tell the energy that the response file does, to `SAME_ENERGY`."""
+    kept = [float(row[f"contacts/{name}/dissipated"]) for name in names]
+    most = SAME_ENERGY * (sum(map(abs, kept)) + 1e-3 * abs(float(row["supplied"])))
+    for name, found, energy in zip(names, maps, kept, strict=False):
+        if not abs(found.loss - energy) <= most:
+            raise UserError(
+                f"contact map of {name}: {found.loss:.6g} J a cycle, where the response has {energy:.6g} J; no map is "
+                "drawn: report it, the response itself is not touched by it"
+            )

@@ -14,9 +14,13 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.readout import measured
 from ..results import Journal
+from ..units import Quantity
+from . import edges
 from .assemble import Built, build, swept
 from .closed_form import Answer, in_closed_form
+from .edges import Rising
 from .keeping import series_name
 from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
 
@@ -37,7 +41,8 @@ class CaseResult:
 
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
-    peaks. truncation: largest estimated error of a resonance for want of harmonics, where their number was looked for.
+    peaks. rising: ends of the band at which responses still rise. truncation: largest estimated error of a resonance
+    for want of harmonics, where their number was looked for.
     """
 
     settings: CaseSettings
@@ -49,8 +54,14 @@ class CaseResult:
     remarks: tuple[str, ...]
     built: Built
     at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
+    rising: tuple[Rising, ...] = ()
     truncation: float | None = None
     stuck_damping: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def quantity(self) -> Quantity:
+        """What the first read-out measures."""
+        return measured(self.built.assembly)
 
     def lifted(self, normal: float) -> tuple[Array, Array]:
         """Whether contacts would lift off, which the closed form does not follow: (f,) of the sweep, (p,) of its peaks.
@@ -119,19 +130,20 @@ def _run(
     else:
         responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
     free = free_response(built, frequency)
+    at_the_ends = edges.rising(responses, resonances)
     remarks = [
         *built.remarks,
-        *_of_a_gauge(built),
         *_by_the_book(built),
         *_between(built),
         *_of_stuck_modes(built, max(forces, default=None)),
         *remarks,
         *_too_coarse(settings, *stuck),
         *_not_converged(responses),
+        *edges.remarks(at_the_ends),
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built, at_peaks,
-        left.most if left else None, stuck[1],
+        tuple(at_the_ends), left.most if left else None, stuck[1],
     )  # fmt: skip
 
 
@@ -223,15 +235,6 @@ def _book_can(built: Built, path: Path | str) -> None:
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
             raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "marched"') from error
-
-
-def _of_a_gauge(built: Built) -> list[str]:
-    """That what is drawn is a strain, which columns and axes made for displacements give in m."""
-    watch = built.assembly.watches[0]
-    gauges = built.bodies[watch.member].group.gauges
-    if watch.monitor not in gauges or watch.label != gauges[watch.monitor].labels[0]:
-        return []
-    return [f"'{watch.monitor}' is a strain gauge: amplitudes and means of the response are strain, and no m."]
 
 
 def _by_the_book(built: Built) -> list[str]:
@@ -353,8 +356,11 @@ def _truncated(
     whole = settings.ring is not None and settings.ring.model == "full"
     if not problem.groups or settings.mode == "book" or whole:
         return []
-    point, e, share = max(judged(problem, found, [f for f, _ in peaks]), key=lambda one: one[2], default=(None,) * 3)
-    if point is None or share <= TRUNCATION:
+    looked_at = judged(problem, found, [f for f, _ in peaks])
+    if not looked_at:
+        return []
+    point, e, share = max(looked_at, key=lambda one: one[2])
+    if share <= TRUNCATION:
         return []
     where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
     if not np.isfinite(share):

@@ -294,50 +294,93 @@ def rated(family: Family, value: float, peak: Peak, share: float = 1e-4) -> Peak
 
 
 def lowest(family: Family, ridge: Ridge, settings: Settings | None = None, tolerance: float = 1e-4) -> Lowest:
-    """The value at which the followed peak is lowest: where the derivative of its height changes its sign.
+    """The value at which the followed peak is lowest: where the derivative of its height changes its sign, if no peak
+    that is known is lower; else about the lowest of those, by the heights themselves. Never above a followed one.
+
+    Contacts that switch point by point ripple the height, and the derivative changes its sign at every ripple.
 
     Args:
         tolerance: of the parameter, relative to its bracket. The height there errs by the square of it.
     """
     settings = settings or SEARCH
     falls = (ridge.rate[:-1] < 0) & (ridge.rate[1:] > 0)
-    least = int(np.argmin(ridge.value))
-    if not falls.any():
-        status = "no optimum between the ends: the peak is lowest at one of them"
-        return Lowest(float(ridge.parameter[least]), ridge.peaks[least], status, 0)
-    i = min(np.flatnonzero(falls), key=lambda k: min(ridge.value[k], ridge.value[k + 1]))
-    return _between_two(family, ridge, int(i), settings, tolerance)
+    least, spent = int(np.argmin(ridge.value)), 0
+    if falls.any():
+        i = min(np.flatnonzero(falls), key=lambda k: min(ridge.value[k], ridge.value[k + 1]))
+        found = _between_two(family, ridge, int(i), settings, tolerance)
+        if found.peak.value <= ridge.value[least]:
+            return found
+        spent = found.evaluations
+    if least in (0, len(ridge.peaks) - 1):
+        return Lowest(float(ridge.parameter[least]), ridge.peaks[least], NO_OPTIMUM, spent)
+    return _by_heights(_Between(family, ridge, slice(least - 1, least + 2), settings), tolerance, spent)
+
+
+class _Between:
+    """Peaks between some that were followed. Attributes: found: value -> peak. spent: evaluations of R."""
+
+    def __init__(self, family: Family, ridge: Ridge, which: slice, settings: Settings) -> None:
+        self.family, self.settings, self.spent = family, settings, 0
+        self.found = dict(zip(ridge.parameter[which].tolist(), ridge.peaks[which], strict=True))
+
+    def __call__(self, value: float) -> Peak:
+        """The peak at a value, from those next to it.
+
+        Raises:
+            Lost: it is not found.
+        """
+        if value not in self.found:
+            near = sorted(self.found.items(), key=lambda item: -abs(item[0] - value))
+            here = _stepped(self.family, near[-2:], value, self.settings, 1.0) or _stepped(
+                self.family, near[-1:], value, self.settings, 1.0
+            )
+            if here is None:
+                raise Lost
+            self.found[value] = here
+            self.spent += here.evaluations
+        return self.found[value]
+
+    @property
+    def least(self) -> float:
+        """The value with the lowest of all peaks."""
+        return min(self.found, key=lambda value: self.found[value].value)
+
+
+NO_OPTIMUM = "no optimum between the ends: the peak is lowest at one of them"
+LOST = "the peak was lost on the way to its lowest place"
 
 
 def _between_two(family: Family, ridge: Ridge, i: int, settings: Settings, tolerance: float) -> Lowest:
     low, high = float(ridge.parameter[i]), float(ridge.parameter[i + 1])
-    found = {low: ridge.peaks[i], high: ridge.peaks[i + 1]}
+    at = _Between(family, ridge, slice(i, i + 2), settings)
+    try:
+        best = float(
+            scipy.optimize.brentq(lambda v: at(v).rate, low, high, xtol=tolerance * abs(high - low), rtol=1e-12)
+        )
+        at(best)
+    except Lost:
+        return Lowest(at.least, at.found[at.least], LOST, at.spent)
+    steep = min(abs(ridge.rate[i]), abs(ridge.rate[i + 1]))
+    status = CONVERGED if abs(at.found[best].rate) <= 1e-3 * steep else "kink"
+    return Lowest(best, at.found[best], status, at.spent)
 
-    def rate(value: float) -> float:
-        if value not in found:
-            near = sorted(found.items(), key=lambda item: -abs(item[0] - value))
-            here = _stepped(family, near[-2:], value, settings, 1.0) or _stepped(
-                family, near[-1:], value, settings, 1.0
-            )
-            if here is None:
-                raise Lost
-            found[value] = here
-        return found[value].rate
+
+def _by_heights(at: _Between, tolerance: float, spent: int) -> Lowest:
+    """Where the peak is lowest beside a followed one that is lower than both its neighbours: a golden section, which
+    knows the lowest one from the beginning and keeps the lowest of all that it sees."""
+    low, middle, high = sorted(at.found)
+    ends = abs(at.found[low].rate), abs(at.found[high].rate)
+    status, options = "", {"xtol": tolerance, "maxiter": 20}
+
+    def height(value: float) -> float:
+        return at(float(value)).value
 
     try:
-        best = float(scipy.optimize.brentq(rate, low, high, xtol=tolerance * abs(high - low), rtol=1e-12))
-        rate(best)
+        scipy.optimize.minimize_scalar(height, (low, middle, high), method="golden", options=options)
     except Lost:
-        best = min(found, key=lambda value: found[value].value)
-        return Lowest(best, found[best], "the peak was lost on the way to its lowest place", _spent(found))
-    steep = min(abs(ridge.rate[i]), abs(ridge.rate[i + 1]))
-    status = CONVERGED if abs(found[best].rate) <= 1e-3 * steep else "kink"
-    return Lowest(best, found[best], status, _spent(found))
+        status = LOST
+    best = at.found[at.least]
+    smooth = abs(best.rate) <= 1e-3 * min(ends)
+    return Lowest(at.least, best, status or (CONVERGED if smooth else "kink"), spent + at.spent)
 
 
-def _nowhere() -> Peak:
-    raise Lost
-
-
-def _spent(found: dict[float, Peak]) -> int:
-    return sum(peak.evaluations for peak in list(found.values())[2:])

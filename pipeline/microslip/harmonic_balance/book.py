@@ -31,7 +31,7 @@ from ..contact.portion import Portion
 from ..contact.sliders import Iwan, Strips
 from ..data import Array, ComplexArray, UserError
 from .orbits import TOLERANCE, Orbits, orbits
-from .patch import Cycle
+from .patch import Cycle, Traced
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined
 
 NORMAL_TOLERANCE = 1e-3
@@ -379,6 +379,9 @@ def normal_law(law: Law, strips: int = 0) -> Normal | Strips:
     return law.normal
 
 
+SAMPLES = 64
+"""Of a cycle in which the points are looked at."""
+
 # The patch ---------------------------------------------------------------------------------------------------------
 
 
@@ -505,6 +508,13 @@ class BookPatch:
         parts = [np.asarray(p) for p in _watched(self.points, self.kinematics, u)]
         return [Cycle(lost, lost, slips, open_, 0.0) for lost, slips, open_ in zip(*parts, strict=True)]
 
+    def traced(self, u: Array, period: float = 1.0) -> list[Traced]:
+        """`watch` and the points' forces in time: mean and first harmonic, which is all that the mode knows of them."""
+        angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+        waves = np.stack([np.ones(SAMPLES), np.cos(angle), np.sin(angle)])
+        forces = np.einsum("hs,cnih->csni", waves, np.asarray(_of_points(self.points, self.kinematics, u)))
+        return [Traced(f, one) for f, one in zip(forces, self.watch(u), strict=True)]
+
     def stiffness(self, u: Array) -> ComplexArray:
         """(c, k, k) complex stiffness of coordinates u (c, k, 3) (Sextro Eq. (5.2-32), or (5.2-35) if asked for).
 
@@ -522,7 +532,7 @@ class BookPatch:
 @jax.jit
 def _watched(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
     """(c, n) J dissipated in the plane, and shares of the cycle that are slip and open."""
-    wave = jnp.asarray(np.cos(2 * np.pi * (np.arange(64) + 0.5) / 64))
+    wave = jnp.asarray(np.cos(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES))
 
     def one(u: jax.Array) -> tuple[jax.Array, ...]:
         normal, t = _motion(G, u)
@@ -532,6 +542,22 @@ def _watched(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...
         swing = normal[0] + jnp.sqrt(jnp.sum(normal[1:] ** 2, axis=0)) * wave[:, None]
         pressed = jax.lax.map(lambda x: sliders(points.law, x, 0).pressed, swing)
         return lost, slips.astype(float), (pressed <= 0).mean(axis=0)
+
+    return jax.lax.map(one, u)
+
+
+@jax.jit
+def _of_points(points: Points, G: jax.Array, u: jax.Array) -> jax.Array:
+    """(c, n, 3, 3) mean, cos and sin of the forces of the points along n, t1, t2, N; the sum of them is `_resultants`'.
+
+    No mean of the tangential forces.
+    """
+
+    def one(u: jax.Array) -> jax.Array:
+        normal, t = _motion(G, u)
+        plane = points.across(normal[0], t).reshape(2, 2, -1)
+        whole = jnp.zeros((len(G), 3, 3)).at[:, 0].set(points.along(normal).T)
+        return whole.at[:, 1:, 1:].set(jnp.moveaxis(plane, -1, 0))
 
     return jax.lax.map(one, u)
 

@@ -6,7 +6,7 @@ Sextro Figs. 5.5-2 and 5.4-2. Many responses of one system: each starts where on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,12 @@ from ..continuation import CONVERGED
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Indices, UserError
 from ..system.assembly import Assembly, Ring
+from ..units import METRES, Quantity
 from . import response
 from .jenkins import tops
 from .peak import resonance
 from .problem import Problem
-from .readout import Watched
+from .readout import Watched, measured
 from .reduced import stuck
 from .response import HarmonicResponse
 from .solver import Report, solve
@@ -34,7 +35,7 @@ class OverOrders:
     Attributes:
         order: (e,) engine orders. index: (e,) of their waves. frequency: (e,) Hz and amplitude: (e,) m of the first
             read-out; NaN where the band holds no peak. stuck: (e,) Hz, the nearest mode with sticking
-            contacts, or NaN. failed: (e,) points that did not converge.
+            contacts, or NaN. failed: (e,) points that did not converge. quantity: what is read; m stands for its unit.
     """
 
     order: Indices
@@ -43,6 +44,7 @@ class OverOrders:
     amplitude: Array
     stuck: Array
     failed: Indices
+    quantity: Quantity = field(kw_only=True, default=METRES)
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
@@ -50,7 +52,7 @@ class OverOrders:
             "engine_order": self.order.astype(float),
             "wave": self.index.astype(float),
             "resonance_Hz": self.frequency,
-            "amplitude_m": self.amplitude,
+            self.quantity.column("amplitude"): self.amplitude,
             "stuck_Hz": self.stuck,
             "failed_points": self.failed.astype(float),
         }
@@ -78,7 +80,7 @@ def over_orders(
             largest peak the way uphill is followed (`peak`), round folds too. under: words for the report, such as
             the normal force. keep: is given what there is after every engine order.
     """
-    rows = list[tuple[Any, ...]]()
+    rows, whole = list[tuple[Any, ...]](), OverOrders(*6 * (np.zeros(0, dtype=int),))
     for i, e in enumerate(orders):
         report(f"engine order {e}{under}, {i + 1} of {len(orders)}")
         problem = build(int(e))
@@ -86,10 +88,12 @@ def over_orders(
         modes = stuck(problem.parts[1][0], problem.stiffness[0]) if len(problem.parts[1]) == 1 else np.zeros(0)
         near = modes[np.abs(modes - f).argmin()] if len(modes) and np.isfinite(f) else np.nan
         rows.append((int(e), problem.assembly.index(1), f, a, near, failed))
-        what = f"{f:.6g} Hz, {a:.4g} m" if np.isfinite(f) else "no resonance in the band"
+        columns = (np.array(column) for column in zip(*rows, strict=True))
+        whole = OverOrders(*columns, quantity=measured(problem.assembly))
+        what = f"{f:.6g} Hz, {a:.4g} {whole.quantity.said}" if np.isfinite(f) else "no resonance in the band"
         report(f"engine order {e}{under}: {what}")
-        keep(OverOrders(*(np.array(column) for column in zip(*rows, strict=True))))
-    return OverOrders(*(np.array(column) for column in zip(*rows, strict=True)))
+        keep(whole)
+    return whole
 
 
 def largest(problem: Problem, frequency: Array, report: Report = lambda _: None) -> tuple[float, float, int]:
@@ -124,7 +128,8 @@ class Envelope:
 
     Attributes:
         frequency: (f,) Hz. names: of what varies. values: (c, n) of every combination. monitor: (c, f) complex
-            amplitudes of the first read-out, m. converged: (c, f). iterations: (c, f) Newton steps.
+            amplitudes of the first read-out, m. converged: (c, f). iterations: (c, f) Newton steps. quantity: what is
+            read; m stands for its unit.
     """
 
     frequency: Array
@@ -133,6 +138,7 @@ class Envelope:
     monitor: ComplexArray
     converged: Array
     iterations: Array
+    quantity: Quantity = field(kw_only=True, default=METRES)
 
     @property
     def low(self) -> Array:
@@ -154,9 +160,10 @@ class Envelope:
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
-        each = {f"combination_{i + 1}_m": np.where(ok, np.abs(a), np.nan)
+        name = self.quantity.column
+        each = {name(f"combination_{i + 1}"): np.where(ok, np.abs(a), np.nan)
                 for i, (a, ok) in enumerate(zip(self.monitor, self.converged, strict=True))}  # fmt: skip
-        return {"frequency_Hz": self.frequency, "low_m": self.low, "high_m": self.high, **each}
+        return {"frequency_Hz": self.frequency, name("low"): self.low, name("high"): self.high, **each}
 
     def corners(self) -> dict[str, Array]:
         """Name -> column of a table of the combinations."""
@@ -165,7 +172,7 @@ class Envelope:
         return {
             "combination": 1.0 + np.arange(len(self.values)),
             **named,
-            "peak_m": self.peaks,
+            self.quantity.column("peak"): self.peaks,
             "failed_points": failed,
         }
 
@@ -204,7 +211,8 @@ def envelope(
         start = found.x[0] if found.converged[0] else None
         rows.append((found.monitor, found.converged, found.iterations))
         columns = [np.array(column) for column in zip(*rows, strict=True)]
-        whole = Envelope(np.asarray(frequency), tuple(ranges), np.array(values[: i + 1]), *columns)
+        done = np.array(values[: i + 1])
+        whole = Envelope(np.asarray(frequency), tuple(ranges), done, *columns, quantity=found.quantity)
         keep(whole)
     return whole
 

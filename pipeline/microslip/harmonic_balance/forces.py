@@ -19,7 +19,7 @@ from ..contact.harmonics import CHUNK, force_alone, force_harmonics
 from ..contact.law import Law, point_axes
 from ..contact.patch import Patch
 from ..data import Array
-from .patch import Cycle, needs_rate, watch
+from .patch import Cycle, Traced, needs_rate, traced
 
 
 class Forces(Protocol):
@@ -39,6 +39,10 @@ class Forces(Protocol):
 
     def watch(self, u: Array, period: float) -> list[Cycle]:
         """What the points of each contact do in a cycle."""
+        ...
+
+    def traced(self, u: Array, period: float) -> list[Traced]:
+        """The same with the points' forces in time, those that `force` is made of."""
         ...
 
 
@@ -80,8 +84,11 @@ class Marched:
         return np.asarray(_rate(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
 
     def watch(self, u: Array, period: float) -> list[Cycle]:
+        return [one.cycle for one in self.traced(u, period)]
+
+    def traced(self, u: Array, period: float) -> list[Traced]:
         G = self.kinematics
-        return [watch(self.patch.law, G, one, period, self.samples, self.cycles, self.settled) for one in u]
+        return [traced(self.patch.law, G, one, period, self.samples, self.cycles, self.settled) for one in u]
 
 
 def repeated(law: Law, n: int, times: int) -> Law:

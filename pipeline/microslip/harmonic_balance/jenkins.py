@@ -9,7 +9,7 @@ surfaces, varying normal load and more harmonics are `response`'s.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ import scipy.optimize
 
 from ..data import Array, ComplexArray, Indices, ModalGroup
 from ..results.names import apart
+from ..units import METRES, Quantity
 
 Report = Callable[[str], None]
 
@@ -63,6 +64,7 @@ class FrequencyResponse:
         slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
         converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
             amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        quantity: what the monitored row measures; m stands for its unit.
         modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
             0-peak; of the closed form alone.
     """
@@ -74,13 +76,14 @@ class FrequencyResponse:
     converged: Array
     limit: Array
     normal_swing: Array
+    quantity: Quantity = field(kw_only=True, default=METRES)
     modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
     force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     def columns(self) -> dict[str, Array]:
         """What stands in a table beside the frequency, by name and unit."""
         return {
-            "amplitude_m": np.abs(self.monitor),
+            self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
             "converged": self.converged.astype(float),
@@ -259,10 +262,48 @@ def tops(response: FrequencyResponse) -> Indices:
     return np.flatnonzero(whole & (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
 
 
+DIP = 0.01
+"""Share of the lower one of two tops by which the response has to fall between them for them to be two resonances: the
+1 % of amplitude (2 % of its square) that also ends the climb to a followed peak, `continuation.extremum.DIP`. Contacts
+that switch point by point and sample by sample ripple a plateau by less."""
+
+
+def prominent(height: Array, candidates: Indices) -> Indices:
+    """Those of some tops of a curve that stand for one resonance each: of tops with less than `DIP` between them the
+    highest, the topographic prominence of the others being less than that.
+
+    Args:
+        height: (f,) along the curve, all known. candidates: numbers of tops, rising.
+    """
+    kept: list[int] = []
+    for i in map(int, candidates):
+        while kept and height[kept[-1] : i + 1].min() > (1 - DIP) * min(height[kept[-1]], height[i]):
+            if height[kept[-1]] >= height[i]:
+                break
+            kept.pop()
+        else:
+            kept.append(i)
+    return np.array(kept, dtype=int)
+
+
+def resonances(
+    response: FrequencyResponse, found: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Of peaks (Hz, m) found between the points of a sweep those that are one resonance each, see `prominent`."""
+    grid, ok = response.frequency, response.converged
+    f = np.concatenate([grid[ok], [f for f, _ in found]])
+    height = np.concatenate([np.abs(response.monitor)[ok], [a for _, a in found]])
+    order = np.argsort(f, kind="stable")
+    at = np.flatnonzero(order >= np.count_nonzero(ok))
+    kept = prominent(height[order], at)
+    return [(float(f[i]), float(height[i])) for i in order[kept]]
+
+
 def refined_peaks(
     response: FrequencyResponse, respond: Callable[[Array], FrequencyResponse]
 ) -> list[tuple[float, float]]:
-    """`peaks`, each searched for between its two neighbours on the grid, so that the step does not cut it off.
+    """`peaks`, each searched for between its two neighbours on the grid, so that the step does not cut it off, and
+    those of one plateau taken together.
 
     Args:
         respond: the response at other frequencies (Hz).
@@ -276,7 +317,7 @@ def refined_peaks(
             top = int(np.clip(a.argmax(), 1, 7))
             low, high = float(r.frequency[top - 1]), float(r.frequency[top + 1])
         found.append((float(r.frequency[a.argmax()]), float(a.max())))
-    return found
+    return resonances(response, found)
 
 
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:

@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray
 from ..results.journal import Journal
 from ..system.assembly import Assembly, Member, Watch
 from .families import Family, followed
-from .jenkins import tops
+from .jenkins import resonances, tops
 from .patch import Cycle
 from .problem import Problem
 from .response import HarmonicResponse, Operating, highest, of_points, operating
@@ -31,7 +31,7 @@ def kept_response(
             `frequency` where the response is highest are kept as well, with ``peak`` = 1.
 
     Returns:
-        The response at `frequency`, and (Hz, m) of its local maxima.
+        The response at `frequency`, and (Hz, m) of its resonances: of the maxima of one plateau the highest.
     """
     held = {key: restored(problem, row) for key, row in journal.of(series).items()}
     known = {f: held[f][0] for f in map(float, frequency) if f in held}
@@ -46,7 +46,7 @@ def kept_response(
     points = sweep(problem, frequency, report, known=known, keep=keep)
     response = of_points(problem, points, limit, [found[float(f)] for f in frequency])
     peaks = [_peak(problem, response, i, journal, series, report) for i in tops(response)]
-    return response, peaks
+    return response, resonances(response, peaks)
 
 
 def _peak(

@@ -37,9 +37,17 @@ class Cycle(NamedTuple):
     unsteady: float
 
 
-def watch(
+class Traced(NamedTuple):
+    """What a force model makes of the points of a patch in time: force (s, n, 3) N of s samples of a cycle along n, t1,
+    t2, the first one at the cycle's beginning, and the sums over the cycle."""
+
+    force: Array
+    cycle: Cycle
+
+
+def traced(
     law: Law, G: Array, u: Array, period: float, samples: int, count: int, settled: float = 0.0
-) -> Cycle:  # fmt: skip
+) -> Traced:  # fmt: skip
     """One more cycle than the force is found from, looked at in time.
 
     Args:
@@ -48,7 +56,7 @@ def watch(
     """
     parts = _watched(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
     dissipated, by_slip, slipping, open_ = (np.asarray(p) for p in parts[:4])
-    return Cycle(dissipated, by_slip, slipping, open_, float(parts[4]))
+    return Traced(parts[5], Cycle(dissipated, by_slip, slipping, open_, float(parts[4])))
 
 
 @partial(jax.jit, static_argnames=("samples", "count"))
@@ -75,4 +83,4 @@ def _watched(
     size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
     unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
     by_slip = jnp.sum(mean[..., 1:] * slid, axis=(0, 2))
-    return jnp.sum(mean * moved, axis=(0, 2)), by_slip, slips.mean(axis=0), open_.mean(axis=0), unsteady
+    return jnp.sum(mean * moved, axis=(0, 2)), by_slip, slips.mean(axis=0), open_.mean(axis=0), unsteady, force

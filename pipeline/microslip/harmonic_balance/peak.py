@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from ..continuation import CONVERGED, Lowest, Peak, Ridge, lowest, ridge
+from ..continuation import Lowest, Peak, Ridge, lowest, ridge
 from ..continuation import peak as climbed
+from ..continuation.extremum import NO_OPTIMUM
 from ..data import Array
 from .problem import Problem
 from .readout import Watched
@@ -45,7 +46,8 @@ class Optimum:
 
     Attributes:
         parameter. resonance: there. status: "converged": a minimum of one peak; "kink": one where its derivative
-            jumps; "two peaks": where one takes over from another, of the same height; else what went wrong.
+            jumps; "two peaks": where one takes over from another, of the same height; "followed": one of the values
+            followed, which nothing found between them beats; else what went wrong.
         ridges: the peaks followed, from the first value on and from the last one back. other: rad/s and m of the
             highest response of the band besides, on the grid of the check.
     """
@@ -55,6 +57,15 @@ class Optimum:
     status: str
     ridges: tuple[Ridge, ...]
     other: tuple[float, float]
+
+    @property
+    def spread(self) -> float:
+        """By which share of the lowest the highest resonance changes over all values that were followed; infinite where
+        these are fewer than two."""
+        heights = [float(np.sqrt(one.value)) for _, one in highest_followed(self.ridges)]
+        if len(heights) < 2:
+            return float("inf")
+        return max(heights) / min(*heights, self.resonance.amplitude) - 1
 
 
 def highest(problem: Problem, Omega: Array, watch: int = 0, report: Report = lambda _: None) -> Peak:
@@ -90,7 +101,7 @@ def optimum(
     """The value between the first and the last one at which the highest resonance in a band is lowest.
 
     The highest peaks at both ends are followed through all values; a few of them do. The lowest place of the higher
-    one is found by its derivative, or where the two are of the same height.
+    one is found by its derivative, or where the two are of the same height; it is compared with all that was followed.
 
     Args:
         values: rising or falling. Omega: (f,) rad/s, the band on a grid that sees its resonances. keep: is told every
@@ -119,13 +130,53 @@ def optimum(
     ridges = (forward,) if same else (forward, back)
     found = _crossing(family, forward, back) if not same else None
     if found is None:
-        known = [one for one in ridges if len(one.peaks) > 1] or list(ridges)
-        found = min((lowest(family, one) for one in known), key=lambda one: (one.status != CONVERGED, one.peak.value))
+        found = lowest(family, forward) if same else _of_the_higher(family, forward, back)
+    found = _not_beaten(found, ridges)
     report(f"other peaks at {found.parameter:.5g}")
     return Optimum(
         found.parameter, resonance(found.peak), found.status, ridges,
         _beside(make(found.parameter), Omega, found.peak, watch, report),
     )  # fmt: skip
+
+
+def highest_followed(ridges: Sequence[Ridge]) -> list[tuple[float, Peak]]:
+    """(value, peak) of the higher of the followed peaks, at every value that all of them reach."""
+    ways = [_by_value(one) for one in ridges]
+    common = [value for value in ways[0] if all(value in way for way in ways)]
+    return [(value, max((way[value] for way in ways), key=lambda one: one.value)) for value in common]
+
+
+def _by_value(one: Ridge) -> dict[float, Peak]:
+    """Value -> peak of those that were found."""
+    return {v: p for v, p in zip(one.parameter.tolist(), one.peaks, strict=True) if p.converged}
+
+
+def _of_the_higher(family: Callable[[float], Watched], forward: Ridge, back: Ridge) -> Lowest:
+    """Where one of two peaks that do not cross is lowest: the higher one where both are known, the one known at more
+    values if they are one; the lower of two places where no value is known of both."""
+    known = [one for one in (forward, back) if len(one.peaks) > 1]
+    if len(known) == 1:
+        return lowest(family, known[0])
+    ways = [_by_value(one) for one in (forward, back)]
+    gaps = [_gap(ways[0][value], ways[1][value]) for value in ways[0] if value in ways[1]]
+    if not gaps:
+        return min((lowest(family, one) for one in (forward, back)), key=lambda one: one.peak.value)
+    if any(gaps):
+        return lowest(family, forward if sum(gaps) > 0 else back)
+    return lowest(family, max((forward, back), key=lambda one: len(one.peaks)))
+
+
+def _not_beaten(found: Lowest, ridges: Sequence[Ridge]) -> Lowest:
+    """What was found, or the lowest of the followed peaks where that is lower by more than rounding."""
+    followed = highest_followed(ridges)
+    if not followed:
+        return found
+    value, least = min(followed, key=lambda one: one[1].value)
+    if not least.value < found.peak.value * (1 - ROUNDING):
+        return found
+    ends = [end for one in ridges for end in (one.parameter.min(), one.parameter.max())]
+    status = NO_OPTIMUM if value in (min(ends), max(ends)) else "followed"
+    return Lowest(value, least, status, found.evaluations)
 
 
 def _crossing(family: Callable[[float], Watched], forward: Ridge, back: Ridge) -> Lowest | None:

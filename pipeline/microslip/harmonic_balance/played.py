@@ -21,7 +21,7 @@ from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..data import Array, Indices
 from .forces import Forces, Marched
-from .patch import Cycle
+from .patch import Cycle, Traced
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +51,21 @@ class Played(Marched):
         slope = self.spring * (transform @ (values - known[dragged]))
         return (self.spring * (path - places) @ transform.T)[:, None], slope[:, None, :, None]
 
-    def watch(self, u: Array, period: float) -> list[Cycle]:
+    def traced(self, u: Array, period: float) -> list[Traced]:
         path, places, _ = self._sliders(u)
         force, none = self.spring * (path - places), np.zeros(1)
         mean = 0.5 * (force + np.roll(force, 1, axis=1))
         moved, slid = (x - np.roll(x, 1, axis=1) for x in (path, places))
         slips = (np.abs(slid) > 1e-9 * np.abs(moved).max(initial=0.0)).mean(axis=1)
         work = [np.array([a]) for a in (mean * moved).sum(axis=1)], [np.array([b]) for b in (mean * slid).sum(axis=1)]
-        return [Cycle(a, b, np.array([c]), none, 0.0) for a, b, c in zip(*work, slips, strict=True)]
+        cycles = [Cycle(a, b, np.array([c]), none, 0.0) for a, b, c in zip(*work, slips, strict=True)]
+        return [Traced(f, one) for f, one in zip(self._of_points(force), cycles, strict=True)]
+
+    def _of_points(self, force: Array) -> Array:
+        """(c, s, 1, 3) forces of the points, with the constant normal one, from those along the coordinate."""
+        out = force[..., None, None] * self.patch.kinematics[:, :, 0] / self._length**2
+        out[..., 0] += float(np.asarray(self._law.normal.force(jnp.zeros(1)))[0])
+        return out
 
     @property
     def _law(self) -> PointContact:

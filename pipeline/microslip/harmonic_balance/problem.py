@@ -20,7 +20,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, played, reduced
 from .blocks import Matrix
 from .forces import Forces
-from .patch import Cycle
+from .patch import Cycle, Traced
 from .reduced import Eliminated, Seen, View
 
 SOFTER = 0.7
@@ -75,6 +75,10 @@ class Group:
     def watch(self, u: Array, period: float) -> list[Cycle]:
         """See `forces.Forces`."""
         return self.model.watch(self._back(u), period)
+
+    def traced(self, u: Array, period: float) -> list[Traced]:
+        """See `forces.Forces`; where a wave leads by a phase, samples begin where it is at zero phase."""
+        return self.model.traced(self._back(u), period)
 
     def _back(self, u: Array) -> Array:
         return np.matmul(u, self._turns(u.shape[2]).transpose(0, 2, 1)) if self.phase.any() else u

@@ -7,7 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Array, ComplexArray
+from ..system.assembly import Assembly
+from ..units import METRES, Quantity
 from .problem import AtFrequency, Group, Problem
+
+
+def measured(assembly: Assembly, watch: int = 0) -> Quantity:
+    """What a read-out of an assembly measures: by the unit of its row; metres where nothing is read."""
+    if watch >= len(assembly.watches):
+        return METRES
+    w = assembly.watches[watch]
+    group = next(iter(next(m for m in assembly.members if m.name == w.member).groups.values()))
+    of_gauge = w.monitor in group.gauges and w.label in group.gauges[w.monitor].labels
+    rows = (group.gauges if of_gauge else group.monitors).get(w.monitor)
+    return METRES if rows is None else Quantity(rows.unit)
 
 
 @dataclass(frozen=True)

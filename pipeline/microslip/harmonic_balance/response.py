@@ -14,9 +14,10 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
-from .jenkins import FrequencyResponse, tops
-from .patch import Cycle
+from .jenkins import FrequencyResponse, resonances, tops
+from .patch import Cycle, Traced
 from .problem import Problem
+from .readout import measured
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -72,6 +73,13 @@ def operating(problem: Problem, point: Point) -> Operating:
     )
 
 
+def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
+    """Contact -> what its force model makes of its points in the cycle of a solution."""
+    each = [np.stack([found.relative[problem.assembly.contacts[i].name] for i in g.contacts]) for g in problem.groups]
+    period = 2 * np.pi / found.Omega
+    return _by_contact(problem, [g.traced(u, period) for g, u in zip(problem.groups, each, strict=True)])
+
+
 def _by_contact(p: Problem, values: Sequence[Any]) -> dict[str, Any]:
     """Contact -> its value, in the order of the assembly, from values by groups."""
     found = {i: one for g, many in zip(p.groups, values, strict=True) for i, one in zip(g.contacts, many, strict=True)}
@@ -117,10 +125,11 @@ class HarmonicResponse(FrequencyResponse):
     seconds: Array
 
     def columns(self) -> dict[str, Array]:
-        more = {f"amplitude_{h}_m": np.abs(self.harmonics[:, h]) for h in range(2, self.harmonics.shape[1])}
+        of, name = range(2, self.harmonics.shape[1]), self.quantity.column
+        more = {name(f"amplitude_{h}"): np.abs(self.harmonics[:, h]) for h in of}
         return {
             **super().columns(),
-            "mean_m": self.harmonics[:, 0].real,
+            name("mean"): self.harmonics[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
             "supplied_J": self.supplied,
@@ -153,6 +162,7 @@ def of_points(
         error=np.array([p.error for p in points]),
         iterations=np.array([p.iterations for p in points]),
         seconds=np.array([p.seconds for p in points]),
+        quantity=measured(problem.assembly),
         **parts,
     )
 
@@ -205,12 +215,13 @@ def of_body(
 
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
-    """(Hz, m) of every local maximum of the first read-out, searched for between its neighbours on the grid.
+    """(Hz, m) of every local maximum of the first read-out, searched for between its neighbours on the grid; of those
+    of one plateau the highest, see `jenkins.apart`.
 
     To a millionth of the distance between the two or in twelve steps; points that do not converge count as none.
     """
     found = [highest(problem, response, i) for i in tops(response)]
-    return [(p.Omega / (2 * np.pi), amplitude) for p, amplitude in found]
+    return resonances(response, [(p.Omega / (2 * np.pi), amplitude) for p, amplitude in found])
 
 
 def highest(problem: Problem, response: HarmonicResponse, top: int) -> tuple[Point, float]:

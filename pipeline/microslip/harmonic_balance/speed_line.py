@@ -109,7 +109,7 @@ def _together(found: list[HarmonicResponse]) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for f in fields(HarmonicResponse):
         values = [getattr(r, f.name) for r in found]
-        if f.name == "limit":
+        if f.name in ("limit", "quantity"):
             out[f.name] = values[0]
         elif isinstance(values[0], tuple):
             out[f.name] = tuple(v for one in values for v in one)

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from ..contact.harmonics import waves
-from ..contact.law import Law, State
 from ..contact.patch import Patch
-from ..contact.periodic import cycles
 from ..data import Array, ComplexArray, Indices, Interface
 from ..exchange import vtu
 
@@ -26,9 +20,10 @@ class ContactMap:
     Attributes:
         name. places: (n, 2) m along t1 and t2 from the patch's origin. areas: (n,) m2. origin: (3,) m and rotation:
             (3, 3) rows n, t1, t2 of the side it is drawn on, body axes.
-        pressure_mean, pressure_least, pressure_most: (n,) Pa, nothing where open. traction: (n,) Pa, largest swing of
-            the tangential traction about its mean. tractions: (n, 3, H + 1) complex harmonics, Pa along n, t1, t2, of
-            the traction on the body, the mean first; pressure is negative there.
+        pressure_mean, pressure_least, pressure_most: (n,) Pa, nothing where open; of the book's mode mean and first
+            harmonic, which may go below nothing. traction: (n,) Pa, largest swing of the
+            tangential traction about its mean. tractions: (n, 3, H + 1) complex harmonics, Pa along n, t1, t2, of the
+            traction on the body, the mean first; pressure is negative there.
         dissipated: (n,) J/m2 a cycle, work done on the contact. sticking, slipping, open: (n,) shares of the cycle.
         by_samples: the largest change of a pressure or traction from one sample to the next, over the largest of all:
             how far least and most may be off.
@@ -67,53 +62,29 @@ class ContactMap:
 
 
 def contact_map(
-    patch: Patch, side: Interface, u: Array, period: float, samples: int = 256, count: int = 4, settled: float = 0.0
+    patch: Patch, side: Interface, force: Array, dissipated: Array, slipping: Array, open_: Array, harmonics: int,
+    phase: float = 0.0,
 ) -> ContactMap:  # fmt: skip
-    """March a patch through the cycle of its coordinates and look at every point.
+    """A patch from what a force model says of its n points in a cycle; nothing is computed anew.
 
     Args:
-        side: where it is drawn. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... of the patch's coordinates, measured as its
-            law does. period: s. samples: of a cycle. count, settled: see `contact.periodic.periodic`.
+        side: where it is drawn. force: (s, n, 3) N along n, t1, t2 in s samples of the cycle. dissipated: (n,) J a
+            cycle. slipping, open_: (n,) shares of the cycle. harmonics: H, of the tractions. phase: rad by which
+            the wave leads the samples in the first harmonic.
     """
-    G = jnp.asarray(patch.kinematics)
-    traced = _traced(patch.law, G, jnp.asarray(u), period, samples, count, settled)
-    force, slid, path = (np.asarray(x) for x in traced)
     p = force / patch.areas[None, :, None]
     swing = p[..., 1:] - p[..., 1:].mean(axis=0)
-    moved = path - np.roll(path, 1, axis=0)
-    work = (0.5 * (p + np.roll(p, 1, axis=0)) * moved).sum(axis=(0, 2))
-    opened = force[..., 0] <= 0
-    slips = (np.abs(slid).max(axis=-1) > 1e-9 * np.abs(moved).max(initial=0.0)) & ~opened
-    H = u.shape[1] // 2
-    waves_of = np.moveaxis(np.fft.rfft(p, axis=0)[: H + 1] * (2 / samples), 0, -1)
+    waves_of = np.moveaxis(np.fft.rfft(p, axis=0)[: harmonics + 1] * (2 / len(p)), 0, -1)
+    waves_of *= np.exp(1j * phase * np.arange(harmonics + 1))
     waves_of[..., 0] *= 0.5
     jumps = np.abs(p - np.roll(p, 1, axis=0)).max(initial=0.0)
     return ContactMap(
         patch.interface, patch.points, patch.areas, side.origin, side.rotation,
         p[..., 0].mean(axis=0), p[..., 0].min(axis=0), p[..., 0].max(axis=0),
         np.linalg.norm(swing, axis=-1).max(axis=0),
-        -waves_of, work, 1.0 - (slips | opened).mean(axis=0), slips.mean(axis=0), opened.mean(axis=0),
+        -waves_of, dissipated / patch.areas, np.maximum(1.0 - slipping - open_, 0.0), slipping, open_,
         float(jumps / max(np.abs(p).max(initial=0.0), 1e-300)),
     )  # fmt: skip
-
-
-@partial(jax.jit, static_argnames=("samples", "count"))
-def _traced(
-    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
-    settled: jax.Array | float,
-) -> tuple[jax.Array, jax.Array, jax.Array]:  # fmt: skip
-    """Forces (s, n, 3), path slid in every step (s, n, 2) and displacement (s, n, 3) of one more cycle."""
-    values, _ = waves(u.shape[1] // 2, samples)
-    path = jnp.einsum("sk,nia,ak->sni", values, G, u)
-    _, state = cycles(law, path, period, count, settled)
-    speed = (path - jnp.roll(path, 1, axis=0)) * (samples / period)
-
-    def one(state: State, sample: tuple[jax.Array, jax.Array]) -> tuple[State, tuple[jax.Array, jax.Array]]:
-        force, after = law.step(sample[0], sample[1], period / samples, state)
-        return after, (force, law.slip(after) - law.slip(state))
-
-    _, (force, slid) = jax.lax.scan(one, state, (path, speed))
-    return force, slid, path
 
 
 # drawing -----------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array
+from ..units import METRES, Quantity
 from .operating import shades
 from .plots import _figure, _plain, _save
 
@@ -19,15 +20,15 @@ if TYPE_CHECKING:
     from ..harmonic_balance.identification import Identified, NodalDiagram
 
 
-def _in_micrometres(axes: Axes) -> None:
-    """Amplitudes on a logarithmic scale with plain numbers."""
+def _in_millionths(axes: Axes, of: Quantity) -> None:
+    """Amplitudes of a quantity on a logarithmic scale with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_ylabel("amplitude in µm (0-peak)")
+    axes.set_ylabel(f"amplitude in {of.micro} (0-peak)")
 
 
 def _whole(axes: Axes) -> None:
@@ -85,7 +86,7 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     last = list(found.values())[-1]
     upper.plot(last.order, last.stuck, color="0.6", linewidth=1, linestyle="--", label="sticking contacts")
     upper.set_ylabel("resonance in Hz")
-    _in_micrometres(lower)
+    _in_millionths(lower, last.quantity)
     lower.set_xlabel("engine order")
     _whole(lower)
     upper.set_title(title)
@@ -99,7 +100,7 @@ def envelope_picture(
     """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2).
 
     Args:
-        measured: (f,) Hz and (f,) m.
+        measured: (f,) Hz and (f,) amplitudes.
     """
     figure = _figure(9.0, 6.0)
     axes = figure.subplots()
@@ -111,7 +112,7 @@ def envelope_picture(
         axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
     if measured is not None:
         axes.plot(measured[0], 1e6 * measured[1], ".", color="#b3261e", label="measured")
-    _in_micrometres(axes)
+    _in_millionths(axes, found.quantity)
     axes.set_xlim(found.frequency[0], found.frequency[-1])
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_title(title)
@@ -120,19 +121,20 @@ def envelope_picture(
 
 
 def speed_line_picture(
-    rpm: Array, frequency: Array, amplitude: Array, normal: Array, path: Path, title: str
+    rpm: Array, frequency: Array, amplitude: Array, normal: Array, path: Path, title: str, of: Quantity = METRES
 ) -> Path:  # fmt: skip
     """Amplitude and normal forces along an engine-order line.
 
     Args:
-        rpm, frequency: (s,) speeds and Hz. amplitude: (s,) m, NaN where not converged. normal: (s, contacts) N.
+        rpm, frequency: (s,) speeds and Hz. amplitude: (s,) m, NaN where not converged. normal: (s, contacts) N. of:
+            what is read; m stands for its unit.
     """
     figure = _figure(9.0, 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     for axes in (upper, lower):
         _plain(axes)
     upper.plot(rpm, 1e6 * amplitude, color="#1f5f99", linewidth=1.6)
-    _in_micrometres(upper)
+    _in_millionths(upper, of)
     upper.set_title(title)
     for i, (colour, force) in enumerate(zip(shades(normal.shape[1]), normal.T, strict=True)):
         lower.plot(rpm, force, color=colour, linewidth=1.4, label=f"contact {i + 1}")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..data import Array
+from ..units import METRES, Quantity
 from .operating import shades
 from .plots import COLOURS, _figure, _length, _plain, _save
 
@@ -25,8 +27,7 @@ def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
     figure = _figure(9.0, 5.6)
     axes = figure.subplots()
     _plain(axes)
-    _, unit = _length(0.1 * np.concatenate([one.amplitude for one in found]))
-    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    scale, unit = _scale(0.1 * np.concatenate([one.amplitude for one in found]), found[0].quantity)
     colours = shades(len(found)) if len(found) > 1 else [COLOURS[0]]
     for colour, one in zip(colours, found, strict=True):
         x, y = one.parameter, scale * one.amplitude
@@ -71,12 +72,17 @@ def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
         axes.autoscale(axis="both" if name == "y" else "x")
 
 
-def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path) -> Path:
-    """Frequency and damping ratio over the amplitude, a curve a normal force (N)."""
+def _scale(values: Array, of: Quantity) -> tuple[float, str]:
+    """Factor and unit in which values of a quantity need no powers of ten."""
+    _, unit = _length(values)
+    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit], unit.removesuffix("m") + of.said
+
+
+def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Quantity = METRES) -> Path:
+    """Frequency and damping ratio over the amplitude of what is read, a curve a normal force (N)."""
     figure = _figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
-    _, unit = _length(0.1 * np.concatenate([[1e-9], *(one.amplitude[-1:] for one in found.values())]))
-    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    scale, unit = _scale(0.1 * np.concatenate([[1e-9], *(one.amplitude[-1:] for one in found.values())]), of)
     for colour, (normal, one) in zip(shades(len(found)), sorted(found.items()), strict=True):
         x, label = scale * one.amplitude, f"$F_N$ = {normal:g} N"
         left.semilogx(x, one.Omega / (2 * np.pi), color=colour, linewidth=1.7, label=label)
@@ -91,12 +97,11 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path) -> Pa
     return _save(figure, path)
 
 
-def optimum_plot(found: Optimum, label: str, title: str, path: Path) -> Path:
-    """Height and frequency of the followed peaks over a setting, the optimum marked."""
+def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES) -> Path:
+    """Height and frequency of the followed peaks of what is read over a setting, the optimum marked."""
     figure = _figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
-    _, unit = _length(np.array([found.resonance.amplitude]))
-    scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
+    scale, unit = _scale(np.array([found.resonance.amplitude]), of)
     best = found.resonance
     for i, ridge in enumerate(found.ridges):
         points = [*zip(ridge.parameter, ridge.lam / (2 * np.pi), scale * np.sqrt(ridge.value), strict=True)]

@@ -11,6 +11,7 @@ from ..case import CaseResult, CaseSettings
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..results.names import apart
+from ..units import METRES, Quantity
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -40,7 +41,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
         )  # fmt: skip
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
-    axes.set_ylabel(f"amplitude of {_read(s)} (0-peak)")
+    axes.set_ylabel(f"amplitude of {_read(s)}, in {result.quantity.micro} (0-peak)")
     to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
     axes.set_title(f"{s.name}: friction response{to}")
     axes.set_xlim(low, high)
@@ -54,20 +55,21 @@ def response_picture(result: CaseResult, path: Path) -> None:
 
 
 def _read(s: CaseSettings) -> str:
-    """The first read-out and its unit, for values times a million."""
+    """The first read-out; without a direction where none is told, as of a gauge, which has its own."""
     first = s.watches[0]
-    if s.monitor is None and "direction" not in first.model_fields_set:  # a gauge, whose file tells the direction
-        return f"{first.monitor}, in 1e-6 or µm"
-    return f"{first.monitor}, {first.direction}, in µm"
+    if s.monitor is None and "direction" not in first.model_fields_set:
+        return first.monitor
+    return f"{first.monitor}, {first.direction}"
 
 
 def comparison_picture(
-    case: CaseSettings, marched: Mapping[float, Array], book: Mapping[float, Array], path: Path
-) -> None:  # fmt: skip
+    case: CaseSettings, marched: Mapping[float, Array], book: Mapping[float, Array], path: Path, of: Quantity = METRES
+) -> None:
     """Amplitude over frequency in both modes, a panel a normal force.
 
     Args:
-        marched, book: normal force (N) -> (2, f) Hz and m, not a number where a point did not converge.
+        marched, book: normal force (N) -> (2, f) Hz and m, not a number where a point did not converge. of: what is
+            read; m stands for its unit.
     """
     from matplotlib.figure import Figure
 
@@ -85,14 +87,15 @@ def comparison_picture(
     panels[0, 0].legend(fontsize=9, title=f"marched: H = {case.harmonics}", title_fontsize=8)
     figure.suptitle(f"{case.name}: the book's mode beside the marched laws", fontsize=11)
     figure.supxlabel("excitation frequency in Hz", fontsize=10)
-    figure.supylabel("first harmonic of the monitor in µm (0-peak)", fontsize=10)
+    figure.supylabel(f"first harmonic of the read-out in {of.micro} (0-peak)", fontsize=10)
     figure.savefig(path, format="png")
 
 
 def _with_peaks(
     r: FrequencyResponse, peaks: list[tuple[float, float]], lifted: tuple[Array, Array]
 ) -> tuple[Array, Array, Array]:
-    """Frequency, Hz, amplitude, µm, and lift-off at the points of a sweep and at the peaks found between them."""
+    """Frequency, Hz, amplitude, millionths of its unit, and lift-off at the points of a sweep and at the peaks found
+    between them."""
     f = np.concatenate([r.frequency, [f for f, _ in peaks]])
     amplitude = np.concatenate([np.where(r.converged, np.abs(r.monitor), np.nan), [a for _, a in peaks]])
     order = np.argsort(f, kind="stable")

@@ -1,0 +1,55 @@
+"""A response that still rises at an end of its band: told, with a range that holds the resonance beyond."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from microslip.case.edges import remarks, rising
+from microslip.harmonic_balance import FrequencyResponse
+
+
+def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyResponse:
+    """Sum of single modes (Hz, damping ratio, share)."""
+    a = sum(share / (f0**2 - f**2 + 2j * d * f0 * f) for f0, d, share in resonances) * 100.0**2
+    zero, none = np.zeros(len(f)), np.zeros((len(f), 0))
+    return FrequencyResponse(f, np.asarray(a), none, zero, np.ones(len(f), bool), np.zeros(0), none)
+
+
+@pytest.mark.parametrize("damping", [1e-4, 0.01, 0.1])
+@pytest.mark.parametrize("away", [0.2, 2.0, 20.0])
+def test_the_range_to_add_holds_the_resonance(damping: float, away: float) -> None:
+    """One mode at 100 Hz beyond either end, near and far, with little and with much damping, whose top
+    lies at 100 sqrt(1 - 2 D^2) Hz."""
+    top = 100 * np.sqrt(1 - 2 * damping**2)
+    for f, key in ((np.linspace(50.0, top - away, 81), "stop"), (np.linspace(top + away, 150.0, 81), "start")):
+        r = modes(f, (100.0, damping, 1.0))
+        (one,) = rising({7.0: r}, {})
+        low, high = sorted((one.frequency, one.to))
+        assert low < top < high and one.normal_force == 7.0
+        assert one.amplitude == np.abs(r.monitor).max()
+        (said,) = remarks([one])
+        assert f"sweep.{key}" in said and one.add in said
+
+
+def test_ends_that_do_not_rise() -> None:
+    """The flanks of a resonance inside, an end 20 dB below it, and a ripple of half a per cent."""
+    f = np.linspace(80, 120, 81)
+    assert rising({1.0: modes(f, (100.0, 0.01, 1.0))}, {1.0: [(100.0, 50.0)]}) == []
+    far = modes(f, (100.0, 0.001, 1.0), (126.0, 0.001, -1.0))
+    (one,) = rising({1.0: far}, {})
+    assert one.frequency == 120.0
+    assert rising({1.0: far}, {1.0: [(100.0, 500.0)]}) == []
+    ripple = modes(f, (100.0, 0.01, 1.0))
+    wavy = np.full(len(f), 2.0) + 0.005 * np.cos(2 * np.pi * (f - 80) / 8)
+    assert rising({1.0: FrequencyResponse(**{**vars(ripple), "monitor": wavy})}, {}) == []
+
+
+def test_points_that_failed_say_nothing() -> None:
+    """The end is the last point that is known."""
+    f = np.linspace(50, 99, 50)
+    r = modes(f, (100.0, 0.01, 1.0))
+    known = f < 90
+    (one,) = rising({1.0: FrequencyResponse(**{**vars(r), "converged": known})}, {})
+    assert one.frequency == 89.0 and one.to > 100
+    assert rising({1.0: FrequencyResponse(**{**vars(r), "converged": f < 0})}, {}) == []

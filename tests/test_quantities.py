@@ -1,0 +1,49 @@
+"""What a read-out measures has one name, in whatever table it stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small import basis as small_basis
+
+from microslip.case.curves import Followed
+from microslip.harmonic_balance.envelope import Envelope, OverOrders
+from microslip.harmonic_balance.readout import measured
+from microslip.system.assembly import Assembly, Member, Watch
+from microslip.units import METRES, Quantity, amplitude_of
+
+STRAIN = Quantity("1")
+
+
+@pytest.mark.parametrize(("unit", "column", "micro"), [
+    ("m", "amplitude_m", "µm"), ("rad", "amplitude_rad", "µrad"), ("1", "amplitude_strain", "µm/m"),
+])  # fmt: skip
+def test_names_and_back(unit: str, column: str, micro: str) -> None:
+    of = Quantity(unit)
+    assert of.column("amplitude") == column and of.micro == micro == f"µ{of.said}"
+    assert amplitude_of({"frequency_Hz": 1.0, column: 3.0, "stress_amplitude_Pa": 7.0}) == (3.0, of)
+
+
+def test_what_an_assembly_reads() -> None:
+    """By the row: a gauge's strain, a monitor's metres; nothing read is in metres."""
+    member = Member("beam", {0: small_basis().groups[0, 0]})
+    probe, gauge = Watch("beam", "tip-probe", "u_x"), Watch("beam", "root", "strain")
+    a = Assembly((member,), (), (), (probe, gauge))
+    assert measured(a) == METRES and measured(a, 1) == STRAIN
+    assert measured(replace(a, watches=(gauge, probe))) == STRAIN and measured(replace(a, watches=())) == METRES
+
+
+def test_tables_of_surveys_and_curves() -> None:
+    """No column of a strain is one of metres."""
+    one, ok = np.ones(1), np.ones((1, 1), dtype=bool)
+    row = {"parameter": 1.0, "fold": 0, "gauges/root": np.ones((1, 2), dtype=complex)}
+    tables = [
+        OverOrders(one, one, one, one, one, one, quantity=STRAIN).columns(),
+        Envelope(one, ("load",), one[None], one[None], ok, one[None], quantity=STRAIN).columns(),
+        Envelope(one, ("load",), one[None], one[None], ok, one[None], quantity=STRAIN).corners(),
+        Followed("frequency", 1.0, None, (1.0, 2.0), "", (row,), "bound", STRAIN).columns(),
+    ]
+    for columns in tables:
+        assert any(name.endswith("_strain") for name in columns) and not any(name.endswith("_m") for name in columns)
