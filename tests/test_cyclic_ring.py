@@ -561,7 +561,7 @@ def of_the_ring(basis) -> np.ndarray:
     return np.sort(np.concatenate(every))
 
 
-@pytest.mark.parametrize("backend", ["auto", "superlu"])
+@pytest.mark.parametrize("backend", ["auto", pytest.param("superlu", marks=pytest.mark.slow)])
 def test_shrouds_that_stay_closed_couple_the_sectors_as_they_do_the_ring(backend):
     """The contact's stiffness between neighbours, with its phase, against six contacts within one body.
 
@@ -583,7 +583,7 @@ def test_either_side_may_press_on_the_other():
         np.testing.assert_allclose(other.groups[key].frequency[:3], g.frequency[:3], rtol=0.03)
 
 
-@pytest.mark.parametrize("method", ["rubin", "craig-bampton"])
+@pytest.mark.parametrize("method", [pytest.param("rubin", marks=pytest.mark.slow), "craig-bampton"])
 def test_reductions_keep_the_coupling_of_closed_shrouds(method):
     interface = {"name": "top", "face": "top", "t2": [0.0, 1.0, 0.0]}
     exact = joined()
