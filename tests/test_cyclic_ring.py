@@ -389,7 +389,12 @@ def coupled_errors(reduction: str, count: int, stiffness: float):
 
 
 @pytest.mark.parametrize(
-    ("reduction", "few", "many"), [("eigenmodes", 4e-2, 3e-3), ("rubin", 1e-5, 1e-9), ("craig-bampton", 4e-3, 2e-4)]
+    ("reduction", "few", "many"),
+    [
+        ("eigenmodes", 4e-2, 3e-3),
+        ("rubin", 1e-5, 1e-9),
+        pytest.param("craig-bampton", 4e-3, 2e-4, marks=pytest.mark.slow),
+    ],
 )
 def test_neighbours_in_contact_couple_at_every_nodal_diameter(reduction, few, many):
     """Springs (1e9 N/m) between the mean motion of right and of the next sector's left: reduced sectors are Ritz
