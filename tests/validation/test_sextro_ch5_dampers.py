@@ -103,6 +103,7 @@ def element(bases):
     return study.over_forces(built, (20.0, 50.0, 70.0, 100.0, 400.0), frequency, finer=1)
 
 
+@pytest.mark.slow
 def test_bending_and_torsion_have_their_minimum_at_about_the_same_normal_force(element) -> None:
     """Fig. 5.5-6b, c: within a factor of two, between the softest and the hardest coupling tried."""
     best = [study.optimum(element, pick) for pick in (study.bending, study.torsion)]
