@@ -234,6 +234,7 @@ def two_modes():
     return body(rows, 2 * np.pi * np.array([30.0, 55.0]), 0.003), np.array([1.0, 0.6]), np.array([1.0, -0.5])
 
 
+@pytest.mark.slow
 def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     """Against a golden-section search over single solutions. Points that change between stick and slip sample by
     sample ripple the top by 3e-5 of its height, which is flat to that within 0.5 %."""
@@ -295,6 +296,7 @@ def test_ridges_that_meet_are_followed_from_their_own_sides(monkeypatch):
     assert peaks._crossing(None, forward, Ridge(ends, twice, "complete")) is None
 
 
+@pytest.mark.slow
 def test_where_one_resonance_takes_over_from_another():
     """Two modes driven by p and 1/p, the contact stuck: peaks p a and b / p are lowest together at p^2 = b / a."""
     g, _, _ = two_modes()

@@ -384,6 +384,7 @@ def ring():
     return problem, found.x, orbit(problem, found.x, RING)
 
 
+@pytest.mark.slow
 def test_sectors_that_are_driven_alike_may_part_company(ring):
     """The travelling wave of equal blades loses stability by a real multiplier: a solution of the sector, and one of
     the ring, but not the one that the ring takes. A sector alone cannot tell."""
