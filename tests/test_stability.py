@@ -283,7 +283,12 @@ def brute_force(problem, Omega, steps, periods):
 
 @pytest.mark.parametrize(
     ("problem", "f", "count"),
-    [(sliding(), 17.0, 2), (sliding(), 15.0, 2), (swinging((12.0, 4, 2)), 22.0, 6), (swinging((20.0, 8, 4)), 22.0, 6)],
+    [
+        pytest.param(sliding(), 17.0, 2, marks=pytest.mark.slow),
+        (sliding(), 15.0, 2),
+        pytest.param(swinging((12.0, 4, 2)), 22.0, 6, marks=pytest.mark.slow),
+        (swinging((20.0, 8, 4)), 22.0, 6),
+    ],
     ids=["turning", "decaying", "space", "space and lift-off"],
 )
 def test_multipliers_with_memory_against_brute_force(problem, f, count):
