@@ -42,7 +42,9 @@ def readout(problem, f):
     return found, abs(operating(problem, found).watched[0, 1])
 
 
-@pytest.mark.parametrize(("make", "f"), [(opening, 22.0), (opening, 30.0), (sliding, 17.0)])
+@pytest.mark.parametrize(
+    ("make", "f"), [(opening, 22.0), (opening, 30.0), pytest.param(sliding, 17.0, marks=pytest.mark.slow)]
+)
 def test_the_estimate_is_of_the_size_of_the_error(make, f):
     """Within a factor of three of the difference to 21 harmonics, wherever that is above 1e-4."""
     exact = readout(make(MANY), f)[1]

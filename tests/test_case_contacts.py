@@ -121,6 +121,7 @@ def test_a_line_of_contact_in_pieces() -> None:
 
 
 @pytest.mark.parametrize("law, points", CURVED)
+@pytest.mark.slow
 def test_the_books_mode_of_a_curved_contact(law: str, points: list[int]) -> None:
     """Gaps and Hertz' law in book mode, with one tangential stiffness; two are refused in one sentence."""
     raw = table(**PIN, law=law, points=points) | {"mode": "book"}

@@ -100,6 +100,7 @@ def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     assert [read_response(f).mode for f in files.values()] == (["book", "marched"] if own else ["marched", "book"])
 
 
+@pytest.mark.slow
 def test_a_case_in_the_books_mode(folder: Path) -> None:
     """`mode` and `strips` in the file: microslip takes energy where without it everything sticks."""
     sticks = ["sweep.normal_forces=[0.4]", "amplitude=0.002", "sweep.start=300.0", "sweep.points=4"]

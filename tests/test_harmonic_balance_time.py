@@ -249,6 +249,7 @@ def test_beam_with_a_jenkins_element() -> None:
     assert errors[-1] < 5e-6 and errors[0] > 8 * errors[1] > 64 * errors[2]
 
 
+@pytest.mark.slow
 def test_beam_with_a_contact_in_space_that_lifts_off_has_two_motions() -> None:
     """Two stable motions at one frequency: the integration finds one from rest and stays at the other one from the
     balance's solution. Either: 1e-4 in every harmonic, with steps of a length, since the laws follow a slider that

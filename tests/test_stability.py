@@ -356,7 +356,7 @@ def test_compliance_beside_the_modes_is_that_of_a_mode_too_stiff_to_move_on_its_
 # motions in time ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("f", "stable"), [(90.0, True), (115.0, False)])
+@pytest.mark.parametrize(("f", "stable"), [pytest.param(90.0, True, marks=pytest.mark.slow), (115.0, False)])
 def test_a_motion_that_loses_stability_by_a_multiplier_below_minus_1_repeats_every_second_period(f, stable):
     """A mass pressed on a spring that cannot pull, driven at about twice its own frequency."""
     law = PointContact(Penalty(value(2e5)), Coulomb(value(0.3)), value(1e5))
