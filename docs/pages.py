@@ -4,7 +4,7 @@ Marks in a page:
 
     <!-- table NAME --> ... <!-- end -->     filled in by make_pictures.py
     <!-- file PATH -->                       the fenced block that follows is written to PATH
-    <!-- run -->, <!-- run slow -->         the lines of the block that follows are typed into a shell
+    <!-- run -->                            the lines of the block that follows are typed into a shell
 """
 
 from __future__ import annotations
@@ -57,20 +57,19 @@ def table(head: list[str], rows: list[list[Any]]) -> str:
 
 @dataclass(frozen=True)
 class Step:
-    """A file to write (`path`) or lines to type; `slow` ones are left out of the quick tests."""
+    """A file to write (`path`) or lines to type."""
 
     path: str
     text: str
-    slow: bool
 
 
 def steps(page: str) -> Iterator[Step]:
     """The examples of a page in order."""
     for kind, more, text in BLOCK.findall((HERE / page).read_text(encoding="utf-8")):
-        yield Step(more if kind == "file" else "", text, kind == "run" and more == "slow")
+        yield Step(more if kind == "file" else "", text)
 
 
-def play(page: str, folder: Path, slow: bool = True) -> str:
+def play(page: str, folder: Path) -> str:
     """Do what a page says in an empty folder, with this Python's `microslip`; returns what the commands printed.
 
     Raises:
@@ -81,7 +80,7 @@ def play(page: str, folder: Path, slow: bool = True) -> str:
         if step.path:
             (folder / step.path).parent.mkdir(parents=True, exist_ok=True)
             (folder / step.path).write_text(step.text, encoding="utf-8")
-        elif slow or not step.slow:
+        else:
             shown += [typed(line, folder) for line in step.text.splitlines() if line and not line.startswith("#")]
     return "\n".join(shown)
 

@@ -1,10 +1,14 @@
 """One thread (the same bits at every run), a fixed seed for the property tests, no silent skips where none may be."""
 
+import ctypes
+import gc
 import os
 import re
 import signal
 import sys
 from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
@@ -21,13 +25,45 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+QUICK = "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0"
+"""Compile in a third of the time: a quick test runs a program once or twice. The slow tests compile as a user does."""
+
+
+def locked(package: str) -> bool:
+    """Whether requirements.lock names the installed version: another compiler might not know the flags, and stop."""
+    lock = Path(__file__).resolve().parents[1] / "requirements.lock"
+    try:
+        return lock.is_file() and f"{package}=={version(package)}" in lock.read_text(encoding="utf-8").split()
+    except PackageNotFoundError:
+        return False
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before jax is loaded, and for the processes that tests start."""
+    if config.getoption("markexpr") == "not slow" and locked("jaxlib"):
+        os.environ.setdefault("XLA_FLAGS", QUICK)
+
+
+def crowded() -> bool:
+    """Whether this process has mapped 20,000 pieces of memory or holds 1.2 GB; yes where that is not known."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") > 1.2e9 or Path("/proc/self/maps").read_text().count("\n") > 20_000
+    except OSError:
+        return True
+
+
 @pytest.fixture(autouse=True, scope="module")
 def programs_are_dropped() -> Iterator[None]:
-    """Compiled programs of a test file go with it: each keeps pieces of memory mapped, of which a process may have
-    65530; beyond that the compiler crashes."""
+    """Compiled programs are shared by the test files until there are too many: each keeps pieces of memory mapped, of
+    which a process may have 65530; beyond that the compiler crashes."""
     yield
-    if "jax" in sys.modules:
+    if "jax" in sys.modules and crowded():
         sys.modules["jax"].clear_caches()
+        gc.collect()
+        if sys.platform == "linux":
+            trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # give it back: glibc alone has it
+            trim and trim(0)
 
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")

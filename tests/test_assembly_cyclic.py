@@ -129,6 +129,7 @@ def test_compliance_of_the_whole_ring_is_that_of_its_waves(basis: ModalBasis) ->
     assert c.labels[r] == c.labels[0].replace("@0", "@1")
 
 
+@pytest.mark.slow
 def test_a_patch_that_deforms_on_a_sector_and_on_the_whole_disc() -> None:
     """Node-wise patch between the blades of the sector, and of the disc: 1e-9 of the amplitude in all blades."""
     basis = made(gap=0.0)

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 pytest.importorskip("gmsh", exc_type=ImportError)
 
 
+@pytest.mark.slow
 def test_the_modal_benchmark_times_every_stage(tmp_path):
     command = [sys.executable, str(ROOT / "benchmarks" / "modal.py"), "--quick", "--peers", "--work", str(tmp_path)]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
@@ -24,6 +25,7 @@ def test_the_modal_benchmark_times_every_stage(tmp_path):
         assert text in done.stdout
 
 
+@pytest.mark.slow
 def test_the_cyclic_benchmark_compares_the_two_ways(tmp_path):
     command = [sys.executable, str(ROOT / "benchmarks" / "cyclic.py"), "--quick", "--work", str(tmp_path)]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
@@ -53,6 +55,7 @@ def test_the_contact_benchmark_compares_laws_that_agree():
     assert all(float(r[-1]) < 1e-12 for r in rows if r[1] != "microslip, two cycles")
 
 
+@pytest.mark.slow
 def test_the_ring_response_benchmark_sees_the_same_peak_in_all_modes():
     command = [sys.executable, str(ROOT / "benchmarks" / "ring_response.py"), "--quick"]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])

@@ -167,8 +167,20 @@ def test_volume_and_bytes(parts: Path, tmp_path: Path) -> None:
     assert (tmp_path / "a.msh").read_bytes() == (tmp_path / "b.msh").read_bytes()
 
 
-@pytest.mark.parametrize("unit, size", [("m", 0.01), ("mm", 10.0), ("in", 0.4)])
-@pytest.mark.parametrize("file", ["bracket.step", "bracket.igs"])
+SLOW = pytest.mark.slow  # every test here starts gmsh in a process: one of a kind is quick
+
+
+@pytest.mark.parametrize(
+    "file, unit, size",
+    [
+        ("bracket.step", "mm", 10.0),
+        ("bracket.igs", "in", 0.4),
+        pytest.param("bracket.step", "m", 0.01, marks=SLOW),
+        pytest.param("bracket.step", "in", 0.4, marks=SLOW),
+        pytest.param("bracket.igs", "m", 0.01, marks=SLOW),
+        pytest.param("bracket.igs", "mm", 10.0, marks=SLOW),
+    ],
+)
 def test_unit(parts: Path, tmp_path: Path, file: str, unit: str, size: float) -> None:
     """STEP and IGES state their unit (mm here): whatever the body file's, the bracket is 60 x 40 x 40 mm."""
     body = meshed(parts / file, tmp_path / "a.msh", unit=unit, size=size)
@@ -242,27 +254,23 @@ def test_overlapping_solids(parts: Path, tmp_path: Path) -> None:
 # ---------------------------------------------------------------- picking
 
 
-@pytest.mark.parametrize(
-    "rule, expected",
-    [
-        ({"colour": [255, 0, 0]}, 60 * 6 + 34 * 6 + 16 * (1 - np.pi / 4)),
-        ({"label": "face_7"}, 40 * 6),
-        ({"label": "face_1"}, 60 * 6 + 34 * 6 + 16 * (1 - np.pi / 4)),  # the whole label wins over face_10
-        ({"box": [59, -1, -1, 61, 41, 7]}, 40 * 6),
-        ({"surfaces": [4, 7]}, 2 * 40 * 6),
-    ],
-)
-def test_picking(parts: Path, tmp_path: Path, rule: dict, expected: float) -> None:
-    body = meshed(parts / "painted.step", tmp_path / "a.msh", [{"name": "here", **rule}], size=10)
-    assert set(body.faces) == {"here"}
-    assert area(body, "here") == pytest.approx(expected * 1e-6, rel=5e-3)
-
-
-def test_part_of_a_label(parts: Path, tmp_path: Path) -> None:
-    body = meshed(parts / "painted.step", tmp_path / "a.msh", [{"name": "all", "label": "face"}], size=10)
-    surface = 2 * (60 * 6 + 34 * 6 + 16 * (1 - np.pi / 4)) + 40 * 6 * 2 + 40 * (60 + 40 + 50 + 30 + 2 * np.pi)
-    surface += 12 * np.pi * 6 - 2 * np.pi * 36
-    assert area(body, "all") == pytest.approx(surface * 1e-6, rel=1e-2)
+def test_picking(parts: Path, tmp_path: Path) -> None:
+    """Faces of every kind of rule on one mesh: the areas of the surfaces meant."""
+    side = 60 * 6 + 34 * 6 + 16 * (1 - np.pi / 4)
+    rules = {
+        "colour": ({"colour": [255, 0, 0]}, side),
+        "label": ({"label": "face_7"}, 40 * 6),
+        "whole": ({"label": "face_1"}, side),  # the whole label wins over face_10
+        "box": ({"box": [59, -1, -1, 61, 41, 7]}, 40 * 6),
+        "surfaces": ({"surfaces": [4, 7]}, 2 * 40 * 6),
+    }
+    faces = [{"name": name, **rule} for name, (rule, _) in rules.items()]
+    body = meshed(parts / "painted.step", tmp_path / "a.msh", [*faces, {"name": "all", "label": "face"}], size=10)
+    assert set(body.faces) == {*rules, "all"}
+    for name, (_, expected) in rules.items():
+        assert area(body, name) == pytest.approx(expected * 1e-6, rel=5e-3), name
+    surface = 2 * side + 40 * 6 * 2 + 40 * (60 + 40 + 50 + 30 + 2 * np.pi) + 12 * np.pi * 6 - 2 * np.pi * 36
+    assert area(body, "all") == pytest.approx(surface * 1e-6, rel=1e-2)  # a part of a label
 
 
 def test_labels_and_colours_survive_joining(parts: Path, tmp_path: Path) -> None:
@@ -299,7 +307,7 @@ def test_table(parts: Path) -> None:
 @pytest.mark.parametrize(
     "file, words",
     [
-        ("nothing.step", ["geometry.cad", "no file"]),
+        pytest.param("nothing.step", ["geometry.cad", "no file"], marks=SLOW),
         ("sheet.step", ["geometry.cad", "no solid", "export it as a solid"]),
         ("open.brep", ["geometry.cad", "open along 4 edges"]),
         ("apart.step", ["geometry.cad", "3 parts"]),
@@ -309,8 +317,11 @@ def test_unsuitable_file(parts: Path, tmp_path: Path, file: str, words: list[str
     refused(parts / file, tmp_path / "a.msh", file, *words, size=5)
 
 
-@pytest.mark.parametrize("file", ["bracket.step", "bracket.brep", "bracket.igs"])
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.995])
+QUICK = ("bracket.step", 0.3), ("bracket.brep", 0.995), ("bracket.igs", 0.7)
+CUT = [(f, s) for f in ("bracket.step", "bracket.brep", "bracket.igs") for s in (0.0, 0.3, 0.7, 0.995)]
+
+
+@pytest.mark.parametrize("file, share", [c if c in QUICK else pytest.param(*c, marks=SLOW) for c in CUT])
 def test_truncated_file(parts: Path, tmp_path: Path, file: str, share: float) -> None:
     whole = (parts / file).read_bytes()
     short = tmp_path / file
@@ -330,12 +341,12 @@ def test_open_shell(parts: Path, tmp_path: Path) -> None:
     "settings, words",
     [
         ({"size": -1}, ["mesh.size = -1"]),
-        ({"size": "big"}, ["mesh.size = 'big'"]),
+        pytest.param({"size": "big"}, ["mesh.size = 'big'"], marks=SLOW),
         ({"size": 1e-4}, ["mesh.size", "length_unit"]),
-        ({"size": 8, "order": 3}, ["mesh.order = 3"]),
+        pytest.param({"size": 8, "order": 3}, ["mesh.order = 3"], marks=SLOW),
         ({"size": 8, "local": {"clmp": 2.0}}, ["mesh.local.clmp", "clamp"]),
-        ({"size": 8, "local": {"clamp": 0.0}}, ["mesh.local.clamp"]),
-        ({"size": 8, "unit": "furlong"}, ["length_unit = 'furlong'", "mm"]),
+        pytest.param({"size": 8, "local": {"clamp": 0.0}}, ["mesh.local.clamp"], marks=SLOW),
+        pytest.param({"size": 8, "unit": "furlong"}, ["length_unit = 'furlong'", "mm"], marks=SLOW),
     ],
 )
 def test_bad_settings(parts: Path, tmp_path: Path, settings: dict, words: list[str]) -> None:
@@ -344,7 +355,9 @@ def test_bad_settings(parts: Path, tmp_path: Path, settings: dict, words: list[s
 
 
 @pytest.mark.parametrize(
-    "rule", [{"label": "clampp"}, {"colour": [1, 2, 3]}, {"box": [0, 0, 0, 1, 1, 1]}, {"surfaces": [99]}]
+    "rule",
+    [{"label": "clampp"}]
+    + [pytest.param(r, marks=SLOW) for r in ({"colour": [1, 2, 3]}, {"box": [0, 0, 0, 1, 1, 1]}, {"surfaces": [99]})],
 )
 def test_rule_without_surface(parts: Path, tmp_path: Path, rule: dict) -> None:
     faces = [{"name": "clamp", **rule}]

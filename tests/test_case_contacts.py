@@ -96,6 +96,7 @@ def test_faces_are_set_against_each_other_by_their_places() -> None:
 
 RADIUS = 1000.0  # m: a line 17 mm wide on the face of 120 mm
 PIN = {"curvature": [float("inf"), RADIUS], "young": 2.1e11}
+CURVED = [pytest.param("smooth", [2, 44], marks=pytest.mark.slow), ("hertz", [3, 1])]
 
 
 def test_a_curved_face_is_fitted_to_hertz() -> None:
@@ -204,14 +205,15 @@ def test_a_line_of_contact_in_pieces() -> None:
     assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=1e-3)
 
 
-def test_the_books_mode_of_a_curved_contact() -> None:
+@pytest.mark.parametrize("law, points", CURVED)
+@pytest.mark.slow
+def test_the_books_mode_of_a_curved_contact(law: str, points: list[int]) -> None:
     """Gaps and Hertz' law in book mode, with one tangential stiffness; two are refused in one sentence."""
-    for law, points in (("smooth", [2, 44]), ("hertz", [3, 1])):
-        raw = table(**PIN, law=law, points=points) | {"mode": "book"}
-        with pytest.raises(UserError, match="isotropic = true"):
-            run_case(made(raw), {"small": small.basis()}, PATH)
-        raw["contacts"][0]["isotropic"] = True
-        assert run_case(made(raw), {"small": small.basis()}, PATH).responses[200.0].converged.all()
+    raw = table(**PIN, law=law, points=points) | {"mode": "book"}
+    with pytest.raises(UserError, match="isotropic"):
+        run_case(made(raw), {"small": small.basis()}, PATH)
+    raw["contacts"][0]["isotropic"] = True
+    assert run_case(made(raw), {"small": small.basis()}, PATH).responses[200.0].converged.all()
 
 
 def test_one_round_contact() -> None:
@@ -220,10 +222,10 @@ def test_one_round_contact() -> None:
     assert len(contact.patch.points) == 1 and contact.offset[0] > 0
 
 
-def test_a_curved_face_that_converges_in_a_case() -> None:
-    for law, points in (("smooth", [2, 44]), ("hertz", [3, 1])):
-        result = run_case(made(table(**PIN, law=law, points=points)), {"small": small.basis()}, PATH)
-        assert result.responses[200.0].converged.all()
+@pytest.mark.parametrize("law, points", CURVED)
+def test_a_curved_face_that_converges_in_a_case(law: str, points: list[int]) -> None:
+    result = run_case(made(table(**PIN, law=law, points=points)), {"small": small.basis()}, PATH)
+    assert result.responses[200.0].converged.all()
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {

@@ -63,6 +63,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One harmonic of both: what is left between them is the swing of the normal force, some per cent here."""
     assert main(["respond", "case.toml", "--compare-book", "--quiet"]) == 0
@@ -84,7 +85,7 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     assert "of 9 frequencies" not in out.err and "F_N = 50 N: marched" in out.out
 
 
-@pytest.mark.parametrize("own", ["", 'mode = "book"\n'])
+@pytest.mark.parametrize("own", ["", pytest.param('mode = "book"\n', marks=pytest.mark.slow)])
 def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     """A plain response and the comparison of both modes, after one another: each point is computed once."""
     (folder / "case.toml").write_text(own + CASE)
@@ -102,6 +103,7 @@ def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     assert [read_response(f).mode for f in files.values()] == (["book", "marched"] if own else ["marched", "book"])
 
 
+@pytest.mark.slow
 def test_a_case_in_the_books_mode(folder: Path) -> None:
     """`mode` and `strips` in the file: microslip takes energy where without it everything sticks."""
     sticks = ["sweep.normal_forces=[0.4]", "amplitude=0.002", "sweep.start=300.0", "sweep.points=4"]

@@ -299,6 +299,7 @@ def test_only_contacts_that_are_closed_together_squeeze() -> None:
 
 
 @pytest.mark.skipif(importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed")
+@pytest.mark.slow
 def test_the_blade_of_5_3(tmp_path: Path) -> None:
     """Numbers of docs/reduction.md on a coarse mesh. Squeeze: 0.912e9 N/m on 4 mm; 12 mm lies 0.1 % off, 0.3 % allowed.
 

@@ -163,10 +163,12 @@ def test_projection_on_a_cylinder():
 # the static state --------------------------------------------------------------------------------------------------
 
 
-def blocks(below: str = "tetra10", above: str = "hexahedron20", press: float = 1e-5, **more) -> BodyModel:
+def blocks(
+    below: str = "tetra10", above: str = "hexahedron20", press: float = 1e-5, layers: int = 1, **more
+) -> BodyModel:
     """Two blocks 1 x 1 x 0.4 m, meshed differently, on rollers all around, pressed by an interference."""
-    a = brick(below, (2, 3, 2), (1, 1, 0.4))
-    b = brick(above, (3, 2, 2), (1, 1, 0.4), (0, 0, 0.4))
+    a = brick(below, (1, 2, layers), (1, 1, 0.4))
+    b = brick(above, (2, 1, layers), (1, 1, 0.4), (0, 0, 0.4))
     mesh = together(a=a, b=b)
     pair = make_pair(mesh, "c", "a_z1", "b_z0", E, interference=press, **more)
     sides = {f"{p}_{s}0": s for p in "ab" for s in "xy"}
@@ -269,8 +271,8 @@ def hertz_error(fine: int) -> tuple[float, float]:
 
 def test_hertz_cylinder():
     """Half width and highest pressure of the line contact; what is left is the block's size and its strain."""
-    coarse, fine = hertz_error(2), hertz_error(12)
-    assert fine[0] < 0.006 and fine[1] < 0.008  # measured 0.004 and 0.005, at two boxes 0.014 and 0.67
+    coarse, fine = hertz_error(2), hertz_error(8)
+    assert fine[0] < 0.006 and fine[1] < 0.008  # measured 0.003 and 0.004, at two boxes 0.014 and 0.67
     assert fine[0] < 0.4 * coarse[0] and fine[1] < 0.4 * coarse[1]
 
 
@@ -377,7 +379,7 @@ def top_force(r) -> float:
 
 def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
     """Apart at rest, pressed at the top: the range's frequencies at speeds between against equilibria of their own."""
-    mesh, top, between = shrouded(gap=1e-5), 8000.0, (3000.0, 5500.0)
+    mesh, top, between = shrouded((1, 1, 4), gap=1e-5), 8000.0, (3000.0, 5500.0)
     rotation = settings_of([0.0]).rotation.model_copy(update={"range_rpm": (0.0, top)})
     ranged = modal_basis(mesh, settings_of([0.0]).model_copy(update={"rotation": rotation}))
     true = modal_basis(mesh, settings_of(between)).groups
@@ -401,7 +403,7 @@ def test_a_range_follows_the_stiffness_through_the_closing_of_an_open_contact():
 
 def test_shroud_closes_at_a_speed_and_presses_harder_beyond():
     """Open below, closed above; an interference presses harder at every one."""
-    mesh, speeds = shrouded(gap=1e-5), (0.0, 2000.0, 4000.0, 8000.0, 12000.0)
+    mesh, speeds = shrouded((1, 1, 4), gap=1e-5), (0.0, 2000.0, 4000.0, 8000.0, 12000.0)
     groups = modal_basis(mesh, settings_of(speeds)).groups
     found = [groups[i, 0].contacts["shroud"] for i in range(len(speeds))]
     force = np.array([c.normal_force for c in found])

@@ -48,6 +48,7 @@ print(float(history(law, jnp.full((9, 1, 3), 1e-5), 1e-4).force[-1, 0, 0]), "/ja
 """
 
 
+@pytest.mark.slow
 def test_compiled_programs_are_kept_between_runs(tmp_path: Path) -> None:
     """The second process takes the program from the cache and finds the same force; damaged entries are passed over."""
     first, second = (python(COMPILED, XDG_CACHE_HOME=str(tmp_path)).split() for _ in range(2))

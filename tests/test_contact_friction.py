@@ -279,7 +279,9 @@ def test_the_fluid_part_of_linear_heights_is_elementary() -> None:
 
 
 @pytest.mark.parametrize(
-    "heights", [Polynomial(), tabulated([0, 0.2, 0.5, 1.0], [0, 0.3, 0.5, 1.0])], ids=["book", "table"]
+    "heights",
+    [Polynomial(), pytest.param(tabulated([0, 0.2, 0.5, 1.0], [0, 0.3, 0.5, 1.0]), marks=pytest.mark.slow)],
+    ids=["book", "table"],
 )
 def test_both_parts_against_quadrature_of_the_printed_integrals(heights) -> None:
     slope = jax.jit(jax.grad(heights.area))

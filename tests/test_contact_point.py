@@ -239,10 +239,14 @@ RATED = {
 }
 
 
-@pytest.mark.parametrize("ratio", [None, 0.2])
-@pytest.mark.parametrize("friction", RATED.values(), ids=RATED.keys())
-def test_a_rate_dependent_step_solves_its_equation(friction, ratio) -> None:
+QUICK = ("coulomb", 0.2), ("falling", None), ("falling exponentially", 0.2), ("heated", None)
+PAIRS = [(name, ratio) for name in RATED for ratio in (None, 0.2)]
+
+
+@pytest.mark.parametrize("name, ratio", [p if p in QUICK else pytest.param(*p, marks=pytest.mark.slow) for p in PAIRS])
+def test_a_rate_dependent_step_solves_its_equation(name, ratio) -> None:
     """Slid: |F| = mu(slip/dt) N with the slip along F; stuck: |F| <= mu(0) N. From rest, 300 random steps."""
+    friction = RATED[name]
     rng = np.random.default_rng(3)
     n, dt = 300, 1e-4
     pressed = jnp.asarray(10 ** rng.uniform(0, 3, n))
@@ -384,7 +388,7 @@ def test_a_stuck_damped_contact_loses_the_energy_of_a_kelvin_voigt_element() -> 
         (contract.test_friction_stays_in_its_cone, BOX),
         (contract.test_the_force_does_not_jump_at_separation, JUMP),
         (contract.test_dissipated_energy_grows, PRESTRESSED),
-        (contract.test_the_force_does_not_jump_at_separation, PRESTRESSED),
+        pytest.param(contract.test_the_force_does_not_jump_at_separation, PRESTRESSED, marks=pytest.mark.slow),
         (lambda example: contract.test_stuck_and_moved_under_changing_load_gives_no_energy(example, -1), PRINTED),
     ],
     ids=["box", "jump", "no preload: energy", "no preload: force", "printed"],

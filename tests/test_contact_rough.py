@@ -73,8 +73,13 @@ def derivatives(law, u):
     return law.force(u), law.stiffness(u), law.share(u), slope, work
 
 
+QUICK = "polynomial|Gaussian, cut|table|smooth|rough, polynomial|hyperbolic, table|Greenwood|measured".split("|")
+
+
 def each(laws):
-    return pytest.mark.parametrize("law", laws.values(), ids=laws.keys())
+    """Every law; those of another distribution, which compile a program of their own, only in the slow tests."""
+    params = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v in laws.items()]
+    return pytest.mark.parametrize("law", params, ids=laws.keys())
 
 
 def differences(f, x, h):

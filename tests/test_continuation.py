@@ -299,7 +299,10 @@ def along(corners: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return distance, np.append(0, np.cumsum(lengths))[:-1] + share * lengths
 
 
-@pytest.mark.parametrize("n, surfaces, strength", [(1, 6, 1.0), (3, 10, 3.0), (10, 40, 4.0), (3, 30, 10.0)])
+@pytest.mark.parametrize(
+    "n, surfaces, strength",
+    [(1, 6, 1.0), (3, 10, 3.0), *(pytest.param(*p, marks=pytest.mark.slow) for p in ((10, 40, 4.0), (3, 30, 10.0)))],
+)
 def test_random_piecewise_linear_curves_are_never_left_or_reversed(n, surfaces, strength):
     """Against a walk from kink to kink: every point lies on it, in order, to the end. Many kinks exceed 90 degrees."""
     sharp = 0
@@ -441,7 +444,10 @@ def sampled(law, harmonics: int, samples: int, damping: float, force: float, sca
     return Given(f, x_scale=scale)
 
 
-@pytest.mark.parametrize("hardness", [0.5, 5.0, 100.0, -0.4])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("hardness", [pytest.param(0.5, marks=SLOW), 5.0, pytest.param(100.0, marks=SLOW), -0.4])
 def test_an_oscillator_with_a_gap_is_the_same_curve_from_both_ends(hardness):
     """One-sided stop (or a spring that partly lets go) at q = 1, seven harmonics, 64 samples."""
     gap = 1.0
@@ -485,7 +491,13 @@ def slider(spring: float, limit: float, press: float):
 
 @pytest.mark.parametrize(
     "spring, limit, press, force",
-    [(1.0, 0.5, 0.0, 0.2), (10.0, 0.5, 0.0, 0.2), (1.0, 0.2, 0.15, 0.3), (10.0, 0.3, 0.3, 0.3), (3.0, 0.3, -0.6, 0.5)],
+    [
+        (1.0, 0.5, 0.0, 0.2),
+        pytest.param(10.0, 0.5, 0.0, 0.2, marks=SLOW),
+        (1.0, 0.2, 0.15, 0.3),
+        pytest.param(10.0, 0.3, 0.3, 0.3, marks=SLOW),
+        pytest.param(3.0, 0.3, -0.6, 0.5, marks=SLOW),
+    ],
 )
 def test_friction_with_varying_normal_load_is_the_same_curve_from_both_ends(spring, limit, press, force):
     """Three harmonics, 48 samples, sticking at both ends of the sweep or lifting off at resonance."""

@@ -96,6 +96,7 @@ def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "is up to date" in "".join(capsys.readouterr())
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed(case: Path) -> None:
     """Ctrl-C leaves a table, a picture and a response file of what was found; the next call adds the rest."""
 

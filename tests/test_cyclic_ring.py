@@ -389,7 +389,12 @@ def coupled_errors(reduction: str, count: int, stiffness: float):
 
 
 @pytest.mark.parametrize(
-    ("reduction", "few", "many"), [("eigenmodes", 4e-2, 3e-3), ("rubin", 1e-5, 1e-9), ("craig-bampton", 4e-3, 2e-4)]
+    ("reduction", "few", "many"),
+    [
+        ("eigenmodes", 4e-2, 3e-3),
+        ("rubin", 1e-5, 1e-9),
+        pytest.param("craig-bampton", 4e-3, 2e-4, marks=pytest.mark.slow),
+    ],
 )
 def test_neighbours_in_contact_couple_at_every_nodal_diameter(reduction, few, many):
     """Springs (1e9 N/m) between the mean motion of right and of the next sector's left: reduced sectors are Ritz
@@ -561,7 +566,7 @@ def of_the_ring(basis) -> np.ndarray:
     return np.sort(np.concatenate(every))
 
 
-@pytest.mark.parametrize("backend", ["auto", "superlu"])
+@pytest.mark.parametrize("backend", ["auto", pytest.param("superlu", marks=pytest.mark.slow)])
 def test_shrouds_that_stay_closed_couple_the_sectors_as_they_do_the_ring(backend):
     """The contact's stiffness between neighbours, with its phase, against six contacts within one body.
 
@@ -583,7 +588,7 @@ def test_either_side_may_press_on_the_other():
         np.testing.assert_allclose(other.groups[key].frequency[:3], g.frequency[:3], rtol=0.03)
 
 
-@pytest.mark.parametrize("method", ["rubin", "craig-bampton"])
+@pytest.mark.parametrize("method", [pytest.param("rubin", marks=pytest.mark.slow), "craig-bampton"])
 def test_reductions_keep_the_coupling_of_closed_shrouds(method):
     interface = {"name": "top", "face": "top", "t2": [0.0, 1.0, 0.0]}
     exact = joined()

@@ -174,6 +174,7 @@ def test_blade_page_agrees_with_itself() -> None:
     assert all(abs(number(v)) < 0.6 for v in rows("blade.md", "convergence")[-1][2:])
 
 
+@pytest.mark.slow
 def test_modes_page(tmp_path: Path) -> None:
     """Prestress "none" at 4500 rpm on the coarse shroud: frequencies fall, as the table says."""
     coarse = "mesh.local={pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"
@@ -185,6 +186,7 @@ def test_modes_page(tmp_path: Path) -> None:
         np.testing.assert_allclose(basis.groups[i, 0].frequency[:6], [float(r[column]) for r in told], rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_cyclic_page(tmp_path: Path) -> None:
     """Aliases as computed, resonances on their engine-order lines, frequencies of the free shroud at two k."""
     from microslip.ring import aliased, multiplicity
@@ -225,6 +227,7 @@ def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert capsys.readouterr().out.strip() == printed
 
 
+@pytest.mark.slow
 def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Its tables made again, and what its examples print; the profile is the invented one of the table."""
     import microslip_study
@@ -242,6 +245,7 @@ def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
         assert capsys.readouterr().out.strip() == printed
 
 
+@pytest.mark.slow
 def test_python_page(capsys: pytest.CaptureFixture[str]) -> None:
     """Every block of the page goes on from the one before, and prints what stands below it."""
     names: dict[str, object] = {}
@@ -253,6 +257,7 @@ def test_python_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert [line.strip() for line in printed.splitlines()] == capsys.readouterr().out.splitlines()
 
 
+@pytest.mark.slow
 def test_geometry_page(tmp_path: Path) -> None:
     """The pendulum's mass, and the reduced masses 0.092 and 5.632 kg that fix its arm."""
     basis = made(tmp_path, "pendulum", "modes.count=3")
@@ -287,9 +292,10 @@ def test_platforms_page() -> None:
     assert set(eigen.BACKENDS) == {"pardiso", "superlu"}
 
 
+@pytest.mark.slow
 def test_own_model_page(tmp_path: Path) -> None:
-    """Everything the page says to type (pictures left to the slow test); the frequency it shows."""
-    shown = pages.play("your_own_model.md", tmp_path, slow=False)
+    """Everything the page says to type, pictures and friction response as well; the frequency it shows."""
+    shown = pages.play("your_own_model.md", tmp_path)
     for line in pages.filled("your_own_model.md", "import").strip("`").strip().splitlines():
         assert line in shown or "surfaces.png" in line, line  # a machine without OpenGL says so instead
     assert "all " in shown and "checks passed" in shown
@@ -303,11 +309,5 @@ def test_own_model_page(tmp_path: Path) -> None:
         np.testing.assert_allclose(f, [number(line.split()[1]) for line in told], rtol=1e-4)
     coarse = read_basis(tmp_path / "build" / "bracket-coarse" / "basis.h5").groups[0, 0].frequency[0]
     assert coarse == pytest.approx(1020.8, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_own_model_page_to_the_report(tmp_path: Path) -> None:
-    """The same with pictures and friction response."""
-    pages.play("your_own_model.md", tmp_path)
     assert (tmp_path / "build" / "bracket" / "report.html").stat().st_size > 100_000
     assert (tmp_path / "build" / "bracket" / "response.csv").is_file()

@@ -48,7 +48,7 @@ def test_over_the_load() -> None:
     assert stuck.cycles["face"].slipping[0] == 0.0 < response.operating(problem, last).cycles["face"].slipping[0]
 
 
-@pytest.mark.parametrize("factor", [0.85, 4.0])
+@pytest.mark.parametrize("factor", [0.85, pytest.param(4.0, marks=pytest.mark.slow)])
 def test_over_the_normal_force(factor: float) -> None:
     """From the force given to another one: there the motion of a problem that is pressed so from the beginning."""
     found = over_normal_force(ring(), 60.0, 1.0, factor)

@@ -48,6 +48,7 @@ def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
         assert len(rows) > 10 and f[-1] < 0.9 * f[0] and d.max() > 5 * d[0]
 
 
+@pytest.mark.slow
 def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> None:
     """Lower than at both neighbours, which are solved for themselves by another way: the sweep's refined peaks."""
     assert main(["optimum", "case.toml", "--points", "4"]) == 0
@@ -62,6 +63,7 @@ def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> No
     assert peaks[1] == pytest.approx(height, rel=1e-3) and min(peaks[0], peaks[2]) > 1.0005 * peaks[1]
 
 
+@pytest.mark.slow
 def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C at the second normal force, the second peak, the third point: the rows before it are in the table."""
 

@@ -91,7 +91,13 @@ def coarse(assembly: Assembly, harmonics: int = 5, samples: int = 128) -> Proble
     return balance.of(assembly, harmonics, samples)
 
 
-@pytest.mark.parametrize(("push", "least", "most"), [(30.0, 0.0, 0.01), (60.0, 0.5, 0.9), (100.0, 0.95, 1.0)])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("push", "least", "most"),
+    [pytest.param(30.0, 0.0, 0.01, marks=SLOW), (60.0, 0.5, 0.9), pytest.param(100.0, 0.95, 1.0, marks=SLOW)],
+)
 def test_a_damper_that_sticks_slides_in_part_and_as_a_whole_against_time(
     push: float, least: float, most: float
 ) -> None:
@@ -140,6 +146,7 @@ def test_a_place_that_nothing_determines_stays_the_one_at_rest() -> None:
         assert np.abs(found.watched[-1]).max() < 1e-3 * 0.3 * PRESSED / TANGENTIAL
 
 
+@pytest.mark.slow
 def test_a_damper_that_slides_away_is_told_so() -> None:
     """Sliding and swinging normal forces push it along the ridge, where nothing stops it: in time it goes on and on,
     and the blades' amplitude is that of the balance with the damper in place to 1 %."""

@@ -51,7 +51,7 @@ CASES = {
 }
 
 
-SLOW = ("lift-off in space",)
+SLOW = ("lift-off in space", "a gap that closes")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in CASES])

@@ -249,6 +249,7 @@ def test_beam_with_a_jenkins_element() -> None:
     assert errors[-1] < 5e-6 and errors[0] > 8 * errors[1] > 64 * errors[2]
 
 
+@pytest.mark.slow
 def test_beam_with_a_contact_in_space_that_lifts_off_has_two_motions() -> None:
     """Two stable motions at one frequency: the integration finds one from rest and stays at the other one from the
     balance's solution. Either: 1e-4 in every harmonic, with steps of a length, since the laws follow a slider that
@@ -264,6 +265,7 @@ def test_beam_with_a_contact_in_space_that_lifts_off_has_two_motions() -> None:
         assert one.cycles["face"].open[0] > 0.03 and one.cycles["face"].slipping[0] > 0.5
 
 
+@pytest.mark.slow
 def test_ring_of_four_in_a_wave() -> None:
     """Four blades, eight points that slide and open: 1e-4 in every harmonic of every blade, with steps of a length."""
     found, motion = solved(ring_of_four, 15, 2048), moving(ring_of_four)[-1]
@@ -277,7 +279,11 @@ def test_ring_of_four_in_a_wave() -> None:
 
 @pytest.mark.parametrize(
     ("make", "fine", "tolerance"),
-    [(cantilever, (63, 8192), 1e-6), (beam_in_space, (21, 2048), 2e-4), (ring_of_four, (15, 2048), 2e-4)],
+    [
+        (cantilever, (63, 8192), 1e-6),
+        (beam_in_space, (21, 2048), 2e-4),
+        pytest.param(ring_of_four, (15, 2048), 2e-4, marks=pytest.mark.slow),
+    ],
 )
 def test_work_of_the_loads_is_the_friction_along_the_slip_path(make: Any, fine: Any, tolerance: float) -> None:
     """What loads supply less what damping takes, of truncated harmonics, against friction force times path slid, step

@@ -45,6 +45,7 @@ def problem() -> balance.Problem:
     return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1, "samples": 24}))
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp_path: Path) -> None:
     """Stopped three times, each point is computed once; the response is that of one go, to the solver's 1e-10."""
     told: list[str] = []

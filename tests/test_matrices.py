@@ -600,7 +600,7 @@ def test_flipped_bytes_of_hdf5_are_read_or_refused(tmp_path, kind):
             file[f"K/{part}"] = data
         file["M"] = np.eye(3)
     whole = (tmp_path / f"whole.{kind}").read_bytes()
-    for seed in range(8):
+    for seed in range(4):  # each is tried in a process of its own
         (tmp_path / f"{seed}.{kind}").write_bytes(flipped(whole, random.Random(seed)))
         with user_errors_only():
             _read(tmp_path, f"{seed}.{kind}", "stiffness")

@@ -78,7 +78,7 @@ def two_modes(normal, harmonics=3, force=1.0, second=55.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("harmonics", [1, 5])
+@pytest.mark.parametrize("harmonics", [1, pytest.param(5, marks=pytest.mark.slow)])
 def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
     """One degree of freedom, i xi Omega M A drives its first harmonic at Omega: with one harmonic the same equations,
     with more of them the same up to what xi does to the others."""
@@ -94,6 +94,7 @@ def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
         assert point.converged and abs(y + 1j * A) < tolerance * A  # the force leads by a quarter of a period
 
 
+@pytest.mark.slow
 def test_resonances_at_many_levels_of_load_lie_on_the_backbone():
     """Two ways: peaks of the forced response, each found on its own curve, and the mode. The peak of an amplitude lies
     about zeta^2 beside the mode's frequency; the other mode is far away."""
@@ -108,7 +109,8 @@ def test_resonances_at_many_levels_of_load_lie_on_the_backbone():
         assert abs(peak.Omega / at - 1) < 2 * zeta**2 + 5e-4  # and what is between two points of the curve
 
 
-@pytest.mark.parametrize("order", [pytest.param(1, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, 3])
 def test_a_nodal_diameter_of_a_ring(order):
     """One sector for six blades: the mode at a large amplitude, put into all of them, is one of the whole ring; the
     wave that runs the other way has the same frequency and damping."""

@@ -273,6 +273,7 @@ def two_modes():
     return body(rows, 2 * np.pi * np.array([30.0, 55.0]), 0.003), np.array([1.0, 0.6]), np.array([1.0, -0.5])
 
 
+@pytest.mark.slow
 def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     """Against a golden-section search over single solutions. Points that change between stick and slip sample by
     sample ripple the top by 3e-5 of its height, which is flat to that within 0.5 %."""
@@ -364,6 +365,7 @@ def test_a_setting_that_hardly_matters_is_said_to():
     assert np.isinf(peaks.Optimum(1.0, resonance(few.peaks[0]), "kink", (few,), (0.0, 0.0)).spread)
 
 
+@pytest.mark.slow
 def test_where_one_resonance_takes_over_from_another():
     """Two modes driven by p and 1/p, the contact stuck: peaks p a and b / p are lowest together at p^2 = b / a."""
     g, _, _ = two_modes()

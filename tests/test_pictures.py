@@ -197,6 +197,7 @@ def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[floa
 
 
 @needs_scenes
+@pytest.mark.slow
 def test_drawing_says_nothing_on_the_screen(tmp_path: Path) -> None:
     """No display, no warning: neither Python's nor VTK's, which writes past sys.stderr."""
     program = (

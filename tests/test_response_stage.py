@@ -425,6 +425,7 @@ SLED = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     """The sweep begins with three harmonics, and once more with those that the resonance needs. Summary, table and
     response file say how many; interrupted, the next run begins with them. What is followed takes as many."""

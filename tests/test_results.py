@@ -185,10 +185,10 @@ with open_journal(folder / "response.points", "abc", {{"case": "a"}}) as journal
 
 
 def test_a_writer_killed_at_random_instants_leaves_readable_files(tmp_path):
-    """SIGKILL seven times at random: the points are 1, 2, 3, ... without a hole, the HDF5 file is whole or absent."""
+    """SIGKILL four times at random: the points are 1, 2, 3, ... without a hole, the HDF5 file is whole or absent."""
     rng, reached = random.Random(8), 0
     code = _WRITER.format(folder=str(tmp_path), path=sys.path)
-    for _ in range(7):
+    for _ in range(4):
         process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
         assert process.stdout is not None
         assert int(process.stdout.readline()) == reached  # nothing that was kept is lost, nothing is computed twice

@@ -337,6 +337,7 @@ def test_a_campbell_diagram_of_one_nodal_diameter_holds_only_its_modes() -> None
 # --- pictures ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_picture_of_a_cyclic_sector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The diagrams and the ring are drawn, are not blank and do not run over their edges."""
     pytest.importorskip("matplotlib")

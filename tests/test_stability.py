@@ -283,7 +283,12 @@ def brute_force(problem, Omega, steps, periods):
 
 @pytest.mark.parametrize(
     ("problem", "f", "count"),
-    [(sliding(), 17.0, 2), (sliding(), 15.0, 2), (swinging((12.0, 4, 2)), 22.0, 6), (swinging((20.0, 8, 4)), 22.0, 6)],
+    [
+        pytest.param(sliding(), 17.0, 2, marks=pytest.mark.slow),
+        (sliding(), 15.0, 2),
+        pytest.param(swinging((12.0, 4, 2)), 22.0, 6, marks=pytest.mark.slow),
+        (swinging((20.0, 8, 4)), 22.0, 6),
+    ],
     ids=["turning", "decaying", "space", "space and lift-off"],
 )
 def test_multipliers_with_memory_against_brute_force(problem, f, count):
@@ -351,7 +356,7 @@ def test_compliance_beside_the_modes_is_that_of_a_mode_too_stiff_to_move_on_its_
 # motions in time ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("f", "stable"), [(90.0, True), (115.0, False)])
+@pytest.mark.parametrize(("f", "stable"), [pytest.param(90.0, True, marks=pytest.mark.slow), (115.0, False)])
 def test_a_motion_that_loses_stability_by_a_multiplier_below_minus_1_repeats_every_second_period(f, stable):
     """A mass pressed on a spring that cannot pull, driven at about twice its own frequency."""
     law = PointContact(Penalty(value(2e5)), Coulomb(value(0.3)), value(1e5))
@@ -384,6 +389,7 @@ def ring():
     return problem, found.x, orbit(problem, found.x, RING)
 
 
+@pytest.mark.slow
 def test_sectors_that_are_driven_alike_may_part_company(ring):
     """The travelling wave of equal blades loses stability by a real multiplier: a solution of the sector, and one of
     the ring, but not the one that the ring takes. A sector alone cannot tell."""

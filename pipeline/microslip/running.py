@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -263,9 +262,8 @@ def _for_paraview(
     return files
 
 
-@cache
 def _can_draw() -> str | None:
-    """See `pictures.can_draw`; asked once."""
+    """See `pictures.can_draw`."""
     if not _is_there("pyvista"):
         return "PyVista is not there"
     from .pictures import can_draw

@@ -58,7 +58,7 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], ModalBasi
 # ---------------------------------------------------------------- spin pit, 5.4
 
 
-@pytest.mark.parametrize("shape", ["cottage-roof", "cylinder"])
+@pytest.mark.parametrize("shape", [pytest.param("cottage-roof", marks=pytest.mark.slow), "cylinder"])
 def test_strain_over_damper_mass_has_a_minimum_and_the_resonance_rises(bases, shape: str) -> None:
     """Fig. 5.4-4: a heavier damper presses harder, the resonance rises; the strain falls, then rises with the mass."""
     masses = (0.008, 0.0259, 0.0418, 0.117) if shape == "cottage-roof" else (0.0259, 0.075, 0.117, 0.3)
@@ -103,6 +103,7 @@ def element(bases):
     return study.over_forces(built, (20.0, 50.0, 70.0, 100.0, 400.0), frequency, finer=1)
 
 
+@pytest.mark.slow
 def test_bending_and_torsion_have_their_minimum_at_about_the_same_normal_force(element) -> None:
     """Fig. 5.5-6b, c: within a factor of two, between the softest and the hardest coupling tried."""
     best = [study.optimum(element, pick) for pick in (study.bending, study.torsion)]

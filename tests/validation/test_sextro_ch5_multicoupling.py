@@ -41,6 +41,7 @@ def test_faces_of_the_damper(damped: ModalBasis) -> None:
     assert damped.groups[0, 0].frequency[0] == pytest.approx(14.1, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_the_damper_lowers_amplitudes_by_decades_and_the_stress_by_less(damped: ModalBasis) -> None:
     """At 30 and 100 N, where it does not open much: less than 2 % of the amplitude without a damper, and more than 5 %
     of the stress at 100 N: the accelerometer stands at the damper, the foot does not."""

@@ -61,6 +61,7 @@ def nearest(found: np.ndarray, wanted: float) -> float:
     return float(found[np.abs(found / wanted - 1).argmin()])
 
 
+@pytest.mark.slow
 def test_free_frequencies(first: Rig) -> None:
     """0.5 % as in test_sextro_ch5."""
     frequency = first.bodies["blade"].groups[0, 0].frequency
@@ -68,6 +69,7 @@ def test_free_frequencies(first: Rig) -> None:
         assert nearest(frequency, printed) == pytest.approx(printed, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_neighbours_are_almost_rigid(first: Rig, second: Rig) -> None:
     """Their first eigenfrequency is above ten times the 700 Hz to which the rig was driven."""
     for each in (first, second):

@@ -45,6 +45,7 @@ def test_fifteen_modes_are_nearly_as_good_as_twenty(ring: study.Ring) -> None:
     np.testing.assert_allclose(few, all_, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_high_engine_orders_resonate_lower(ring: study.Ring) -> None:
     """Fig. 5.5-2, already with sticking contacts: falling from order 2 to 12; order 0 does not press, and is soft."""
     first = {e: sticking(ring, e)[0] for e in (0, 2, 4, 8, 10, 12)}
@@ -63,6 +64,7 @@ def test_the_normal_force_has_an_optimum(ring: study.Ring) -> None:
     assert best.stress < 0.6 * little.stress and best.stress < 0.05 * most.stress
 
 
+@pytest.mark.slow
 def test_small_normal_forces_let_contacts_separate_at_high_engine_orders(ring: study.Ring) -> None:
     """Figs. 5.5-4 and 5.5-5: at 2 N contacts open and order 10 is stressed more than order 2; at 100 N none opens."""
     low, high = (study.highest(ring.problem(2.0, e), ring.basis, BAND) for e in (2, 10))

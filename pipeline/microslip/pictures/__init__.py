@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,10 +55,16 @@ raise SystemExit(0 if p.screenshot(return_img=True).min() < 250 else 3)
 def can_draw() -> str | None:
     """Whether PyVista can draw here: None, or a sentence that says why not and what to install.
 
-    Tried in a process of its own, because VTK ends the process when a library of OpenGL is missing.
+    Tried once, in a process of its own, because VTK ends the process when a library of OpenGL is missing.
     """
+    return _tried(sys.executable)
+
+
+@cache
+def _tried(python: str) -> str | None:
+    """What `can_draw` says of this Python."""
     root = str(Path(__file__).parents[2])
-    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {root!r})\n{_PROBE}"]
+    command = [python, "-c", f"import sys; sys.path.insert(0, {root!r})\n{_PROBE}"]
     try:
         tried = subprocess.run(command, capture_output=True, text=True, timeout=120)
     except (OSError, subprocess.SubprocessError) as error:
