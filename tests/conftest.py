@@ -44,26 +44,30 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("XLA_FLAGS", QUICK)
 
 
-def crowded() -> bool:
-    """Whether this process has mapped 20,000 pieces of memory or holds 1.2 GB; yes where that is not known."""
+def held() -> float:
+    """Bytes of memory this process holds; 0 where that is not known (only Linux limits what is mapped)."""
     try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * os.sysconf("SC_PAGE_SIZE") > 1.2e9 or Path("/proc/self/maps").read_text().count("\n") > 20_000
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
-        return True
+        return 0.0
 
 
-@pytest.fixture(autouse=True, scope="module")
+MOST = {"bytes": 1.5e9}
+"""What a process may hold before compiled programs are dropped."""
+
+
+@pytest.fixture(autouse=True)
 def programs_are_dropped() -> Iterator[None]:
-    """Compiled programs are shared by the test files until there are too many: each keeps pieces of memory mapped, of
-    which a process may have 65530; beyond that the compiler crashes."""
+    """Compiled programs are shared by all tests until there are too many: each keeps memory, in pieces of which a
+    process may have 65530 mapped (20,000 at 1.5 GB); beyond that the compiler crashes."""
     yield
-    if "jax" in sys.modules and crowded():
+    if "jax" in sys.modules and held() > MOST["bytes"]:
         sys.modules["jax"].clear_caches()
         gc.collect()
         if sys.platform == "linux":
             trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # give it back: glibc alone has it
             trim and trim(0)
+        MOST["bytes"] = max(1.5e9, held() + 5e8)
 
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")

@@ -488,6 +488,7 @@ def test_hostile_content_is_refused_before_it_is_read(
         read_basis(path)
 
 
+@pytest.mark.slow
 def test_flipped_bytes_end_in_words(tmp_path: Path) -> None:
     """Without a seal: 0, 1 or 2 and a line of text, never a traceback, a crash or a hang."""
     whole = (KIT / "samples" / "three-masses.h5").read_bytes()

@@ -14,7 +14,16 @@ from microslip.contact.periodic import cycles
 
 SAMPLES = 256
 TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)
-LAWS = pytest.mark.parametrize("example", EXAMPLES.values(), ids=EXAMPLES.keys())
+SISTERS = {  # laws that differ from a quick one in their characteristic or heights alone
+    "exponential heights, cut", "linear heights", "tabulated heights", "point, rising", "point, heated",
+    "point, static and sliding", "point, measured", "Mindlin", "round point", "gapped point",
+}  # fmt: skip
+assert SISTERS <= set(EXAMPLES)
+LAWS = pytest.mark.parametrize(
+    "example",
+    [pytest.param(e, marks=pytest.mark.slow if name in SISTERS else ()) for name, e in EXAMPLES.items()],
+    ids=EXAMPLES.keys(),
+)
 FORCES = jax.jit(cycles, static_argnums=3)
 
 
