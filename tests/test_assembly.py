@@ -172,3 +172,30 @@ def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
                 assert found[w] == pytest.approx(right[w], rel=1e-9)
                 assert amplitude(at, point.x, *at.forces(point.x), watch=i).value == pytest.approx(right[w], rel=1e-9)
     assert len({f"{abs(y):.3e}" for y in right.values()}) == 3
+
+
+def rubbing(phase: float, push: float, friction: float) -> Assembly:
+    """A blade that rubs on the ground, all its loads turned by a phase."""
+    places, areas = grid(0.02, 0.01, (4, 3))
+    n = len(areas)
+    law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(friction)), jnp.asarray(1e6 / n))
+    wall = touching("wall", Patch("right", places, areas, law), Side("blade", "right"), None, normal=20.0)
+    one = sector(4, 0)
+    return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.watches)
+
+
+@pytest.mark.parametrize(("push", "friction", "state"), [(0.3, 0.05, "partial slip"), (0.2, 0.05, "stuck")])
+def test_the_phase_of_all_loads_turns_the_answer_and_nothing_else(push: float, friction: float, state: str) -> None:
+    """By 8 of 64 samples: 1e-10. Points that slip forget where their marching began, and those that never slipped
+    remember nothing else than the preloaded place. A state that sticks loses nothing, and not what rounding leaves."""
+    found = []
+    for phase in (0.0, np.pi / 4):
+        p = balance.of(rubbing(phase, push, friction), 1, 64)
+        o = response.operating(p, solve(p, 2 * np.pi * 60.0, []))
+        found.append((o.watched[0, 1] * np.exp(-1j * phase), float(o.cycles["wall"].dissipated.sum())))
+    assert found[1][0] == pytest.approx(found[0][0], rel=1e-10)
+    share = o.cycles["wall"].slipping.mean()
+    if state == "stuck":
+        assert share == 0 and found[0][1] == found[1][1] == 0.0
+    else:
+        assert 0 < share < 0.5 and found[1][1] == pytest.approx(found[0][1], rel=1e-9) and found[0][1] > 1e-8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -59,6 +59,16 @@ def traced(
     return Traced(parts[5], Cycle(dissipated, by_slip, slipping, open_, float(parts[4])))
 
 
+def above_rounding(terms: Any, axes: Any) -> Any:
+    """Sums of works that come and go over axes of an array; zero where what is left is rounding of what came."""
+    total = terms.sum(axis=axes)
+    return total * (abs(total) > ROUNDING * abs(terms).sum(axis=axes))
+
+
+ROUNDING = 1e-13
+"""Share of the work that goes to and fro in a cycle below which what is lost is not told from zero."""
+
+
 @partial(jax.jit, static_argnames=("samples", "count"))
 def _watched(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
@@ -78,9 +88,10 @@ def _watched(
     moved = path - jnp.roll(path, 1, axis=0)
     open_ = force[..., 0] <= 0
     least = 1e-9 * jnp.abs(moved).max()
-    slips = (jnp.abs(slid).max(axis=-1) > least) & ~open_
+    moves = jnp.abs(slid).max(axis=-1) > least
+    slips = moves & ~open_
     change = jnp.einsum("nia,sni->sa", G, force - before)[:, :3]
     size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
     unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
-    by_slip = jnp.sum(mean[..., 1:] * slid, axis=(0, 2))
-    return jnp.sum(mean * moved, axis=(0, 2)), by_slip, slips.mean(axis=0), open_.mean(axis=0), unsteady, force
+    by_slip = jnp.sum(mean[..., 1:] * slid * moves[..., None], axis=(0, 2))
+    return above_rounding(mean * moved, (0, 2)), by_slip, slips.mean(axis=0), open_.mean(axis=0), unsteady, force
