@@ -4,9 +4,10 @@
     python benchmarks/contact_points.py --quick  # 40 points, no growth: seconds
 
 pyHarm (an environment of its own, `sh tests/peers/setup.sh pyharm`) evaluates its elements one after the other. The
-numpy loop goes over the samples of all points at once, with the derivative written out by hand. All three march the
-same law, a penalty spring with a Coulomb cone that stays closed, and must agree: pyHarm's force jumps where a contact
-opens.
+numpy loop goes over the samples of all points at once, with the derivative written out by hand. All three march a
+penalty spring with a Coulomb cone that stays closed (pyHarm's force jumps where a contact opens). The numpy loop takes
+the same straight ways and must agree; pyHarm returns radially at the end of each step, of first order in the samples,
+and is that much apart.
 microslip marches two cycles if not told otherwise, pyHarm always three: microslip is timed with both.
 Times are the least of some rounds; wall and CPU seconds, of all threads a program takes.
 """
@@ -75,38 +76,65 @@ def ours(law: Law, u: np.ndarray, samples: int, count: int, rounds: int) -> dict
 
 
 def numpy_loop(u: np.ndarray, samples: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Penalty spring, Coulomb cone, radial return; tangents of all harmonics carried along by hand."""
+    """Penalty spring, Coulomb cone, straight ways (`point.dragged`); tangents of all harmonics carried by hand."""
     n, _, size = u.shape
     values, transform = (np.array(x) for x in waves(size // 2, samples))
     path = np.einsum("sh,nkh->skn", values, u)
     force, slope = np.zeros((samples, 3, n)), np.zeros((samples, 3, 3, size, n))
     tangential, before, carried = np.zeros((2, n)), np.zeros((2, n)), np.zeros((2, 3, size, n))
-    row_before = np.zeros(size)
+    limit, of_limit, row_before = np.zeros(n), np.zeros((3, size, n)), np.zeros(size)
     for step in range(count * samples):
         i = step % samples
-        row = values[i]
+        row, closed = values[i], path[i, 0] > 0
         normal = NORMAL * np.maximum(path[i, 0], 0.0)
-        closed = path[i, 0] > 0
-        trial = np.where(closed, tangential + TANGENTIAL * (path[i, 1:] - before), 0.0)
-        moved = carried.copy()
-        for d in (0, 1):
-            moved[d, d + 1] += TANGENTIAL * (row - row_before)[:, None]
-        moved *= closed
-        length, held = np.hypot(*trial), MU * normal
-        slides = length > held
-        safe = np.where(length > 0, length, 1.0)
-        direction = trial / safe
-        kept = np.where(slides, held / safe, 1.0)
-        along = np.einsum("dn,dkhn->khn", direction, moved)
-        turned = moved - np.where(slides, 1.0, 0.0) * direction[:, None, None] * along
-        carried = kept * turned
-        pressed = np.zeros((3, size, n))
+        pressed, moves = np.zeros((3, size, n)), np.zeros((2, 3, size, n))
         pressed[0] = NORMAL * closed * row[:, None]
-        carried += np.where(slides, 1.0, 0.0) * direction[:, None, None] * MU * pressed
-        tangential, before, row_before = kept * trial, path[i, 1:], row
+        for d in (0, 1):
+            moves[d, d + 1] = (TANGENTIAL * (row - row_before))[:, None] * closed
+        carried *= closed
+        way = np.where(closed, TANGENTIAL * (path[i, 1:] - before), 0.0)
+        given = (tangential * closed, way, limit * closed, MU * normal)
+        tangential, slides, (by_force, by_way, by_before, by_held) = straight(*given)
+        turned = np.einsum("dn,dkhn->khn", by_force, carried) + np.einsum("dn,dkhn->khn", by_way, moves)
+        turned += by_before * of_limit * closed + by_held * MU * pressed
+        slid = _over(tangential, MU * normal)[:, None, None] * MU * pressed
+        slid += np.stack([-tangential[1], tangential[0]])[:, None, None] * turned
+        carried = np.where(slides, slid, carried + moves)
+        before, row_before, limit, of_limit = path[i, 1:], row, MU * normal, MU * pressed
         force[i] = np.vstack([normal, tangential])
         slope[i, 0], slope[i, 1:] = pressed, carried
     return np.einsum("hs,skn->nkh", transform, force), np.einsum("gs,skjhn->nkgjh", transform, slope)
+
+
+def _over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.where(b > 0, a / np.where(b > 0, b, 1.0), 0.0)
+
+
+def straight(F: np.ndarray, d: np.ndarray, R0: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple]:
+    """Force after a straight way d, whether it slides, and the derivatives of its angle then."""
+    way, grows = np.hypot(*d), R - R0
+    room = np.maximum(R0**2 - (F**2).sum(axis=0), 0.0)
+    a, b = way**2 - grows**2, (F * d).sum(axis=0) - R0 * grows
+    root = np.sqrt(np.maximum(b**2 + a * room, 0.0))
+    s = np.clip(np.where(b > 0, _over(room, b + root), _over(root - b, a)), 0.0, 1.0)
+    r, P, e = R0 + s * grows, F + s * d, _over(d, way)
+    x, y = (e * P).sum(axis=0), e[0] * P[1] - e[1] * P[0]
+    lag = _over(2 * (1 - s) * way, r + R)
+    c, first = np.where(x >= 0, r + x, y), np.where(x >= 0, y, r - x)
+    last = first * np.exp(-lag)
+    size = c**2 + last**2
+    cos, sin = _over(c**2 - last**2, size), _over(2 * c * last, size)
+    trial = F + d
+    tried = np.hypot(*trial)
+    slides = tried > R
+    along = np.where(size > 0, np.stack([e[0] * cos - e[1] * sin, e[1] * cos + e[0] * sin]), _over(trial, tried))
+    angles, mean = _over(np.exp(-lag) * (c**2 + first**2), size), _over(np.ones_like(R), r + R)
+    T, fall = _over(np.stack([-P[1], P[0]]), r**2), sin * lag * mean
+    excess = _over(angles * (T * d).sum(axis=0) + 2 * sin * way * mean + fall * grows, root)
+    by_force = angles * T - excess * P
+    by_way = (1 - angles) * _over(np.stack([-e[1], e[0]]), way) + s * by_force - 2 * sin * (1 - s) * mean * e
+    parts = (by_force, by_way, (1 - s) * (fall + excess * r), fall * (1 + s) + excess * r * s)
+    return np.where(slides, R * along, trial), slides, parts
 
 
 def pyharm(u: np.ndarray, samples: int, rounds: int, work: Path) -> dict | None:

@@ -287,11 +287,14 @@ def test_ring_of_four_in_a_wave() -> None:
 )
 def test_work_of_the_loads_is_the_friction_along_the_slip_path(make: Any, fine: Any, tolerance: float) -> None:
     """What loads supply less what damping takes, of truncated harmonics, against friction force times path slid, step
-    by step in time, which converges with the step on its own: a slider on a line with the second power, one that turns
-    with the first."""
+    by step in time, which converges with the step on its own: a slider on a line with the second power. One that turns
+    is as near from the start as the loads' truncated harmonics let it be seen."""
     slid = [sum(m.slip_work) for m in moving(make)]
     gaps = np.abs(np.diff(slid))
-    assert (gaps[1:] < gaps[:-1] / (4 if make is cantilever else 1.5)).all()
+    if make is cantilever:
+        assert (gaps[1:] < gaps[:-1] / 4).all()
+    else:
+        assert gaps.max() < 0.1 * tolerance * slid[-1]
     found = solved(make, *fine)
     lost, by_slip = found.supplied - found.damped, sum(float(c.by_slip.sum()) for c in found.cycles.values())
     assert lost == pytest.approx(slid[-1], rel=tolerance)

@@ -143,7 +143,7 @@ def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest
         pytest.skip("pictures of bodies cannot be drawn on this machine")
     told: list[str] = []
     running.run_body(job, report=told.append)
-    assert len(told) == 4 and all("is up to date" in t for t in told)
+    assert sum("is up to date" in t for t in told) == 4  # the stuck modes are told again
     mesh = build / "pictures" / "mesh.png"
     mesh.write_bytes(mesh.read_bytes()[:-1])
     monkeypatch.setattr("microslip.pictures.draw_all", stopped)

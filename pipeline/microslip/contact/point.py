@@ -68,7 +68,7 @@ class PointContact(Law):
         springs = self._springs(met(share, state.share))
         left = jnp.minimum(ratio(share, state.share), 1.0)
         relaxed = state.elastic * left
-        stiffness = springs if self.damping is None else springs * (1 + self.damping / dt)
+        stiffness = springs if self.damping is None else springs + self._springs(share) * self.damping / dt
         way = stiffness * (tangential - state.tangential)
         time = state.time + dt
         if self._straight:

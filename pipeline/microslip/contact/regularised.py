@@ -21,6 +21,7 @@ from ..errors import NotConverged
 from .friction import Friction, creep
 from .law import Array, Law, norm, ratio, settings, static
 from .normal import Normal
+from .point import met
 
 
 class MassState(NamedTuple):
@@ -71,15 +72,15 @@ class MassContact(Law):
     def step(self, u: Array, v: Array, dt: Array | float, state: MassState) -> tuple[Array, MassState]:
         """Implicit Euler: of first order, and for a vanishing mass and creep exactly the return map of `point`."""
         approach, tangential = u.T[0], u.T[1:]
-        share, pressed, stretch = self._loaded(approach, v.T[0], state)
+        share, pressed, stretch, carries = self._loaded(approach, v.T[0], state)
         springs, time = self._springs(), state.time + dt
         moved = tangential - state.tangential
-        trial = self.mass / dt * state.velocity + springs * stretch + springs * (1 + self.damping / dt) * moved
-        resistance = self.mass / dt + springs * (dt + self.damping)
+        trial = self.mass / dt * state.velocity + springs * stretch + springs * (carries + self.damping / dt) * moved
+        resistance = self.mass / dt + springs * (carries * dt + self.damping)
         sliding = self._velocity(trial, resistance, pressed, share, time)
         velocity = jnp.where(share > 0, sliding, moved / dt)
         growth = moved - velocity * dt
-        after = stretch + growth
+        after = stretch + carries * growth
         force = share * springs * (after + self.damping / dt * growth)
         slipped = state.slipped + jnp.where(share > 0, velocity * dt, 0.0)
         settled = MassState(tangential, after, velocity, share, slipped, time)
@@ -126,11 +127,14 @@ class MassContact(Law):
         second = self.stiffness_1 if self.stiffness_2 is None else self.stiffness_2
         return jnp.stack([jnp.atleast_1d(self.stiffness_1), jnp.atleast_1d(second)])
 
-    def _loaded(self, u: Array, v: Array, state: MassState) -> tuple[Array, Array, Array]:
-        """Share, normal force, and the stretch of the area that is in contact now."""
+    def _loaded(self, u: Array, v: Array, state: MassState) -> tuple[Array, Array, Array, Array]:
+        """Share, normal force, the stretch of the area that is in contact now, and the share of it that carries over
+        the step (`point.met`)."""
         share = self.normal.share(u)
-        kept = 1.0 if self.printed else jnp.minimum(ratio(state.share, share, 1.0), 1.0)
-        return share, self._pressed(u, v), kept * state.stretch
+        if self.printed:
+            return share, self._pressed(u, v), state.stretch, jnp.ones_like(share)
+        kept = jnp.minimum(ratio(state.share, share, 1.0), 1.0)
+        return share, self._pressed(u, v), kept * state.stretch, ratio(met(share, state.share), share, 1.0)
 
     def _drag(self, speed: Array, pressed: Array, share: Array, time: Array) -> Array:
         """(n,) friction over the speed and the share, Ns/m."""
