@@ -18,7 +18,7 @@ from microslip.contact.heights import Polynomial
 from microslip.contact.law import history
 from microslip.contact.normal import Penalty, Preload, Rough
 from microslip.contact.periodic import cycles
-from microslip.contact.point import PointContact, PointState
+from microslip.contact.point import PointContact, PointState, dragged
 from microslip.harmonic_balance.orbits import exact
 
 MU, N0, K = 0.4, 100.0, 2e7
@@ -108,6 +108,25 @@ def first_harmonics(law, motion, samples):
     t = 2 * np.pi * np.arange(samples) / samples
     force = np.asarray(CYCLES(law, jnp.asarray(motion(t[:, None])), 1.0, 60, 1e-12)[0])
     return 2 / samples * np.einsum("snk,s->nk", force, np.exp(-1j * t))
+
+
+def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
+    """From rest inside the circle and from the circle itself, with a limit that grows or falls: 1e-7 of what it is,
+    but for one in a thousand, next to where it begins to slide."""
+    rng, n, h = np.random.default_rng(0), 4000, 1e-6
+    before = rng.uniform(0.5, 1.5, n)
+    force, way = rng.normal(size=(2, n)), rng.normal(size=(2, n)) * 10 ** rng.uniform(-2, 0.7, n)
+    on_circle = rng.random(n) < 0.5
+    force *= before / np.hypot(*force) * np.where(on_circle, 1.0, rng.random(n))
+    given = [force, way, before, before * rng.uniform(0.5, 1.5, n)]
+    moved = [rng.normal(size=x.shape) for x in given]
+    along = force / before * moved[2] + np.stack([-force[1], force[0]]) * rng.normal(size=n)  # the circle's own change
+    moved[0] = np.where(on_circle, along, moved[0])
+    told = np.asarray(jax.jvp(dragged, tuple(map(jnp.asarray, given)), tuple(map(jnp.asarray, moved)))[1])
+    ends = [np.asarray(dragged(*(x + s * h * y for x, y in zip(given, moved, strict=True)))) for s in (1, -1)]
+    differences = (ends[0] - ends[1]) / (2 * h)
+    wrong = np.abs(told - differences).max(axis=0) / (1 + np.abs(differences).max(axis=0))
+    assert np.isfinite(told).all() and np.quantile(wrong, 0.999) < 1e-7
 
 
 @pytest.mark.parametrize("axes", [(2.0, 1.0), (1.3, 0.9)], ids=["slides", "sticks twice"])
