@@ -34,7 +34,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.harmonics import force_harmonics, waves
 from microslip.contact.law import Law
 from microslip.contact.normal import Penalty
-from microslip.contact.point import PointContact
+from microslip.contact.point import PointContact, _mean_inverse
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
@@ -119,7 +119,8 @@ def straight(F: np.ndarray, d: np.ndarray, R0: np.ndarray, R: np.ndarray) -> tup
     s = np.clip(np.where(b > 0, _over(room, b + root), _over(root - b, a)), 0.0, 1.0)
     r, P, e = R0 + s * grows, F + s * d, _over(d, way)
     x, y = (e * P).sum(axis=0), e[0] * P[1] - e[1] * P[0]
-    lag = _over(2 * (1 - s) * way, r + R)
+    inverse, by_first, by_last = (np.asarray(x) for x in _mean_inverse(r, R))
+    lag = (1 - s) * way * inverse
     c, first = np.where(x >= 0, r + x, y), np.where(x >= 0, y, r - x)
     last = first * np.exp(-lag)
     size = c**2 + last**2
@@ -128,12 +129,12 @@ def straight(F: np.ndarray, d: np.ndarray, R0: np.ndarray, R: np.ndarray) -> tup
     tried = np.hypot(*trial)
     slides = tried > R
     along = np.where(size > 0, np.stack([e[0] * cos - e[1] * sin, e[1] * cos + e[0] * sin]), _over(trial, tried))
-    angles, mean = _over(np.exp(-lag) * (c**2 + first**2), size), _over(np.ones_like(R), r + R)
-    T, fall = _over(np.stack([-P[1], P[0]]), r**2), sin * lag * mean
-    excess = _over(angles * (T * d).sum(axis=0) + 2 * sin * way * mean + fall * grows, root)
+    angles, T = _over(np.exp(-lag) * (c**2 + first**2), size), _over(np.stack([-P[1], P[0]]), r**2)
+    at_first, at_last = (-sin * (1 - s) * way * by for by in (by_first, by_last))
+    excess = _over(angles * (T * d).sum(axis=0) + sin * way * inverse + at_first * grows, root)
     by_force = angles * T - excess * P
-    by_way = (1 - angles) * _over(np.stack([-e[1], e[0]]), way) + s * by_force - 2 * sin * (1 - s) * mean * e
-    parts = (by_force, by_way, (1 - s) * (fall + excess * r), fall * (1 + s) + excess * r * s)
+    by_way = (1 - angles) * _over(np.stack([-e[1], e[0]]), way) + s * by_force - sin * (1 - s) * inverse * e
+    parts = (by_force, by_way, (1 - s) * (at_first + excess * r), at_first * s + at_last + excess * r * s)
     return np.where(slides, R * along, trial), slides, parts
 
 

@@ -59,13 +59,13 @@ class PointContact(Law):
 
     def init(self, n: int) -> PointState:
         pair, one = jnp.zeros((2, n)), jnp.zeros(n)
-        return PointState(pair, pair, one, one, pair, one)
+        return PointState(pair, pair, one, jnp.ones(n), pair, one)  # the first step is taken with all of its area
 
     def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
         approach, tangential = u.T[0], u.T[1:]
         share = self.normal.share(approach)
         pressed = self._pressed(approach, v.T[0])
-        springs = self._springs(met(share, state.share))
+        springs = self._springs(met(share, jnp.maximum(state.share, touching(self.normal, approach))))
         left = jnp.minimum(ratio(share, state.share), 1.0)
         relaxed = state.elastic * left
         stiffness = springs if self.damping is None else springs + self._springs(share) * self.damping / dt
@@ -126,10 +126,15 @@ class PointContact(Law):
 def met(after: Array, before: Array) -> Array:
     """What a spring's stiffness counts over a step from ``before`` to ``after``: area that comes carries from then on.
 
-    Half of what came, on average; what goes takes its force with it, exactly as if it had been gone all the time. Of a
-    contact that was open it is all: where in the step it closed is not known.
+    Half of what came, on average; what goes takes its force with it, exactly as if it had been gone all the time.
     """
-    return jnp.where(before > 0, 0.5 * (after + jnp.minimum(after, before)), after)
+    return 0.5 * (after + jnp.minimum(after, before))
+
+
+def touching(normal: Normal, approach: Array) -> Array:
+    """(n,) share of the area of contacts that barely touch: all of a smooth one, none of a rough one. What begins
+    from there and what begins open are then the same in the limit."""
+    return normal.share(jnp.full_like(approach, 1e-30))
 
 
 @jax.custom_jvp
@@ -138,8 +143,8 @@ def dragged(force: Array, way: Array, before: Array, held: Array) -> Array:
 
     The spring takes up the way until its force is what friction holds, R. From there its angle beta to the way obeys
     R d beta = -sin(beta) ds, because the slip has the direction of the force: tan(beta / 2) falls as exp(-s / R),
-    exact whatever the length of the way. R goes straight from one end of the way to the other, of which the fall of
-    the angle takes the mean.
+    exact whatever the length of the way, also where R goes straight from one value to another along it: from nothing,
+    where a contact closes, the force has the direction of the way.
 
     Args:
         force: (2, ...) N before, not longer than ``before``. way: (2, ...) stiffness times displacement, N. before,
@@ -153,8 +158,8 @@ def dragged(force: Array, way: Array, before: Array, held: Array) -> Array:
 
 class _Way(NamedTuple):
     """Of a slider's way: whether it slides; the share of it before it does, and d share over -(P . dP - R dR) there;
-    P and R then; length, direction; fall of beta / 2's tangent as an exponent; sine of the last angle, and d of the
-    last over d of the first one."""
+    P and R then; length, direction; mean of 1 / R from there on and its derivatives with respect to R at both ends;
+    sine of the last angle, and d of the last over d of the first one."""
 
     slides: Array
     share: Array
@@ -163,7 +168,7 @@ class _Way(NamedTuple):
     reached: Array
     length: Array
     e: Array
-    fall: Array
+    softness: tuple[Array, Array, Array]
     sine: Array
     angles: Array
 
@@ -178,8 +183,8 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     reached, on_cone = before + share * grows, force + share * way
     e = ratio(way, length)
     along, across = jnp.sum(e * on_cone, axis=0), e[0] * on_cone[1] - e[1] * on_cone[0]
-    fall = ratio(2 * (1 - share) * length, reached + held)
-    left, ahead = jnp.exp(-fall), along >= 0
+    softness = _mean_inverse(reached, held)
+    left, ahead = jnp.exp(-(1 - share) * length * softness[0]), along >= 0
     # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
     cosine, first = jnp.where(ahead, reached + along, across), jnp.where(ahead, across, reached - along)
     sine = first * left
@@ -188,8 +193,24 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     turned = jnp.where(size > 0, jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), ratio(trial, tried))
     slides = tried > held
     angles = ratio(left * (cosine**2 + first**2), size)
-    told = _Way(slides, share, ratio(jnp.ones_like(found), found), on_cone, reached, length, e, fall, y, angles)
+    told = _Way(slides, share, ratio(jnp.ones_like(found), found), on_cone, reached, length, e, softness, y, angles)
     return jnp.where(slides, held * turned, trial), told
+
+
+def _mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
+    """Mean of 1 / R over a straight way from R = first to last, (ln last - ln first) / (last - first), and its
+    derivatives with respect to both; without a difference of equal numbers where they are alike."""
+    both = first + last
+    r = jnp.clip(ratio(last - first, both), -_ALIKE, _ALIKE)
+    near = jnp.abs(r) < 1e-3
+    at = jnp.where(near, 0.5, r)
+    G = jnp.where(near, 1 + r**2 / 3 + r**4 / 5, jnp.arctanh(at) / at)
+    slope = jnp.where(near, 2 * r / 3 + 4 * r**3 / 5, (1 / (1 - at**2) - jnp.arctanh(at) / at) / at)
+    mean, bend = ratio(2 * G, both), ratio(4 * slope, both**3)
+    return mean, -ratio(mean, both) - bend * last, -ratio(mean, both) + bend * first
+
+
+_ALIKE = 1 - 1e-12  # of (last - first) / (last + first): from nothing, the angle falls to e^-28 and not to zero
 
 
 @dragged.defjvp
@@ -197,16 +218,16 @@ def _dragged_jvp(given: tuple[Array, ...], moved: tuple[Array, ...]) -> tuple[Ar
     """With the derivatives of the last angle by hand: two thirds of the work of a chain of derivatives."""
     (_, way, before, held), (of_force, of_way, of_before, of_held) = given, moved
     out, w = _dragged(*given)
-    s, share_of, mean = w.share, 1 - w.share, ratio(jnp.ones_like(held), w.reached + held)
+    s, share_of, (inverse, by_first, by_last) = w.share, 1 - w.share, w.softness
     turn = ratio(jnp.stack([-w.on_cone[1], w.on_cone[0]]), w.reached**2)  # d angle of P over dP
-    slope = w.sine * w.fall * mean  # of the fall over d(R + R)
-    by_share = w.angles * jnp.sum(turn * way, axis=0) + w.sine * 2 * w.length * mean + slope * (held - before)
+    at_first, at_last = (-w.sine * share_of * w.length * by for by in (by_first, by_last))  # d angle over dR
+    by_share = w.angles * jnp.sum(turn * way, axis=0) + w.sine * w.length * inverse + at_first * (held - before)
     by_excess = by_share * w.by_excess
     by_force = w.angles * turn - by_excess * w.on_cone
     across = ratio(jnp.stack([-w.e[1], w.e[0]]), w.length)
-    by_way = (1 - w.angles) * across + s * by_force - 2 * w.sine * share_of * mean * w.e
-    by_before = share_of * (slope + by_excess * w.reached)
-    by_held = slope * (1 + s) + by_excess * w.reached * s
+    by_way = (1 - w.angles) * across + s * by_force - w.sine * share_of * inverse * w.e
+    by_before = share_of * (at_first + by_excess * w.reached)
+    by_held = at_first * s + at_last + by_excess * w.reached * s
     angle = jnp.sum(by_force * of_force + by_way * of_way, axis=0) + by_before * of_before + by_held * of_held
     normal = ratio(out, held)
     slid = normal * of_held + jnp.stack([-out[1], out[0]]) * angle

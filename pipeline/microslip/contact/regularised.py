@@ -21,7 +21,7 @@ from ..errors import NotConverged
 from .friction import Friction, creep
 from .law import Array, Law, norm, ratio, settings, static
 from .normal import Normal
-from .point import met
+from .point import met, touching
 
 
 class MassState(NamedTuple):
@@ -67,7 +67,7 @@ class MassContact(Law):
 
     def init(self, n: int) -> MassState:
         none = jnp.zeros((2, n))
-        return MassState(none, none, none, jnp.zeros(n), none, jnp.zeros(n))
+        return MassState(none, none, none, jnp.ones(n), none, jnp.zeros(n))
 
     def step(self, u: Array, v: Array, dt: Array | float, state: MassState) -> tuple[Array, MassState]:
         """Implicit Euler: of first order, and for a vanishing mass and creep exactly the return map of `point`."""
@@ -134,7 +134,8 @@ class MassContact(Law):
         if self.printed:
             return share, self._pressed(u, v), state.stretch, jnp.ones_like(share)
         kept = jnp.minimum(ratio(state.share, share, 1.0), 1.0)
-        return share, self._pressed(u, v), kept * state.stretch, ratio(met(share, state.share), share, 1.0)
+        before = jnp.maximum(state.share, touching(self.normal, u))
+        return share, self._pressed(u, v), kept * state.stretch, ratio(met(share, before), share, 1.0)
 
     def _drag(self, speed: Array, pressed: Array, share: Array, time: Array) -> Array:
         """(n,) friction over the speed and the share, Ns/m."""

@@ -21,7 +21,7 @@ from .heights import Heights, as_table
 from .law import Array, Law, ratio, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
-from .point import PointContact, dragged, met, slide, weight
+from .point import PointContact, dragged, met, slide, touching, weight
 from .series import BULK
 
 
@@ -54,16 +54,24 @@ class Sliders(Law):
         """Normal force (n,) N, springs along t1 (m, n) N/m and limits (m, n) N at an approach (n,) m."""
         raise NotImplementedError
 
+    def full(self) -> Array:
+        """(m, 1) or (m, n) springs along t1 with all of the area in contact, N/m."""
+        raise NotImplementedError
+
+    def touching(self, approach: Array) -> Array:
+        """The springs of contacts that barely touch, see `point.touching`; all of them where it is one by one."""
+        return self.full()
+
     def init(self, n: int) -> SliderState:
         pair, each = jnp.zeros((2, n)), jnp.zeros((self.count(), n))
-        return SliderState(pair, jnp.zeros((self.count(), 2, n)), each, each, pair)
+        return SliderState(pair, jnp.zeros((self.count(), 2, n)), each, each + self.full(), pair)
 
     def step(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> tuple[Array, SliderState]:
         pressed, springs, limits = self.local(u.T[0])
         moved = u.T[1:] - state.tangential
         left = jnp.minimum(ratio(springs, state.springs), 1.0)
         relaxed = state.elastic * left[:, None]
-        both = self._both(met(springs, state.springs))
+        both = self._both(met(springs, jnp.maximum(state.springs, self.touching(u.T[0]))))
         way = both * moved
         if self.stiffness_ratio is None:
             of_each = (jnp.moveaxis(part, 1, 0) for part in (relaxed, way))
@@ -147,6 +155,9 @@ class Strips(Sliders):
         springs = jnp.where(overlap > 0, self.stiffness_t * self.shares, 0.0)
         return jnp.sum(pressed, axis=0), springs, self.mu * pressed
 
+    def full(self) -> Array:
+        return self.stiffness_t * self.shares
+
     def pressed_energy(self, approach: Array) -> Array:
         if self.held is not None:
             return self.local(approach)[0] * approach
@@ -210,6 +221,12 @@ class Iwan(Sliders):
         pressed = self.normal.force(approach)
         springs = self.stiffness * self.shares * self.normal.share(approach)
         return pressed, springs, self.mu * self.strengths * pressed
+
+    def full(self) -> Array:
+        return self.stiffness * self.shares
+
+    def touching(self, approach: Array) -> Array:
+        return self.full() * touching(self.normal, approach)
 
     def pressed_energy(self, approach: Array) -> Array:
         return self.normal.stored(approach)
