@@ -183,7 +183,7 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     reached, on_cone = before + share * grows, force + share * way
     e = ratio(way, length)
     along, across = jnp.sum(e * on_cone, axis=0), e[0] * on_cone[1] - e[1] * on_cone[0]
-    softness = _mean_inverse(reached, held)
+    softness = mean_inverse(reached, held)
     left, ahead = jnp.exp(-(1 - share) * length * softness[0]), along >= 0
     # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
     cosine, first = jnp.where(ahead, reached + along, across), jnp.where(ahead, across, reached - along)
@@ -197,7 +197,7 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     return jnp.where(slides, held * turned, trial), told
 
 
-def _mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
+def mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
     """Mean of 1 / R over a straight way from R = first to last, (ln last - ln first) / (last - first), and its
     derivatives with respect to both; without a difference of equal numbers where they are alike."""
     both = first + last

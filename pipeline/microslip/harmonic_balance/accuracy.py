@@ -30,7 +30,7 @@ PER_HARMONIC = 8
 
 SAFETY = 3.0
 """By which the changes are multiplied. Of 102 solutions of 60 random systems (`tests/test_accuracy.py`) the error is
-covered in 101; it is a third of the estimate in the median. With 2 it would be covered in 97."""
+covered in 101; it is a third of the estimate in the median. With 2 it would be covered in 98."""
 
 FINEST = 2048
 """Samples up to which they are doubled where none lies in the phases in which a contact sticks."""
