@@ -219,3 +219,19 @@ def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> Non
     (said,) = _of_stuck_modes(b, 1e3)
     assert most > 5e-3 and f"{100 * most:.3g} %" in said
     assert not _of_stuck_modes(strips(tmp_path), 1e3)
+
+
+@pytest.mark.parametrize("normal", [1e5, 1e7])
+def test_contacts_pressed_by_a_million_times_what_moves_them(tmp_path: Path, normal: float) -> None:
+    """Forces that large round to more than the 1e-10 of the answer that a balance is found to: it is linear, so that a
+    large force changes nothing of it, at the resonance neither."""
+    b = strips(tmp_path, joint=1e7)
+    resonance = damping(b)[0][0]
+    points = [
+        [solve(p, 2 * np.pi * f, []) for f in (10.0, resonance, 54.0)] for p in (problem_of(b, n) for n in (1e3, normal))
+    ]
+    assert all(one.converged for row in points for one in row)
+    scales = [problem_of(b, n).scale for n in (1e3, normal)]
+    for stuck_, pressed in zip(*points, strict=True):
+        moved = [(one.x.reshape(3, -1) * scale)[1:] for one, scale in zip((stuck_, pressed), scales, strict=True)]
+        np.testing.assert_allclose(moved[1], moved[0], rtol=0, atol=1e-6 * np.abs(moved[0]).max())

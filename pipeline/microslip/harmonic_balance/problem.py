@@ -221,6 +221,18 @@ class AtFrequency:
         """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
         return self._stacked([view.reference for view in self.views])
 
+    @cached_property
+    def rounding(self) -> float:
+        """The rounding of forces as large as the preloads, as it may be seen in R."""
+        p, pressed = self.problem, np.zeros(self.problem.count)
+        for g in p.groups:
+            for side in (g.first, g.second):
+                if side is not None:
+                    np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
+        pressed *= p.length / p.scale
+        moved = [np.abs(one.compliance) @ pressed[s] for one, s in zip(self.views, p.slices(), strict=True)]
+        return float(np.finfo(float).eps * np.abs(np.hstack(moved) / p.scale).max(initial=0.0))
+
     def residual(self, x: Array) -> Array:
         """(size,) R alone."""
         return self.residual_of(x, self.force(x))
