@@ -8,6 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -356,7 +357,7 @@ class AtFrequency:
 
 def _harmonics(D: ComplexArray, V: Array) -> Array:
     """(W, c, ...) compliances (H + 1, c, c) of the harmonics applied to (W, c, ...)."""
-    flat = V.reshape(*V.shape[:2], -1)
+    flat = V.reshape(*V.shape[:2], math.prod(V.shape[2:]))
     out = np.empty_like(flat)
     out[0] = D[0].real @ flat[0]
     amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])

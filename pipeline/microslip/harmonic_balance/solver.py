@@ -74,8 +74,8 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
     R, fresh, history = at.residual(x), False, list[float]()
     reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
     for count in range(most):
-        size = np.clip(np.abs(x).max(), 1e-3 * reference, 1e3 * reference)
-        error = float(np.abs(R).max() / size)
+        size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
+        error = float(np.abs(R).max(initial=0.0) / size)
         history.append(error)
         if not np.isfinite(error):
             return Point(at.Omega, x, "not a number", error, count, history=tuple(history))
