@@ -126,6 +126,7 @@ def test_a_measured_body_is_drawn_by_its_points_with_the_signs_of_the_other(tmp_
     assert set(drawn) == {"mac", "pairs"}
 
 
+@pytest.mark.slow
 def test_modes_go_out_as_a_universal_file_and_come_back_as_a_test(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

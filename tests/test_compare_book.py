@@ -85,6 +85,7 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     assert "of 9 frequencies" not in out.err and "F_N = 50 N: marched" in out.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", ["", pytest.param('mode = "book"\n', marks=pytest.mark.slow)])
 def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     """A plain response and the comparison of both modes, after one another: each point is computed once."""

@@ -385,6 +385,7 @@ def test_the_temperature_solves_the_printed_implicit_equation(u, w, strength, k,
     assert len(roots) % 2 == 1 and float(curve.slip_depth(w, u)) == pytest.approx(roots[0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_branch_from_rest_is_followed_to_its_fold_and_left_there():
     """Against the printed equation, whose root is followed in small steps of w until it is gone."""
     curve, u = MonotoneSlip(Polynomial(), 1.0, 1.0, 2.0, 1.0), 1.5
@@ -400,6 +401,7 @@ def test_the_branch_from_rest_is_followed_to_its_fold_and_left_there():
     assert len(snapped) == 1 and snapped[0] == pytest.approx(0.7125, abs=0.0025)
 
 
+@pytest.mark.slow
 def test_the_slip_depth_never_falls_and_the_curve_is_odd():
     w = np.linspace(0, 3, 400)
     curve = MonotoneSlip(Polynomial(), 1.0, np.array([0.0, 0.4, 1.0])[:, None, None], 1.2, np.array([0.0, 3])[:, None])

@@ -37,6 +37,7 @@ def table(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
     """At the small end the frequency of the sticking contact, at the large end a lower one, much damped between."""
     assert main(["backbone", "case.toml"]) == 0
@@ -116,6 +117,7 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
 
 
+@pytest.mark.slow
 def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
     """The response of a sliding block is stable; growth factors of every point are in the table: 1 where sliders that
     stick came to touch their limit, which keep what they are given."""

@@ -94,6 +94,7 @@ def coarse(assembly: Assembly, harmonics: int = 5, samples: int = 128) -> Proble
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("push", "least", "most"),
     [pytest.param(30.0, 0.0, 0.01, marks=SLOW), (60.0, 0.5, 0.9), pytest.param(100.0, 0.95, 1.0, marks=SLOW)],
@@ -176,6 +177,7 @@ def test_a_steady_force_is_held_by_friction_or_named() -> None:
     assert solve(coarse(rider(60.0, 0.0)), Omega, []).converged
 
 
+@pytest.mark.slow
 def test_slow_time_rests_at_solutions_and_leads_to_them() -> None:
     """A solution is a fixed point of every step of slow time, and what is found from rest is the one of Newton's."""
     for push in (30.0, 100.0):

@@ -54,6 +54,7 @@ CASES = {
 SLOW = ("lift-off in space", "a gap that closes")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in CASES])
 def test_a_curve_is_followed_to_its_end_from_both_sides(name: str) -> None:
     """It reaches the other bound, in no more points than given, and the residual vanishes on it. Both ways meet the

@@ -168,6 +168,7 @@ def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     np.testing.assert_allclose(a.harmonics, b.harmonics, rtol=0, atol=1e-7 * np.abs(a.monitor).max())
 
 
+@pytest.mark.slow
 def test_one_harmonic_and_a_constant_force_are_the_closed_form() -> None:
     """Against `jenkins`: the sampled force converges to the closed form with the square of the step."""
     g, limit, kt = oscillator(), 0.6, 2e4
@@ -255,6 +256,7 @@ def in_time(problem: Problem, r: HarmonicResponse, steps: int) -> np.ndarray:
     return (r.contact[0] @ np.array(waves)).T - problem.groups[0].offset[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f", [17.0, 21.0])
 def test_jenkins_oscillator_against_time_integration(f: float) -> None:
     """Relative 1e-4 of the amplitude over the whole period (21 harmonics; the force has a kink)."""
@@ -296,6 +298,7 @@ def test_contact_in_space_under_a_swinging_normal_force_against_time_integration
     assert r.dissipated[0] == pytest.approx(lost, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_one_harmonic_is_not_enough() -> None:
     """What the others are for: against 21 of them one is off by more than 10 %, three by less than half of that."""
     amplitude = [abs(swinging((20.0, 8.0, 4.0), H, 2048)[1].monitor[0]) for H in (1, 3, 21)]
@@ -303,6 +306,7 @@ def test_one_harmonic_is_not_enough() -> None:
     assert error[0] > 0.1 and error[1] < 0.5 * error[0]
 
 
+@pytest.mark.slow
 def test_work_of_the_excitation_is_the_friction_along_the_slip_path() -> None:
     """Supplied less damped, of the harmonics, against force times path slid, in time; the gap closes with the step."""
     gaps = []
@@ -347,6 +351,7 @@ def test_a_body_that_only_its_contact_holds() -> None:
     assert np.abs(r.harmonics[:, 0]).min() > 1e-9  # the mean approach is not that of the preload
 
 
+@pytest.mark.slow
 def test_a_body_that_walks_away_is_no_solution() -> None:
     """Free along the tangent too: normal load and friction in phase push it on, no mean holds it. No false answer."""
     g = body(np.vstack([np.eye(3), np.zeros((3, 3))]), np.zeros(3))
@@ -358,6 +363,7 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
 
 
+@pytest.mark.slow
 def test_continuation_follows_a_contact_that_lifts_off_through_its_folds() -> None:
     """A mass pressed on a spring that cannot pull softens where it lifts off: the resonance leans over, with three
     solutions between two folds. On the curve R vanishes; at three frequencies it meets what Newton's method finds.
@@ -512,6 +518,7 @@ mu = 0.3
 """
 
 
+@pytest.mark.slow
 def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
     (tmp_path / "sole.toml").write_text(CONTACT)

@@ -180,6 +180,7 @@ def shaken(damping: float, load: float, normal: float) -> balance.Problem:
     return balance.of(replace(one, members=(Member("blade", {0: damped}),)), **{**FINE, "harmonics": 1})
 
 
+@pytest.mark.slow
 def test_envelope_encloses_every_combination() -> None:
     """Each combination against its own cold sweep, 1e-8; smallest and largest of them at every frequency."""
     f = np.linspace(50, 75, 7)

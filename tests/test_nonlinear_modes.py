@@ -49,6 +49,7 @@ def test_a_jenkins_element_against_its_closed_form():
     assert all((abs(found.amplitude - a) < 1e-9 * a).any() for a in asked)
 
 
+@pytest.mark.slow
 def test_small_motions_stick_and_large_ones_slide():
     """Two modes and eight points: the modes of both linear limits, each with its own damping."""
     problem = two_modes(4.0, harmonics=1)
@@ -78,6 +79,7 @@ def two_modes(normal, harmonics=3, force=1.0, second=55.0):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harmonics", [1, pytest.param(5, marks=pytest.mark.slow)])
 def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
     """One degree of freedom, i xi Omega M A drives its first harmonic at Omega: with one harmonic the same equations,

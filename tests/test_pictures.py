@@ -160,6 +160,7 @@ def test_every_picture_of_a_body_at_two_speeds(tmp_path: Path) -> None:
             ).mean() > 0.01  # it moves
 
 
+@pytest.mark.slow
 @needs_scenes
 def test_modes_differ_from_each_other(tmp_path: Path) -> None:
     """A window that is not drawn anew shows the same mode again and again."""

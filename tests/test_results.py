@@ -184,6 +184,7 @@ with open_journal(folder / "response.points", "abc", {{"case": "a"}}) as journal
 """
 
 
+@pytest.mark.slow
 def test_a_writer_killed_at_random_instants_leaves_readable_files(tmp_path):
     """SIGKILL four times at random: the points are 1, 2, 3, ... without a hole, the HDF5 file is whole or absent."""
     rng, reached = random.Random(8), 0

@@ -281,6 +281,7 @@ def brute_force(problem, Omega, steps, periods):
     return values[np.argsort(-abs(values))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "f", "count"),
     [
@@ -314,6 +315,7 @@ def test_a_slider_forgets_and_one_that_sticks_does_not_count():
     np.testing.assert_allclose(abs(found[:2]), np.exp(-D * omega * 2 * np.pi / Omega), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_what_a_motion_reaches_is_all_that_changes():
     """A patch of 8 points, some of which slide: the map of everything, column by column, has the same largest
     multipliers as the map on what perturbations of the motion reach; a slider that sticks all the time adds 1s, one
@@ -356,6 +358,7 @@ def test_compliance_beside_the_modes_is_that_of_a_mode_too_stiff_to_move_on_its_
 # motions in time ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("f", "stable"), [pytest.param(90.0, True, marks=pytest.mark.slow), (115.0, False)])
 def test_a_motion_that_loses_stability_by_a_multiplier_below_minus_1_repeats_every_second_period(f, stable):
     """A mass pressed on a spring that cannot pull, driven at about twice its own frequency."""

@@ -292,6 +292,7 @@ def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 2
 
 
+@pytest.mark.slow
 def test_three_masses_of_the_page(tmp_path: Path) -> None:
     """What the page shows is what its lines print."""
     sys.path.insert(0, str(ROOT / "docs"))

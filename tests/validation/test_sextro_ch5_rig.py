@@ -76,6 +76,7 @@ def test_neighbours_are_almost_rigid(first: Rig, second: Rig) -> None:
         assert all(each.bodies[side].groups[0, 0].frequency[0] > 7000 for side in ("right", "left"))
 
 
+@pytest.mark.slow
 def test_coupled_frequencies_at_780_newton(first: Rig) -> None:
     """3.5 %: the printed ones are rounded to 10 Hz, which is 4 % of the first; nothing is tuned."""
     for printed in PRINTED:
@@ -84,6 +85,7 @@ def test_coupled_frequencies_at_780_newton(first: Rig) -> None:
     assert resonance[0][0] == pytest.approx(first.result.stuck[0], rel=2e-3)  # sticks but near the edges
 
 
+@pytest.mark.slow
 def test_elastic_neighbours_are_as_good_as_the_ground(first: Rig) -> None:
     """Neighbours clamped 60 mm away lower the frequencies, by less than 0.1 %: their first one is 60 times higher."""
     settings, _ = load_case(ROOT / "pipeline/cases/blade-rough.toml", ["sweep.points=2", "sweep.normal_forces=[780]"])
@@ -94,6 +96,7 @@ def test_elastic_neighbours_are_as_good_as_the_ground(first: Rig) -> None:
         assert 0.999 * other < one < other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["first", "second"])
 def test_the_resonance_falls_with_the_normal_force(case: str, request: pytest.FixtureRequest) -> None:
     """Figs. 5.3-7 and 5.3-11: from 780 N downwards, as less of the contact touches; the friction damps."""
@@ -106,6 +109,7 @@ def test_the_resonance_falls_with_the_normal_force(case: str, request: pytest.Fi
     assert twenty.frequency[np.abs(twenty.monitor).argmax()] < hundred[0] - 1.0
 
 
+@pytest.mark.slow
 def test_both_arrangements_behave_alike(first: Rig, second: Rig) -> None:
     """The "very close behaviour": the three resonances of the second within 4 % of the first's, in the same order."""
     for one, other in zip(first.result.stuck[:3], second.result.stuck[:3], strict=True):
