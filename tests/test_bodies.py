@@ -243,7 +243,7 @@ def test_shroud_gap(tmp_path: Path) -> None:
         {"blades": 36, "chord_root": 45.0, "chord_tip": 45.0, "stagger": 10.0},
         pytest.param({"blades": 8}, marks=pytest.mark.slow),
         pytest.param({"shroud_angle": 0.0, "contact_width": 44.0}, marks=pytest.mark.slow),
-        {"shroud_angle": -30.0, "stagger": -15.0, "twist": -40.0},
+        pytest.param({"shroud_angle": -30.0, "stagger": -15.0, "twist": -40.0}, marks=pytest.mark.slow),
     ],
     ids=["36 blades", "8 blades", "no shroud angle, contact as wide as the shroud", "mirrored"],
 )
@@ -268,6 +268,7 @@ def test_same_settings_same_bytes(tmp_path: Path, body: str) -> None:
     assert (tmp_path / "a.msh").read_bytes() == (tmp_path / "b.msh").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ONE_QUICK)
 def test_length_unit_is_free(tmp_path: Path, body: str) -> None:
     """Drawn in metres, each body is the one drawn in millimetres."""

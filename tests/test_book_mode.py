@@ -255,7 +255,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, book.BookPatch]:
     return {name: book.book_patch(patch(law), strips, where=where) for name, (law, strips) in LAWS.items()}
 
 
-@pytest.mark.parametrize("name", ["rough, microslip", "strips"])
+@pytest.mark.parametrize("name", [slow("rough, microslip"), "strips"])
 def test_derivative_meets_differences(name: str, made: dict[str, book.BookPatch]) -> None:
     """Of all resultants with respect to all harmonics; the strips' springs jump where a strip begins to touch, and no
     difference is taken across that."""

@@ -375,7 +375,7 @@ def test_unwritable(parts: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals")
-@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("sign", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_stopped_half_way(parts: Path, tmp_path: Path, sign: int) -> None:
     """Stopped while meshing: the process ends at once and leaves no mesh."""
     note, out = tmp_path / "a.json", tmp_path / "a.msh"

@@ -525,6 +525,7 @@ def test_the_packages_sample_is_the_kits() -> None:
     assert path.stat().st_size < 500_000
 
 
+@pytest.mark.slow
 def test_respond_to_the_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From nothing to a friction response in one command, and the same from a copy of one's own."""
     monkeypatch.chdir(tmp_path)

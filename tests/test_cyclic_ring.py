@@ -391,7 +391,7 @@ def coupled_errors(reduction: str, count: int, stiffness: float):
 @pytest.mark.parametrize(
     ("reduction", "few", "many"),
     [
-        ("eigenmodes", 4e-2, 3e-3),
+        pytest.param("eigenmodes", 4e-2, 3e-3, marks=pytest.mark.slow),
         ("rubin", 1e-5, 1e-9),
         pytest.param("craig-bampton", 4e-3, 2e-4, marks=pytest.mark.slow),
     ],

@@ -580,6 +580,7 @@ def test_order_of_frequencies(cell_type):
     assert slope(sizes(cell_type), errors.mean(axis=1)) == pytest.approx(ORDERS[cell_type], abs=0.3)
 
 
+@pytest.mark.slow
 def test_order_of_the_mass_quadrature():
     """What four points instead of a full rule change in the mass of straight ten-node tetrahedra is of order 4 too."""
     steps = (3, 4, 6)

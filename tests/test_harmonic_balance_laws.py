@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from microslip import continuation
-from microslip.case import CaseSettings, load_case, run_case
+from microslip.case import CaseResult, CaseSettings, load_case, run_case
 from microslip.case.assemble import build
 from microslip.case.run import _not_periodic, problem_of
 from microslip.contact.friction import Coulomb, Falling
@@ -143,7 +143,7 @@ def test_linear_limit_is_modal_superposition() -> None:
     places, areas = grid(0.072, 0.005, (4, 3))
     law = PointContact(Penalty(value(3e6 / 12)), Coulomb(value(1e6)), value(1e6 / 12))
     patch = Patch("face", places, areas, law)
-    frequency = np.linspace(20, 300, 15)
+    frequency = np.linspace(20, 300, 5)
     problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=16)
     r = harmonic_response(problem, frequency, np.array([1.0]))
     K = g.K_r + g.interfaces["face"].rows.T @ problem.stiffness[0] @ g.interfaces["face"].rows
@@ -156,7 +156,7 @@ def test_linear_limit_is_modal_superposition() -> None:
     np.testing.assert_allclose(stuck(problem.parts[0][0], problem.stiffness[0]), values, rtol=1e-9)
 
 
-@pytest.mark.parametrize("scale", [0.01, 30.0])
+@pytest.mark.parametrize("scale", [pytest.param(0.01, marks=pytest.mark.slow), 30.0])
 def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     """Any k on the left side gives the same response, and the same residual up to the factor (1 + D k)."""
     g, force, watched = modes_with_rows()
@@ -282,7 +282,9 @@ def swinging(load: tuple[float, float, float], harmonics: int, samples: int) -> 
     return problem, harmonic_response(problem, np.array([22.0]), np.ones(1))
 
 
-@pytest.mark.parametrize(("load", "opens"), [((12.0, 4.0, 2.0), False), ((20.0, 8.0, 4.0), True)])
+@pytest.mark.parametrize(
+    ("load", "opens"), [pytest.param((12.0, 4.0, 2.0), False, marks=pytest.mark.slow), ((20.0, 8.0, 4.0), True)]
+)
 def test_contact_in_space_under_a_swinging_normal_force_against_time_integration(
     load: tuple[float, float, float], opens: bool
 ) -> None:
@@ -443,20 +445,29 @@ def asked(folder: Path, *replaced: tuple[str, str]) -> CaseSettings:
     return load_case(folder / "case.toml")[0]
 
 
-def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(tmp_path: Path) -> None:
+FEW = ("start = 35.0\nstop = 200.0\npoints = 25", "start = 45.0\nstop = 136.0\npoints = 8")
+"""A band in which nothing takes long."""
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> CaseResult:
+    return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled(), "case.toml")
+
+
+def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(answered: CaseResult, tmp_path: Path) -> None:
     """Pressed by 1e5 N both are the same springs, if the closed form is given the width and height whose rotational
     stiffness is that of four by two points: (1 - 1/n^2) of a uniform patch (errata to 5.2-40/41)."""
-    result = run_case(asked(tmp_path), sled(), "case.toml")
+    result = answered
     narrow = f"width = {0.06 * np.sqrt(1 - 1 / 16)}\nheight = {0.03 * np.sqrt(1 - 1 / 4)}"
     linear = ('law = "smooth"\n', ""), ("points = [4, 2]\n", ""), ("width = 0.06\nheight = 0.03", narrow)
-    closed = run_case(asked(tmp_path, *linear), sled(), "case.toml")
+    closed = run_case(asked(tmp_path, FEW, *linear), sled(), "case.toml")
     assert all(r.converged.all() for r in result.responses.values())
     np.testing.assert_allclose(result.responses[1e5].monitor, closed.responses[1e5].monitor, rtol=1e-8)
     np.testing.assert_allclose(result.stuck, closed.stuck, rtol=1e-8)
 
 
-def test_a_case_with_a_law_slides_and_its_table_says_how(tmp_path: Path) -> None:
-    result = run_case(asked(tmp_path), sled(), "case.toml")
+def test_a_case_with_a_law_slides_and_its_table_says_how(answered: CaseResult) -> None:
+    result = answered
     loose = result.responses[5.0]
     assert isinstance(loose, HarmonicResponse) and loose.slipping.max() > 0.3
     assert np.abs(loose.monitor).max() < np.abs(result.responses[1e5].monitor).max()
@@ -523,8 +534,8 @@ def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
     (tmp_path / "sole.toml").write_text(CONTACT)
     own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
-    settings = asked(tmp_path, own)
-    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path)))
+    settings = asked(tmp_path, own, FEW)
+    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path, FEW)))
     for normal, r in by_case.responses.items():
         np.testing.assert_allclose(by_file.responses[normal].monitor, r.monitor, rtol=1e-9)
     assert by_case.responses[5.0].slipping.max() > 0.3

@@ -134,6 +134,7 @@ def test_frequencies_that_no_stiffness_gives_are_told(basis: ModalBasis) -> None
 # ---------------------------------------------------------------- resonance over engine order
 
 
+@pytest.mark.slow
 def test_resonances_over_engine_order_are_those_of_the_stuck_ring() -> None:
     """Pressed hard, so that contacts only stick: each order's peak is that of the linear sector, searched for on a
     grid of a millionth; amplitudes to 1e-6, orders beyond N/2 like those that alias onto them."""

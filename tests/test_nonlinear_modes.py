@@ -34,11 +34,14 @@ def sliding(harmonics=1, samples=1024, ratio=0.02, force=1.0):
     )  # fmt: skip
 
 
-def test_a_jenkins_element_against_its_closed_form():
+@pytest.mark.parametrize(
+    ("low", "high", "sizes"), [(2e-5, 1e-4, [1.5]), pytest.param(3e-6, 3e-3, [0.5, 1.5, 3, 10], marks=pytest.mark.slow)]
+)
+def test_a_jenkins_element_against_its_closed_form(low, high, sizes):
     """One harmonic, A > limit: with theta = acos(1 - 2 / A), c = (theta - sin(2 theta)/2)/pi, b = 4 (A - 1)/(pi A^2)
     (errata to chapter 5): omega^2 = k + kt c and 2 zeta omega = 2 D omega_0 + kt b / omega."""
-    asked = 3e-5 * np.array([0.5, 1.5, 3.0, 10.0])
-    found = backbone(sliding(), 3e-6, 3e-3, asked=asked)
+    asked = 3e-5 * np.array(sizes)
+    found = backbone(sliding(), low, high, asked=asked)
     assert found.complete and found.stuck == pytest.approx(np.sqrt(3e4))
     A = np.maximum(found.amplitude / 3e-5, 1.0)
     theta = np.arccos(1 - 2 / A)

@@ -281,26 +281,26 @@ def brute_force(problem, Omega, steps, periods):
     return values[np.argsort(-abs(values))]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("problem", "f", "count"),
+    ("problem", "f", "count", "steps"),
     [
-        pytest.param(sliding(), 17.0, 2, marks=pytest.mark.slow),
-        (sliding(), 15.0, 2),
-        pytest.param(swinging((12.0, 4, 2)), 22.0, 6, marks=pytest.mark.slow),
-        (swinging((20.0, 8, 4)), 22.0, 6),
+        pytest.param(sliding(), 17.0, 2, (2048, 8192, 60), marks=pytest.mark.slow),
+        (sliding(), 15.0, 2, (2048, 2048, 40)),
+        pytest.param(sliding(), 15.0, 2, (2048, 8192, 60), marks=pytest.mark.slow),
+        pytest.param(swinging((12.0, 4, 2)), 22.0, 6, (2048, 8192, 60), marks=pytest.mark.slow),
+        pytest.param(swinging((20.0, 8, 4)), 22.0, 6, (2048, 8192, 60), marks=pytest.mark.slow),
     ],
-    ids=["turning", "decaying", "space", "space and lift-off"],
+    ids=["turning", "decaying, few steps", "decaying", "space", "space and lift-off"],
 )
-def test_multipliers_with_memory_against_brute_force(problem, f, count):
+def test_multipliers_with_memory_against_brute_force(problem, f, count, steps):
     """Two ways that share the law alone: the other is the motion in time, its map differentiated by differences.
 
     Both err by about the step where a contact changes between stick and slip between two samples, and the 21
     harmonics say when it opens to about 1e-4 of the period, during which a stiff contact turns the motion.
     """
     Omega = 2 * np.pi * f
-    found = stability(solved(problem, Omega), Settings(steps=2048))
-    exact = brute_force(problem, Omega, 8192, 60)
+    found = stability(solved(problem, Omega), Settings(steps=steps[0]))
+    exact = brute_force(problem, Omega, *steps[1:])
     ways = (np.sort_complex(np.round(v[:count], 9)) for v in (found.multipliers, exact))
     np.testing.assert_allclose(*ways, rtol=0, atol=3e-3)
     assert found.stable and found.growth < 1
