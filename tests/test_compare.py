@@ -154,7 +154,7 @@ def test_points_beside_the_mesh_go_to_the_nearest_nodes() -> None:
     ("words", "says"),
     [
         (["--speed", "2"], "has no speed 2"),
-        (["--nodal-diameter", "1"], "nodal diameter 1"),
+        pytest.param(["--nodal-diameter", "1"], "nodal diameter 1", marks=pytest.mark.slow),
         (["--least", "2"], "a MAC lies between 0 and 1"),
     ],
 )

@@ -129,6 +129,7 @@ def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
     assert np.isfinite(told).all() and np.quantile(wrong, 0.999) < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [(2.0, 1.0), (1.3, 0.9)], ids=["slides", "sticks twice"])
 def test_on_an_ellipse_the_force_is_of_second_order_in_the_samples(axes) -> None:
     """Against the orbit's own tables (Sextro 5.2-15 to 5.2-30), made otherwise; 0.3 % of the limit with 64 samples."""

@@ -49,6 +49,23 @@ def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
         assert len(rows) > 10 and f[-1] < 0.9 * f[0] and d.max() > 5 * d[0]
 
 
+def test_backbone_and_stability_of_one_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The frequency falls where it slides; a response that sticks is stable."""
+    monkeypatch.chdir(tmp_path)
+    write_basis(tmp_path / "basis.h5", sled())
+    one = CASE.replace("points = [4, 2]", "points = [1, 1]").replace("harmonics = 2", "harmonics = 1")
+    one = one.replace("points = 25", "points = 3").replace("[5.0, 1e5]", "[40.0]").replace("samples = 32", "samples = 16")
+    (tmp_path / "case.toml").write_text(one)
+    assert main(["respond", "case.toml", "--stability", "-q"]) == 0
+    rows = table("stability.csv")
+    assert len(rows) >= 3 and all(r["stable"] == "1" and 0 < float(r["growth"]) <= 1 for r in rows)
+    assert main(["backbone", "case.toml", "-q"]) == 0
+    f = [float(r["frequency_Hz"]) for r in table("backbone.csv")]
+    assert len(f) > 5 and f[-1] < 0.9 * f[0]
+
+
 @pytest.mark.slow
 def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> None:
     """Lower than at both neighbours, which are solved for themselves by another way: the sweep's refined peaks."""

@@ -222,6 +222,7 @@ def count(points: Path) -> int:
         return 0
 
 
+@pytest.mark.slow
 def test_another_normal_force_adds_and_another_friction_begins_anew(folder: Path) -> None:
     few = CASE.replace("points = 9", "points = 3")
     (folder / "case.toml").write_text(few)

@@ -55,6 +55,7 @@ def test_sticking_frequencies(blade):
         assert np.abs(result.stuck / printed - 1).min() < 0.035
 
 
+@pytest.mark.slow
 def test_friction_lowers_the_first_peak_and_its_frequency(blade):
     """Fig. 5.3-7: with falling normal force the resonance frequency falls; there is an optimum of the amplitude."""
     settings, _ = load_case(
