@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
+import runpy
+import signal
 import subprocess
 import sys
 import tomllib
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -32,14 +36,37 @@ def meshing(body: str) -> dict:
     return tomllib.loads((GEOMETRY / body / "body.toml").read_text())["mesh"]
 
 
-def build(body: str, out: Path, mesh: dict | None = None, **changes: object) -> subprocess.CompletedProcess[str]:
-    """Run the build file in its own process on the parameters of body.toml with changes."""
+def drawn(script: Path, source: Path, out: Path, apart: bool = False) -> subprocess.CompletedProcess[str]:
+    """What a build file says and returns: in this process, which has gmsh at hand, or apart in one of its own."""
+    words = [str(script), str(source), str(out)]
+    if apart:
+        return subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120)
+    from microslip.cad import drawing
+
+    told, said, code = io.StringIO(), io.StringIO(), 0
+    before, handler = sys.argv, signal.getsignal(signal.SIGINT)
+    sys.argv = words
+    drawing.warnings.clear()
+    try:
+        with redirect_stdout(told), redirect_stderr(said):
+            runpy.run_path(words[0], run_name="__main__")
+    except SystemExit as end:
+        code = int(end.code or 0)
+    finally:
+        sys.argv = before
+        signal.signal(signal.SIGINT, handler)
+    return subprocess.CompletedProcess(words, code, told.getvalue(), said.getvalue())
+
+
+def build(
+    body: str, out: Path, mesh: dict | None = None, apart: bool = False, **changes: object
+) -> subprocess.CompletedProcess[str]:
+    """Run the build file on the parameters of body.toml with changes."""
     mesh = mesh or COARSE.get(body) or meshing(body)
     settings = {"geometry": {"parameters": parameters(body, **changes)}, "mesh": mesh}
     source = out.with_suffix(".json")
     source.write_text(json.dumps(settings))
-    command = [sys.executable, str(GEOMETRY / body / "build.py"), str(source), str(out)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return drawn(GEOMETRY / body / "build.py", source, out, apart)
 
 
 def made(body: str, folder: Path, **changes: object) -> Mesh:

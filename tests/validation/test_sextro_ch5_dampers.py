@@ -122,6 +122,7 @@ def test_coupling_raises_the_resonance_with_the_normal_force(element) -> None:
     assert (np.diff(at) > 0).all()
 
 
+@pytest.mark.slow
 def test_resonances_rise_with_the_engine_order_up_to_three(bases) -> None:
     """Fig. 5.5-7: sticking pins, engine orders 0 to 3. Beyond, the book goes on rising and this ring does not."""
     built = study.opened("damping-element", bases)
