@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -41,6 +42,11 @@ def drawn(script: Path, source: Path, out: Path, apart: bool = False) -> subproc
     words = [str(script), str(source), str(out)]
     if apart:
         return subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120)
+    return here(words, lambda: runpy.run_path(words[0], run_name="__main__"))
+
+
+def here(words: list[str], work: Callable[[], object]) -> subprocess.CompletedProcess[str]:
+    """What a program of gmsh's says and returns, in this process."""
     from microslip.cad import drawing
 
     told, said, code = io.StringIO(), io.StringIO(), 0
@@ -49,7 +55,7 @@ def drawn(script: Path, source: Path, out: Path, apart: bool = False) -> subproc
     drawing.warnings.clear()
     try:
         with redirect_stdout(told), redirect_stderr(said):
-            runpy.run_path(words[0], run_name="__main__")
+            work()
     except SystemExit as end:
         code = int(end.code or 0)
     finally:

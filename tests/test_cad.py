@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn import here
 
 from microslip.mesh import mesh_problems, read_mesh
 
@@ -119,7 +120,9 @@ def mesh_cad(cad, out, faces=(), unit="mm", folder=".", **mesh):
     }
     note = out.with_suffix(".json")
     note.write_text(json.dumps(settings))
-    return python("-m", "microslip.cad", str(note), str(out))
+    from microslip.cad.__main__ import main
+
+    return here(["microslip.cad", str(note), str(out)], lambda: main([str(note), str(out)]))
 
 
 def meshed(cad, out, faces=(), unit="mm", **mesh):
