@@ -185,7 +185,10 @@ def rubbing(phase: float, push: float, friction: float) -> Assembly:
     return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.watches)
 
 
-@pytest.mark.parametrize(("push", "friction", "state"), [pytest.param(0.3, 0.05, "partial slip", marks=pytest.mark.slow), (0.2, 0.05, "stuck")])
+@pytest.mark.parametrize(
+    ("push", "friction", "state"),
+    [pytest.param(0.3, 0.05, "partial slip", marks=pytest.mark.slow), (0.2, 0.05, "stuck")],
+)
 def test_the_phase_of_all_loads_turns_the_answer_and_nothing_else(push: float, friction: float, state: str) -> None:
     """By 8 of 64 samples: 1e-10. Points that slip forget where their marching began, and those that never slipped
     remember nothing else than the preloaded place. A state that sticks loses nothing, and not what rounding leaves."""

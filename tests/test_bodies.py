@@ -135,7 +135,9 @@ def test_pendulum_hinge_leaves_the_rotation(pendulum: Mesh, held: tuple[int, ...
 # ---------------------------------------------------------------- shroud
 
 
-@pytest.fixture(scope="module", params=[{}, pytest.param(DESIGN_2, marks=pytest.mark.slow)], ids=["design 1", "design 2"])
+@pytest.fixture(
+    scope="module", params=[{}, pytest.param(DESIGN_2, marks=pytest.mark.slow)], ids=["design 1", "design 2"]
+)
 def shroud(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Mesh]:
     mesh = made("shroud", tmp_path_factory.mktemp("shroud"), **request.param)
     return parameters("shroud", **request.param), mesh

@@ -261,7 +261,7 @@ MISTAKES = [
     (["check", "zero.h5"], "zero.h5"),
     (["check", "other.h5"], "other.h5"),
     (["check", "cut.h5"], "cut.h5"),
-    (["report", "cut.h5"], "cut.h5"),
+    pytest.param(["report", "cut.h5"], "cut.h5", marks=pytest.mark.slow),
     (["info", "gone.step"], "there is no such file"),
     (["info", "cut.msh"], "cut.msh"),
     (["info", "zero.h5"], "zero.h5"),

@@ -56,7 +56,8 @@ def test_backbone_and_stability_of_one_point(
     monkeypatch.chdir(tmp_path)
     write_basis(tmp_path / "basis.h5", sled())
     one = CASE.replace("points = [4, 2]", "points = [1, 1]").replace("harmonics = 2", "harmonics = 1")
-    one = one.replace("points = 25", "points = 3").replace("[5.0, 1e5]", "[40.0]").replace("samples = 32", "samples = 16")
+    one = one.replace("points = 25", "points = 3").replace("[5.0, 1e5]", "[40.0]")
+    one = one.replace("samples = 32", "samples = 16")
     one = one.replace("start = 35.0\nstop = 200.0", "start = 60.0\nstop = 100.0")
     (tmp_path / "case.toml").write_text(one)
     assert main(["respond", "case.toml", "--stability", "-q"]) == 0

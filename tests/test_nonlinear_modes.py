@@ -35,7 +35,8 @@ def sliding(harmonics=1, samples=1024, ratio=0.02, force=1.0):
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "sizes"), [(2.5e-5, 5e-5, [1.5]), pytest.param(3e-6, 3e-3, [0.5, 1.5, 3, 10], marks=pytest.mark.slow)]
+    ("low", "high", "sizes"),
+    [(2.5e-5, 5e-5, [1.5]), pytest.param(3e-6, 3e-3, [0.5, 1.5, 3, 10], marks=pytest.mark.slow)],
 )
 def test_a_jenkins_element_against_its_closed_form(low, high, sizes):
     """One harmonic, A > limit: with theta = acos(1 - 2 / A), c = (theta - sin(2 theta)/2)/pi, b = 4 (A - 1)/(pi A^2)

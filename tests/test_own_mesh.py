@@ -68,7 +68,9 @@ def frequencies(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("name", ["c.unv", *(pytest.param(n, marks=pytest.mark.slow) for n in ("b.msh", "d.inp", "e.med"))])
+@pytest.mark.parametrize(
+    "name", ["c.unv", *(pytest.param(n, marks=pytest.mark.slow) for n in ("b.msh", "d.inp", "e.med"))]
+)
 def test_every_format_gives_the_same_frequencies(frequencies, name):
     """1e-6: the formats print different numbers of digits."""
     assert frequencies(name) == pytest.approx(frequencies("a.msh"), rel=1e-6)

@@ -184,7 +184,10 @@ def test_curves_need_no_3d(tmp_path: Path) -> None:
     assert sorted(found) == ["campbell", "compliance"]
 
 
-@pytest.mark.parametrize(("count", "speeds"), [(1, (0.0,)), (2, (0.0, 3000.0)), pytest.param(14, (0.0,), marks=pytest.mark.slow), (14, (0.0, 3000.0))])
+@pytest.mark.parametrize(
+    ("count", "speeds"),
+    [(1, (0.0,)), (2, (0.0, 3000.0)), pytest.param(14, (0.0,), marks=pytest.mark.slow), (14, (0.0, 3000.0))],
+)
 def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[float, ...], tmp_path: Path) -> None:
     from PIL import Image
 

@@ -267,7 +267,7 @@ SLIDES = ("amplitude=20.0", "sweep.points=5")
 
 @pytest.mark.parametrize(
     "more",
-    [pytest.param(('mode="book"',), marks=pytest.mark.slow), (), pytest.param(("harmonics=3",), marks=pytest.mark.slow)],
+    [*(pytest.param(m, marks=pytest.mark.slow) for m in (('mode="book"',), ("harmonics=3",))), ()],
 )
 def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
     """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J a cycle, single
