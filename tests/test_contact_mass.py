@@ -106,7 +106,7 @@ def test_the_equation_itself_tends_to_the_return_map() -> None:
 # the steps solve the equation ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("printed", [False, True])
+@pytest.mark.parametrize("printed", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("motion", [all_three, pytest.param(shaken, marks=pytest.mark.slow)], ids=["3.7-7", "shaken"])
 def test_steps_converge_to_the_integrated_equation(motion, printed) -> None:
     """Implicit Euler: first order in the step, through stick, slip and separation."""
@@ -141,7 +141,7 @@ def test_friction_of_the_integrated_course_is_the_smoothed_law() -> None:
     assert np.allclose(found.friction[closed], (expected[:, None] * found.velocity)[closed], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0])
+@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_heated_friction_sees_the_normal_force_and_not_that_over_the_share(share) -> None:
     """Slid steadily at a half and at all of the area: mu_0/(1 + p N v) N, by steps and by integration."""
     motion = pulled_half if share == 0.5 else pulled

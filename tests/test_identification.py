@@ -157,6 +157,7 @@ def test_resonances_over_engine_order_are_those_of_the_stuck_ring() -> None:
     assert found.stuck[0] == pytest.approx(found.frequency[0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_band_without_a_resonance_says_so() -> None:
     one = sector(6, 1, normal=1e4, push=1.0)
 

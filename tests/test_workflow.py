@@ -70,7 +70,9 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "old", "new", "made"),
     [
-        pytest.param("case.toml", "normal_forces = [1.0, 100.0]", "normal_forces = [1.0, 90.0]", {RESPONSE}, marks=SLOW),
+        pytest.param(
+            "case.toml", "normal_forces = [1.0, 100.0]", "normal_forces = [1.0, 90.0]", {RESPONSE}, marks=SLOW
+        ),
         ("case.toml", "friction = 0.3", "friction = 0.31", {RESPONSE}),
         ("body.toml", "density = 7850.0", "density = 7800.0", {BASIS, RESPONSE}),
         pytest.param("body.toml", "count = 6", "count = 5", {BASIS, RESPONSE}, marks=SLOW),
