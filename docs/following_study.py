@@ -95,7 +95,8 @@ def mode(axes: Any) -> None:
     other.semilogx(1e6 * found.amplitude, 100 * found.damping, color=GREY, lw=1.4)
     other.set_ylabel("damping ratio in %", color=GREY)
     other.spines[["top"]].set_visible(False)
-    peaks = [resonance(highest(rubbing(10.0, F), 2 * np.pi * np.linspace(28, 50, 45))) for F in (0.3, 1, 2, 3, 4)]
+    band = 2 * np.pi * np.linspace(28, 50, 45)
+    peaks = [resonance(highest(rubbing(10.0, F), band)[0]) for F in (0.3, 1, 2, 3, 4)]
     good = [p for p in peaks if p.status == "converged"]
     axes.plot([1e6 * p.amplitude for p in good], [p.Omega / (2 * np.pi) for p in good], "o", color=RED, ms=5,
               label="peaks of forced responses")  # fmt: skip
@@ -104,11 +105,11 @@ def mode(axes: Any) -> None:
 
 
 def valley(axes: Any) -> None:
-    """The highest resonance over the normal force: followed, and sweeps to compare with."""
+    """The highest resonance over the normal force: peaks on the curve, and sweeps to compare with."""
     band = 2 * np.pi * np.linspace(28, 48, 41)
     best = optimum(rubbing, [3.8, 5.0, 8.0, 14.0], band)
-    ridge = best.ridges[0]
-    axes.plot(ridge.parameter, 1e6 * np.sqrt(ridge.value), "o", color=BLUE, ms=5, label="followed")
+    tops = [1e6 * one.amplitude for one in best.found.values()]
+    axes.plot(list(best.found), tops, "o", color=BLUE, ms=5, label="peaks")
     axes.plot(best.parameter, 1e6 * best.resonance.amplitude, "o", ms=11, mfc="none", mec=RED, mew=1.8, label="optimum")
     forces = np.geomspace(3.8, 14, 21)
     swept = []

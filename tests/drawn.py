@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import json
-import runpy
-import signal
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import run
 
 from microslip.data import Mesh
 from microslip.mesh import mesh_problems, read_mesh
@@ -38,30 +34,11 @@ def meshing(body: str) -> dict:
 
 
 def drawn(script: Path, source: Path, out: Path, apart: bool = False) -> subprocess.CompletedProcess[str]:
-    """What a build file says and returns: in this process, which has gmsh at hand, or apart in one of its own."""
+    """What a build file says and returns, in a process of its own: a new one, or one that has gmsh at hand."""
     words = [str(script), str(source), str(out)]
     if apart:
         return subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120)
-    return here(words, lambda: runpy.run_path(words[0], run_name="__main__"))
-
-
-def here(words: list[str], work: Callable[[], object]) -> subprocess.CompletedProcess[str]:
-    """What a program of gmsh's says and returns, in this process."""
-    from microslip.cad import drawing
-
-    told, said, code = io.StringIO(), io.StringIO(), 0
-    before, handler = sys.argv, signal.getsignal(signal.SIGINT)
-    sys.argv = words
-    drawing.warnings.clear()
-    try:
-        with redirect_stdout(told), redirect_stderr(said):
-            work()
-    except SystemExit as end:
-        code = int(end.code or 0)
-    finally:
-        sys.argv = before
-        signal.signal(signal.SIGINT, handler)
-    return subprocess.CompletedProcess(words, code, told.getvalue(), said.getvalue())
+    return run(words)
 
 
 def build(

@@ -11,6 +11,7 @@ from small import basis as small_basis
 
 from microslip.assessment import (
     Assessment,
+    _ranges,
     assess,
     draw,
     families,
@@ -211,3 +212,12 @@ def test_long_sweeps_are_drawn_by_some_of_their_points() -> None:
     assert 400 < len(chosen) < 445 and {0, 1214, 1234, 1254, 4999} <= set(chosen)
     short = Series("a", {}, np.arange(300.0), ("converged",) * 300, {})
     assert len(drawn_points(short)) == 300
+
+
+def test_the_stress_of_another_mode_is_not_that_of_a_resonance():
+    """Two resonances, at points 2 and 9; the stress between them is lowest at 5, the read-out (not asked) near 8, where
+    the second one stresses the body more than the first does anywhere. Points 4 and 7 are not drawn, 6 is not known."""
+    stress = np.array([1.0, 3, 5, 3, 2, 1, 9, 4, 8, 9, 7])
+    chosen, known = np.array([0, 1, 2, 3, 5, 6, 8, 9, 10]), np.arange(11) != 6
+    ranges = _ranges(stress[chosen], chosen, known, np.array([2, 9]))
+    assert [list(r) for r in ranges] == [[0, 1, 2, 3, 4, 5], [5, 7, 8, 9, 10]]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import here
+from processes import run
 
 from microslip.mesh import mesh_problems, read_mesh
 
@@ -120,9 +120,7 @@ def mesh_cad(cad, out, faces=(), unit="mm", folder=".", **mesh):
     }
     note = out.with_suffix(".json")
     note.write_text(json.dumps(settings))
-    from microslip.cad.__main__ import main
-
-    return here(["microslip.cad", str(note), str(out)], lambda: main([str(note), str(out)]))
+    return run(["microslip.cad", str(note), str(out)], module=True)
 
 
 def meshed(cad, out, faces=(), unit="mm", **mesh):

@@ -85,7 +85,7 @@ def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> No
 
 @pytest.mark.slow
 def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C at the second normal force, the second peak, the third point: the rows before it are in the table."""
+    """Ctrl-C at the second normal force, the third value, the third point: the rows before it are in the table."""
 
     def stop_at(words: str, *names: str) -> list[str]:
         said: list[str] = []
@@ -106,17 +106,16 @@ def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyP
     assert main(["respond", "case.toml", "-q"]) == 0
     stop_at("3 of ", "stability")
     assert len(table("stability.csv")) == 2
-    peaks = 0
+    begun = []
 
-    def second(text: str) -> None:
-        nonlocal peaks
-        peaks += text.startswith("peak 1 at ")
-        if peaks == 3:
+    def third(text: str) -> None:
+        begun.extend([text] if text.startswith("highest resonance at ") and ":" not in text else [])
+        if len(begun) == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        following.optimum_over(cli._followed(Path("case.toml"), None, ()), points=4, report=second)
-    assert [r["what"] for r in table("optimum.csv")] == ["peak 1", "peak 1"]
+        following.optimum_over(cli._followed(Path("case.toml"), None, ()), points=4, report=third)
+    assert [r["what"] for r in table("optimum.csv")] == ["highest resonance"] * 2
 
 
 def test_no_optimum_says_where_to_look(capsys: pytest.CaptureFixture[str]) -> None:

@@ -222,3 +222,17 @@ def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> Non
     (said,) = _of_stuck_modes(b, 1e3)
     assert most > 5e-3 and f"{100 * most:.3g} %" in said
     assert not _of_stuck_modes(strips(tmp_path), 1e3)
+
+
+@pytest.mark.parametrize("normal", [1e5, 1e7])
+def test_contacts_pressed_by_a_million_times_what_moves_them(tmp_path: Path, normal: float) -> None:
+    """Forces that large round to more than the 1e-10 of the answer that a balance is found to: it is linear, so that a
+    large force changes nothing of it, at the resonance neither."""
+    b = strips(tmp_path, joint=1e7)
+    resonance = damping(b)[0][0]
+    problems = [problem_of(b, one) for one in (1e3, normal)]
+    for f in (10.0, resonance, 54.0):
+        points = [solve(p, 2 * np.pi * f, []) for p in problems]
+        assert all(one.converged for one in points)
+        little, much = (p.displacement(one.x)[1:] for p, one in zip(problems, points, strict=True))
+        np.testing.assert_allclose(much, little, rtol=0, atol=1e-6 * np.abs(little).max())

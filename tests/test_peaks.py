@@ -15,8 +15,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.continuation import Lowest, Peak, Ridge, Settings, lowest, peak, ridge
-from microslip.following import told
+from microslip.continuation import NO_OPTIMUM, Settings, lowest, peak, rated
+from microslip.following import missed, told
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
@@ -141,34 +141,33 @@ def test_without_a_peak_the_end_is_told():
 # over a parameter -----------------------------------------------------------------------------------------------------
 
 
+def climbing(family, x, lam):
+    """value -> the peak of the family uphill from a guess, with its rate."""
+    return lambda p: rated(family, p, peak(family(p), np.array(x), lam))
+
+
 def test_optimal_damping_of_a_relaxing_spring():
     """All curves pass through one point, Omega^2 = 1 + N/2 and |a| = 2/N; the best peak is the one that lies
-    there. Followed from little to much damping through the valley, not swept."""
-    family = relaxing
-    first = peak(family(0.2), np.array([1.0, -1.0]), 1.0)
-    assert first.converged
-    path = ridge(family, first, np.geomspace(0.2, 8.0, 9))
-    best = lowest(family, path, tolerance=1e-8)
-    assert path.status == "complete" and best.status == "converged"
-    assert np.sqrt(best.peak.value) == pytest.approx(1.0, rel=1e-9) and best.peak.lam**2 == pytest.approx(2.0, rel=1e-7)
-    assert best.parameter == pytest.approx(2.0 / np.sqrt(1 + 2.0 / 2), rel=1e-6)  # N / sqrt(1 + N/2)
-    assert best.evaluations < 300
+    there."""
+    best = lowest(climbing(relaxing, [1.0, -1.0], 1.0), np.geomspace(0.2, 8.0, 5), tolerance=1e-10)
+    assert best.status == "converged"
+    assert np.sqrt(best.peak.value) == pytest.approx(1.0, rel=1e-9) and best.peak.lam**2 == pytest.approx(2.0, rel=1e-4)
+    assert best.parameter == pytest.approx(2.0 / np.sqrt(1 + 2.0 / 2), rel=1e-4)  # N / sqrt(1 + N/2)
+    few = lowest(climbing(relaxing, [1.0, -1.0], 1.0), np.geomspace(0.2, 8.0, 5))
+    assert few.status == "converged" and len(few.found) <= 5 + 5 and few.peak.value < 1 + 1e-5
 
 
 def test_rates_are_the_derivative_of_the_peaks_height():
-    first = peak(jenkins(0.9), np.array([0.1, -1.0]), 1.2)
-    path = ridge(jenkins, first, [0.9, 1.0, 1.2])
-    assert path.status == "complete" and all(one.converged for one in path.peaks)
-    for p, one in zip(path.parameter, path.peaks, strict=True):
-        sides = [ridge(jenkins, one, [p, p * (1 + s)]).value[-1] for s in (1e-4, -1e-4)]
-        assert one.rate == pytest.approx(np.log(sides[0] / sides[1]) / (2e-4 * p), rel=1e-5)
+    for p in (0.9, 1.0, 1.2):
+        at = climbing(jenkins, [0.1, -1.0], 1.2)
+        sides = [at(p * (1 + s)).value for s in (1e-4, -1e-4)]
+        assert at(p).rate == pytest.approx(np.log(sides[0] / sides[1]) / (2e-4 * p), rel=1e-5)
 
 
 def test_optimal_friction_against_brute_force():
-    """The peak of a Jenkins element over its limit: followed to its lowest place, and the largest amplitude at which
-    any frequency has a solution, amplitude by amplitude, limit by limit."""
-    first = peak(jenkins(0.9), np.array([0.1, -1.0]), 1.2)
-    best = lowest(jenkins, ridge(jenkins, first, np.linspace(0.9, 2.2, 6)))
+    """The peak of a Jenkins element over its limit: its lowest place, and the largest amplitude at which any frequency
+    has a solution, amplitude by amplitude, limit by limit."""
+    best = lowest(climbing(jenkins, [0.1, -1.0], 1.2), np.linspace(0.9, 2.2, 4), tolerance=1e-7)
 
     def highest(p):  # of all frequencies, by a fine sweep of the explicit curve w(A)
         A = np.linspace(p * (1 + 1e-9), 20.0, 100_001)
@@ -186,7 +185,6 @@ def test_optimal_friction_against_brute_force():
     assert best.status == "converged"
     assert np.sqrt(best.peak.value) == pytest.approx(exact.fun, rel=1e-6)
     assert best.parameter == pytest.approx(exact.x, rel=1e-3)  # flat there: 1e-6 of the height is 1e-3 of the place
-    assert best.evaluations < 300
 
 
 @dataclass(frozen=True)
@@ -200,30 +198,55 @@ class Hill(Roof):
 
 
 def hills(height):
-    """Hills of a height that depends on p, followed from 1 to 6, and the family."""
+    """value -> the top of a hill of a height that depends on it."""
 
     def family(p):
         return Hill(p, height=height)
 
-    first = peak(family(1.0), np.array([height(1.0) - 0.09]), 0.7)
-    return ridge(family, first, np.linspace(1.0, 6.0, 6)), family
+    return lambda p: rated(family, p, peak(family(p), np.array([height(p) - 0.09]), 0.7))
+
+
+VALUES = np.linspace(1.0, 6.0, 6)
 
 
 def test_a_kink_that_an_end_beats_is_no_optimum():
     """Falling all the way but for a nick between the first two values, where the derivative changes its sign."""
-    path, family = hills(lambda p: 2 - 0.01 * p + 0.03 * abs(p - 1.4) * (p < 2.2))
-    best = lowest(family, path)
-    assert path.rate[0] < 0 < path.rate[1] and path.status == "complete"
-    assert best.parameter == 6.0 and best.status.startswith("no optimum between the ends")
+    best = lowest(hills(lambda p: 2 - 0.01 * p + 0.03 * abs(p - 1.4) * (p < 2.2)), VALUES)
+    assert best.parameter == 6.0 and best.status == NO_OPTIMUM
+
+
+def test_a_valley_beside_an_end_is_found():
+    """Lowest of the values is the first one, from which the height falls on."""
+    best = lowest(hills(lambda p: 2 + 0.1 * (p - 1.2) ** 2), VALUES, tolerance=1e-9)
+    assert best.status == "converged" and best.parameter == pytest.approx(1.2, abs=1e-4)
 
 
 @pytest.mark.parametrize("phase", np.linspace(0, 6, 7))
-def test_no_followed_peak_is_lower_than_the_optimum(phase):
+def test_no_peak_that_was_found_is_lower_than_the_optimum(phase):
     """A shallow valley at 3.4 under ripples of the same size, as contacts that switch point by point make them."""
-    path, family = hills(lambda p: 2 + 0.01 * (p - 3.4) ** 2 + 0.004 * np.sin(17 * p + phase))
-    best = lowest(family, path)
+    best = lowest(hills(lambda p: 2 + 0.01 * (p - 3.4) ** 2 + 0.004 * np.sin(17 * p + phase)), VALUES)
     assert best.status in ("converged", "kink")
-    assert best.peak.value <= path.value.min() and 2 < best.parameter < 5
+    assert best.peak.value == min(one.value for one in best.found.values()) and 2 < best.parameter < 5
+    assert set(VALUES) < set(best.found)
+
+
+def test_a_kink_is_found_in_few_steps():
+    """Two straight lines meet where their tangents say."""
+    best = lowest(hills(lambda p: 2 + max(0.3 * (2.7 - p), 0.7 * (p - 2.7))), VALUES)
+    assert best.status == "kink" and best.parameter == pytest.approx(2.7, abs=1e-6) and len(best.found) <= 8
+
+
+def test_a_value_without_a_peak_is_passed_over():
+    """The third of the values has none; the valley between its neighbours is found all the same."""
+    at = hills(lambda p: 2 + 0.1 * (p - 3.3) ** 2)
+
+    def highest_but_one(p):
+        return replace(at(p), status="no resonance in the band") if p == 3.0 else at(p)
+
+    best = lowest(highest_but_one, VALUES, tolerance=1e-9)
+    assert best.parameter == pytest.approx(3.3, abs=1e-4) and not best.found[3.0].converged
+    nothing = lowest(lambda p: replace(at(p), status="no resonance in the band"), VALUES)
+    assert nothing.status == "no resonance in the band"
 
 
 # with contacts --------------------------------------------------------------------------------------------------------
@@ -278,8 +301,8 @@ def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     """Against a golden-section search over single solutions. Points that change between stick and slip sample by
     sample ripple the top by 3e-5 of its height, which is flat to that within 0.5 %."""
     problem = pressed(4.0)
-    found = highest(problem, BAND)
-    assert found.converged
+    found, end = highest(problem, BAND)
+    assert found.converged and end is None
 
     def height(f):
         point = solve(problem, 2 * np.pi * f, [found.x])
@@ -298,7 +321,7 @@ def test_optimal_normal_force_against_sweeps():
     """The highest resonance in a band over the normal force: followed to its lowest place, and from sweeps of single
     solutions over 4.5 % around it, force by force; within what sampling ripples."""
     best = optimum(pressed, [3.0, 5.0, 8.0], BAND)
-    assert best.status in ("converged", "kink") and best.other[1] < best.resonance.amplitude
+    assert best.status in ("converged", "kink") and not best.rising
     around = best.resonance.Omega / (2 * np.pi) * np.linspace(0.975, 1.02, 46)
 
     def swept(normal):
@@ -311,58 +334,59 @@ def test_optimal_normal_force_against_sweeps():
     assert min(beside) > here * (1 - 2e-4) and beside[0] > 1.01 * here and beside[3] > 1.002 * here
 
 
-def test_ridges_that_meet_are_followed_from_their_own_sides(monkeypatch):
-    """Heights exp(v) from 0 up and exp(2 - v) from 2 down are the same at 1. Followed up from 0, the second one is lost
-    to a third, a little above the first; ridges that join, apart by rounding, do not cross at all."""
-
-    def at(v, rate):
-        return Peak(np.zeros(1), 1.0, float(np.exp(v if rate > 0 else 2 - v)), False, "converged", np.zeros(2), 0, rate)
-
-    def followed(family, first, values):
-        found = at(values[-1], first.rate)
-        if first.rate < 0 and values[-1] > values[0]:
-            found = replace(at(values[-1], 1.0), value=1.01 * at(values[-1], 1.0).value)
-        return Ridge(np.array(values), (first, found), "complete")
-
-    monkeypatch.setattr(peaks, "ridge", followed)
-    ends = np.array([0.0, 2.0])
-    forward = Ridge(ends, tuple(at(v, 1.0) for v in ends), "complete")
-    back = Ridge(ends[::-1], tuple(at(v, -1.0) for v in ends[::-1]), "complete")
-    found = peaks._crossing(None, forward, back)
-    assert found.status == "two peaks" and found.parameter == pytest.approx(1.0, rel=1e-8)
-    apart = zip(forward.peaks, (1 + 1e-13, 1 - 1e-13), strict=True)
-    twice = tuple(replace(one, value=one.value * factor) for one, factor in apart)
-    assert peaks._crossing(None, forward, Ridge(ends, twice, "complete")) is None
-
-
-def ridge_of(heights):
-    """A ridge of amplitudes over 1, 2, ... that are flat at each of them."""
-    told = {True: "converged", False: "no start"}
-    tops = [Peak(np.zeros(1), 1.0, a**2, False, told[bool(np.isfinite(a))], np.zeros(2), 0, 0.0) for a in heights]
-    return Ridge(np.arange(1.0, len(tops) + 1), tuple(tops), "complete")
-
-
-def test_what_was_found_is_compared_with_all_that_was_followed():
-    """A kink of 4.2142 beside 4.2133 further on and 4.2109 at the end, as a blade had it whose friction does little;
-    beside a lower one between the ends; and of two resonances it is the higher one at each value that counts."""
-    kink = Lowest(1.5, ridge_of([4.2142]).peaks[0], "kink", 0)
-    first, inside, other = ridge_of([4.23, 4.2133, 4.2109]), ridge_of([4.23, 4.2133, 4.3]), ridge_of([4.0, 4.25, 4.25])
-    end, better = peaks._not_beaten(kink, (first,)), peaks._not_beaten(kink, (inside,))
-    assert (end.parameter, better.parameter) == (3.0, 2.0) and better.status == "followed"
-    assert end.status.startswith("no optimum between the ends")
-    assert peaks._not_beaten(kink, (first, other)) is kink
-    assert peaks._not_beaten(kink, (ridge_of([4.3, np.nan, 4.22]),)) is kink
-
-
 def test_a_setting_that_hardly_matters_is_said_to():
     """The highest resonance changes by 0.45 % over the range, or by 5 %."""
     for most, word in ((4.23, True), (4.42, False)):
-        ridges = (ridge_of([most, 4.2133, 4.2109]),)
-        found = peaks.Optimum(3.0, resonance(ridges[0].peaks[-1]), "kink", ridges, (0.0, 0.0))
+        heights = {1.0: most, 2.0: 4.2133, 3.0: 4.2109}
+        tops = {p: peaks.Resonance(1.0, a, np.zeros(1), "converged") for p, a in heights.items()}
+        found = peaks.Optimum(3.0, tops[3.0], NO_OPTIMUM, tops, {})
         assert found.spread == pytest.approx(most / 4.2109 - 1)
         assert ("hardly matters" in told(found, "normal_force")) is word
-    few = ridge_of([4.2])
-    assert np.isinf(peaks.Optimum(1.0, resonance(few.peaks[0]), "kink", (few,), (0.0, 0.0)).spread)
+        assert "an end; look beyond it with --high above 3" in missed(found, "normal_force")
+    one = peaks.Optimum(1.0, tops[1.0], NO_OPTIMUM, {1.0: tops[1.0]}, {})
+    assert np.isinf(one.spread)
+
+
+def masses(normal):
+    """Three masses in a chain of which the last one rubs, one harmonic, few samples: ripples and many kinks."""
+    K = 1e4 * np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
+    squares, modes = np.linalg.eigh(K)
+    rows = np.zeros((6, 3))
+    rows[1] = modes[2]
+    g = body(rows, np.sqrt(squares), 0.004)
+    law = PointContact(Penalty(jnp.asarray(1e4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e3))
+    patch = Patch("face", np.zeros((1, 2)), np.ones(1), law)
+    return of_body(
+        g, (patch,), np.array([normal]), modes[0], modes[2], harmonics=1, samples=48, length=1e-4
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_optimum_of_a_slider_against_sweeps():
+    """No force beside it has a lower peak, found by sweeps with a fine step; the peak moves by 40 % of its frequency,
+    so that it cannot be followed from one force to the next. What the table says of a force is the sweep's peak."""
+    band = 2 * np.pi * np.linspace(5, 14, 46)
+    best = optimum(masses, [1.0, 3.0, 12.0], band)
+    assert best.status in ("converged", "kink") and 1 < best.parameter < 12
+
+    def swept(normal):
+        problem = masses(normal)
+        points = sweep(problem, np.linspace(5, 14, 361))
+        return max(abs(operating(problem, p).watched[0, 1]) for p in points if p.converged)
+
+    for normal, one in best.found.items():
+        assert one.status == "converged" and one.amplitude >= best.resonance.amplitude
+        if normal in (1.0, 3.0, 12.0, best.parameter):
+            assert swept(normal) * (1 - 1e-4) <= one.amplitude < 1.015 * swept(normal)  # a peak between two points
+    assert min(swept(best.parameter * share) for share in (0.7, 1.4)) > best.resonance.amplitude
+
+
+def test_a_top_at_the_end_of_the_band_is_no_peak():
+    """Of a stuck contact the resonance lies beyond the band: there is none in it, and the end is told."""
+    problem, beyond = pressed(1e6), 2 * np.pi * np.linspace(20, 28, 9)
+    found, end = highest(problem, beyond)
+    assert not found.converged and found.status == "no resonance in the band"
+    assert end == pytest.approx(beyond[-1])
 
 
 @pytest.mark.slow
@@ -378,7 +402,6 @@ def test_where_one_resonance_takes_over_from_another():
 
     band = 2 * np.pi * np.linspace(25, 70, 91)
     best = optimum(driven, [0.3, 1.0, 3.0], band)
-    heights = [highest(driven(best.parameter), part) for part in (band[:44], band[44:])]
+    heights = [highest(driven(best.parameter), part)[0] for part in (band[:44], band[44:])]
     assert best.status == "two peaks" and all(one.converged for one in heights)
-    assert heights[0].value == pytest.approx(heights[1].value, rel=1e-7)
-    assert abs(best.other[0] / best.resonance.Omega - 1) > 0.1  # the other one is told
+    assert heights[0].value == pytest.approx(heights[1].value, rel=5e-4)

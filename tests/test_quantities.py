@@ -12,7 +12,7 @@ from microslip.case.curves import Followed
 from microslip.harmonic_balance.envelope import Envelope, OverOrders
 from microslip.harmonic_balance.readout import measured
 from microslip.system.assembly import Assembly, Member, Watch
-from microslip.units import METRES, Quantity, amplitude_of
+from microslip.units import METRES, Quantity, amplitude_of, counted, percent
 
 STRAIN = Quantity("1")
 
@@ -24,6 +24,11 @@ def test_names_and_back(unit: str, column: str, micro: str) -> None:
     of = Quantity(unit)
     assert of.column("amplitude") == column and of.micro == micro == f"µ{of.said}"
     assert amplitude_of({"frequency_Hz": 1.0, column: 3.0, "stress_amplitude_Pa": 7.0}) == (3.0, of)
+
+
+def test_shares_and_numbers_in_words() -> None:
+    assert [percent(share) for share in (0.00742, 0.05, 7.42)] == ["0.74 %", "5 %", "740 %"]
+    assert (counted(1, "harmonic"), counted(3, "harmonic")) == ("1 harmonic", "3 harmonics")
 
 
 def test_what_an_assembly_reads() -> None:

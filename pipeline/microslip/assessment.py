@@ -131,7 +131,7 @@ def assess(
         lifts = np.asarray(np.isclose(series.frequency[:, None], invalid, rtol=1e-9).any(axis=1))
         chosen, at = drawn_points(series), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
-        ranges = _ranges(size, series.converged, at)
+        ranges = _ranges(peaks.amplitude, chosen, series.converged, at)
         most = [_most_stressed(motion, r[lifts[r] == lifts[i]], chosen, peaks, only)
                 for i, r in zip(at, ranges, strict=True)]  # fmt: skip
         if not np.isin(most, chosen).all():
@@ -151,16 +151,18 @@ def _quantity(response: Response, monitor: str) -> Quantity:
     return Quantity(unit_of(f"gauges/{monitor}" if f"gauges/{monitor}" in names else f"monitors/{monitor}"))
 
 
-def _ranges(size: Array, known: Array, at: Indices) -> list[Indices]:
-    """Points about each of the resonances `at`, in order, that belong to it: between the lowest ones beside it."""
+def _ranges(stress: Array, chosen: Array, known: Array, at: Indices) -> list[Indices]:
+    """Points about each of the resonances `at`, in order, that belong to it: between where the stress (Pa, at those
+    chosen) is lowest beside it. Where the read-out is lowest another mode may stress the body most."""
     if not len(at):
         return []
-    points = np.flatnonzero(known)
+    points, sure = np.flatnonzero(known), known[chosen]
+    seen, stress = chosen[sure], stress[sure]
     ends = [points[0], *at, points[-1]]
     lows = []
     for a, b in zip(ends[:-1], ends[1:], strict=True):
-        between = points[(points >= a) & (points <= b)]
-        lows.append(between[size[between].argmin()])
+        between = (seen >= a) & (seen <= b)
+        lows.append(seen[between][stress[between].argmin()])
     return [points[(points >= a) & (points <= b)] for a, b in zip(lows[:-1], lows[1:], strict=True)]
 
 

@@ -74,6 +74,7 @@ NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_no
 Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
 Positive = Annotated[float, BeforeValidator(_float), Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_nan=False)]
+Ratio = Annotated[NotNegative, Field(lt=1)]
 Length = Annotated[Number, _LENGTH]
 PositiveLength = Annotated[Positive, _LENGTH]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)]
@@ -82,6 +83,7 @@ Point = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)
 Box = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
 Positives = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector)]
+Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_finite_vector)]
 Directions = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
 FaceName = Annotated[str, Field(min_length=1, max_length=200)]  # as other programs name their sets
@@ -515,7 +517,7 @@ class Modes(Model):
 class Damping(Model):
     """Modal damping: one ratio, a table of ratios per mode, or Rayleigh D = alpha M + beta K (Sextro Eq. (2.4-3))."""
 
-    ratio: NotNegative | None = None
+    ratio: Ratio | None = None
     table: Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)] | None = None
     alpha: NotNegative | None = None
     beta: NotNegative | None = None

@@ -356,7 +356,7 @@ def optimum(
     case: Path, basis: Path | None = None, /, *, over: str = "normal_force", low: float | None = None,
     high: float | None = None, points: int = 6, set_: Set = (), quiet: Quiet = False,
 ) -> None:  # fmt: skip
-    """The normal force, or another setting, at which the highest resonance of a case is lowest: followed, not swept.
+    """The normal force, or another setting, at which the highest resonance of a case is lowest.
 
     Args:
         case: a case.toml, or the folder that holds it.
@@ -365,7 +365,7 @@ def optimum(
             case by its dotted name.
         low: first value of the range that is searched; the smallest of sweep.normal_forces if not given.
         high: last value of it; the largest of sweep.normal_forces if not given.
-        points: values through which the resonance is followed from one end to the other.
+        points: values from one end to the other at which a sweep looks for it first.
     """
     from . import following
 

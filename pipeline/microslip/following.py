@@ -20,6 +20,7 @@ from .body import load_toml, override
 from .case import CaseSettings, keeping
 from .case.assemble import Built, build
 from .case.run import problem_of
+from .continuation import NO_OPTIMUM
 from .data import ModalBasis, UserError
 from .harmonic_balance.readout import measured
 from .mistakes import validate
@@ -28,9 +29,8 @@ from .units import METRES, Quantity
 from .workflow import Report
 
 if TYPE_CHECKING:
-    from .continuation import Peak
     from .harmonic_balance.nonlinear_modes import Backbone
-    from .harmonic_balance.peak import Optimum
+    from .harmonic_balance.peak import Optimum, Resonance
     from .harmonic_balance.problem import Problem
     from .harmonic_balance.stability import Stability
 
@@ -169,8 +169,8 @@ def optimum_over(
 
     Args:
         over: ``normal_force``; a key of the contacts, changed in all of them; or any key of the case, dotted.
-        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: through
-            which the peak is followed. ``optimum.csv`` holds the peaks as they are found.
+        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: values
+            from one to the other at which it is looked for. ``optimum.csv`` holds the resonances as they are found.
 
     Raises:
         UserError: no range, or contacts that the sweep does not press.
@@ -187,7 +187,8 @@ def optimum_over(
         raise UserError(f"{over}: give --low and --high, two {kind}, between which its optimum is looked for")
     if over == NORMAL_FORCE and not forces:
         raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
-    length = problem_of(built, forces[0] if forces else None).length
+    between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
+    length = problem_of(built, between).length
 
     @lru_cache(maxsize=64)
     def make(value: float) -> Problem:
@@ -196,47 +197,61 @@ def optimum_over(
 
     sweep = built.settings.sweep
     band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
-    rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
 
-    def keep(number: int, value: float, peak: Peak) -> None:
-        rows.append(_peak_row(number, value, peak))
-        store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
+    def keep(found: Mapping[float, Resonance]) -> None:
+        _optimum_table(found, over, case)
 
     values = np.linspace(low, high, points) if signed else np.geomspace(low, high, points)
     return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
 
 
-def _peak_row(number: int, value: float, peak: Peak) -> str:
-    return f"{value:.10g},{peak.lam / 2 / np.pi:.10g},{np.sqrt(peak.value):.8g},peak {number}"
-
-
 def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
-    """``optimum.csv``: the peaks followed and the optimum; ``pictures/optimum.png``."""
+    """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``."""
     from .pictures.following import optimum_plot
 
+    files = [_optimum_table(found.found, over, case, found)]
+    if any(one.status == "converged" for one in found.found.values()):
+        label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
+        picture = case.folder / "pictures" / "optimum.png"
+        title = _title(case, "highest resonance and optimum")
+        files.append(optimum_plot(found, label, title, picture, case.quantity))
+    return files
+
+
+def _optimum_table(found: Mapping[float, Resonance], over: str, case: Case, best: Optimum | None = None) -> Path:
     rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
-    best = found.resonance
-    for i, ridge in enumerate(found.ridges):
-        for value, peak in zip(ridge.parameter, ridge.peaks, strict=True):
-            rows.append(_peak_row(i + 1, value, peak))
-    rows.append(f"{found.parameter:.10g},{best.Omega / 2 / np.pi:.10g},{best.amplitude:.8g},optimum: {found.status}")
+    for value, one in found.items():
+        what = "highest resonance" if one.status == "converged" else one.status
+        rows.append(f"{value:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
+    if best is not None:
+        one = best.resonance
+        what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
+        rows.append(f"{best.parameter:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
     store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
-    label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
-    picture = case.folder / "pictures" / "optimum.png"
-    title = _title(case, "resonance and optimum")
-    return [case.folder / "optimum.csv", optimum_plot(found, label, title, picture, case.quantity)]
+    return case.folder / "optimum.csv"
 
 
 def told(found: Optimum, over: str, of: Quantity = METRES) -> str:
     """The optimum of what is read in a sentence."""
-    best, (other, height) = found.resonance, found.other
-    unit = " N" if over == NORMAL_FORCE else ""
+    best, unit = found.resonance, " N" if over == NORMAL_FORCE else ""
+    if best.status != "converged":
+        return f"{over}: no resonance was found at any value"
     where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} {of.said} at "
     lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
     lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
-    if height > 1.001 * best.amplitude:
-        lines += f"; another one, near {other / 2 / np.pi:.6g} Hz, is higher there: {height:.4g} {of.said}"
-    return lines + _hardly(found)
+    return lines + _hardly(found) + _rising(found, unit)
+
+
+def _rising(found: Optimum, unit: str) -> str:
+    """Where the response is higher at an end of the band than any resonance in it."""
+    said = ""
+    for end in sorted(set(found.rising.values())):
+        values = ", ".join(f"{value:.4g}" for value, where in found.rising.items() if where == end)
+        said += (
+            f"; at {values}{unit} the response is higher still at {end / 2 / np.pi:.6g} Hz, an end of the band: a "
+            "resonance may lie beyond, widen the sweep"
+        )
+    return said
 
 
 HARDLY = 0.01
@@ -248,23 +263,21 @@ def _hardly(found: Optimum) -> str:
     """That the setting hardly matters, if it does not."""
     if found.spread >= HARDLY:
         return ""
-    values = np.concatenate([one.parameter for one in found.ridges])
     return (
-        f"; the setting hardly matters: from {values.min():g} to {values.max():g} the highest resonance changes by "
-        f"{100 * found.spread:.2g} %"
+        f"; the setting hardly matters: from {min(found.found):g} to {max(found.found):g} the highest resonance "
+        f"changes by {100 * found.spread:.2g} %"
     )
 
 
 def is_optimum(found: Optimum) -> bool:
     """Whether the lowest place lies between the ends."""
-    return found.status in ("converged", "kink", "two peaks", "followed")
+    return found.status in ("converged", "kink", "two peaks")
 
 
 def missed(found: Optimum, over: str) -> str:
     """Why there is no optimum, and where to look for it."""
-    values, unit = np.concatenate([one.parameter for one in found.ridges]), " N" if over == NORMAL_FORCE else ""
-    low, high = values.min(), values.max()
-    if not found.status.startswith("no optimum between"):
+    low, high, unit = min(found.found), max(found.found), " N" if over == NORMAL_FORCE else ""
+    if found.status != NO_OPTIMUM or found.parameter not in (low, high):
         return f"no optimum was found: {found.status}"
     end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"
     return (

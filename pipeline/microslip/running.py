@@ -26,6 +26,7 @@ from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
 from .results.files import unit_of
+from .results.names import apart
 from .units import Quantity, amplitude_of
 from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage
 
@@ -455,11 +456,10 @@ def respond(
             )
     folder = root / "build" / case.name
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
-    for peak in summary["resonances"]:
-        note = f" ({peak['note']})" if peak.get("note") else ""
-        report(f"F_N = {peak['normal_force_N']:g} N: {_at(peak)}{note}")
-    for end in summary["rising_at_the_edge"]:
-        report(f"F_N = {end['normal_force_N']:g} N: still rising at {_at(end)}; add {end['add']}")
+    rows = [*summary["resonances"], *summary["rising_at_the_edge"]]
+    for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
+        note = f" ({row['note']})" if row.get("note") else f"; add {row['add']}" if "add" in row else ""
+        report(f"F_N = {normal} N: {'still rising at ' if 'add' in row else ''}{_at(row)}{note}")
     return folder / "response.csv", converged
 
 

@@ -32,6 +32,16 @@ def density(system: str) -> float:
     return mass / length**3
 
 
+def counted(number: int, thing: str) -> str:
+    """A number of things: "1 harmonic", "3 harmonics"."""
+    return f"{number} {thing}" + ("" if number == 1 else "s")
+
+
+def percent(share: float) -> str:
+    """A share of 1 in percent, two digits: 0.0074 -> "0.74 %", 7.4 -> "740 %"."""
+    return f"{float(f'{100 * share:.2g}'):.15g} %"
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What a read-out measures. Attributes: unit: SI, as rows of the modal file name it: "m", "rad", "1" of a strain.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -16,7 +16,7 @@ from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.readout import measured
 from ..results import Journal
-from ..units import Quantity
+from ..units import Quantity, counted, percent
 from . import edges
 from .assemble import Built, build, swept
 from .closed_form import Answer, in_closed_form
@@ -130,7 +130,9 @@ def _run(
     else:
         responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
     free = free_response(built, frequency)
-    at_the_ends = edges.rising(responses, resonances)
+    idle = [normal for normal, r in responses.items() if still(r)]
+    resonances |= {normal: [] for normal in idle}
+    at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
     remarks = [
         *built.remarks,
         *_by_the_book(built),
@@ -139,12 +141,35 @@ def _run(
         *remarks,
         *_too_coarse(settings, *stuck),
         *_not_converged(responses),
+        *_idle(idle),
         *edges.remarks(at_the_ends),
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built, at_peaks,
         tuple(at_the_ends), left.most if left else None, stuck[1],
     )  # fmt: skip
+
+
+STILL = 1e-10
+"""Share of the contacts' motion below which a read-out counts as one that does not move: rounding."""
+
+
+def still(response: FrequencyResponse) -> bool:
+    """Whether nothing moves the first read-out, so that its peaks are none."""
+    ok = response.converged
+    moved = float(np.abs(response.slip[ok]).max(initial=0.0))
+    return 0 < moved and float(np.abs(response.monitor[ok]).max(initial=0.0)) <= STILL * moved
+
+
+def _idle(forces: Sequence[float]) -> list[str]:
+    """A remark where nothing moves the first read-out."""
+    if not forces:
+        return []
+    pressed = ", ".join(f"{normal:g}" for normal in forces)
+    return [
+        f"At F_N = {pressed} N the first read-out does not move while the contacts do: it has no resonances; read "
+        "another direction or another monitor."
+    ]
 
 
 def _by_laws(
@@ -164,7 +189,7 @@ def _by_laws(
         remarks += _not_periodic(key, found.unsteady, built.settings)
         remarks += _lifting(built, problem, found, key)
         few = left.out if left else partial(_truncated, built)
-        remarks += few(problem, found, resonances[key], key)
+        remarks += [] if still(found) else few(problem, found, resonances[key], key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, remarks
@@ -331,15 +356,15 @@ class _Left:
             f, e = point.Omega / (2 * np.pi), enough(problem, point, self.tolerance, floor=floor, first=estimate)
             if e.problem.harmonics > problem.harmonics:
                 n = e.problem.harmonics
-                said = f"at F_N = {normal:g} N and {f:.6g} Hz {problem.harmonics} harmonics leave an error of about "
-                raise _TooFew(n, said + f"{100 * share:.2g} %; all once more with {n}")
+                said = f"at F_N = {normal:g} N and {f:.6g} Hz an error of about {percent(share)} is left with "
+                raise _TooFew(n, said + f"{counted(problem.harmonics, 'harmonic')}; all once more with {n}")
             worst = max(worst, (share, f))
         self.most = max(self.most, worst[0])
         if worst[0] <= self.tolerance:
             return []
         return [
-            f"At F_N = {normal:g} N the amplitude at {worst[1]:.6g} Hz is uncertain by about {100 * worst[0]:.2g} % "
-            f"with {problem.harmonics} harmonics, above harmonics_error; no solution with more of them was found."
+            f"At F_N = {normal:g} N the amplitude at {worst[1]:.6g} Hz is uncertain by about {percent(worst[0])} "
+            f"with {counted(problem.harmonics, 'harmonic')}, above harmonics_error; no solution with more was found."
         ]
 
 
@@ -367,8 +392,8 @@ def _truncated(
         return [f"{where}: with twice the harmonics ({e.harmonics}) and samples ({e.samples}) no solution was found."]
     what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
     return [
-        f"{where} by about {100 * share:.2g} %, mostly for want of {what}: there are {e.harmonics} harmonics and "
-        f"{e.samples} samples; raise {what}."
+        f"{where} by about {percent(share)}, mostly for want of {what}, with "
+        f"{counted(e.harmonics, 'harmonic')} and {e.samples} samples; raise {what}."
     ]
 
 
@@ -384,7 +409,7 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
     at, which = np.unravel_index(int(share.argmax()), share.shape)
     return [
         f"At F_N = {normal:g} N points of {problem.assembly.contacts[which].name} would lift off, for "
-        f"{100 * share[at, which]:.2g} % of points and time at {found.frequency[at]:.6g} Hz; the book's mode takes "
+        f"{percent(share[at, which])} of points and time at {found.frequency[at]:.6g} Hz; the book's mode takes "
         'their friction for that of a closed contact: compare with mode = "marched".'
     ]
 
@@ -396,7 +421,7 @@ def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> lis
     todo = "lower settled" if settings.settled > 1e-4 else "raise cycles"
     return [
         f"At F_N = {normal:g} N the sliders were not periodic after {settings.cycles} cycles at most: contact forces "
-        f"change by up to {100 * worst:.2g} % in the next one; {todo}."
+        f"change by up to {percent(worst)} in the next one; {todo}."
     ]
 
 

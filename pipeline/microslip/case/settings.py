@@ -15,6 +15,8 @@ from ..body import (
     Number,
     Numbers,
     Positive,
+    Ratio,
+    Ratios,
     Vector,
     _finite_vector,
     _float,
@@ -62,7 +64,7 @@ class BodyOfCase(Model):
     file: str | None = None
     speed: Annotated[int, Field(ge=0)] = 0
     speed_rpm: NotNegative | None = None
-    damping_ratio: NotNegative | Numbers | None = None
+    damping_ratio: Ratio | Ratios | None = None
     aerodynamics: str | None = None
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
     mass: Positive | None = None
@@ -204,9 +206,9 @@ class CaseSettings(Model):
 
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
     [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
-    many as an estimated harmonics_error (a share of the amplitude) at the resonances asks for; samples (of a cycle),
-    cycles (marched at most until the sliders are periodic) and settled (within which share of the largest force
-    they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
+    many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
+    a cycle), cycles (marched at most until the sliders are periodic) and settled (within which share of the largest
+    force they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
     (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
     touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
     Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
@@ -232,7 +234,7 @@ class CaseSettings(Model):
     mode: Literal["marched", "book"] = "marched"
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
     damping: Literal["modal", "structural", "stuck"] | None = None
-    damping_ratio: NotNegative | Numbers | None = None
+    damping_ratio: Ratio | Ratios | None = None
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
     samples: Annotated[int, Field(ge=8, le=100000)] = 48

@@ -189,7 +189,7 @@ def _kept(missing: Callable[[Array], tuple[Array, Array]], u: Array, step: Array
 def _deep_enough(patch: Patch, normal: float) -> float:
     """A pure approach (m) whose force is not below the one asked for."""
     u = np.zeros(patch.count)
-    for u[0] in 1e-9 * 2.0 ** np.arange(30):
+    for u[0] in 1e-9 * 2.0 ** np.arange(40):
         if _pressed(patch, u)[0][0] >= normal:
             return float(u[0])
     raise UserError(f"{patch.interface}: no approach below {u[0]:.2g} m makes a normal force of {normal:g} N")

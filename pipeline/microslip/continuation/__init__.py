@@ -1,5 +1,5 @@
 """Newton's method (`newton`), following R(x, lambda) = 0 through folds, branch points and kinks (`curve`), peaks of an
-output on that curve, followed over a further parameter down to where they are lowest (`extremum`).
+output on that curve and where they are lowest over a further parameter (`extremum`).
 
 Knows no mechanics: lambda may be a frequency, a normal force, a level of excitation.
 """
@@ -13,12 +13,13 @@ from .curve import advance as advance
 from .curve import follow as follow
 from .curve import start as start
 from .curve import trace as trace
+from .extremum import NO_OPTIMUM as NO_OPTIMUM
+from .extremum import SEARCH as SEARCH
 from .extremum import Lowest as Lowest
 from .extremum import Peak as Peak
-from .extremum import Ridge as Ridge
 from .extremum import lowest as lowest
 from .extremum import peak as peak
-from .extremum import ridge as ridge
+from .extremum import rated as rated
 from .newton import CONVERGED as CONVERGED
 from .newton import NewtonSettings as NewtonSettings
 from .newton import Problem as Problem

@@ -7,7 +7,7 @@ of the problem the peak's height changes by the derivative
     dg/dp = g_p + grad g . dy/dp,    [dR/dy; t^T] dy/dp = [-R_p; 0]
 
 which needs no second derivatives, because the motion of the peak along the curve changes nothing (the envelope
-theorem). Its root is the optimum of p. At a kink it is no derivative, and the optimum is searched for by the values.
+theorem). Two such tangents with a valley between them meet where it is lowest, or below it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import scipy.optimize
 
 from ..data import Array
 from .curve import Lost, Segment, Settings, State, advance, root
@@ -100,24 +99,37 @@ def _climbed(problem: Rated, state: State, settings: Settings, spent: int) -> Pe
 def _ahead(slope: _Slope, state: State, settings: Settings, spent: int) -> Peak:
     """The highest point ahead on the curve, up to where g has fallen by `DIP` behind it.
 
-    Between two points of the curve with a slope that changes from up to down its root is the peak.
+    A peak lies between two points if g leaves the first one upwards and comes to the second one downwards; the root of
+    its slope is the peak. It also does if g is higher at the one that it leaves or reaches the wrong way: kinks lie
+    between, as where the root is not found or lower than either end. The step is then halved, down to `NARROW`.
     """
     best = _at(slope, state.y, state.tangent, spent)
-    status = ""
+    status, within = "", settings
     while not status:
-        after = advance(slope.problem, state, settings)
+        after = advance(slope.problem, state, within)
         spent += after.found[-1].evaluations if after.found else 0
-        if after.found and slope(state.y, state.tangent) > 0 >= slope(after.y, after.tangent):
-            pinned = _pinned(slope, state, after, settings, spent)
-            spent = pinned.evaluations
-            best = pinned if pinned.value > best.value else best
-        here = slope.output(after.y)[0]
+        there, here = slope.output(state.y)[0], slope.output(after.y)[0]
+        leaves_up, comes_down = slope(state.y, state.tangent) > 0, slope(after.y, after.tangent) <= 0
+        if after.found and (leaves_up and (comes_down or here < there) or comes_down and here > there):
+            top = _pinned(slope, state, after, settings, spent) if leaves_up and comes_down else None
+            length = norm(after.y - state.y)
+            if top is None and length > NARROW:
+                within = replace(settings, step_max=0.5 * length)
+                continue
+            top = top or max((_at(slope, p.y, p.tangent, spent) for p in (state, after)), key=lambda peak: peak.value)
+            spent = top.evaluations
+            best = top if top.value >= best.value else best
+        within = settings
         if here > best.value:
             best = _at(slope, after.y, after.tangent, spent, "the peak is still ahead")
         if here < best.value * math.exp(-DIP):
             return replace(best, evaluations=spent)
         status, state = after.status, after
     return replace(best, status=best.status if best.converged else f"no peak before the end: {status}")
+
+
+NARROW = 1e-6
+"""Scaled length of curve between a rise and a fall at which the higher end is the peak."""
 
 
 def _reversed(state: State) -> State:
@@ -141,15 +153,16 @@ class _Slope:
         return self.problem.output(y[:-1] * self.scaled.x_scale, float(y[-1]) * self.scaled.lam_scale)
 
 
-def _pinned(slope: _Slope, state: State, after: State, settings: Settings, spent: int) -> Peak:
+def _pinned(slope: _Slope, state: State, after: State, settings: Settings, spent: int) -> Peak | None:
+    """The root of the slope between two states, if it is found and no lower than both: one of several may be."""
     bends = bool(after.found and after.found[-1].kink)
     segment = Segment(state.y, after.y, state.tangent, after.tangent, bends)
     try:
         y, t = root(slope.scaled, segment, settings, slope)
     except Lost:
-        best = max(((state.y, state.tangent), (after.y, after.tangent)), key=lambda end: slope.output(end[0])[0])
-        return replace(_at(slope, *best, spent), status="the curve was lost between two points about the peak")
-    return _at(slope, y, t, spent + slope.scaled.count)
+        return None
+    found = _at(slope, y, t, spent + slope.scaled.count)
+    return found if found.value >= max(slope.output(one.y)[0] for one in (state, after)) else None
 
 
 def _at(slope: _Slope, y: Array, t: Array, spent: int, status: str = CONVERGED) -> Peak:
@@ -165,118 +178,10 @@ Family = Callable[[float], Rated]
 """The problem at a value of the parameter. Unknowns and scales must mean the same at all of them."""
 
 
-@dataclass(frozen=True)
-class Ridge:
-    """A peak followed over a parameter. Attributes: parameter: (k,). peaks: k. status: why it ended."""
-
-    parameter: Array
-    peaks: tuple[Peak, ...]
-    status: str
-
-    @property
-    def lam(self) -> Array:
-        """(k,) places of the peaks."""
-        return np.array([p.lam for p in self.peaks])
-
-    @property
-    def value(self) -> Array:
-        """(k,) their heights."""
-        return np.array([p.value for p in self.peaks])
-
-    @property
-    def rate(self) -> Array:
-        """(k,) derivative of the logarithm of their heights."""
-        return np.array([p.rate for p in self.peaks])
-
-
-@dataclass(frozen=True)
-class Lowest:
-    """The parameter at which a peak is lowest. status: "converged": its derivative vanishes there; "kink": it jumps;
-    else what went wrong. evaluations: of R, the last search alone."""
-
-    parameter: float
-    peak: Peak
-    status: str
-    evaluations: int
-
-
-def ridge(
-    family: Family, first: Peak, values: Sequence[float], settings: Settings | None = None, jump: float = 0.3,
-    halvings: int = 6, keep: Callable[[float, Peak], None] = lambda value, peak: None,
-) -> Ridge:  # fmt: skip
-    """A peak followed over a parameter, from the value where it is known through all others in turn.
-
-    From each value to the next a step is predicted along the last two peaks, and halved while the search fails or ends
-    farther from the prediction than ``jump`` (scaled; or a jump of the height's logarithm): on another peak.
-
-    Args:
-        first: the peak at values[0]. keep: is given every value and its peak as they are found.
-    """
-    settings = settings or SEARCH
-    if not first.converged:
-        return Ridge(np.array(values[:1], dtype=float), (first,), first.status)
-    known = [(float(values[0]), rated(family, float(values[0]), first))]
-    asked = [0]
-    keep(*known[0])
-    for value in values[1:]:
-        reached = _reached(family, known, float(value), settings, jump, halvings)
-        if not reached:
-            last = known[-1][0]
-            return _ridge(known, asked, f"ended at {last:g}: the peak was not found again beyond; it may merge there")
-        asked.append(len(known) - 1)
-        keep(*known[-1])
-    return _ridge(known, asked, "complete")
-
-
-def _ridge(known: list[tuple[float, Peak]], asked: list[int], status: str) -> Ridge:
-    kept = [known[i] for i in asked]
-    return Ridge(np.array([value for value, _ in kept]), tuple(peak for _, peak in kept), status)
-
-
-def _reached(
-    family: Family, known: list[tuple[float, Peak]], value: float, settings: Settings, jump: float, halvings: int
-) -> bool:
-    """Adds peaks to the known ones up to a value."""
-    shortest = abs(value - known[-1][0]) * 0.5**halvings
-    step = value - known[-1][0]
-    while known[-1][0] != value:
-        last = known[-1][0]
-        there = value if abs(value - last) <= abs(step) * (1 + 1e-9) else last + step
-        found = _stepped(family, known, there, settings, jump)
-        if found is None:
-            step *= 0.5
-            if abs(step) < shortest:
-                return False
-        else:
-            known.append((there, found))
-            step *= 2.0
-    return True
-
-
-def _stepped(
-    family: Family, known: list[tuple[float, Peak]], value: float, settings: Settings, jump: float
-) -> Peak | None:
-    """The peak at another value, if it is the same one."""
-    problem = family(value)
-    scaled = Scaled(problem)
-    last = known[-1][1]
-    here = scaled.pack(last.x, last.lam)
-    guess = here
-    if len(known) > 1:
-        (before, other), now = known[-2], known[-1][0]
-        guess = here + (value - now) / (now - before) * (here - scaled.pack(other.x, other.lam))
-    starts = [guess, here] if len(known) > 1 else [here]
-    for y in starts:
-        found = _from(problem, y, last.tangent, settings)
-        if found.converged:
-            moved = norm(scaled.pack(found.x, found.lam) - y) / max(1.0, norm(y))
-            if moved <= jump and abs(math.log(found.value / last.value)) <= 1.0:
-                return rated(family, value, found)
-    return None
-
-
 def rated(family: Family, value: float, peak: Peak, share: float = 1e-4) -> Peak:
     """The peak with the derivative of its height's logarithm, by differences of R and g at the peak's place."""
+    if not peak.converged:
+        return peak
     h = share * (abs(value) or 1.0)
     problem = family(value)
     slope = _Slope(problem)
@@ -293,94 +198,86 @@ def rated(family: Family, value: float, peak: Peak, share: float = 1e-4) -> Peak
     return replace(peak, rate=g_p + slope(y, moved))
 
 
-def lowest(family: Family, ridge: Ridge, settings: Settings | None = None, tolerance: float = 1e-4) -> Lowest:
-    """The value at which the followed peak is lowest: where the derivative of its height changes its sign, if no peak
-    that is known is lower; else about the lowest of those, by the heights themselves. Never above a followed one.
+@dataclass(frozen=True)
+class Lowest:
+    """Where a peak is lowest over a parameter.
 
-    Contacts that switch point by point ripple the height, and the derivative changes its sign at every ripple.
-
-    Args:
-        tolerance: of the parameter, relative to its bracket. The height there errs by the square of it.
+    Attributes:
+        parameter. peak: there. found: value -> peak of all that were looked at, rising.
+        status: "converged": its derivative vanishes there; "kink": it jumps; "two peaks": one takes over from another;
+            `NO_OPTIMUM`; else why no peak is known.
     """
-    settings = settings or SEARCH
-    falls = (ridge.rate[:-1] < 0) & (ridge.rate[1:] > 0)
-    least, spent = int(np.argmin(ridge.value)), 0
-    if falls.any():
-        i = min(np.flatnonzero(falls), key=lambda k: min(ridge.value[k], ridge.value[k + 1]))
-        found = _between_two(family, ridge, int(i), settings, tolerance)
-        if found.peak.value <= ridge.value[least]:
-            return found
-        spent = found.evaluations
-    if least in (0, len(ridge.peaks) - 1):
-        return Lowest(float(ridge.parameter[least]), ridge.peaks[least], NO_OPTIMUM, spent)
-    return _by_heights(_Between(family, ridge, slice(least - 1, least + 2), settings), tolerance, spent)
 
-
-class _Between:
-    """Peaks between some that were followed. Attributes: found: value -> peak. spent: evaluations of R."""
-
-    def __init__(self, family: Family, ridge: Ridge, which: slice, settings: Settings) -> None:
-        self.family, self.settings, self.spent = family, settings, 0
-        self.found = dict(zip(ridge.parameter[which].tolist(), ridge.peaks[which], strict=True))
-
-    def __call__(self, value: float) -> Peak:
-        """The peak at a value, from those next to it.
-
-        Raises:
-            Lost: it is not found.
-        """
-        if value not in self.found:
-            near = sorted(self.found.items(), key=lambda item: -abs(item[0] - value))
-            here = _stepped(self.family, near[-2:], value, self.settings, 1.0) or _stepped(
-                self.family, near[-1:], value, self.settings, 1.0
-            )
-            if here is None:
-                raise Lost
-            self.found[value] = here
-            self.spent += here.evaluations
-        return self.found[value]
-
-    @property
-    def least(self) -> float:
-        """The value with the lowest of all peaks."""
-        return min(self.found, key=lambda value: self.found[value].value)
+    parameter: float
+    peak: Peak
+    status: str
+    found: dict[float, Peak]
 
 
 NO_OPTIMUM = "no optimum between the ends: the peak is lowest at one of them"
-LOST = "the peak was lost on the way to its lowest place"
+SAME = 5e-3
+"""Relative difference of the places of what counts as one peak."""
 
 
-def _between_two(family: Family, ridge: Ridge, i: int, settings: Settings, tolerance: float) -> Lowest:
-    low, high = float(ridge.parameter[i]), float(ridge.parameter[i + 1])
-    at = _Between(family, ridge, slice(i, i + 2), settings)
-    try:
-        best = float(
-            scipy.optimize.brentq(lambda v: at(v).rate, low, high, xtol=tolerance * abs(high - low), rtol=1e-12)
-        )
-        at(best)
-    except Lost:
-        return Lowest(at.least, at.found[at.least], LOST, at.spent)
-    steep = min(abs(ridge.rate[i]), abs(ridge.rate[i + 1]))
-    status = CONVERGED if abs(at.found[best].rate) <= 1e-3 * steep else "kink"
-    return Lowest(best, at.found[best], status, at.spent)
+def lowest(
+    highest: Callable[[float], Peak], values: Sequence[float], tolerance: float = 1e-4, most: int = 12
+) -> Lowest:  # fmt: skip
+    """The value of a parameter at which the highest peak is lowest.
+
+    It is found at all values; then between the lowest one and its neighbour on the side to which it falls, in turn
+    where the tangents of both ends meet, which finds a kink, and where their rates say that it is level. Nothing is
+    said to be lowest that another value which was looked at beats: contacts that switch point by point ripple the
+    height, and the derivative with it.
+
+    Args:
+        highest: the highest peak at a value, `rated`. values: rising or falling. tolerance: of ln g, by
+            which a lower peak would go unseen. most: peaks at most between the values.
+    """
+    found = {float(value): highest(float(value)) for value in values}
+    ends = min(found), max(found)
+    known = sorted(value for value, peak in found.items() if peak.converged)
+    if not known:
+        first = float(values[0])
+        return Lowest(first, found[first], found[first].status, found)
+    i = min(range(len(known)), key=lambda k: found[known[k]].value)
+    at = i if found[known[i]].rate < 0 else i - 1
+    status = NO_OPTIMUM
+    if 0 <= at < len(known) - 1:
+        status = _valley(highest, found, known[at], known[at + 1], tolerance, most)
+    found = dict(sorted(found.items()))
+    best = min((value for value, peak in found.items() if peak.converged), key=lambda value: found[value].value)
+    return Lowest(best, found[best], NO_OPTIMUM if best in ends else status, found)
 
 
-def _by_heights(at: _Between, tolerance: float, spent: int) -> Lowest:
-    """Where the peak is lowest beside a followed one that is lower than both its neighbours: a golden section, which
-    knows the lowest one from the beginning and keeps the lowest of all that it sees."""
-    low, middle, high = sorted(at.found)
-    ends = abs(at.found[low].rate), abs(at.found[high].rate)
-    status, options = "", {"xtol": tolerance, "maxiter": 20}
-
-    def height(value: float) -> float:
-        return at(float(value)).value
-
-    try:
-        scipy.optimize.minimize_scalar(height, (low, middle, high), method="golden", options=options)
-    except Lost:
-        status = LOST
-    best = at.found[at.least]
-    smooth = abs(best.rate) <= 1e-3 * min(ends)
-    return Lowest(at.least, best, status or (CONVERGED if smooth else "kink"), spent + at.spent)
+BESIDE = 0.01
+"""Share of the way from one value to the other within which a place counts as beside an end."""
 
 
+def _valley(
+    highest: Callable[[float], Peak], found: dict[float, Peak], low: float, high: float, tolerance: float, most: int
+) -> str:
+    """Adds the peaks between two values until the tangents say that none is lower by more than the tolerance.
+
+    They do where they meet well inside; beside an end they would where one bends the other way, at a kink, so that the
+    other side is looked at, or until they are so short that they matter no more.
+    """
+    steep = min(abs(found[low].rate), abs(found[high].rate))
+    for turn in range(most):
+        left, right = found[low], found[high]
+        width, falls, rises = high - low, left.rate, right.rate
+        if low > 0:  # heights are nearly powers of what is positive
+            width, falls, rises = math.log(high / low), low * falls, high * rises
+        gap, bend = math.log(right.value / left.value), rises - falls
+        meet = (rises * width - gap) / (bend * width) if bend > 0 else 0.0
+        inside = BESIDE <= meet <= 1 - BESIDE
+        if (inside and min(gap, 0.0) - falls * meet * width <= tolerance) or max(-falls, rises) * width <= tolerance:
+            break
+        share = min(max(meet, BESIDE), 1 - BESIDE) if turn % 2 == 0 else -falls / bend if inside else 0.5
+        value = low * math.exp(share * width) if low > 0 else low + share * width
+        here = found[value] = highest(value)
+        if not here.converged:
+            return f"lost between {low:g} and {high:g}: {here.status}"
+        low, high = (value, high) if here.rate < 0 else (low, value)
+    if min(abs(found[low].rate), abs(found[high].rate)) <= 0.1 * steep:
+        return CONVERGED
+    return "two peaks" if abs(found[low].lam / found[high].lam - 1) > SAME else "kink"

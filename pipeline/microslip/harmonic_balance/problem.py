@@ -8,6 +8,7 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -221,6 +222,18 @@ class AtFrequency:
         """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
         return self._stacked([view.reference for view in self.views])
 
+    @cached_property
+    def rounding(self) -> float:
+        """The rounding of forces as large as the preloads, as it may be seen in R."""
+        p, pressed = self.problem, np.zeros(self.problem.count)
+        for g in p.groups:
+            for side in (g.first, g.second):
+                if side is not None:
+                    np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
+        pressed *= p.length / p.scale
+        moved = [np.abs(one.compliance) @ pressed[s] for one, s in zip(self.views, p.slices(), strict=True)]
+        return float(np.finfo(float).eps * np.abs(np.hstack(moved) / p.scale).max(initial=0.0))
+
     def residual(self, x: Array) -> Array:
         """(size,) R alone."""
         return self.residual_of(x, self.force(x))
@@ -344,7 +357,7 @@ class AtFrequency:
 
 def _harmonics(D: ComplexArray, V: Array) -> Array:
     """(W, c, ...) compliances (H + 1, c, c) of the harmonics applied to (W, c, ...)."""
-    flat = V.reshape(*V.shape[:2], -1)
+    flat = V.reshape(*V.shape[:2], math.prod(V.shape[2:]))
     out = np.empty_like(flat)
     out[0] = D[0].real @ flat[0]
     amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])

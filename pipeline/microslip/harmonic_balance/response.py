@@ -133,8 +133,8 @@ class HarmonicResponse(FrequencyResponse):
             **more,
             "slip_dissipated_J": self.by_slip,
             "supplied_J": self.supplied,
-            "slipping": self.slipping.mean(axis=1),
-            "open": self.open.mean(axis=1),
+            "slipping": self.slipping.sum(axis=1) / max(self.slipping.shape[1], 1),
+            "open": self.open.sum(axis=1) / max(self.open.shape[1], 1),
             "harmonics": np.full(len(self.frequency), self.harmonics.shape[1] - 1.0),
             "iterations": self.iterations.astype(float),
         }

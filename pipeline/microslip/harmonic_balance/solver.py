@@ -49,6 +49,13 @@ class Point:
         return AWAY in self.status
 
 
+ROUNDING = 4.0
+"""Times the rounding of the preloads, at which R counts as nothing, if that is less than `AT_MOST` of x: forces that
+press a contact a million times more than anything moves it leave no more of R than their last digits."""
+
+AT_MOST = 1e-5
+"""Share of x that rounding may be."""
+
 CONTRACTION = 0.1
 """Share of |R| that a step may leave for the derivative to be used again: it costs as much as a dozen residuals."""
 
@@ -61,17 +68,18 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
 
     Args:
         x: start. tolerance: of the largest entry of R over that of x, which counts within 1e-3 and 1e3 of the
-            reference's.
+            reference's; no less than what `ROUNDING` leaves.
         slope: derivative of the forces somewhere near, to begin with.
     """
     R, fresh, history = at.residual(x), False, list[float]()
     reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
     for count in range(most):
-        error = float(np.abs(R).max() / np.clip(np.abs(x).max(), 1e-3 * reference, 1e3 * reference))
+        size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
+        error = float(np.abs(R).max(initial=0.0) / size)
         history.append(error)
         if not np.isfinite(error):
             return Point(at.Omega, x, "not a number", error, count, history=tuple(history))
-        if error <= tolerance:
+        if error <= max(tolerance, min(ROUNDING * at.rounding / size, AT_MOST)):
             return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
         if slope is None:
             slope, fresh = at.forces(x)[1], True

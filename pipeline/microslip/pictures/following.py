@@ -98,39 +98,36 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
 
 
 def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES) -> Path:
-    """Height and frequency of the followed peaks of what is read over a setting, the optimum marked."""
+    """Height and frequency of the highest resonance of what is read over a setting, the optimum marked."""
     figure = _figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
     scale, unit = _scale(np.array([found.resonance.amplitude]), of)
-    best = found.resonance
-    for i, ridge in enumerate(found.ridges):
-        points = [*zip(ridge.parameter, ridge.lam / (2 * np.pi), scale * np.sqrt(ridge.value), strict=True)]
-        if i == 0:
-            points.append((found.parameter, best.Omega / (2 * np.pi), scale * best.amplitude))
-        x, f, a = np.array(sorted(points)).T
-        name = f"peak {i + 1}" if len(found.ridges) > 1 else None
-        left.semilogx(x, a, "o-", color=COLOURS[i], markersize=4, linewidth=1.6, label=name)
-        right.semilogx(x, f, "o-", color=COLOURS[i], markersize=4, linewidth=1.6)
-    for axes, y in ((left, scale * best.amplitude), (right, best.Omega / (2 * np.pi))):
-        axes.plot(found.parameter, y, "o", markersize=11, mfc="none", mec="#c8382c", mew=1.8)
+    known = {value: one for value, one in found.found.items() if one.status == "converged"}
+    x = np.array(list(known))
+    height = scale * np.array([one.amplitude for one in known.values()])
+    frequency = np.array([one.Omega for one in known.values()]) / (2 * np.pi)
+    for axes, y in ((left, height), (right, frequency)):
+        axes.plot(x, y, "o-", color=COLOURS[0], markersize=4, linewidth=1.6)
+        at = (found.parameter, y[list(known).index(found.parameter)])
+        axes.plot(*at, "o", markersize=11, mfc="none", mec="#c8382c", mew=1.8)
         _plain(axes)
         axes.set_xlabel(label)
-    left.annotate(
-        f"{found.parameter:.4g}", (found.parameter, scale * best.amplitude), xytext=(0, -18),
-        textcoords="offset points", ha="center", fontsize=9, color="#c8382c",
-    )  # fmt: skip
-    heights = scale * np.sqrt(np.concatenate([ridge.value for ridge in found.ridges]))
-    if heights.max() > 20 * heights.min():
+        if x.min() > 0:
+            axes.set_xscale("log")
+            low, high = np.log10(x.min()), np.log10(x.max())
+            ticks = sorted({float(f"{10**e:.2g}") for e in np.linspace(low, high, 6)})
+            axes.set_xticks(ticks, labels=[f"{v:g}" for v in ticks])
+            axes.minorticks_off()
+        if axes is left:
+            axes.annotate(
+                f"{found.parameter:.4g}", at, xytext=(0, -18), textcoords="offset points", ha="center", fontsize=9,
+                color="#c8382c",
+            )  # fmt: skip
+    if height.max() > 20 * height.min():
         left.set_yscale("log")
-    for axes in (left, right):
-        ticks = sorted({float(v) for ridge in found.ridges for v in ridge.parameter})
-        axes.set_xticks(ticks, labels=[f"{v:.3g}" for v in ticks])
-        axes.minorticks_off()
-    left.set_ylabel(f"height of the resonance in {unit} (0-peak)")
+    left.set_ylabel(f"height of the highest resonance in {unit} (0-peak)")
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")
-    if len(found.ridges) > 1:
-        left.legend(fontsize=9)
     figure.suptitle(title, fontsize=12)
     return _save(figure, path)
 

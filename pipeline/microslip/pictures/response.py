@@ -20,18 +20,20 @@ def response_picture(result: CaseResult, path: Path) -> None:
 
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
-    axes.semilogy(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
+    axes.plot(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
     colours, lifted = _colours(len(result.responses)), list[float]()
     forces = sorted(result.responses, reverse=True)
     for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
         r = result.responses[normal]
         f, amplitude, lifts = _with_peaks(r, result.resonances[normal], result.lifted(normal))
         sure = np.where(lifts, np.nan, amplitude)
-        axes.semilogy(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {said} N")
+        axes.plot(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {said} N")
         if lifts.any():
             beside = lifts | np.append(lifts[1:], False) | np.append(False, lifts[:-1])  # up to the line that is sure
-            axes.semilogy(f, np.where(beside, amplitude, np.nan), color=colour, lw=1.6, ls=":")
+            axes.plot(f, np.where(beside, amplitude, np.nan), color=colour, lw=1.6, ls=":")
             lifted.append(normal)
+    if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
+        axes.set_yscale("log")
     low, high = result.free.frequency[[0, -1]]
     for f in result.stuck[(result.stuck > low) & (result.stuck < high)]:
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)

@@ -28,6 +28,7 @@ from ..body import (
     Number,
     Numbers,
     Positive,
+    Ratio,
     Vector,
     _finite_vector,
     _tuple,
@@ -552,7 +553,7 @@ class SystemSettings(Model):
     contacts: Annotated[tuple[ContactOfSystem, ...], BeforeValidator(_tuple)] = ()
     forces: Annotated[tuple[ForceSettings, ...], BeforeValidator(_tuple)] = ()
     monitors: Annotated[tuple[MonitorSettings, ...], BeforeValidator(_tuple)] = ()
-    damping_ratio: NotNegative = 0.0
+    damping_ratio: Ratio = 0.0
 
     @model_validator(mode="after")
     def _names_once(self) -> SystemSettings:
