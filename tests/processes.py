@@ -11,7 +11,8 @@ from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing.connection import Connection
 
 READY = multiprocessing.get_context("forkserver")
-READY.set_forkserver_preload(["gmsh", *(f"microslip.cad.{name}" for name in ("drawing", "faces", "solids")), "processes"])
+CAD = ("microslip.cad.drawing", "microslip.cad.faces", "microslip.cad.solids")
+READY.set_forkserver_preload(["gmsh", *CAD, "processes"])
 
 
 def run(words: list[str], module: bool = False) -> subprocess.CompletedProcess[str]:
