@@ -108,7 +108,7 @@ def test_resonances_at_many_levels_of_load_lie_on_the_backbone():
     order = np.argsort(found.amplitude)
     for force in (0.3, 1.0, 2.0, 4.0):
         problem = two_modes(4.0, 1, force, 400.0)
-        peak = resonance(highest(problem, 2 * np.pi * np.linspace(28, 45, 35)))
+        peak = resonance(highest(problem, 2 * np.pi * np.linspace(28, 45, 35))[0])
         assert peak.status == "converged"
         at = np.interp(np.log(peak.amplitude), np.log(found.amplitude[order]), found.Omega[order])
         zeta = np.interp(np.log(peak.amplitude), np.log(found.amplitude[order]), found.damping[order])
