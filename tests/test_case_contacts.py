@@ -63,7 +63,8 @@ def built(raw: dict[str, Any]) -> Any:
     return build(settings, {b.name: small.basis() for b in settings.members}, PATH)
 
 
-@pytest.mark.parametrize("patch", ["nodal", pytest.param("rigid", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("patch", ["nodal", "rigid"])
 def test_a_beam_whose_patch_deforms_on_the_ground(patch: str) -> None:
     """It converges, and says how many deformations there are."""
     result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()}, PATH)

@@ -124,6 +124,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_every_table_has_its_picture(done: Path) -> None:
     names = {"normal", "loops", "motion", "friction", "wear", "yield"}
     assert {f.stem for f in done.glob("*.png")} == names

@@ -282,9 +282,8 @@ def swinging(load: tuple[float, float, float], harmonics: int, samples: int) -> 
     return problem, harmonic_response(problem, np.array([22.0]), np.ones(1))
 
 
-@pytest.mark.parametrize(
-    ("load", "opens"), [pytest.param((12.0, 4.0, 2.0), False, marks=pytest.mark.slow), ((20.0, 8.0, 4.0), True)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("load", "opens"), [((12.0, 4.0, 2.0), False), ((20.0, 8.0, 4.0), True)])
 def test_contact_in_space_under_a_swinging_normal_force_against_time_integration(
     load: tuple[float, float, float], opens: bool
 ) -> None:

@@ -150,9 +150,8 @@ def test_the_order_of_the_bodies_says_nothing(tmp_path: Path, more: str) -> None
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())
 
 
-@pytest.mark.parametrize(
-    "more", [pytest.param('damping = "structural"', marks=pytest.mark.slow), 'damping = "stuck"\ndamping_ratio = 0.02']
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("more", ['damping = "structural"', 'damping = "stuck"\ndamping_ratio = 0.02'])
 def test_a_sector_and_the_whole_ring_are_damped_alike(tmp_path: Path, more: str) -> None:
     """Every stuck mode of the wave is one of the ring's with the same damping, 1e-9; in slip all blades answer as the
     sector does, 1e-8, whichever way the ring is eliminated."""

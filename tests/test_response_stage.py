@@ -84,6 +84,7 @@ def computed(told: list[str]) -> list[str]:
     return [t for t in told if "frequencies" in t or "peak near" in t]
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed(folder: Path) -> None:
     """Ctrl-C at the sixth point: five are kept, and readable; the next call computes four, and the peak."""
 

@@ -88,6 +88,7 @@ def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     assert "is up to date" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_respond_over_orders(ring: Path, capsys) -> None:
     """Each order's largest resonance stands where the linear ring has it (contacts stick)."""
     ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\n")
