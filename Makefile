@@ -12,7 +12,7 @@ SOURCES  := $(shell find pipeline/microslip -name '*.py')
 
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)
-unexport DISPLAY PYTHONPATH PYTHONHOME
+unexport DISPLAY PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE # without byte code the start takes twice as long
 
 # The environment knows the folder it was made for: a checkout that was moved or copied is set up again.
 MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import run
 
 from microslip.data import Mesh
 from microslip.mesh import mesh_problems, read_mesh
@@ -32,14 +33,23 @@ def meshing(body: str) -> dict:
     return tomllib.loads((GEOMETRY / body / "body.toml").read_text())["mesh"]
 
 
-def build(body: str, out: Path, mesh: dict | None = None, **changes: object) -> subprocess.CompletedProcess[str]:
-    """Run the build file in its own process on the parameters of body.toml with changes."""
+def drawn(script: Path, source: Path, out: Path, apart: bool = False) -> subprocess.CompletedProcess[str]:
+    """What a build file says and returns, in a process of its own: a new one, or one that has gmsh at hand."""
+    words = [str(script), str(source), str(out)]
+    if apart:
+        return subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=120)
+    return run(words)
+
+
+def build(
+    body: str, out: Path, mesh: dict | None = None, apart: bool = False, **changes: object
+) -> subprocess.CompletedProcess[str]:
+    """Run the build file on the parameters of body.toml with changes."""
     mesh = mesh or COARSE.get(body) or meshing(body)
     settings = {"geometry": {"parameters": parameters(body, **changes)}, "mesh": mesh}
     source = out.with_suffix(".json")
     source.write_text(json.dumps(settings))
-    command = [sys.executable, str(GEOMETRY / body / "build.py"), str(source), str(out)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return drawn(GEOMETRY / body / "build.py", source, out, apart)
 
 
 def made(body: str, folder: Path, **changes: object) -> Mesh:

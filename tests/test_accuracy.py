@@ -45,7 +45,8 @@ def readout(problem, f):
     return found, abs(operating(problem, found).watched[0, 1])
 
 
-@pytest.mark.parametrize(("make", "f"), [pytest.param(opening, 22.0, marks=pytest.mark.slow), (sliding, 17.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("make", "f"), [(opening, 22.0), (sliding, 17.0)])
 def test_the_estimate_is_of_the_size_of_the_error(make, f):
     """Of the difference to 21 harmonics it is at least that, and at most ten times, wherever that is above 1e-4."""
     exact = readout(make(MANY), f)[1]
@@ -125,6 +126,7 @@ def test_more_harmonics_are_the_same_problem():
     assert finer(few, 2, 512).groups[0].model.samples == 512
 
 
+@pytest.mark.slow
 def test_harmonics_are_added_until_the_tolerance_is_met():
     problem = opening(1)
     found = enough(problem, readout(problem, 22.0)[0], tolerance=2e-3)
@@ -135,6 +137,20 @@ def test_harmonics_are_added_until_the_tolerance_is_met():
     assert not enough(problem, readout(problem, 22.0)[0], tolerance=1e-9, most=4).reached
 
 
+def test_harmonics_are_added_to_a_slider_and_too_few_are_told():
+    """One harmonic where a Jenkins element slides is remarked on; the next number leaves an eighth of its error."""
+    built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="marched"))
+    problem = sliding(1)
+    start = readout(problem, 17.0)[0]
+    found = enough(problem, start, tolerance=1e-6, most=5)
+    assert not found.reached and [e.harmonics for e in found.errors] == [1, 5]
+    assert found.errors[1].readout < found.errors[0].readout / 8
+    assert enough(problem, start, tolerance=1.01 * found.errors[0].readout).reached
+    (remark,) = _truncated(built, problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    assert "At F_N = 8 N the amplitude at 17 Hz" in remark
+
+
+@pytest.mark.slow
 def test_a_case_says_where_its_harmonics_are_too_few():
     """One harmonic at a contact that slides and opens is remarked on; seven are not."""
     built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="marched"))

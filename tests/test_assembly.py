@@ -50,7 +50,7 @@ FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "settled": 1e-13, "length":
 
 
 RINGS = [(b, e, form) for b, e in ((6, 1), (6, 5), (4, 2), (7, 2), (5, 0)) for form in ("relative", "sides")]
-QUICK = (6, 5, "sides"), (4, 2, "relative"), (5, 0, "relative")
+QUICK = ((4, 2, "relative"),)
 
 
 @pytest.mark.parametrize(
@@ -152,6 +152,7 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
     np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * np.abs(found[0].watched).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["relative", "sides"])
 def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
     """Every order of two bodies and of three read-outs, two of them of one body: each row is the read-out's own, and
@@ -184,7 +185,10 @@ def rubbing(phase: float, push: float, friction: float) -> Assembly:
     return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.watches)
 
 
-@pytest.mark.parametrize(("push", "friction", "state"), [(0.3, 0.05, "partial slip"), (0.2, 0.05, "stuck")])
+@pytest.mark.parametrize(
+    ("push", "friction", "state"),
+    [pytest.param(0.3, 0.05, "partial slip", marks=pytest.mark.slow), (0.2, 0.05, "stuck")],
+)
 def test_the_phase_of_all_loads_turns_the_answer_and_nothing_else(push: float, friction: float, state: str) -> None:
     """By 8 of 64 samples: 1e-10. Points that slip forget where their marching began, and those that never slipped
     remember nothing else than the preloaded place. A state that sticks loses nothing, and not what rounding leaves."""

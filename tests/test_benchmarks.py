@@ -35,6 +35,7 @@ def test_the_cyclic_benchmark_compares_the_two_ways(tmp_path):
         assert text in done.stdout
 
 
+@pytest.mark.slow
 def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
     command = [sys.executable, str(ROOT / "benchmarks" / "ring.py"), "--quick", "--work", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
@@ -44,6 +45,7 @@ def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_contact_benchmark_compares_laws_that_agree():
     command = [sys.executable, str(ROOT / "benchmarks" / "contact_points.py"), "--quick"]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])

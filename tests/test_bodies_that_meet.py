@@ -52,7 +52,7 @@ def assert_they_meet(a: Patch, b: Patch, turn: np.ndarray, near: float = MICRON)
 # ---------------------------------------------------------------- neighbours of the rig
 
 
-@pytest.mark.parametrize("arrangement", [1, 2])
+@pytest.mark.parametrize("arrangement", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_rig_neighbours_lie_on_the_blade(tmp_path: Path, arrangement: int) -> None:
     own = {"contact_width": 20.0} if arrangement == 2 else {}
     blade = made("blade", tmp_path, mesh={"size": 20.0}, arrangement=arrangement, **own)

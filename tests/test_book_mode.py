@@ -108,6 +108,7 @@ def computed() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return A, e * A, orbits.exact(A, e * A)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("which", "closed"), [(0, line), (1, circle)], ids=["line", "circle"])
 def test_orbits_have_their_closed_forms(which: int, closed: object, computed: tuple) -> None:
     """Computed ones to the error of their ways (1e-5 of the limit), the table to the error it knows."""
@@ -117,12 +118,19 @@ def test_orbits_have_their_closed_forms(which: int, closed: object, computed: tu
     assert np.allclose(along(A, B)[0] * A, exact, rtol=0, atol=KNOWN.error)
 
 
+@pytest.mark.parametrize(("ratio", "closed"), [(1e-5, line), (1.0, circle)], ids=["line", "circle"])
+def test_the_table_has_the_closed_forms(ratio: float, closed: object) -> None:
+    """To the error it knows."""
+    assert np.allclose(along(SIZES, ratio * SIZES)[0], closed(SIZES), rtol=0, atol=KNOWN.error / SIZES)
+
+
 def test_a_cross_stiffness_that_is_neither_stick_nor_slip() -> None:
     """A line with a little of the other direction: c_zeta above 1, and b_zeta > 0 (errata to zeta_A -> 0)."""
     c, b = along(np.array([1.2]), np.array([1e-3]))[1][0].real, along(np.array([2.0]), np.array([1e-3]))[1][0].imag
     assert 1.05 < c < 1.15 and b > 0.1
 
 
+@pytest.mark.slow
 def test_the_error_of_the_table_is_the_one_it_promises(computed: tuple) -> None:
     """At the places chosen at random."""
     A, B, K = (x[..., 2 * len(SIZES) :] for x in computed)
@@ -247,7 +255,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, book.BookPatch]:
     return {name: book.book_patch(patch(law), strips, where=where) for name, (law, strips) in LAWS.items()}
 
 
-@pytest.mark.parametrize("name", ["rough, microslip", "strips"])
+@pytest.mark.parametrize("name", [slow("rough, microslip"), "strips"])
 def test_derivative_meets_differences(name: str, made: dict[str, book.BookPatch]) -> None:
     """Of all resultants with respect to all harmonics; the strips' springs jump where a strip begins to touch, and no
     difference is taken across that."""

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import run
 
 from microslip.mesh import mesh_problems, read_mesh
 
@@ -119,7 +120,7 @@ def mesh_cad(cad, out, faces=(), unit="mm", folder=".", **mesh):
     }
     note = out.with_suffix(".json")
     note.write_text(json.dumps(settings))
-    return python("-m", "microslip.cad", str(note), str(out))
+    return run(["microslip.cad", str(note), str(out)], module=True)
 
 
 def meshed(cad, out, faces=(), unit="mm", **mesh):
@@ -375,7 +376,7 @@ def test_unwritable(parts: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals")
-@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("sign", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_stopped_half_way(parts: Path, tmp_path: Path, sign: int) -> None:
     """Stopped while meshing: the process ends at once and leaves no mesh."""
     note, out = tmp_path / "a.json", tmp_path / "a.msh"

@@ -146,6 +146,7 @@ def flow(folder: Path, pressure: str) -> None:
     (folder / "flow.csv").write_text("\n".join(["x,y,z,p_real,p_imag", *lines]))
 
 
+@pytest.mark.slow
 def test_the_response_follows_an_edited_field(tmp_path, monkeypatch, capsys) -> None:
     """From the command line: a field that is twice as large makes the response anew, twice as large while the contact
     sticks; the same field again is up to date; a field that is no field is one sentence and exit code 2."""
@@ -164,6 +165,7 @@ def test_the_response_follows_an_edited_field(tmp_path, monkeypatch, capsys) -> 
     assert "excitations.contact_left.field: flow.csv: has no x, y, z, p_real" in "".join(capsys.readouterr())
 
 
+@pytest.mark.slow
 def test_a_field_needs_no_residual_shape(tmp_path, monkeypatch) -> None:
     """MacNeal's basis keeps residual shapes of its own rows; a field has none, and the response goes without: a fifth
     of the modal answer at most is missing against Rubin's basis, whose modes hold the face's statics."""

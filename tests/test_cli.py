@@ -187,6 +187,7 @@ def test_run_prints_the_first_frequencies(
     assert main(["run", "box", "-q"]) == 0 and said(capsys) == ("", "")
 
 
+@pytest.mark.slow
 def test_run_of_a_case_and_a_response_that_does_not_converge(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -260,7 +261,7 @@ MISTAKES = [
     (["check", "zero.h5"], "zero.h5"),
     (["check", "other.h5"], "other.h5"),
     (["check", "cut.h5"], "cut.h5"),
-    (["report", "cut.h5"], "cut.h5"),
+    pytest.param(["report", "cut.h5"], "cut.h5", marks=pytest.mark.slow),
     (["info", "gone.step"], "there is no such file"),
     (["info", "cut.msh"], "cut.msh"),
     (["info", "zero.h5"], "zero.h5"),
@@ -353,8 +354,10 @@ def test_a_mistake_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch)
     [
         (["mesh", "box", "--set", "mesh.size=1"], "meshing", "meshes/box.msh", signal.SIGINT),
         (["mesh", "box", "--set", "mesh.size=1"], "meshing", "meshes/box.msh", signal.SIGTERM),
-        (["modes", "box", "--set", "mesh.size=3.5", "--set", "modes.count=400"], "eigenmodes", "build/box/basis.h5",
-         signal.SIGINT),
+        pytest.param(
+            ["modes", "box", "--set", "mesh.size=3.5", "--set", "modes.count=400"], "eigenmodes", "build/box/basis.h5",
+            signal.SIGINT, marks=pytest.mark.slow,
+        ),
     ],
     ids=["while gmsh works", "ended while gmsh works", "while the modes are solved"],
 )  # fmt: skip
@@ -410,9 +413,9 @@ sys.exit(main(sys.argv[1:]))
     ("words", "code", "text"),
     [
         (["check", "build/box/basis.h5"], 0, "checks passed"),
-        (["info", "build/box/basis.h5"], 0, "6 modes"),
-        (["info", "box"], 0, "a clamped box"),
-        (["export", "build/box/basis.h5", "--to", "mat"], 0, "basis.mat"),
+        pytest.param(["info", "build/box/basis.h5"], 0, "6 modes", marks=pytest.mark.slow),
+        pytest.param(["info", "box"], 0, "a clamped box", marks=pytest.mark.slow),
+        pytest.param(["export", "build/box/basis.h5", "--to", "mat"], 0, "basis.mat", marks=pytest.mark.slow),
         (["init", "blade"], 0, "ready"),
         (["modes", "box", "--force"], 2, "pip install 'microslip[fem]'"),
     ],

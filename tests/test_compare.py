@@ -126,6 +126,7 @@ def test_a_measured_body_is_drawn_by_its_points_with_the_signs_of_the_other(tmp_
     assert set(drawn) == {"mac", "pairs"}
 
 
+@pytest.mark.slow
 def test_modes_go_out_as_a_universal_file_and_come_back_as_a_test(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -153,7 +154,7 @@ def test_points_beside_the_mesh_go_to_the_nearest_nodes() -> None:
     ("words", "says"),
     [
         (["--speed", "2"], "has no speed 2"),
-        (["--nodal-diameter", "1"], "nodal diameter 1"),
+        pytest.param(["--nodal-diameter", "1"], "nodal diameter 1", marks=pytest.mark.slow),
         (["--least", "2"], "a MAC lies between 0 and 1"),
     ],
 )

@@ -85,6 +85,7 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     assert "of 9 frequencies" not in out.err and "F_N = 50 N: marched" in out.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", ["", pytest.param('mode = "book"\n', marks=pytest.mark.slow)])
 def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     """A plain response and the comparison of both modes, after one another: each point is computed once."""
@@ -116,7 +117,7 @@ def test_a_case_in_the_books_mode(folder: Path) -> None:
     assert lost[0] <= 1e-18 < lost[1]
 
 
-@pytest.mark.parametrize(("amplitude", "told"), [(200.0, True), (0.02, False)])
+@pytest.mark.parametrize(("amplitude", "told"), [(200.0, True), pytest.param(0.02, False, marks=pytest.mark.slow)])
 def test_the_books_mode_says_where_contacts_would_lift_off(folder: Path, amplitude: float, told: bool) -> None:
     few = ['mode="book"', "sweep.start=325.0", "sweep.stop=345.0", "sweep.points=3", f"amplitude={amplitude}"]
     running.respond(folder / "case.toml", None, few)

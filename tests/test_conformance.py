@@ -129,7 +129,9 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("[bS]*/python*"))
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize(
+    "name", [n if n == "sector-cyclic" else pytest.param(n, marks=pytest.mark.slow) for n in SMALL]
+)
 def test_the_validator_runs_where_there_is_only_h5py_and_numpy(name: str, bare: Path, tmp_path: Path) -> None:
     """The kit without the scripts that make it, in an environment without microslip, scipy or any other package."""
     kit = shutil.copytree(KIT, tmp_path / "kit", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
@@ -525,6 +527,7 @@ def test_the_packages_sample_is_the_kits() -> None:
     assert path.stat().st_size < 500_000
 
 
+@pytest.mark.slow
 def test_respond_to_the_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From nothing to a friction response in one command, and the same from a copy of one's own."""
     monkeypatch.chdir(tmp_path)

@@ -525,6 +525,7 @@ def test_settings_that_cannot_be_are_refused(change, reason):
         settings_of(**change)
 
 
+@pytest.mark.slow
 def test_interference_beyond_all_measure_is_refused():
     """Half a metre pressed into blocks of 0.4 m: a sentence, not a number."""
     with pytest.raises((UserError, NotConverged), match="closures|equilibrium|unstable"):

@@ -110,6 +110,13 @@ def columns(file: Path) -> dict[str, np.ndarray]:
     return dict(zip(head.split(","), table.T, strict=True))
 
 
+@pytest.mark.slow
+def test_quiet_means_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path)
+    assert main(["contact", str(tmp_path), "-o", str(tmp_path / "y"), "-q"]) == 0
+    assert capsys.readouterr().out == ""
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("contact")
@@ -117,6 +124,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_every_table_has_its_picture(done: Path) -> None:
     names = {"normal", "loops", "motion", "friction", "wear", "yield"}
     assert {f.stem for f in done.glob("*.png")} == names
@@ -177,8 +185,6 @@ def test_what_is_printed(done: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert re.search(r"slip limit at the working point +200 N", out)
     assert "the quasi-static contact law may be used: it is 0.02 % too stiff" in out
     assert "The contact stays elastic" in out and "stick / slip / open" in out
-    assert main(["contact", str(tmp_path), "-o", str(tmp_path / "y"), "-q"]) == 0
-    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize("figure", ["3.5-3", "3.6-5", "3.9-2"])

@@ -128,7 +128,9 @@ def swinging(name, n=40):
     return example, some(n, example=example).at[:, 0].multiply(0.3).at[:, 0, 0].set(example.normal)
 
 
-@pytest.mark.parametrize(("name", "enough"), [("smooth point", 400), ("rough strips", 5000), ("Iwan", 400)])
+@pytest.mark.parametrize(("name", "enough"), [
+    ("smooth point", 400), pytest.param("rough strips", 5000, marks=pytest.mark.slow), ("Iwan", 400),
+])  # fmt: skip
 def test_cycles_go_on_until_the_sliders_have_settled(name: str, enough: int) -> None:
     """Under a swinging normal load sliders creep: two cycles are not enough, and the end of the creep is noticed.
 
@@ -183,7 +185,9 @@ def test_derivatives_are_those_of_the_periodic_state(name: str) -> None:
     assert error.max() < 1e-5
 
 
-@pytest.mark.parametrize(("name", "apart"), [("smooth point", 0.0), ("rough strips", 0.0), ("point with mass", 1e-6)])
+@pytest.mark.parametrize(("name", "apart"), [
+    ("smooth point", 0.0), pytest.param("rough strips", 0.0, marks=pytest.mark.slow), ("point with mass", 1e-6),
+])  # fmt: skip
 def test_force_and_derivative_belong_to_the_same_number_of_cycles(name: str, apart: float) -> None:
     """With a coarse tolerance, in chunks that settle at different times; where cycles are marched one more would show.
 

@@ -17,6 +17,8 @@ TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)
 SISTERS = {  # laws that differ from a quick one in their characteristic or heights alone
     "exponential heights, cut", "linear heights", "tabulated heights", "point, rising", "point, heated",
     "point, static and sliding", "point, measured", "Mindlin", "round point", "gapped point",
+    "Gaussian heights, cut", "worn heights", "hyperbolic point", "potential point", "measured point",
+    "point, scattered", "Mindlin, two stiffnesses", "portion of a rough contact",
 }  # fmt: skip
 assert SISTERS <= set(EXAMPLES)
 LAWS = pytest.mark.parametrize(

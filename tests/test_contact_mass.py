@@ -92,6 +92,7 @@ def test_creep_falls_with_the_first_power_of_the_slope() -> None:
     assert np.polyfit(np.log(slopes), np.log(away), 1)[0] == pytest.approx(-1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_equation_itself_tends_to_the_return_map() -> None:
     """Integrated, not stepped; the return map of a hundred times finer steps. First order in the mass."""
     fine = marched(PointContact(ROUGH, COULOMB, value(1), value(1.0), value(0.2)), all_three, 20000)[::100]
@@ -105,8 +106,8 @@ def test_the_equation_itself_tends_to_the_return_map() -> None:
 # the steps solve the equation ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("printed", [False, True])
-@pytest.mark.parametrize("motion", [all_three, shaken], ids=["3.7-7", "shaken"])
+@pytest.mark.parametrize("printed", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("motion", [all_three, pytest.param(shaken, marks=pytest.mark.slow)], ids=["3.7-7", "shaken"])
 def test_steps_converge_to_the_integrated_equation(motion, printed) -> None:
     """Implicit Euler: first order in the step, through stick, slip and separation."""
     law = element(1e-2, 1e3, damping=0.2, printed=printed)
@@ -140,7 +141,7 @@ def test_friction_of_the_integrated_course_is_the_smoothed_law() -> None:
     assert np.allclose(found.friction[closed], (expected[:, None] * found.velocity)[closed], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0])
+@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_heated_friction_sees_the_normal_force_and_not_that_over_the_share(share) -> None:
     """Slid steadily at a half and at all of the area: mu_0/(1 + p N v) N, by steps and by integration."""
     motion = pulled_half if share == 0.5 else pulled
@@ -213,6 +214,7 @@ def test_on_a_constant_area_the_printed_form_is_the_same() -> None:
     assert np.allclose(a, b, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_on_a_changing_area_the_printed_form_is_another_one() -> None:
     a, b = (integrate(element(printed=p), all_three, TIMES, 1e-6).force for p in (False, True))
     assert np.abs(a - b).max() > 0.03 and np.array_equal(a[:, 0], b[:, 0])

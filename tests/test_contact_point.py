@@ -129,18 +129,19 @@ def test_derivatives_of_a_straight_way_are_those_of_differences() -> None:
     assert np.isfinite(told).all() and np.quantile(wrong, 0.999) < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [(2.0, 1.0), (1.3, 0.9)], ids=["slides", "sticks twice"])
 def test_on_an_ellipse_the_force_is_of_second_order_in_the_samples(axes) -> None:
     """Against the orbit's own tables (Sextro 5.2-15 to 5.2-30), made otherwise; 0.3 % of the limit with 64 samples."""
     a, b = axes
     K_eta, K_zeta = exact(np.array([a]), np.array([b]))[:, 0]
     right = np.array([a * K_eta, -1j * b * K_zeta]) * LIMIT
-    samples, errors = (16, 32, 64, 128), []
+    samples, errors = (16, 64), []
     for s in samples:
         shape = LIMIT / K * np.array([0.0, a, b])
         found = first_harmonics(JENKINS, lambda t, way=shape: np.stack([0 * t, np.cos(t), np.sin(t)], axis=-1) * way, s)
         errors.append(np.abs(found[0, 1:] - right).max() / LIMIT)
-    assert errors[2] < 3e-3
+    assert errors[1] < 3e-3
     assert np.polyfit(np.log(samples), np.log(errors), 1)[0] == pytest.approx(-2, abs=0.1)
 
 
@@ -154,11 +155,11 @@ def test_a_rough_contact_whose_load_swings_is_of_second_order_in_the_samples(swi
         way = [1 + swing * np.cos(t + phase), 1.5 * np.cos(t) + 0.3 * np.sin(2 * t), np.sin(t) + 0 * phase]
         return np.stack(np.broadcast_arrays(*way), axis=-1) * [12e-6, 3e-5, 2e-5]
 
-    samples = (32, 64, 128, 256)
+    samples = (64, 256)
     right = first_harmonics(law, motion, 2048)
     wrong = [np.abs(first_harmonics(law, motion, s) - right)[:, 1:] for s in samples]
     errors = np.sqrt(np.mean(np.square(wrong), axis=(1, 2)) / np.mean(np.abs(right[:, 1:]) ** 2))
-    assert errors[1] < 2e-3
+    assert errors[0] < 2e-3
     assert np.polyfit(np.log(samples), np.log(errors), 1)[0] == pytest.approx(-2, abs=0.1)
 
 
@@ -404,7 +405,7 @@ def test_a_stuck_damped_contact_loses_the_energy_of_a_kelvin_voigt_element() -> 
 @pytest.mark.parametrize(
     ("test", "wrong"),
     [
-        (contract.test_friction_stays_in_its_cone, BOX),
+        pytest.param(contract.test_friction_stays_in_its_cone, BOX, marks=pytest.mark.slow),
         (contract.test_the_force_does_not_jump_at_separation, JUMP),
         (contract.test_dissipated_energy_grows, PRESTRESSED),
         pytest.param(contract.test_the_force_does_not_jump_at_separation, PRESTRESSED, marks=pytest.mark.slow),

@@ -74,6 +74,7 @@ def problem(case: Path, normal: float = 10.0) -> Any:
     return problem_of(build(load_case(case)[0], {"lifting": lifting()}, case), normal)
 
 
+@pytest.mark.slow
 def test_over_the_frequency(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The curve of `over_frequency` in the table; every point in the response file solves the balance anew."""
     assert main(["respond", "case.toml", "--over", "frequency"]) == 0
@@ -141,6 +142,7 @@ def test_no_start_is_said(case: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert "no start: not a number; begin elsewhere than at 140 Hz (curve.band)." in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_over_the_load(case: Path) -> None:
     """At the resonance, if no frequency is given; the end of the curve is a motion under the whole load."""
     case.write_text(CASE + "[curve]\nload = [0.1, 1.0]\n")

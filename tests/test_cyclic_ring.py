@@ -98,7 +98,9 @@ CASES = [("hexahedron20", 6, 0.0), ("hexahedron20", 6, RPM), ("tetra10", 5, RPM)
 # ---------------------------------------------------------------- spectra
 
 
-@pytest.mark.parametrize(("cell_type", "sectors", "rpm"), CASES)
+@pytest.mark.parametrize(
+    ("cell_type", "sectors", "rpm"), [pytest.param(*CASES[0], marks=pytest.mark.slow), *CASES[1:]]
+)
 def test_frequencies_of_every_nodal_diameter(cell_type, sectors, rpm):
     """Even and odd numbers of sectors, at rest and about the nonlinear equilibrium (measured: 6e-12)."""
     full = whole(cell_type, sectors, rpm * np.pi / 30)
@@ -324,7 +326,7 @@ def ring_waves(k: int):
     return np.sort(rings.whirl(K, M, G, 30)[0])
 
 
-@pytest.mark.parametrize("k", range(4))
+@pytest.mark.parametrize("k", [1, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 3))])
 def test_forward_and_backward_waves_against_the_ring(k):
     """All degrees of freedom of the ring with Coriolis forces against 12 modes of the sector: within the error that is
     stated beside them, which is useful (1e-3 and less for the first ones), and labelled by the sign of w."""
@@ -391,7 +393,7 @@ def coupled_errors(reduction: str, count: int, stiffness: float):
 @pytest.mark.parametrize(
     ("reduction", "few", "many"),
     [
-        ("eigenmodes", 4e-2, 3e-3),
+        pytest.param("eigenmodes", 4e-2, 3e-3, marks=pytest.mark.slow),
         ("rubin", 1e-5, 1e-9),
         pytest.param("craig-bampton", 4e-3, 2e-4, marks=pytest.mark.slow),
     ],

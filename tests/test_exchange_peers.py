@@ -83,6 +83,7 @@ def test_octave_builds_the_system_and_answers_as_we_do(reduction: str, tmp_path:
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")
 def test_octave_rubs_the_body_along_a_force_direction(tmp_path: Path) -> None:
     """One elastic dry friction element, sampled in Octave, in the closed form of one Jenkins element here.

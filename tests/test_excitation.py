@@ -102,6 +102,7 @@ def test_gas_load_is_the_stimulus_of_the_steady_load() -> None:
     assert load == Load("blade", "gas", pytest.approx(1000 * np.exp(0.5j)), 3)
 
 
+@pytest.mark.slow
 def test_several_orders_at_once_on_a_sector_are_those_on_the_ring() -> None:
     """Engine orders 2, 4 and 6 with phases of their own on blades that rub: every blade of the whole ring moves as the
     sector says, 1e-9, and the energy that comes in is the ring's, N times the sector's, and above 0."""

@@ -48,6 +48,7 @@ def test_over_the_load() -> None:
     assert stuck.cycles["face"].slipping[0] == 0.0 < response.operating(problem, last).cycles["face"].slipping[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.85, pytest.param(4.0, marks=pytest.mark.slow)])
 def test_over_the_normal_force(factor: float) -> None:
     """From the force given to another one: there the motion of a problem that is pressed so from the beginning."""

@@ -568,7 +568,12 @@ def sizes(cell_type):
     return [1 / n for n in STEPS[cell_type]]
 
 
-@pytest.mark.parametrize("cell_type", CELLS)
+def flat_slow(cells):
+    """Meshes of tetrahedra have five times as many cells."""
+    return [pytest.param(c, marks=pytest.mark.slow) if c == "tetra10" else c for c in cells]
+
+
+@pytest.mark.parametrize("cell_type", flat_slow(CELLS))
 def test_order_of_frequencies(cell_type):
     """Eigenvalues of the brick on rollers (smooth shapes, bent cells) converge with order 4, linear cells with 2.
 
@@ -580,6 +585,7 @@ def test_order_of_frequencies(cell_type):
     assert slope(sizes(cell_type), errors.mean(axis=1)) == pytest.approx(ORDERS[cell_type], abs=0.3)
 
 
+@pytest.mark.slow
 def test_order_of_the_mass_quadrature():
     """What four points instead of a full rule change in the mass of straight ten-node tetrahedra is of order 4 too."""
     steps = (3, 4, 6)
@@ -590,7 +596,7 @@ def test_order_of_the_mass_quadrature():
     )  # 3.6 here, 3.8 between 6 and 8
 
 
-@pytest.mark.parametrize("cell_type", QUADRATIC)
+@pytest.mark.parametrize("cell_type", flat_slow(QUADRATIC))
 def test_order_of_the_geometric_stiffness(cell_type):
     """Uniform initial stress along the edges adds (S_i k_i^2) / rho to each eigenvalue, here as much as the shear."""
     S = np.array([1.5, 0.4, 0.8]) * SHEAR

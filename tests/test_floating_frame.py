@@ -237,6 +237,7 @@ def test_gravity_stiffens_a_hanging_body():
 # ---------------------------------------------------------------- prescribed rotation
 
 
+@pytest.mark.slow
 def test_a_slow_spin_up_ends_in_the_static_deflection():
     """Omega raised smoothly to 600 rpm: the modal coordinates end where K(Omega) q = Omega^2 centrifugal has them."""
     b = floating_body(blade())

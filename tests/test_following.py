@@ -37,6 +37,7 @@ def table(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
     """At the small end the frequency of the sticking contact, at the large end a lower one, much damped between."""
     assert main(["backbone", "case.toml"]) == 0
@@ -46,6 +47,34 @@ def test_backbone(capsys: pytest.CaptureFixture[str]) -> None:
         rows = [r for r in table("backbone.csv") if r["normal_force_N"] == normal]
         f, d = (np.array([float(r[key]) for r in rows]) for key in ("frequency_Hz", "damping_ratio"))
         assert len(rows) > 10 and f[-1] < 0.9 * f[0] and d.max() > 5 * d[0]
+
+
+def one_point(folder: Path, monkeypatch: pytest.MonkeyPatch, points: int) -> None:
+    """The sled on one point, one harmonic, few samples; its case in a folder of its own."""
+    monkeypatch.chdir(folder)
+    write_basis(folder / "basis.h5", sled())
+    one = CASE.replace("points = [4, 2]", "points = [1, 1]").replace("harmonics = 2", "harmonics = 1")
+    one = one.replace("points = 25", f"points = {points}").replace("[5.0, 1e5]", "[40.0]")
+    one = one.replace("samples = 32", "samples = 16")
+    one = one.replace("start = 35.0\nstop = 200.0", "start = 60.0\nstop = 100.0")
+    (folder / "case.toml").write_text(one)
+
+
+def test_backbone_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The frequency falls where it slides."""
+    one_point(tmp_path, monkeypatch, points=3)
+    assert main(["backbone", "case.toml", "-q"]) == 0
+    f = [float(r["frequency_Hz"]) for r in table("backbone.csv")]
+    assert len(f) > 5 and f[-1] < 0.9 * f[0]
+
+
+@pytest.mark.slow
+def test_stability_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A response that sticks is stable."""
+    one_point(tmp_path, monkeypatch, points=3)
+    assert main(["respond", "case.toml", "--stability", "-q"]) == 0
+    rows = table("stability.csv")
+    assert len(rows) >= 3 and all(r["stable"] == "1" and 0 < float(r["growth"]) <= 1 for r in rows)
 
 
 @pytest.mark.slow
@@ -98,10 +127,15 @@ def test_what_was_found_stays_when_it_is_interrupted(monkeypatch: pytest.MonkeyP
     assert [r["what"] for r in table("optimum.csv")] == ["highest resonance"] * 2
 
 
-def test_no_optimum_says_where_to_look(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2"]) == 1
+def test_no_optimum_says_where_to_look(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one_point(tmp_path, monkeypatch, points=9)
+    band = ["--set", "sweep.start=100", "--set", "sweep.stop=140"]
+    assert main(["optimum", "case.toml", "--low", "20", "--high", "30", "--points", "2", *band]) == 1
     assert "no optimum between 20 and 30 N" in (err := capsys.readouterr().err)
     assert "lowest at 20 N, an end; look beyond it with --low below 20" in err
+    assert [r["what"] for r in table("optimum.csv")[:2]] == ["highest resonance"] * 2
 
 
 def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,6 +149,7 @@ def test_an_angle_is_followed_through_nothing(monkeypatch: pytest.MonkeyPatch) -
     np.testing.assert_allclose(asked[1], [0.1, 0.2, 0.4])
 
 
+@pytest.mark.slow
 def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
     """The response of a sliding block is stable; growth factors of every point are in the table: 1 where sliders that
     stick came to touch their limit, which keep what they are given."""

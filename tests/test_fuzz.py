@@ -103,7 +103,7 @@ def token_edited(text: str, edits: list[tuple[int, int, str]]) -> bytes:
 BODIES = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "geometry").glob("*/body.toml"))]
 
 
-@settings(max_examples=250)
+@settings(max_examples=100)
 @given(st.sampled_from(BODIES), EDITS, st.booleans())
 def test_changed_body_files(folder: Path, text: str, edits: list[tuple[int, int, str]], words: bool) -> None:
     path = folder / "body.toml"
@@ -169,7 +169,7 @@ FULL = small.table(
 )  # fmt: skip
 
 
-@settings(max_examples=250)
+@settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(0, 10**6), VALUES), min_size=1, max_size=3), KEYS, VALUES, st.booleans())
 @example([(0, 10**400)], "zzz", True, False)
 def test_any_value_at_any_place_of_the_settings(
@@ -204,14 +204,14 @@ def read_any_mesh(path: Path) -> None:
         mesh_problems(read_mesh(path, "mm"))
 
 
-@settings(max_examples=100)  # what passes the first look is tried in a process of its own
+@settings(max_examples=30)  # what passes the first look is tried in a process of its own
 @given(EDITS, st.booleans())
 def test_changed_gmsh_files(folder: Path, edits: list[tuple[int, int, str]], words: bool) -> None:
     (folder / "part.msh").write_bytes((token_edited if words else edited)(TET, edits))
     read_any_mesh(folder / "part.msh")
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(EDITS, st.booleans())
 def test_changed_abaqus_files(folder: Path, edits: list[tuple[int, int, str]], words: bool) -> None:
     (folder / "part.inp").write_bytes((token_edited if words else edited)(INP, edits))
@@ -236,7 +236,8 @@ def foreign(folder: Path) -> None:
         FOREIGN[name] = (folder / name).read_bytes()
 
 
-@settings(max_examples=20)  # each in a process of its own
+@pytest.mark.slow
+@settings(max_examples=6)  # each in a process of its own
 @given(st.sampled_from(["a.msh", "b.msh", "a.vtu", "a.vtk", "a.bdf"]), st.integers(0, 2**32))
 def test_flipped_bytes_in_other_meshes(folder: Path, foreign: None, name: str, seed: int) -> None:
     (folder / name).write_bytes(flipped(FOREIGN[name], random.Random(seed)))
@@ -319,11 +320,12 @@ print("end", flush=True)
 """
 
 
-def test_flipped_bytes_in_unsealed_modal_files(folder: Path, modal_file: Path) -> None:
+@pytest.mark.parametrize("stop", [15, pytest.param(60, marks=pytest.mark.slow)])
+def test_flipped_bytes_in_unsealed_modal_files(folder: Path, modal_file: Path, stop: int) -> None:
     """Read in one process after the other. Where HDF5 itself crashes or hangs, the door in front of it must hold."""
     paths = [str(ROOT / "tests"), str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    first, stop, deaths = 0, 60, 0
+    first, deaths = 0, 0
     while first < stop:
         words = [sys.executable, "-W", "error::RuntimeWarning", "-c", WORKER]
         words += [str(modal_file), str(folder / "flipped.h5"), str(first), str(stop)]

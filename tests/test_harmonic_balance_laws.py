@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from microslip import continuation
-from microslip.case import CaseSettings, load_case, run_case
+from microslip.case import CaseResult, CaseSettings, load_case, run_case
 from microslip.case.assemble import build
 from microslip.case.run import _not_periodic, problem_of
 from microslip.contact.friction import Coulomb, Falling
@@ -143,7 +143,7 @@ def test_linear_limit_is_modal_superposition() -> None:
     places, areas = grid(0.072, 0.005, (4, 3))
     law = PointContact(Penalty(value(3e6 / 12)), Coulomb(value(1e6)), value(1e6 / 12))
     patch = Patch("face", places, areas, law)
-    frequency = np.linspace(20, 300, 15)
+    frequency = np.linspace(20, 300, 5)
     problem = of_body(g, (patch,), np.array([1e5]), force, watched, samples=16)
     r = harmonic_response(problem, frequency, np.array([1.0]))
     K = g.K_r + g.interfaces["face"].rows.T @ problem.stiffness[0] @ g.interfaces["face"].rows
@@ -156,7 +156,7 @@ def test_linear_limit_is_modal_superposition() -> None:
     np.testing.assert_allclose(stuck(problem.parts[0][0], problem.stiffness[0]), values, rtol=1e-9)
 
 
-@pytest.mark.parametrize("scale", [0.01, 30.0])
+@pytest.mark.parametrize("scale", [pytest.param(0.01, marks=pytest.mark.slow), 30.0])
 def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     """Any k on the left side gives the same response, and the same residual up to the factor (1 + D k)."""
     g, force, watched = modes_with_rows()
@@ -168,6 +168,7 @@ def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
     np.testing.assert_allclose(a.harmonics, b.harmonics, rtol=0, atol=1e-7 * np.abs(a.monitor).max())
 
 
+@pytest.mark.slow
 def test_one_harmonic_and_a_constant_force_are_the_closed_form() -> None:
     """Against `jenkins`: the sampled force converges to the closed form with the square of the step."""
     g, limit, kt = oscillator(), 0.6, 2e4
@@ -255,6 +256,7 @@ def in_time(problem: Problem, r: HarmonicResponse, steps: int) -> np.ndarray:
     return (r.contact[0] @ np.array(waves)).T - problem.groups[0].offset[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f", [17.0, 21.0])
 def test_jenkins_oscillator_against_time_integration(f: float) -> None:
     """Relative 1e-4 of the amplitude over the whole period (21 harmonics; the force has a kink)."""
@@ -280,6 +282,7 @@ def swinging(load: tuple[float, float, float], harmonics: int, samples: int) -> 
     return problem, harmonic_response(problem, np.array([22.0]), np.ones(1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("load", "opens"), [((12.0, 4.0, 2.0), False), ((20.0, 8.0, 4.0), True)])
 def test_contact_in_space_under_a_swinging_normal_force_against_time_integration(
     load: tuple[float, float, float], opens: bool
@@ -296,6 +299,7 @@ def test_contact_in_space_under_a_swinging_normal_force_against_time_integration
     assert r.dissipated[0] == pytest.approx(lost, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_one_harmonic_is_not_enough() -> None:
     """What the others are for: against 21 of them one is off by more than 10 %, three by less than half of that."""
     amplitude = [abs(swinging((20.0, 8.0, 4.0), H, 2048)[1].monitor[0]) for H in (1, 3, 21)]
@@ -303,6 +307,7 @@ def test_one_harmonic_is_not_enough() -> None:
     assert error[0] > 0.1 and error[1] < 0.5 * error[0]
 
 
+@pytest.mark.slow
 def test_work_of_the_excitation_is_the_friction_along_the_slip_path() -> None:
     """Supplied less damped, of the harmonics, against force times path slid, in time; the gap closes with the step."""
     gaps = []
@@ -347,6 +352,7 @@ def test_a_body_that_only_its_contact_holds() -> None:
     assert np.abs(r.harmonics[:, 0]).min() > 1e-9  # the mean approach is not that of the preload
 
 
+@pytest.mark.slow
 def test_a_body_that_walks_away_is_no_solution() -> None:
     """Free along the tangent too: normal load and friction in phase push it on, no mean holds it. No false answer."""
     g = body(np.vstack([np.eye(3), np.zeros((3, 3))]), np.zeros(3))
@@ -358,6 +364,7 @@ def test_a_body_that_walks_away_is_no_solution() -> None:
     assert not r.converged.any() and np.isfinite(r.error).all() and np.isfinite(r.x).all()
 
 
+@pytest.mark.slow
 def test_continuation_follows_a_contact_that_lifts_off_through_its_folds() -> None:
     """A mass pressed on a spring that cannot pull softens where it lifts off: the resonance leans over, with three
     solutions between two folds. On the curve R vanishes; at three frequencies it meets what Newton's method finds.
@@ -437,20 +444,29 @@ def asked(folder: Path, *replaced: tuple[str, str]) -> CaseSettings:
     return load_case(folder / "case.toml")[0]
 
 
-def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(tmp_path: Path) -> None:
+FEW = ("start = 35.0\nstop = 200.0\npoints = 25", "start = 45.0\nstop = 136.0\npoints = 8")
+"""A band in which nothing takes long."""
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> CaseResult:
+    return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled(), "case.toml")
+
+
+def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(answered: CaseResult, tmp_path: Path) -> None:
     """Pressed by 1e5 N both are the same springs, if the closed form is given the width and height whose rotational
     stiffness is that of four by two points: (1 - 1/n^2) of a uniform patch (errata to 5.2-40/41)."""
-    result = run_case(asked(tmp_path), sled(), "case.toml")
+    result = answered
     narrow = f"width = {0.06 * np.sqrt(1 - 1 / 16)}\nheight = {0.03 * np.sqrt(1 - 1 / 4)}"
     linear = ('law = "smooth"\n', ""), ("points = [4, 2]\n", ""), ("width = 0.06\nheight = 0.03", narrow)
-    closed = run_case(asked(tmp_path, *linear), sled(), "case.toml")
+    closed = run_case(asked(tmp_path, FEW, *linear), sled(), "case.toml")
     assert all(r.converged.all() for r in result.responses.values())
     np.testing.assert_allclose(result.responses[1e5].monitor, closed.responses[1e5].monitor, rtol=1e-8)
     np.testing.assert_allclose(result.stuck, closed.stuck, rtol=1e-8)
 
 
-def test_a_case_with_a_law_slides_and_its_table_says_how(tmp_path: Path) -> None:
-    result = run_case(asked(tmp_path), sled(), "case.toml")
+def test_a_case_with_a_law_slides_and_its_table_says_how(answered: CaseResult) -> None:
+    result = answered
     loose = result.responses[5.0]
     assert isinstance(loose, HarmonicResponse) and loose.slipping.max() > 0.3
     assert np.abs(loose.monitor).max() < np.abs(result.responses[1e5].monitor).max()
@@ -512,12 +528,13 @@ mu = 0.3
 """
 
 
+@pytest.mark.slow
 def test_a_case_with_the_law_of_a_contact_file(tmp_path: Path) -> None:
     """The smooth law written in a file of its own, shared out among eight points: the same response, 1e-10."""
     (tmp_path / "sole.toml").write_text(CONTACT)
     own = ('law = "smooth"\nnormal_stiffness = 3e6\ntangential_stiffness = 1e6\nfriction = 0.3', 'file = "sole.toml"')
-    settings = asked(tmp_path, own)
-    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path)))
+    settings = asked(tmp_path, own, FEW)
+    by_file, by_case = (run_case(s, sled(), tmp_path / "case.toml") for s in (settings, asked(tmp_path, FEW)))
     for normal, r in by_case.responses.items():
         np.testing.assert_allclose(by_file.responses[normal].monitor, r.monitor, rtol=1e-9)
     assert by_case.responses[5.0].slipping.max() > 0.3

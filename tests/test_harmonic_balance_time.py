@@ -239,6 +239,7 @@ def test_duffing_oscillator() -> None:
     assert apart(solved(duffing, 15, 64), extrapolated(values, (2, 4))) < 1e-6
 
 
+@pytest.mark.slow
 def test_beam_with_a_jenkins_element() -> None:
     """20 modes, slip to and fro: 5e-6 of the amplitude after extrapolation, 63 harmonics. The error falls with the
     number of harmonics by more than its third power: the force has kinks, the beam takes two powers more."""
@@ -277,6 +278,7 @@ def test_ring_of_four_in_a_wave() -> None:
 # energy ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "fine", "tolerance"),
     [

@@ -134,6 +134,7 @@ def test_frequencies_that_no_stiffness_gives_are_told(basis: ModalBasis) -> None
 # ---------------------------------------------------------------- resonance over engine order
 
 
+@pytest.mark.slow
 def test_resonances_over_engine_order_are_those_of_the_stuck_ring() -> None:
     """Pressed hard, so that contacts only stick: each order's peak is that of the linear sector, searched for on a
     grid of a millionth; amplitudes to 1e-6, orders beyond N/2 like those that alias onto them."""
@@ -156,6 +157,7 @@ def test_resonances_over_engine_order_are_those_of_the_stuck_ring() -> None:
     assert found.stuck[0] == pytest.approx(found.frequency[0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_band_without_a_resonance_says_so() -> None:
     one = sector(6, 1, normal=1e4, push=1.0)
 
@@ -180,6 +182,7 @@ def shaken(damping: float, load: float, normal: float) -> balance.Problem:
     return balance.of(replace(one, members=(Member("blade", {0: damped}),)), **{**FINE, "harmonics": 1})
 
 
+@pytest.mark.slow
 def test_envelope_encloses_every_combination() -> None:
     """Each combination against its own cold sweep, 1e-8; smallest and largest of them at every frequency."""
     f = np.linspace(50, 75, 7)

@@ -212,6 +212,7 @@ def step_file(tmp_path, monkeypatch):
     return tmp_path / "Teil 1 ü.step"
 
 
+@pytest.mark.slow
 def test_a_cad_file_runs_at_once_and_then_with_its_lines_uncommented(step_file, capsys):
     assert main(["import", step_file.name, "block"]) == 0
     out = capsys.readouterr().out

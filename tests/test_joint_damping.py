@@ -150,6 +150,7 @@ def test_the_order_of_the_bodies_says_nothing(tmp_path: Path, more: str) -> None
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", ['damping = "structural"', 'damping = "stuck"\ndamping_ratio = 0.02'])
 def test_a_sector_and_the_whole_ring_are_damped_alike(tmp_path: Path, more: str) -> None:
     """Every stuck mode of the wave is one of the ring's with the same damping, 1e-9; in slip all blades answer as the
@@ -180,6 +181,7 @@ def test_bodies_that_slide_freely_keep_their_own_damping(tmp_path: Path) -> None
     np.testing.assert_allclose(D, np.where(f > 1e-3, RATIO, 0.0), rtol=1e-6, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every stuck mode with damping and width in the summary and the response file; steps wider than a resonance of the
     stuck modes are told; mistakes end with 2."""

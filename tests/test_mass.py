@@ -117,6 +117,7 @@ def test_a_body_that_rotates_or_has_no_mass_is_refused(sample: ModalBasis, folde
         respond(path, None, ["bodies.vane.mass=-1"])
 
 
+@pytest.mark.slow
 def test_resonances_are_followed_over_the_mass(sample: ModalBasis, folder: Path) -> None:
     """`optimum --over bodies.vane.mass`: sticking nearly, the first resonance falls with the root of the mass (2 %)."""
     path = case(folder, "")

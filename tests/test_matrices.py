@@ -567,6 +567,7 @@ def test_shapes_of_lone_nodes_are_drawn(tmp_path):
     assert path is not None and len(Image.open(path).convert("RGB").getcolors(10**7)) > 20
 
 
+@pytest.mark.slow
 def test_damage_that_kills_the_parser_is_a_sentence(tmp_path):
     """scipy's compiled reader of .mat files crashes on some flipped bytes: the process that tries it first does."""
     from test_fuzz import flipped

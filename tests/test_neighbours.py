@@ -133,7 +133,9 @@ def ranged(mesh):
     return modal_basis(mesh, s.model_copy(update={"rotation": rotation}))
 
 
-@pytest.mark.parametrize("direction", ["forward", "backward", "standing"])
+@pytest.mark.parametrize(
+    "direction", ["forward", *(pytest.param(d, marks=pytest.mark.slow) for d in ("backward", "standing"))]
+)
 def test_waves_over_a_range_end_in_those_of_its_ends(ranged, direction: str) -> None:
     """The curves of the Campbell diagram, made from the range, against modes solved for at both ends.
 

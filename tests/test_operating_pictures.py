@@ -65,6 +65,7 @@ def test_the_body_is_drawn_where_it_is_farthest_out(harmonics):
     assert np.linalg.norm(shape, axis=1).max() == size == pytest.approx(far, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_stressed_body_and_contact_maps(tmp_path):
     """Three tiles at speed with limits; nothing where the file has no shapes."""
     from test_operating import linear_patch, marched_map

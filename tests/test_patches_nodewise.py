@@ -129,6 +129,7 @@ def forces(patch: Patch, u: Array) -> Array:
     return patch.kinematics[:, 0].T @ (pressure(patch, u) * patch.areas)
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_what_the_tolerance_says() -> None:
     """A bar with all its modes: more deformations, less motion that they miss, more accurate pressures; all of them,
     and nothing is missed."""
@@ -232,6 +233,7 @@ def pair(a: Block, b: Block, tolerance: float = 1e-4) -> tuple[Patch, Side, Side
     return Patch("top", found.points, found.areas, law(found.areas), found.shapes), first, second, C
 
 
+@pytest.mark.slow
 def test_meshes_that_do_not_match_agree_with_those_that_do() -> None:
     """A narrow block on a wide one, pressed by 2 um. Facets that meet (3 x 2 below 5 x 2) or not: force within 0.5 %,
     pressure at the middle within 2 %, of the finest; the points are those of the narrow face and fill it."""
@@ -276,6 +278,7 @@ def test_jacobian_of_a_patch_that_deforms_against_differences() -> None:
     np.testing.assert_allclose(rate, along, rtol=0, atol=1e-5 * np.abs(along).max())
 
 
+@pytest.mark.slow
 def test_forced_vibration_with_a_patch_that_deforms() -> None:
     """It slips here and sticks there, and what is supplied is dissipated, in the contact by its path in time: that
     path is sampled, with an error that falls with the square of the step."""

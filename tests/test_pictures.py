@@ -131,6 +131,7 @@ def drawn(basis: ModalBasis, folder: Path) -> dict[str, Path]:
     return pictures.draw_all(basis, folder, engine_orders=(1, 2, 30))
 
 
+@pytest.mark.slow
 @needs_scenes
 def test_every_picture_of_a_body_at_two_speeds(tmp_path: Path) -> None:
     from PIL import Image
@@ -160,6 +161,7 @@ def test_every_picture_of_a_body_at_two_speeds(tmp_path: Path) -> None:
             ).mean() > 0.01  # it moves
 
 
+@pytest.mark.slow
 @needs_scenes
 def test_modes_differ_from_each_other(tmp_path: Path) -> None:
     """A window that is not drawn anew shows the same mode again and again."""
@@ -182,7 +184,10 @@ def test_curves_need_no_3d(tmp_path: Path) -> None:
     assert sorted(found) == ["campbell", "compliance"]
 
 
-@pytest.mark.parametrize(("count", "speeds"), [(1, (0.0,)), (2, (0.0, 3000.0)), (14, (0.0,)), (14, (0.0, 3000.0))])
+@pytest.mark.parametrize(
+    ("count", "speeds"),
+    [(1, (0.0,)), (2, (0.0, 3000.0)), pytest.param(14, (0.0,), marks=pytest.mark.slow), (14, (0.0, 3000.0))],
+)
 def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[float, ...], tmp_path: Path) -> None:
     from PIL import Image
 

@@ -399,7 +399,7 @@ def test_changed_bytes_of_med_are_read_or_refused(tmp_path: Path) -> None:
     """Few, because each is tried in a process of its own first."""
     whole = med(tmp_path / "whole.med").read_bytes()
     read_mesh(tmp_path / "whole.med", "m")
-    for seed in range(8):
+    for seed in range(3):
         (tmp_path / f"{seed}.med").write_bytes(flipped(whole, random.Random(seed)))
         with user_errors_only():
             read_mesh(tmp_path / f"{seed}.med", "m")

@@ -184,6 +184,7 @@ with open_journal(folder / "response.points", "abc", {{"case": "a"}}) as journal
 """
 
 
+@pytest.mark.slow
 def test_a_writer_killed_at_random_instants_leaves_readable_files(tmp_path):
     """SIGKILL four times at random: the points are 1, 2, 3, ... without a hole, the HDF5 file is whole or absent."""
     rng, reached = random.Random(8), 0
@@ -284,6 +285,11 @@ def test_damaged_and_foreign_files_get_one_sentence(tmp_path):
         file.attrs["format"] = "microslip-modal-basis"
     with pytest.raises(UserError, match="is no response"):
         read_response(path)
+
+
+@pytest.mark.slow
+def test_incomplete_and_newer_files_get_one_sentence(tmp_path):
+    path = tmp_path / "response.h5"
     write_response(path, response(1.0))
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = "7.0"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from meshes import STEEL, body, brick
 
 from microslip.contact.friction import Coulomb
@@ -41,6 +42,7 @@ def rubbing(group: ModalGroup, frequency: np.ndarray) -> HarmonicResponse:
     return harmonic_response(problem, frequency, np.array([300.0]))
 
 
+@pytest.mark.slow
 def test_ten_modes_with_rubins_vectors_are_nearer_than_sixty_eigenmodes() -> None:
     """Against sixty modes with the same static vectors. Ten modes with the six of the face and the one of the load are
     nearer by two powers of ten than sixty modes alone, which do not hold the compliance under the contact, and these

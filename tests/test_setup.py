@@ -272,6 +272,7 @@ def test_the_wheel_holds_the_package_and_the_bodies_and_nothing_else(tmp_path: P
     assert [n for n in names if n.endswith((".msh", ".h5", ".pyc"))] == ["microslip/samples/basis.h5"]
 
 
+@pytest.mark.slow
 def test_the_wheel_offers_its_bodies_and_meshes_them(tmp_path: Path) -> None:
     zipfile.ZipFile(build("wheel", tmp_path / "dist")).extractall(tmp_path / "site")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}

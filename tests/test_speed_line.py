@@ -47,6 +47,7 @@ def speeds(count: int = 12) -> np.ndarray:
     return np.linspace(0.55 * TOP, 0.95 * TOP, count)
 
 
+@pytest.mark.slow
 def test_every_speed_is_the_response_of_the_body_at_that_speed() -> None:
     """Against a problem built for three of the speeds alone, from groups of the range and forces by hand, started
     cold: 1e-7 of the amplitude. The contact slides at some and sticks at others."""

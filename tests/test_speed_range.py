@@ -357,6 +357,7 @@ def test_at_a_solved_speed_the_range_gives_what_was_solved_for(reduction: str, c
     np.testing.assert_allclose(got.phi, true.phi[:, :, :6], atol=1e-5 * np.abs(true.phi).max())
 
 
+@pytest.mark.slow
 def test_rubin_is_statically_exact_at_held_out_speeds() -> None:
     """The static answers of solved speeds span those between; what is left falls with the tolerance of the range."""
     errors = []
@@ -450,6 +451,7 @@ def test_the_command_line_reads_any_speed_of_the_range(tmp_path, capsys) -> None
     assert "outside the speed range of 'test', 0 to 16000 rpm" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_exports_at_any_speed_of_the_range(tmp_path, capsys) -> None:
     """--rpm writes the reduced body of that speed, bit for bit what `group_at` gives; at a station the station's own.
 

@@ -281,25 +281,26 @@ def brute_force(problem, Omega, steps, periods):
     return values[np.argsort(-abs(values))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("problem", "f", "count"),
+    ("problem", "f", "count", "steps"),
     [
-        pytest.param(sliding(), 17.0, 2, marks=pytest.mark.slow),
-        (sliding(), 15.0, 2),
-        pytest.param(swinging((12.0, 4, 2)), 22.0, 6, marks=pytest.mark.slow),
-        (swinging((20.0, 8, 4)), 22.0, 6),
+        (sliding(), 17.0, 2, (2048, 8192, 60)),
+        (sliding(), 15.0, 2, (2048, 8192, 60)),
+        (swinging((12.0, 4, 2)), 22.0, 6, (2048, 8192, 60)),
+        (swinging((20.0, 8, 4)), 22.0, 6, (2048, 8192, 60)),
     ],
     ids=["turning", "decaying", "space", "space and lift-off"],
 )
-def test_multipliers_with_memory_against_brute_force(problem, f, count):
+def test_multipliers_with_memory_against_brute_force(problem, f, count, steps):
     """Two ways that share the law alone: the other is the motion in time, its map differentiated by differences.
 
     Both err by about the step where a contact changes between stick and slip between two samples, and the 21
     harmonics say when it opens to about 1e-4 of the period, during which a stiff contact turns the motion.
     """
     Omega = 2 * np.pi * f
-    found = stability(solved(problem, Omega), Settings(steps=2048))
-    exact = brute_force(problem, Omega, 8192, 60)
+    found = stability(solved(problem, Omega), Settings(steps=steps[0]))
+    exact = brute_force(problem, Omega, *steps[1:])
     ways = (np.sort_complex(np.round(v[:count], 9)) for v in (found.multipliers, exact))
     np.testing.assert_allclose(*ways, rtol=0, atol=3e-3)
     assert found.stable and found.growth < 1
@@ -314,6 +315,7 @@ def test_a_slider_forgets_and_one_that_sticks_does_not_count():
     np.testing.assert_allclose(abs(found[:2]), np.exp(-D * omega * 2 * np.pi / Omega), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_what_a_motion_reaches_is_all_that_changes():
     """A patch of 8 points, some of which slide: the map of everything, column by column, has the same largest
     multipliers as the map on what perturbations of the motion reach; a slider that sticks all the time adds 1s, one
@@ -356,6 +358,7 @@ def test_compliance_beside_the_modes_is_that_of_a_mode_too_stiff_to_move_on_its_
 # motions in time ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("f", "stable"), [pytest.param(90.0, True, marks=pytest.mark.slow), (115.0, False)])
 def test_a_motion_that_loses_stability_by_a_multiplier_below_minus_1_repeats_every_second_period(f, stable):
     """A mass pressed on a spring that cannot pull, driven at about twice its own frequency."""

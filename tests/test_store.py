@@ -50,6 +50,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(tmp_path: Path) -> None:
     sources = [tmp_path / "a.h5", tmp_path / "b.h5"]
@@ -143,7 +144,7 @@ def test_no_room_gives_one_sentence_and_leaves_the_old_file(tmp_path: Path) -> N
     write_basis(folder / "basis.h5", small.basis(free=True))
     before = (folder / "basis.h5").read_bytes()
     size = (tmp_path / "source.h5").stat().st_size
-    limits = [0, 1, 100, 2048, 9000, 50_000, 300_000, size - 100, size - 1]
+    limits = [0, 2048, 300_000, size - 1]
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, str(tmp_path / "source.h5"), str(folder), *map(str, limits)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(), timeout=120,

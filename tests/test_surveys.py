@@ -88,6 +88,7 @@ def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     assert "is up to date" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_respond_over_orders(ring: Path, capsys) -> None:
     """Each order's largest resonance stands where the linear ring has it (contacts stick)."""
     ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\n")
@@ -100,6 +101,7 @@ def test_respond_over_orders(ring: Path, capsys) -> None:
     assert "<h1>ring: orders</h1>" in page and "data:image/png" in page and page.count("<tr>") == 3
 
 
+@pytest.mark.slow
 def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> None:
     """Ctrl-C at the second engine order, combination: a table of the first, and nothing that says it is whole."""
     ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\npoints = 11\n[ranges]\nload = [1.0, 2.0]\n")
@@ -162,6 +164,7 @@ points = 5
 """
 
 
+@pytest.mark.slow
 def test_respond_over_speeds(tmp_path, monkeypatch, capsys) -> None:
     """Normal forces as told over the square of the speed, frequencies e n / 60; one speed against a case at that
     speed and frequency, 1e-6."""

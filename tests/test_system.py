@@ -300,20 +300,21 @@ def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
     monkeypatch.chdir(tmp_path)
     assert main(["init", "three-masses"]) == 0 and main(["run", "three-masses", "-q"]) == 0
     summary = tmp_path / "build" / "three-masses" / "response.json"
-    few = ["--set", "sweep.points=41", "-q"]
-    for law in ("jenkins", "smooth"):
-        more = ["--set", f'contacts.rub.law="{law}"', "--set", "sweep.normal_forces=[2.0]"]
-        assert main(["respond", "three-masses", "--set", 'direction="y"', *more, *few]) == 0
+    few = ["--set", "sweep.points=15", "-q"]
+    for forces in ("[2.0]", "[0.0]"):
+        more = ["--set", f"sweep.normal_forces={forces}", "--set", 'direction="y"']
+        assert main(["respond", "three-masses", *more, *few]) == 0
         found = json.loads(summary.read_text())
         assert found["resonances"] == [] and found["rising_at_the_edge"] == []
         assert any("does not move" in remark for remark in found["remarks"])
-    assert main(["respond", "three-masses", "--set", "contacts=[]", *few]) == 0
+    assert main(["respond", "three-masses", "--set", "contacts=[]", "--set", "sweep.points=41", "-q"]) == 0
     omega = np.sqrt(scipy.linalg.eigvalsh(*reversed(load_system("three-masses/system.toml").matrices()[::2])))
     tops = {round(one["frequency_Hz"], 3) for one in json.loads(summary.read_text())["resonances"]}
     np.testing.assert_allclose(sorted(tops), omega / (2 * np.pi), rtol=1e-3)
     assert main(["respond", "three-masses", "--set", "damping_ratio=1.5", *few]) == 2
 
 
+@pytest.mark.slow
 def test_three_masses_of_the_page(tmp_path: Path) -> None:
     """What the page shows is what its lines print."""
     sys.path.insert(0, str(ROOT / "docs"))

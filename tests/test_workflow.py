@@ -64,15 +64,23 @@ def test_finished_products_are_as_new_as_what_they_were_made_from(box: Path) -> 
     assert (box / BASIS).stat().st_mtime >= (box / MESH).stat().st_mtime - 1
 
 
+SLOW = pytest.mark.slow
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new", "made"),
     [
-        ("case.toml", "normal_forces = [1.0, 100.0]", "normal_forces = [1.0, 90.0]", {RESPONSE}),
+        pytest.param(
+            "case.toml", "normal_forces = [1.0, 100.0]", "normal_forces = [1.0, 90.0]", {RESPONSE}, marks=SLOW
+        ),
         ("case.toml", "friction = 0.3", "friction = 0.31", {RESPONSE}),
         ("body.toml", "density = 7850.0", "density = 7800.0", {BASIS, RESPONSE}),
-        ("body.toml", "count = 6", "count = 5", {BASIS, RESPONSE}),
-        ("body.toml", "size = 20.0", "size = 10.0", {MESH, BASIS, RESPONSE}),
-        ("body.toml", "size = [20.0, 30.0, 120.0]", "size = [20.0, 32.0, 120.0]", {MESH, BASIS, RESPONSE}),
+        pytest.param("body.toml", "count = 6", "count = 5", {BASIS, RESPONSE}, marks=SLOW),
+        pytest.param("body.toml", "size = 20.0", "size = 10.0", {MESH, BASIS, RESPONSE}, marks=SLOW),
+        pytest.param(
+            "body.toml", "size = [20.0, 30.0, 120.0]", "size = [20.0, 32.0, 120.0]", {MESH, BASIS, RESPONSE},
+            marks=SLOW,
+        ),
         ("build.py", 'name_face("tip"', '# the same mesh\n    name_face("tip"', {MESH}),
         ("body.toml", "a clamped box", "a box that is clamped", set()),
         ("body.toml", "[material]", "# steel\n\n[material]", set()),
@@ -84,6 +92,7 @@ def test_only_what_depends_on_a_change_is_made_again(box: Path, name: str, old: 
     assert run_chain(box) == set()
 
 
+@pytest.mark.slow
 def test_an_override_counts_as_a_change_and_leaves_the_file_alone(box: Path) -> None:
     text = (box / "body.toml").read_text()
     assert run_chain(box, ["material.young=2.0e11"]) == {BASIS, RESPONSE}

@@ -135,6 +135,7 @@ def cylinder_taper_sphere(cell_type, n):
     return brick(cell_type, n, to=to)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_type", CELLS_SLOW)
 def test_le11_solid_cylinder_taper_sphere(cell_type):
     """Heated by sqrt(x^2 + y^2) + z degrees between flat ends: target sigma_zz(A) = -105 MPa.
@@ -195,6 +196,7 @@ def thin_cantilever(cell_type, n, growth):
     return modes(brick(cell_type, (n, n, 1), (1, 1, 0.05), to=to), 6, supports=[{"face": "x0"}])[0][:6]
 
 
+@pytest.mark.slow
 def test_fv16_cantilevered_thin_plate():
     """10 x 10 x 0.05 m, clamped along x = 0: targets 0.421, 1.029, 2.582, 3.306, 3.753, 6.555 Hz.
 
@@ -210,6 +212,7 @@ def test_fv16_cantilevered_thin_plate():
     assert (below > 3e-3).all() and (below < 1.1e-2).all()
 
 
+@pytest.mark.slow
 def test_fv16_by_flat_tetrahedra():
     """Tetrahedra of 0.3 x 0.3 x 0.05 m are stiff in bending: from above by 1 % in mode 6; by 22 % at 1.2 m."""
     above = [thin_cantilever("tetra10", n, 1) / kirchhoff_cantilever() - 1 for n in (8, 16, 32)]
@@ -280,6 +283,7 @@ def test_fv52_on_the_published_mesh():
     np.testing.assert_allclose(found, [0.9760, 1.0101, 1.0101, 1.0072, 1.0017, 1.0022, 1.0022], atol=6e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_type", CELLS[::2])
 def test_fv52_solid_plate_on_its_lower_edges(cell_type):
     """Targets 45.897, 109.44, 109.44, 167.89 Hz (bending), 193.59, 206.19, 206.19 Hz (in the plane).
@@ -301,6 +305,7 @@ def test_fv52_solid_plate_on_its_lower_edges(cell_type):
     assert (below > 0.02).all() and (below < 0.09).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_type", BRICKS_SLOW)
 def test_fv52_on_its_side_faces(cell_type):
     """uz = 0 on the four side faces: a support that a solid feels, and bending converges, to 44.18, 107.3, 163.1 Hz.

@@ -165,7 +165,7 @@ def test_fig_3_7_3_size_of_the_cycle(stick_slip) -> None:
     assert stick_slip.velocity[late, 0].max() == pytest.approx(1 + top / np.sqrt(MASS), rel=5e-3)
 
 
-@pytest.mark.parametrize("slope", [1e3, 1e4])
+@pytest.mark.parametrize("slope", [1e3, pytest.param(1e4, marks=pytest.mark.slow)])
 def test_fig_3_7_3_a_softer_smoothing_makes_the_cycle_smaller(slope) -> None:
     """The peak of the smoothed law again, 39 % and 15 % below mu_0; the load rises a little beyond it."""
     found = integrate(element(0.0, 100.0, slope), steadily, np.linspace(0, 10, 2001), 1e-6)

@@ -28,6 +28,7 @@ def half(tmp_path_factory) -> ModalBasis:
     return read_basis(modes_stage(open_job(ROOT / "geometry/half-pipe", changes, tmp_path_factory.mktemp("half")))[0])
 
 
+@pytest.mark.slow
 def test_joint_without_shear_and_rigid_joint(half: ModalBasis) -> None:
     """Without shear the halves twist as each of them alone (2 %), above the 170 Hz of thin open sections without
     flanges; the rigid joint's torsion is that of the closed tube, 5 % for its flanges. Bending stays below 930 and
@@ -47,6 +48,7 @@ def test_frequencies_rise_with_the_stiffness_and_torsion_most(half: ModalBasis) 
     assert min(soft.of("bending")[1], stiff.of("bending")[1]) > 0.9
 
 
+@pytest.mark.slow
 def test_bending_identifies_the_stiffness_and_predicts_torsion(half: ModalBasis) -> None:
     """Of an experiment with another normal stiffness, which bending and torsion hardly feel: 0.1 % in both."""
     truth = study.joined(half, 1.85e8, ratio=4.0)
@@ -55,6 +57,7 @@ def test_bending_identifies_the_stiffness_and_predicts_torsion(half: ModalBasis)
     assert found.of("torsion")[0] == pytest.approx(truth.of("torsion")[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_case_resonates_where_the_sticking_joint_does(half: ModalBasis) -> None:
     """Twelve bolts of 10 kN do not slip under 20 N: bending resonates as in the linear system."""
     linear = study.joined(half, 1.85e8).of("bending")[0]

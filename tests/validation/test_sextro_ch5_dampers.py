@@ -58,6 +58,7 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], ModalBasi
 # ---------------------------------------------------------------- spin pit, 5.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [pytest.param("cottage-roof", marks=pytest.mark.slow), "cylinder"])
 def test_strain_over_damper_mass_has_a_minimum_and_the_resonance_rises(bases, shape: str) -> None:
     """Fig. 5.4-4: a heavier damper presses harder, the resonance rises; the strain falls, then rises with the mass."""
@@ -113,6 +114,7 @@ def test_bending_and_torsion_have_their_minimum_at_about_the_same_normal_force(e
         assert element[20.0].largest(pick)[1] > 5 * least and element[400.0].largest(pick)[1] > 1.5 * least
 
 
+@pytest.mark.slow
 def test_coupling_raises_the_resonance_with_the_normal_force(element) -> None:
     """Fig. 5.5-7b: by increasing the normal force the coupling is increased, and the resonance frequency with it."""
     assert all(c.converged.all() for c in element.values())
@@ -120,6 +122,7 @@ def test_coupling_raises_the_resonance_with_the_normal_force(element) -> None:
     assert (np.diff(at) > 0).all()
 
 
+@pytest.mark.slow
 def test_resonances_rise_with_the_engine_order_up_to_three(bases) -> None:
     """Fig. 5.5-7: sticking pins, engine orders 0 to 3. Beyond, the book goes on rising and this ring does not."""
     built = study.opened("damping-element", bases)

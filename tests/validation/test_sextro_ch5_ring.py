@@ -56,6 +56,7 @@ def test_high_engine_orders_resonate_lower(ring: study.Ring) -> None:
     assert two.frequency == pytest.approx(first[2], rel=2e-3) and ten.frequency == pytest.approx(first[10], rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_normal_force_has_an_optimum(ring: study.Ring) -> None:
     """Fig. 5.5-3: resonance rises with the normal force; at a few newtons the amplitude is lowest, by a decade."""
     little, best, hundred, most = study.over_forces(ring, (1.0, 9.0, 100.0, 780.0), BAND)
