@@ -156,3 +156,14 @@ def test_flat_tops_and_ledges() -> None:
     f = np.arange(9.0)
     response = curve(f, np.array([0.0, 1.0, 2.0, 2.0, 3.0, 5.0, 5.0, 5.0, 1.0]))
     assert resonances(response, peaks(response)) == [(5.0, 5.0)]
+
+
+@pytest.mark.parametrize(("limit", "found"), [(0.6, True), (2.0, True), (1e3, False)])
+def test_exactly_at_the_resonance_of_a_stuck_contact_without_damping(limit: float, found: bool) -> None:
+    """1 kg on 3e4 N/m beside a slider of 1e4 N/m, at 200 rad/s, where the stuck system is singular to the last bit:
+    what slides takes what is supplied; sticking has no answer, and a point without one is refused."""
+    g, f = oscillator(1.0, 3e4), 200 / (2 * np.pi)
+    r = frequency_response(g, [contact(1e4, limit)], np.array([1.0]), np.array([1.0]), np.array([f - 0.1, f]))
+    assert r.converged.tolist() == [True, found]
+    supplied = -np.pi * r.monitor.imag
+    np.testing.assert_allclose(r.dissipated[r.converged], supplied[r.converged], rtol=1e-8, atol=1e-15)

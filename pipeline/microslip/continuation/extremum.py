@@ -244,9 +244,31 @@ def lowest(
     status = NO_OPTIMUM
     if 0 <= at < len(known) - 1:
         status = _valley(highest, found, known[at], known[at + 1], tolerance, most)
+    if status in ("kink", "two peaks"):
+        _between(highest, found, most)
     found = dict(sorted(found.items()))
     best = min((value for value, peak in found.items() if peak.converged), key=lambda value: found[value].value)
     return Lowest(best, found[best], NO_OPTIMUM if best in ends else status, found)
+
+
+NEAR = 5e-3
+"""Relative distance of two values between which no other one is looked for."""
+
+
+def _between(highest: Callable[[float], Peak], found: dict[float, Peak], most: int) -> None:
+    """Adds peaks half way from the lowest one to its neighbours, until these are `NEAR`: the tangents at the ends of a
+    kink know nothing of the ripples beside it."""
+    for _ in range(most):
+        known = sorted(value for value, peak in found.items() if peak.converged)
+        i = min(range(len(known)), key=lambda k: found[known[k]].value)
+        gaps = [(known[j] - known[i], j) for j in (i - 1, i + 1) if 0 <= j < len(known)]
+        gap, j = max(gaps, key=lambda one: abs(one[0]))
+        if abs(gap) <= NEAR * max(abs(known[i]), abs(known[j])):
+            return
+        middle = 0.5 * (known[i] + known[j])
+        found[middle] = highest(middle)
+        if not found[middle].converged:
+            return
 
 
 BESIDE = 0.01

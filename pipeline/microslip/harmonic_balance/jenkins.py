@@ -175,7 +175,10 @@ def _solve_contacts(
     springs: Array, limits: Array, free: ComplexArray, D: ComplexArray, start: ComplexArray
 ) -> tuple[ComplexArray, bool]:
     """u + D k(|u|) u = free by Newton in real and imaginary parts, steps halved; from `start`, then from sticking."""
-    stuck = np.linalg.solve(np.eye(len(free)) + D * springs, free)
+    try:
+        stuck = np.linalg.solve(np.eye(len(free)) + D * springs, free)
+    except np.linalg.LinAlgError:  # the resonance of the sticking contacts, without damping
+        stuck = np.linalg.solve(np.eye(len(free)) + 0.5 * D * springs, free)
     scale = np.abs(free).max(initial=1e-300)
     u = start
     for first in (start, stuck, free):
@@ -225,7 +228,11 @@ def _newton_step(
     n = len(u)
     A = np.hstack([np.eye(n) + D @ real, 1j * np.eye(n) + D @ imag])
     J = np.vstack([A.real, A.imag])
-    step = np.linalg.solve(J, -np.concatenate([residual.real, residual.imag]))
+    right = -np.concatenate([residual.real, residual.imag])
+    try:
+        step = np.linalg.solve(J, right)
+    except np.linalg.LinAlgError:  # all stick, at their resonance
+        step = np.linalg.lstsq(J, right, rcond=None)[0]
     return step[:n] + 1j * step[n:]
 
 
