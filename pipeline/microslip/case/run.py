@@ -130,7 +130,7 @@ def _run(
     else:
         responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
     free = free_response(built, frequency)
-    idle = [normal for normal, r in responses.items() if still(r)]
+    idle = [normal for normal, r in responses.items() if _still(r)]
     resonances |= {normal: [] for normal in idle}
     at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
     remarks = [
@@ -154,7 +154,7 @@ STILL = 1e-10
 """Share of the contacts' motion below which a read-out counts as one that does not move: rounding."""
 
 
-def still(response: FrequencyResponse) -> bool:
+def _still(response: FrequencyResponse) -> bool:
     """Whether nothing moves the first read-out, so that its peaks are none."""
     ok = response.converged
     moved = float(np.abs(response.slip[ok]).max(initial=0.0))
@@ -189,7 +189,7 @@ def _by_laws(
         remarks += _not_periodic(key, found.unsteady, built.settings)
         remarks += _lifting(built, problem, found, key)
         few = left.out if left else partial(_truncated, built)
-        remarks += [] if still(found) else few(problem, found, resonances[key], key)
+        remarks += [] if _still(found) else few(problem, found, resonances[key], key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, remarks

@@ -39,7 +39,7 @@ class Peak:
     Attributes:
         x: (n,). lam. value: g. kink: the curve bends there, or g does. status: "converged", or what went wrong.
         rate: derivative of ln g with respect to the parameter it is followed over, if it is. tangent: (n + 1,) of the
-            curve, scaled. evaluations: of R.
+            curve, scaled.
     """
 
     x: Array
@@ -48,7 +48,6 @@ class Peak:
     kink: bool
     status: str
     tangent: Array
-    evaluations: int
     rate: float = math.nan
 
     @property
@@ -68,62 +67,53 @@ def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None)
     """The peak uphill from a guess (n,) at lambda, whichever way that is. One that fails says why."""
     settings, scaled = settings or SEARCH, Scaled(problem)
     y = scaled.pack(x, lam)
-    return _from(problem, y, unit(len(y)), settings)
-
-
-def _from(problem: Rated, y: Array, border: Array, settings: Settings) -> Peak:
-    """Uphill from a guess that is corrected with a border."""
-    scaled = Scaled(problem)
-    found = correct(scaled, y, border, float(border @ y), replace(settings.newton, iterations=40, last_resort=True))
+    border, newton = unit(len(y)), replace(settings.newton, iterations=40, last_resort=True)
+    found = correct(scaled, y, border, float(border @ y), newton)
     if not found.ok or found.tangent is None:
-        x, lam = y[:-1] * scaled.x_scale, float(y[-1]) * scaled.lam_scale
-        return Peak(x, lam, math.nan, False, f"no start: {found.status}", border, scaled.count)
+        return Peak(x, lam, math.nan, False, f"no start: {found.status}", border)
     t, y = found.tangent / norm(found.tangent), found.y
     sense = 1 if t[-1] >= 0 else -1
-    state = State(y, t, found.sign, settings.step, None, sense, y, t, 1, 0.0, ())
-    return _climbed(problem, state, settings, scaled.count)
+    return _climbed(problem, State(y, t, found.sign, settings.step, None, sense, y, t, 1, 0.0, ()), settings)
 
 
-def _climbed(problem: Rated, state: State, settings: Settings, spent: int) -> Peak:
+def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
     """Uphill, and the other way too where that peak is hardly higher than the beginning."""
     slope = _Slope(problem)
     uphill = state if slope(state.y, state.tangent) >= 0 else _reversed(state)
     begun = math.log(slope.output(state.y)[0])
-    found = _ahead(slope, uphill, settings, spent)
+    found = _ahead(slope, uphill, settings)
     if not found.converged or math.log(found.value) - begun > DIP:
         return found
-    other = _ahead(slope, _reversed(uphill), settings, found.evaluations)
-    return other if other.converged and other.value > found.value else replace(found, evaluations=other.evaluations)
+    other = _ahead(slope, _reversed(uphill), settings)
+    return other if other.converged and other.value > found.value else found
 
 
-def _ahead(slope: _Slope, state: State, settings: Settings, spent: int) -> Peak:
+def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:
     """The highest point ahead on the curve, up to where g has fallen by `DIP` behind it.
 
     A peak lies between two points if g leaves the first one upwards and comes to the second one downwards; the root of
     its slope is the peak. It also does if g is higher at the one that it leaves or reaches the wrong way: kinks lie
     between, as where the root is not found or lower than either end. The step is then halved, down to `NARROW`.
     """
-    best = _at(slope, state.y, state.tangent, spent)
+    best = _at(slope, state.y, state.tangent)
     status, within = "", settings
     while not status:
         after = advance(slope.problem, state, within)
-        spent += after.found[-1].evaluations if after.found else 0
         there, here = slope.output(state.y)[0], slope.output(after.y)[0]
         leaves_up, comes_down = slope(state.y, state.tangent) > 0, slope(after.y, after.tangent) <= 0
         if after.found and (leaves_up and (comes_down or here < there) or comes_down and here > there):
-            top = _pinned(slope, state, after, settings, spent) if leaves_up and comes_down else None
+            top = _pinned(slope, state, after, settings) if leaves_up and comes_down else None
             length = norm(after.y - state.y)
             if top is None and length > NARROW:
                 within = replace(settings, step_max=0.5 * length)
                 continue
-            top = top or max((_at(slope, p.y, p.tangent, spent) for p in (state, after)), key=lambda peak: peak.value)
-            spent = top.evaluations
+            top = top or max((_at(slope, p.y, p.tangent) for p in (state, after)), key=lambda peak: peak.value)
             best = top if top.value >= best.value else best
         within = settings
         if here > best.value:
-            best = _at(slope, after.y, after.tangent, spent, "the peak is still ahead")
+            best = _at(slope, after.y, after.tangent, "the peak is still ahead")
         if here < best.value * math.exp(-DIP):
-            return replace(best, evaluations=spent)
+            return best
         status, state = after.status, after
     return replace(best, status=best.status if best.converged else f"no peak before the end: {status}")
 
@@ -153,7 +143,7 @@ class _Slope:
         return self.problem.output(y[:-1] * self.scaled.x_scale, float(y[-1]) * self.scaled.lam_scale)
 
 
-def _pinned(slope: _Slope, state: State, after: State, settings: Settings, spent: int) -> Peak | None:
+def _pinned(slope: _Slope, state: State, after: State, settings: Settings) -> Peak | None:
     """The root of the slope between two states, if it is found and no lower than both: one of several may be."""
     bends = bool(after.found and after.found[-1].kink)
     segment = Segment(state.y, after.y, state.tangent, after.tangent, bends)
@@ -161,15 +151,15 @@ def _pinned(slope: _Slope, state: State, after: State, settings: Settings, spent
         y, t = root(slope.scaled, segment, settings, slope)
     except Lost:
         return None
-    found = _at(slope, y, t, spent + slope.scaled.count)
+    found = _at(slope, y, t)
     return found if found.value >= max(slope.output(one.y)[0] for one in (state, after)) else None
 
 
-def _at(slope: _Slope, y: Array, t: Array, spent: int, status: str = CONVERGED) -> Peak:
+def _at(slope: _Slope, y: Array, t: Array, status: str = CONVERGED) -> Peak:
     """The peak at a point; where the slope is not small there, its sign jumps."""
     scaled, steep = slope.scaled, abs(slope(y, t))
     x, lam = y[:-1] * scaled.x_scale, float(y[-1]) * scaled.lam_scale
-    return Peak(x, lam, slope.output(y)[0], steep > 1e-5 * max(1.0, norm(t)), status, t, spent)
+    return Peak(x, lam, slope.output(y)[0], steep > 1e-5 * max(1.0, norm(t)), status, t)
 
 
 # over a parameter ----------------------------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ def highest(
     """
     points = [p for p in sweep(problem, Omega / (2 * np.pi), report) if p.converged]
     watched = Watched(problem, watch)
-    none = Peak(np.zeros(problem.size), float(Omega[0]), np.nan, False, "no solution in the band", np.zeros(0), 0)
+    none = Peak(np.zeros(problem.size), float(Omega[0]), np.nan, False, "no solution in the band", np.zeros(0))
     if not points:
         return none, None
     height = np.array([watched.output(p.x, p.Omega)[0] for p in points])
