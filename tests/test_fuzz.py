@@ -237,7 +237,7 @@ def foreign(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=6)  # each in a process of its own
+@settings(max_examples=20)  # each in a process of its own
 @given(st.sampled_from(["a.msh", "b.msh", "a.vtu", "a.vtk", "a.bdf"]), st.integers(0, 2**32))
 def test_flipped_bytes_in_other_meshes(folder: Path, foreign: None, name: str, seed: int) -> None:
     (folder / name).write_bytes(flipped(FOREIGN[name], random.Random(seed)))
