@@ -13,7 +13,7 @@ from ring_study import Highest, frf, highest
 from microslip.case.run import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance import response
-from microslip.harmonic_balance.jenkins import tops
+from microslip.harmonic_balance.jenkins import brackets
 
 BAND = np.linspace(70.0, 125.0, 56)
 WIDE = np.linspace(90.0, 300.0, 43)
@@ -41,10 +41,9 @@ def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str)
     for normal in forces:
         problem = problem_of(built, normal)
         swept = frf(problem, BAND)
-        points = [response.highest(problem, swept, i)[0] for i in tops(swept)]
-        sizes = [float(abs(response.operating(problem, p).watched[0, 1])) for p in points]
-        at = [p.Omega / (2 * np.pi) for p in points]
-        size, frequency = max(zip(sizes, at, strict=True), default=(np.nan, np.nan))
+        peaks = filter(None, (response.highest(problem, swept, bracket) for bracket in brackets(swept)))
+        sizes = [(size, point.Omega / (2 * np.pi)) for point, size in peaks]
+        size, frequency = max(sizes, default=(np.nan, np.nan))
         found.append(Resonance(normal, frequency, size, (BAND, np.abs(swept.monitor))))
     return found
 

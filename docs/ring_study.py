@@ -16,7 +16,7 @@ from microslip.case.run import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.frames import rotation
 from microslip.harmonic_balance import response
-from microslip.harmonic_balance.jenkins import tops
+from microslip.harmonic_balance.jenkins import brackets
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import sweep
 from microslip.operating.motion import motion_of
@@ -72,14 +72,13 @@ def highest(problem: Problem, basis: ModalBasis, frequency: Array) -> Highest:
     """The resonance with the largest stress of a band; the largest amplitude belongs to the same resonance."""
     found = frf(problem, frequency)
     at, stress = [], []
-    for i in tops(found):
-        point, _ = response.highest(problem, found, i)
-        at.append((point, response.operating(problem, point)))
-        stress.append(foot_stress(basis, at[-1][1]))
+    for peak in filter(None, (response.highest(problem, found, bracket) for bracket in brackets(found))):
+        at.append(response.operating(problem, peak[0]))
+        stress.append(foot_stress(basis, at[-1]))
     if not at:
         return Highest(float("nan"), float("nan"), float("nan"), 0.0, int((~found.converged).sum()))
     top = int(np.argmax(stress))
-    operating = at[top][1]
+    operating = at[top]
     share = max(float(c.open.mean()) for c in operating.cycles.values())
     return Highest(
         operating.Omega / (2 * np.pi), float(abs(operating.watched[0, 1])), stress[top], share,

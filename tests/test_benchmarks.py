@@ -53,8 +53,9 @@ def test_the_contact_benchmark_compares_laws_that_agree():
     assert done.returncode == 0, done.stderr
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| 64 |" in line]
     assert {r[1] for r in rows} >= {"microslip", "numpy loop"}
-    # the same law, three times; two cycles are fewer than the others march
-    assert all(float(r[-1]) < 1e-12 for r in rows if r[1] != "microslip, two cycles")
+    # the same law and step; two cycles are fewer, and pyHarm's step is of first order in the samples
+    most = {"microslip": 0.0, "numpy loop": 1e-12, "microslip, two cycles": 0.5, "pyHarm": 0.5}
+    assert all(float(r[-1]) <= most[r[1]] for r in rows)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from microslip.case.edges import remarks, rising
-from microslip.harmonic_balance import FrequencyResponse
+from microslip.harmonic_balance import FrequencyResponse, refined_peaks
 
 
 def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyResponse:
@@ -43,6 +43,20 @@ def test_ends_that_do_not_rise() -> None:
     ripple = modes(f, (100.0, 0.01, 1.0))
     wavy = np.full(len(f), 2.0) + 0.005 * np.cos(2 * np.pi * (f - 80) / 8)
     assert rising({1.0: FrequencyResponse(**{**vars(ripple), "monitor": wavy})}, {}) == []
+
+
+@pytest.mark.parametrize("between", [(0, 1), (-2, -1)])
+def test_a_resonance_inside_the_outermost_points_is_no_end_that_rises(between: tuple[int, int]) -> None:
+    """It is found there, in closed form; one as far beyond the end is not, and the end rises."""
+    f = np.linspace(50.0, 100.0, 11)
+    one, other = f[list(between)]
+    inside, beyond = 0.7 * f[between[0]] + 0.3 * f[between[1]], f[0 if between[0] == 0 else -1]
+    (known,) = refined_peaks(modes(f, (inside, 1e-3, 1.0)), lambda at: modes(at, (inside, 1e-3, 1.0)))
+    assert one < inside < other and known[0] == pytest.approx(inside, rel=1e-4)
+    assert rising({1.0: modes(f, (inside, 1e-3, 1.0))}, {1.0: [known]}) == []
+    away = beyond + (beyond - np.mean(f)) / 20
+    assert refined_peaks(modes(f, (away, 1e-3, 1.0)), lambda at: modes(at, (away, 1e-3, 1.0))) == []
+    assert len(rising({1.0: modes(f, (away, 1e-3, 1.0))}, {1.0: []})) == 1
 
 
 def test_points_that_failed_say_nothing() -> None:

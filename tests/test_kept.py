@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +12,10 @@ import numpy as np
 import pytest
 from small import beam, table
 from test_assembly import FINE, sector
-from test_harmonic_balance_time import cantilever
+from test_harmonic_balance_time import Cubic, cantilever, group, held
 
 from microslip.body import BodySettings
+from microslip.case.edges import rising
 from microslip.compliance import statics_beside
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Preload
@@ -44,6 +46,14 @@ class Stop(Exception):
 @pytest.fixture(scope="module")
 def problem() -> balance.Problem:
     return balance.of(sector(6, 1, push=0.5), **(FINE | {"harmonics": 1, "samples": 24}))
+
+
+def free(*resonances: float) -> Assembly:
+    """Modes of some resonances (Hz), damping ratio 1 %, pushed with 0.3 and read together, without any contact."""
+    one = np.ones(len(resonances))
+    rows = {"face": np.zeros((6, len(one))), "push": one, "tip": one}
+    body = group(2 * np.pi * np.array(resonances), rows, 0.01)
+    return replace(held(body, Cubic(jnp.asarray(0.0)), [1], np.zeros(1), np.zeros(1), 0.3), contacts=())
 
 
 @pytest.mark.slow
@@ -81,6 +91,30 @@ def test_nothing_is_computed_twice_and_a_wider_sweep_adds_to_it(tmp_path: Path) 
             kept_response(problem, frequency, np.ones(1), journal, SERIES, told.append)
     computed = [t.split(": ")[1] for t in told if "frequencies" in t]
     assert sorted(computed) == sorted(f"{f:.6g} Hz" for f in wide)
+
+
+def test_peaks_are_those_of_the_sweep_whatever_was_kept_before(tmp_path: Path) -> None:
+    """A coarse sweep sees two resonances as one; a fine one of the same points, kept before, does not change which."""
+    problem = balance.of(free(2.2, 2.6), 1, 16, length=0.01)
+    coarse, fine = np.linspace(1.0, 4.0, 4), np.linspace(1.0, 4.0, 61)
+    found = []
+    for frequency, name in ((coarse, "alone"), (fine, "after"), (coarse, "after")):
+        with open_journal(tmp_path / name, "abc", HEAD) as journal:
+            found.append(kept_response(problem, frequency, np.ones(0), journal, SERIES)[1])
+    np.testing.assert_allclose([f for f, _ in found[1]], [2.2, 2.6], rtol=0.01)
+    np.testing.assert_allclose(found[2], found[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [np.linspace(2.0, 6.0, 9), np.linspace(0.45, 2.25, 6)])
+def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, tmp_path: Path) -> None:
+    """2.2 Hz, between the first two points or the last two; asked again, it is known."""
+    problem, told = balance.of(free(2.2), 1, 16, length=0.01), []
+    for _ in range(2):
+        with open_journal(tmp_path / "points", "abc", HEAD) as journal:
+            found, peaks = kept_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+        np.testing.assert_allclose(peaks, [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
+    assert len([t for t in told if "peak near" in t]) == 1
+    assert rising({1.0: found}, {1.0: peaks}) == [] and len(rising({1.0: found}, {1.0: []})) == 1
 
 
 def test_what_is_kept_is_the_point(problem: balance.Problem) -> None:

@@ -46,9 +46,14 @@ def rising(
     for normal, r in responses.items():
         ok = r.converged
         f, a = r.frequency[ok], np.abs(r.monitor[ok])
-        least = OF_THE_HIGHEST * max((height for _, height in resonances.get(normal, ())), default=0.0)
+        if len(f) < 3:
+            continue
+        peaks = resonances.get(normal, ())
+        least = OF_THE_HIGHEST * max((height for _, height in peaks), default=0.0)
         for way in (slice(None, None, -1), slice(None)):
-            if len(f) > 2 and a[way][-1] >= least and _rises(a[way]):
+            last = sorted(f[way][-2:])
+            inside = any(last[0] < at < last[1] for at, _ in peaks)  # what it rises to
+            if not inside and a[way][-1] >= least and _rises(a[way]):
                 found.append(Rising(normal, float(f[way][-1]), float(a[way][-1]), _beyond(f[way], a[way])))
     return found
 

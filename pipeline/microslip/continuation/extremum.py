@@ -274,6 +274,8 @@ def _valley(
     other side is looked at, or until they are so short that they matter no more.
     """
     steep = min(abs(found[low].rate), abs(found[high].rate))
+    if max(abs(found[low].rate), abs(found[high].rate)) * (high - low) <= tolerance:
+        return CONVERGED  # level all the way
     for turn in range(most):
         left, right = found[low], found[high]
         width, falls, rises = high - low, left.rate, right.rate

@@ -23,7 +23,7 @@ from .problem import Problem
 from .readout import Watched, measured
 from .reduced import stuck
 from .response import HarmonicResponse
-from .solver import Report, solve
+from .solver import Report
 
 # --- resonance over engine order -------------------------------------------------------------------------------------
 
@@ -114,9 +114,9 @@ def _near(problem: Problem, found: HarmonicResponse, i: int) -> tuple[Array, flo
     """x and Omega near the top about point i: the way uphill from the grid alone would take three times as long."""
     names = ("frequency", "monitor", "converged", "x")
     cut = replace(found, **{name: getattr(found, name)[i - 1 : i + 2] for name in names})
-    ((f, _),) = response.refined_peaks(problem, cut)
-    point = solve(problem, 2 * np.pi * float(f), [found.x[i]])
-    return (point.x, point.Omega) if point.converged else (found.x[i], 2 * np.pi * float(found.frequency[i]))
+    highest = response.highest(problem, cut, (0, 1, 2))
+    assert highest is not None  # a top has one
+    return highest[0].x, highest[0].Omega
 
 
 # --- envelopes -------------------------------------------------------------------------------------------------------

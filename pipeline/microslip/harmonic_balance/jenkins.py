@@ -269,6 +269,23 @@ def tops(response: FrequencyResponse) -> Indices:
     return np.flatnonzero(whole & (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
 
 
+def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
+    """Points (low, top, high) between which a sweep may have a peak: about its tops, and from an end at which it is
+    higher than beside it inwards, for the peak may lie just inside."""
+    found = [(int(i) - 1, int(i), int(i) + 1) for i in tops(response)]
+    a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
+    ends = [(0, 0, 1), (last - 1, last, last)] if last > 1 else []
+    inside = ((end, high if end == low else low) for low, end, high in ends)
+    rise = [0 < a[beside] < a[end] for end, beside in inside]
+    return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
+
+
+def within(response: FrequencyResponse, bracket: tuple[int, int, int], peak: float) -> bool:
+    """Whether what was found between three points is a peak and no flank or ripple of an end: `DIP` higher than it."""
+    low, top, high = bracket
+    return low < top < high or abs(response.monitor[top]) < (1 - DIP) * peak
+
+
 DIP = 0.01
 """Share of the lower one of two tops by which the response has to fall between them for them to be two resonances: the
 1 % of amplitude (2 % of its square) that also ends the climb to a followed peak, `continuation.extremum.DIP`. Contacts
@@ -316,14 +333,15 @@ def refined_peaks(
         respond: the response at other frequencies (Hz).
     """
     found = []
-    for i in tops(response):
-        low, high = (float(response.frequency[j]) for j in (i - 1, i + 1))
+    for bracket in brackets(response):
+        low, high = (float(response.frequency[j]) for j in (bracket[0], bracket[-1]))
         for _ in range(6):  # nine points a round: the bracket shrinks four times
             r = respond(np.linspace(low, high, 9))
             a = np.where(r.converged, np.abs(r.monitor), 0.0)
             top = int(np.clip(a.argmax(), 1, 7))
             low, high = float(r.frequency[top - 1]), float(r.frequency[top + 1])
-        found.append((float(r.frequency[a.argmax()]), float(a.max())))
+        if within(response, bracket, float(a.max())):
+            found.append((float(r.frequency[a.argmax()]), float(a.max())))
     return resonances(response, found)
 
 

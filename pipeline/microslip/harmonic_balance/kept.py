@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray
 from ..results.journal import Journal
 from ..system.assembly import Assembly, Member, Watch
 from .families import Family, followed
-from .jenkins import resonances, tops
+from .jenkins import brackets, resonances
 from .patch import Cycle
 from .problem import Problem
 from .response import HarmonicResponse, Operating, highest, of_points, operating
@@ -45,22 +45,28 @@ def kept_response(
 
     points = sweep(problem, frequency, report, known=known, keep=keep)
     response = of_points(problem, points, limit, [found[float(f)] for f in frequency])
-    peaks = [_peak(problem, response, i, journal, series, report) for i in tops(response)]
-    return response, resonances(response, peaks)
+    peaks = [_peak(problem, response, bracket, journal, series, report) for bracket in brackets(response)]
+    return response, resonances(response, [peak for peak in peaks if peak])
 
 
 def _peak(
-    problem: Problem, response: HarmonicResponse, top: int, journal: Journal, series: str, report: Report
-) -> tuple[float, float]:  # fmt: skip
-    """The highest point beside a local maximum, kept before or searched for now."""
-    low, high = response.frequency[top - 1], response.frequency[top + 1]
+    problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int], journal: Journal, series: str,
+    report: Report,
+) -> tuple[float, float] | None:  # fmt: skip
+    """The peak between points of a sweep, if there is one: kept by a sweep with the same points there, so that no other
+    sweep has a say in it, or searched for now."""
+    between = [float(response.frequency[i]) for i in (bracket[0], bracket[-1])]
     for key, row in journal.of(series).items():
-        if row.get("peak") and low < key < high:
+        if row.get("peak") and list(row.get("between", ())) == between:
             return key, float(abs(restored(problem, row)[1].watched[0, 1]))
-    report(f"{series}: peak near {response.frequency[top]:.6g} Hz")
-    point, amplitude = highest(problem, response, top)
+    report(f"{series}: peak near {response.frequency[bracket[1]]:.6g} Hz")
+    found = highest(problem, response, bracket)
+    if found is None:
+        return None
+    point, amplitude = found
     f = point.Omega / (2 * np.pi)
-    journal.keep(series, f, record(problem, point, operating(problem, point)) | {"peak": 1})
+    kept = record(problem, point, operating(problem, point))
+    journal.keep(series, f, kept | {"peak": 1, "between": np.array(between)})
     return f, amplitude
 
 
@@ -143,7 +149,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     """A point as a journal keeps it; the names are those of docs/response_file.md."""
     kept: dict[str, Any] = {
         "frequency": point.Omega / (2 * np.pi), "status": point.status, "error": point.error,
-        "iterations": point.iterations, "seconds": point.seconds, "peak": 0, "x": point.x,
+        "iterations": point.iterations, "seconds": point.seconds, "peak": 0, "between": np.zeros(2), "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
     }  # fmt: skip

@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
-from .jenkins import FrequencyResponse, resonances, tops
+from .jenkins import FrequencyResponse, brackets, resonances, within
 from .patch import Cycle, Traced
 from .problem import Problem
 from .readout import measured
@@ -220,12 +220,15 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[fl
 
     To a millionth of the distance between the two or in twelve steps; points that do not converge count as none.
     """
-    found = [highest(problem, response, i) for i in tops(response)]
-    return resonances(response, [(p.Omega / (2 * np.pi), amplitude) for p, amplitude in found])
+    found = [highest(problem, response, bracket) for bracket in brackets(response)]
+    return resonances(response, [(one[0].Omega / (2 * np.pi), one[1]) for one in found if one])
 
 
-def highest(problem: Problem, response: HarmonicResponse, top: int) -> tuple[Point, float]:
-    """The point between the neighbours of a local maximum of the sweep where it is highest, and its amplitude, m."""
+def highest(
+    problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]
+) -> tuple[Point, float] | None:  # fmt: skip
+    """The peak between the outer two of three points of a sweep and its amplitude, m, if there is one."""
+    first, top, last = bracket
     own = Point(2 * np.pi * response.frequency[top], response.x[top], CONVERGED, response.error[top], 0)
     tried = [(own, float(abs(response.monitor[top])))]
 
@@ -236,7 +239,8 @@ def highest(problem: Problem, response: HarmonicResponse, top: int) -> tuple[Poi
         tried.append((point, float(abs(operating(problem, point).watched[0, 1]))))
         return -tried[-1][1]
 
-    low, high = (float(response.frequency[j]) for j in (top - 1, top + 1))
+    low, high = (float(response.frequency[j]) for j in (first, last))
     options: Any = {"xatol": 1e-6 * (high - low), "maxiter": 12}
     scipy.optimize.minimize_scalar(lowered, bounds=(low, high), method="bounded", options=options)
-    return max(tried, key=lambda one: one[1])
+    found = max(tried, key=lambda one: one[1])
+    return found if within(response, bracket, found[1]) else None
