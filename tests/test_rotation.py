@@ -260,6 +260,17 @@ def test_uniform_heat_makes_no_stress_in_a_body_free_to_expand(prestress, materi
         np.testing.assert_allclose(distance, np.linalg.norm(apart @ U, axis=1), rtol=1e-9)
 
 
+def test_no_element_ends_turned_inside_out():
+    """Newton's first step through so much heat lands at a mirrored body, which is in balance as well: y is -1 of y."""
+    mesh = brick("tetra10", (1, 2, 4), (0.02, 0.03, 0.12))
+    held = with_sets(mesh, **{n: np.flatnonzero(mesh.points[:, k] < 1e-9) for k, n in enumerate("xyz")})
+    group = the_group(
+        held, np.full(mesh.n_points, 593.15), material={**HOT, "expansion": [1.2e-3, 0.0, 4e-3]}, output={},
+        supports=[{"face": n, "directions": n} for n in "xyz"], modes={"count": 2},
+    )  # fmt: skip
+    np.testing.assert_allclose(group.u_static, mesh.points * [0.36, 0.0, 1.2], rtol=0, atol=1e-9)
+
+
 ALONG = {k: v for k, v in TURNED.items() if k != "axes"}
 
 

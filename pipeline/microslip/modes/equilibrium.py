@@ -321,6 +321,8 @@ def _newton_at(
         stress = stress_of(model, [green_strain(h) for h in H])
         closing.move(points + u, steps[-1] if steps else np.inf)
         if _stands(steps) and closing.settled:
+            if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
+                break  # in balance, but turned inside out
             whole = isinstance(free, FreeUpper)  # else a sector, whose neighbours count by nodal diameter (`sector`)
             K = _tangent(model, H, stress)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
