@@ -7,6 +7,7 @@ import pytest
 
 from microslip.case.edges import remarks, rising
 from microslip.harmonic_balance import FrequencyResponse, refined_peaks
+from microslip.harmonic_balance.jenkins import overhanging
 
 
 def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyResponse:
@@ -67,3 +68,12 @@ def test_points_that_failed_say_nothing() -> None:
     (one,) = rising({1.0: FrequencyResponse(**{**vars(r), "converged": known})}, {})
     assert one.frequency == 89.0 and one.to > 100
     assert rising({1.0: FrequencyResponse(**{**vars(r), "converged": f < 0})}, {}) == []
+
+
+def test_a_resonance_beside_no_top_of_the_sweep_overhangs() -> None:
+    """A curve that leans to lower frequencies, swept upwards: its peak stands over the motion that the sweep was on."""
+    f = np.linspace(80.0, 120.0, 41)
+    swept = modes(f, (104.0, 0.01, 1.0))
+    (top,) = refined_peaks(swept, lambda at: modes(at, (104.0, 0.01, 1.0)))
+    assert overhanging(swept, [(95.2, 10.0 * top[1]), top]) == [(95.2, 10.0 * top[1])]
+    assert overhanging(swept, [(95.2, float(np.abs(swept.monitor[15])))]) == []  # of a plateau

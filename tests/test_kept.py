@@ -24,6 +24,7 @@ from microslip.contact.point import PointContact
 from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.jenkins import overhanging
 from microslip.harmonic_balance.kept import beside, kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
@@ -83,26 +84,13 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
     assert found.converged.all() and len(peaks) == 1 and found.slipping.max() > 0.2
 
 
-def test_nothing_is_computed_twice_and_a_wider_sweep_adds_to_it(tmp_path: Path) -> None:
-    problem, wide = balance.of(cantilever(), 1, 64, length=0.0125), np.linspace(0.5, 0.8, 5)
-    told: list[str] = []
-    for frequency in (wide[::2], wide[::2], wide):
+def test_nothing_is_computed_twice(tmp_path: Path) -> None:
+    problem, told = balance.of(cantilever(), 1, 64, length=0.0125), list[str]()
+    for series in (SERIES, SERIES, "normal force 30 N"):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            kept_response(problem, frequency, np.ones(1), journal, SERIES, told.append)
+            kept_response(problem, np.linspace(0.5, 0.8, 3), np.ones(1), journal, series, told.append)
     computed = [t.split(": ")[1] for t in told if "frequencies" in t]
-    assert sorted(computed) == sorted(f"{f:.6g} Hz" for f in wide)
-
-
-def test_peaks_are_those_of_the_sweep_whatever_was_kept_before(tmp_path: Path) -> None:
-    """A coarse sweep sees two resonances as one; a fine one of the same points, kept before, does not change which."""
-    problem = balance.of(free(2.2, 2.6), 1, 16, length=0.01)
-    coarse, fine = np.linspace(1.0, 4.0, 4), np.linspace(1.0, 4.0, 61)
-    found = []
-    for frequency, name in ((coarse, "alone"), (fine, "after"), (coarse, "after")):
-        with open_journal(tmp_path / name, "abc", HEAD) as journal:
-            found.append(kept_response(problem, frequency, np.ones(0), journal, SERIES)[1])
-    np.testing.assert_allclose([f for f, _ in found[1]], [2.2, 2.6], rtol=0.01)
-    np.testing.assert_allclose(found[2], found[0], rtol=1e-9)
+    assert computed == 2 * ["0.5 Hz", "0.65 Hz", "0.8 Hz"]
 
 
 @pytest.mark.parametrize("frequency", [np.linspace(2.0, 6.0, 9), np.linspace(0.45, 2.25, 6)])
@@ -115,6 +103,20 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
         np.testing.assert_allclose(peaks, [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
     assert len([t for t in told if "peak near" in t]) == 1
     assert rising({1.0: found}, {1.0: peaks}) == [] and len(rising({1.0: found}, {1.0: []})) == 1
+
+
+def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:
+    """q'' + 0.05 q' + q - 0.004 q^3 = 0.3 cos t leans to lower frequencies: a fine sweep upwards comes along the lower
+    motion past the peak and jumps, a coarse one happens to come near it. Both climb to the same peak: 1e-6."""
+    one = np.ones(1)
+    rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
+    soft = held(group(one, rows, 0.025), Cubic(jnp.asarray(-0.004)), [1], np.zeros(1), np.zeros(1), 0.3)
+    problem, peaks = balance.of(soft, 3, 64, length=1.0), []
+    for points, past in ((7, False), (97, True)):
+        found = response.harmonic_response(problem, np.linspace(0.6, 1.1, points) / (2 * np.pi), np.ones(1))
+        peaks += response.refined_peaks(problem, found)
+        assert bool(overhanging(found, peaks[-1:])) == past
+    np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-6)
 
 
 def test_what_is_kept_is_the_point(problem: balance.Problem) -> None:

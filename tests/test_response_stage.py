@@ -191,6 +191,17 @@ def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
     assert found.keys() == points.keys() and all(np.array_equal(found[n], points[n]) for n in points)
 
 
+def test_what_was_run_before_changes_nothing(folder: Path) -> None:
+    """A sweep, another one, and the first again: the same table and points, to the last bit."""
+    build, found = folder / "build" / "vane", []
+    for points in (3, 5, 3):
+        respond(folder, f"sweep.points={points}")
+        arrays = read_response(build / "response.h5").series[0].arrays
+        found.append(((build / "response.csv").read_text(), {n: a for n, a in arrays.items() if n != "seconds"}))
+    assert found[0][0] == found[2][0] and found[0][1].keys() == found[2][1].keys()
+    assert all(np.array_equal(a, found[2][1][n]) for n, a in found[0][1].items())
+
+
 @pytest.mark.slow
 def test_killed_and_resumed_from_the_command_line(folder: Path) -> None:
     """SIGKILL after a few points, three times; the command then ends with the response of one go, 1e-6."""

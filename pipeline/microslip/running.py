@@ -129,9 +129,14 @@ class Keeper:
         """The journal of an assembly; see `results.open_journal`."""
         head = keeping.head_of(built, self.raw, self.hashes, self.files) | {"finished": False}
         self.begin()
-        with open_journal(self.points, inputs_of_points(built, self.hashes), head, self.fresh) as journal:
+        with open_journal(self.points, self._inputs(built), head, self.fresh) as journal:
             self.fresh = False
             yield journal
+
+    def _inputs(self, built: Built) -> str:
+        """Hash of all that the points depend on: where a motion may be one of several, that is the whole sweep."""
+        sweep = built.settings.sweep
+        return store.fingerprint(inputs_of_points(built, self.hashes), sweep.start, sweep.stop, sweep.points)
 
     def harmonics(self, settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path) -> int:
         """With how many to begin where their number is looked for: those of the points that are kept."""
@@ -139,7 +144,7 @@ class Keeper:
             head, _ = read_journal(self.points)
             kept = int(head["harmonics"])
             built = build(settings.with_harmonics(kept), bases, path)
-            if not self.fresh and head["inputs"] == inputs_of_points(built, self.hashes):
+            if not self.fresh and head["inputs"] == self._inputs(built):
                 return kept
         return FIRST_HARMONICS
 
@@ -296,7 +301,7 @@ def convergence_table(response: Response) -> str:
         for f, status, peak, steps, spent, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
             each = " ".join(f"{e:.1e}" for e in errors if e)
             said = status.replace(",", ";")
-            rows.append(f"{s.name},{f:.10g},{peak:.0f},{said},{steps:.0f},{spent:.3g},{error:.1e},{each}")
+            rows.append(f"{s.name},{f:.10g},{peak > 0:d},{said},{steps:.0f},{spent:.3g},{error:.1e},{each}")
     return "\n".join(rows) + "\n"
 
 

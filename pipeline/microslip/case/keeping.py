@@ -147,7 +147,7 @@ def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[s
     points: dict[float, dict[str, Any]] = {}
     for i, f in enumerate(map(float, r.frequency)):
         row: dict[str, Any] = {
-            "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": peak,
+            "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": float(peak * f),
             f"{kind}/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
             f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
         }  # fmt: skip

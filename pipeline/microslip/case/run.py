@@ -14,6 +14,7 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.jenkins import overhanging
 from ..harmonic_balance.readout import measured
 from ..results import Journal
 from ..units import Quantity, counted, percent
@@ -142,6 +143,7 @@ def _run(
         *_too_coarse(settings, *stuck),
         *_not_converged(responses),
         *_idle(idle),
+        *_overhanging(responses, resonances),
         *edges.remarks(at_the_ends),
     ]
     return CaseResult(
@@ -159,6 +161,20 @@ def _still(response: FrequencyResponse) -> bool:
     ok = response.converged
     moved = float(np.abs(response.slip[ok]).max(initial=0.0))
     return 0 < moved and float(np.abs(response.monitor[ok]).max(initial=0.0)) <= STILL * moved
+
+
+def _overhanging(
+    responses: Mapping[float, FrequencyResponse], resonances: Mapping[float, list[tuple[float, float]]]
+) -> list[str]:  # fmt: skip
+    """A remark on resonances that a sweep jumps past."""
+    found = {normal: overhanging(r, resonances[normal]) for normal, r in responses.items()}
+    return [
+        f"At F_N = {normal:g} N the resonance at {', '.join(f'{f:.6g}' for f, _ in peaks)} Hz overhangs: beside it "
+        "there are several motions at one frequency, and the sweep came along another one (a dot in the picture); microslip "
+        "respond CASE --over frequency draws the whole curve."
+        for normal, peaks in found.items()
+        if peaks
+    ]
 
 
 def _idle(forces: Sequence[float]) -> list[str]:

@@ -286,6 +286,19 @@ def within(response: FrequencyResponse, bracket: tuple[int, int, int], peak: flo
     return low < top < high or abs(response.monitor[top]) < (1 - DIP) * peak
 
 
+def overhanging(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Peaks (Hz, m) that do not lie beside a top of the sweep that led to them: the curve turns back between, and has
+    other motions at the same frequency, on which the sweep came along."""
+    f, a = response.frequency, np.where(response.converged, np.abs(response.monitor), 0.0)
+    highest = {top for _, top, _ in brackets(response)}
+    found = []
+    for at, height in peaks:
+        j = int(np.clip(np.searchsorted(f, at), 1, len(f) - 1))
+        if not {j - 1, j} & highest and max(a[j - 1], a[j]) < (1 - DIP) * height:
+            found.append((at, height))
+    return found
+
+
 DIP = 0.01
 """Share of the lower one of two tops by which the response has to fall between them for them to be two resonances: the
 1 % of amplitude (2 % of its square) that also ends the climb to a followed peak, `continuation.extremum.DIP`. Contacts

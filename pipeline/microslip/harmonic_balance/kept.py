@@ -26,9 +26,11 @@ def kept_response(
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:
     """`response.harmonic_response` and its refined peaks; what a series of the journal holds already is not computed.
 
+    Points of another `frequency` have no place in the series: each one was begun at its neighbours.
+
     Args:
-        frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Points between those of
-            `frequency` where the response is highest are kept as well, with ``peak`` = 1.
+        frequency: Hz. limit: (patches,) friction limits, N, for reports. series: its name. Peaks are kept as well, with
+            ``peak`` = the frequency, Hz, of the point that they were searched from.
 
     Returns:
         The response at `frequency`, and (Hz, m) of its resonances: of the maxima of one plateau the highest.
@@ -53,20 +55,19 @@ def _peak(
     problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int], journal: Journal, series: str,
     report: Report,
 ) -> tuple[float, float] | None:  # fmt: skip
-    """The peak between points of a sweep, if there is one: kept by a sweep with the same points there, so that no other
-    sweep has a say in it, or searched for now."""
-    between = [float(response.frequency[i]) for i in (bracket[0], bracket[-1])]
+    """The peak beside a point of a sweep, if there is one, kept before or searched for now."""
+    beside = float(response.frequency[bracket[1]])
     for key, row in journal.of(series).items():
-        if row.get("peak") and list(row.get("between", ())) == between:
+        if row["peak"] == beside:
             return key, float(abs(restored(problem, row)[1].watched[0, 1]))
-    report(f"{series}: peak near {response.frequency[bracket[1]]:.6g} Hz")
+    report(f"{series}: peak near {beside:.6g} Hz")
     found = highest(problem, response, bracket)
     if found is None:
         return None
     point, amplitude = found
     f = point.Omega / (2 * np.pi)
     kept = record(problem, point, operating(problem, point))
-    journal.keep(series, f, kept | {"peak": 1, "between": np.array(between)})
+    journal.keep(series, f, kept | {"peak": beside})
     return f, amplitude
 
 
@@ -149,7 +150,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     """A point as a journal keeps it; the names are those of docs/response_file.md."""
     kept: dict[str, Any] = {
         "frequency": point.Omega / (2 * np.pi), "status": point.status, "error": point.error,
-        "iterations": point.iterations, "seconds": point.seconds, "peak": 0, "between": np.zeros(2), "x": point.x,
+        "iterations": point.iterations, "seconds": point.seconds, "peak": 0.0, "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
     }  # fmt: skip

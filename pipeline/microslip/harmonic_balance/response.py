@@ -10,6 +10,8 @@ import numpy as np
 import scipy.optimize
 
 from ..contact.patch import Patch
+from ..continuation import SEARCH
+from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
@@ -17,7 +19,7 @@ from . import reduced
 from .jenkins import FrequencyResponse, brackets, resonances, within
 from .patch import Cycle, Traced
 from .problem import Problem
-from .readout import measured
+from .readout import Watched, measured
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -215,11 +217,8 @@ def of_body(
 
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
-    """(Hz, m) of every local maximum of the first read-out, searched for between its neighbours on the grid; of those
-    of one plateau the highest, see `jenkins.apart`.
-
-    To a millionth of the distance between the two or in twelve steps; points that do not converge count as none.
-    """
+    """(Hz, m) of the peaks of the first read-out beside the tops of a sweep; of those of one plateau the highest, see
+    `jenkins.prominent`."""
     found = [highest(problem, response, bracket) for bracket in brackets(response)]
     return resonances(response, [(one[0].Omega / (2 * np.pi), one[1]) for one in found if one])
 
@@ -227,10 +226,15 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[fl
 def highest(
     problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]
 ) -> tuple[Point, float] | None:  # fmt: skip
-    """The peak between the outer two of three points of a sweep and its amplitude, m, if there is one."""
-    first, top, last = bracket
-    own = Point(2 * np.pi * response.frequency[top], response.x[top], CONVERGED, response.error[top], 0)
-    tried = [(own, float(abs(response.monitor[top])))]
+    """The peak of the curve of solutions beside three points of a sweep and its amplitude, m, if there is one.
+
+    It is looked for between the outer two, in twelve steps. If these do not close in on it from both sides, because
+    the curve turns back or the contacts switch, it is climbed to along the curve, which may lead beyond the three
+    points but not beyond the band. Where the climb fails the highest of the points stands for it.
+    """
+    low, top, high = bracket
+    tried = [(Point(2 * np.pi * response.frequency[top], response.x[top], CONVERGED, response.error[top], 0),
+              float(abs(response.monitor[top])))]  # fmt: skip
 
     def lowered(f: float) -> float:
         point = solve(problem, 2 * np.pi * f, [response.x[top]])
@@ -239,8 +243,30 @@ def highest(
         tried.append((point, float(abs(operating(problem, point).watched[0, 1]))))
         return -tried[-1][1]
 
-    low, high = (float(response.frequency[j]) for j in (first, last))
-    options: Any = {"xatol": 1e-6 * (high - low), "maxiter": 12}
-    scipy.optimize.minimize_scalar(lowered, bounds=(low, high), method="bounded", options=options)
-    found = max(tried, key=lambda one: one[1])
-    return found if within(response, bracket, found[1]) else None
+    f = response.frequency
+    options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 12}
+    scipy.optimize.minimize_scalar(lowered, bounds=(float(f[low]), float(f[high])), method="bounded", options=options)
+    near, height = max(tried, key=lambda one: one[1])
+    if not within(response, bracket, height):
+        return None
+    if _closed_in(tried):
+        return near, height
+    band = replace(SEARCH, low=2 * np.pi * float(f[0]), high=2 * np.pi * float(f[-1]))
+    found = climbed(Watched(problem), near.x, near.Omega, band)
+    if found.converged and band.low < found.lam < band.high:
+        point = solve(problem, found.lam, [found.x])
+        size = float(abs(operating(problem, point).watched[0, 1]))
+        if point.converged and size >= height:
+            return point, size
+    return near, height
+
+
+CLOSE = 1e-3
+"""Share of a peak by which the response may be lower on both sides of it for it to be the highest between them."""
+
+
+def _closed_in(tried: list[tuple[Point, float]]) -> bool:
+    """Whether the highest of some points has one on either side that is hardly lower: no fold is between them."""
+    height = [a for _, a in sorted(tried, key=lambda one: one[0].Omega)]
+    i = max(range(len(height)), key=height.__getitem__)
+    return 0 < i < len(height) - 1 and min(height[i - 1], height[i + 1]) > (1 - CLOSE) * height[i]

@@ -10,6 +10,7 @@ import numpy as np
 from ..case import CaseResult, CaseSettings
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.jenkins import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 
@@ -25,7 +26,11 @@ def response_picture(result: CaseResult, path: Path) -> None:
     forces = sorted(result.responses, reverse=True)
     for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
         r = result.responses[normal]
+        apart_from_it = overhanging(r, result.resonances[normal])
         f, amplitude, lifts = _with_peaks(r, result.resonances[normal], result.lifted(normal))
+        on = ~np.isin(f, [at for at, _ in apart_from_it])
+        f, amplitude, lifts = f[on], amplitude[on], lifts[on]
+        axes.plot([at for at, _ in apart_from_it], [1e6 * a for _, a in apart_from_it], "o", color=colour, ms=4)
         sure = np.where(lifts, np.nan, amplitude)
         axes.plot(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {said} N")
         if lifts.any():
@@ -43,7 +48,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
         )  # fmt: skip
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
-    axes.set_ylabel(f"amplitude of {_read(s)}, in {result.quantity.micro} (0-peak)")
+    axes.set_ylabel(f"amplitude of {_read(s, result.quantity)}, in {result.quantity.micro} (0-peak)")
     to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
     axes.set_title(f"{s.name}: friction response{to}")
     axes.set_xlim(low, high)
@@ -56,10 +61,10 @@ def response_picture(result: CaseResult, path: Path) -> None:
     figure.savefig(path, format="png")
 
 
-def _read(s: CaseSettings) -> str:
-    """The first read-out; without a direction where none is told, as of a gauge, which has its own."""
+def _read(s: CaseSettings, of: Quantity) -> str:
+    """The first read-out; without a direction where none is told, or of a gauge, which has its own."""
     first = s.watches[0]
-    if s.monitor is None and "direction" not in first.model_fields_set:
+    if of != METRES or (s.monitor is None and "direction" not in first.model_fields_set):
         return first.monitor
     return f"{first.monitor}, {first.direction}"
 

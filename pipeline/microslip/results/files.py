@@ -205,7 +205,6 @@ def _series(name: str, parameters: Mapping[str, float], points: Mapping[float, M
     keys = sorted(points)
     rows = [points[k] for k in keys]
     names = [n for n, v in (rows[0] if rows else {}).items() if n != "status" and not isinstance(v, str)]
-    names = [n for n in names if all(n in row for row in rows)]
     arrays = {n: stacked([np.asarray(row[n]) for row in rows]) for n in names}
     own = {k: float(v) for k, v in parameters.items()}
     return Series(name, own, np.array(keys), tuple(str(row.get("status", "")) for row in rows), arrays)
