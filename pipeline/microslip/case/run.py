@@ -170,8 +170,8 @@ def _overhanging(
     found = {normal: overhanging(r, resonances[normal]) for normal, r in responses.items()}
     return [
         f"At F_N = {normal:g} N the resonance at {', '.join(f'{f:.6g}' for f, _ in peaks)} Hz overhangs: beside it "
-        "there are several motions at one frequency, and the sweep came along another one (a dot in the picture); microslip "
-        "respond CASE --over frequency draws the whole curve."
+        "there are several motions at one frequency, and the sweep came along another one (a dot in the picture); "
+        "microslip respond CASE --over frequency draws the whole curve."
         for normal, peaks in found.items()
         if peaks
     ]
