@@ -169,8 +169,17 @@ FULL = small.table(
 )  # fmt: skip
 
 
+def deeper(series: Any, examples: int, *strategies: Any) -> Any:
+    """The slow twin of a series, with more examples."""
+    return pytest.mark.slow(settings(max_examples=examples)(given(*strategies)(series.hypothesis.inner_test)))
+
+
+CHANGES = st.lists(st.tuples(st.integers(0, 10**6), VALUES), min_size=1, max_size=3)
+WORDS = st.lists(st.sampled_from([*PIECES, "interfaces", "right", "modes", "count", "supports", "0"]), max_size=7)
+
+
 @settings(max_examples=100)
-@given(st.lists(st.tuples(st.integers(0, 10**6), VALUES), min_size=1, max_size=3), KEYS, VALUES, st.booleans())
+@given(CHANGES, KEYS, VALUES, st.booleans())
 @example([(0, 10**400)], "zzz", True, False)
 def test_any_value_at_any_place_of_the_settings(
     changes: list[tuple[int, Any]], key: str, value: Any, more: bool
@@ -190,10 +199,14 @@ def test_any_value_at_any_place_of_the_settings(
 
 
 @settings(max_examples=100)
-@given(st.lists(st.sampled_from([*PIECES, "interfaces", "right", "modes", "count", "supports", "0"]), max_size=7))
+@given(WORDS)
 def test_any_override(words: list[str]) -> None:
     with user_errors_only():
         override(copy.deepcopy(FULL), ["".join(words)], Path("body.toml"))
+
+
+test_any_value_deeper = deeper(test_any_value_at_any_place_of_the_settings, 250, CHANGES, KEYS, VALUES, st.booleans())
+test_any_override_deeper = deeper(test_any_override, 250, WORDS)
 
 
 # ---------------------------------------------------------------- meshes
@@ -216,6 +229,10 @@ def test_changed_gmsh_files(folder: Path, edits: list[tuple[int, int, str]], wor
 def test_changed_abaqus_files(folder: Path, edits: list[tuple[int, int, str]], words: bool) -> None:
     (folder / "part.inp").write_bytes((token_edited if words else edited)(INP, edits))
     read_any_mesh(folder / "part.inp")
+
+
+test_changed_gmsh_files_deeper = deeper(test_changed_gmsh_files, 100, EDITS, st.booleans())
+test_changed_abaqus_files_deeper = deeper(test_changed_abaqus_files, 300, EDITS, st.booleans())
 
 
 FOREIGN: dict[str, bytes] = {}
