@@ -60,6 +60,22 @@ def test_a_resonance_inside_the_outermost_points_is_no_end_that_rises(between: t
     assert len(rising({1.0: modes(f, (away, 1e-3, 1.0))}, {1.0: []})) == 1
 
 
+@pytest.mark.parametrize("points", [2, 3, 9])
+@pytest.mark.parametrize("past", [0.02, -0.02])
+def test_a_flat_top_close_by_an_end(points: int, past: float) -> None:
+    """The top lies 0.02 Hz inside of either end, where the response has fallen by less than `DIP`, or as far outside."""
+    damping = 0.05
+    top = 100 * np.sqrt(1 - 2 * damping**2)
+    for f in (np.linspace(80.0, top + past, points), np.linspace(top - past, 125.0, points)):
+        r = modes(f, (100.0, damping, 1.0))
+        found = refined_peaks(r, lambda at: modes(at, (100.0, damping, 1.0)))
+        ends = [one.frequency for one in rising({1.0: r}, {1.0: found})]
+        if past > 0:
+            assert found[0][0] == pytest.approx(top, abs=2e-3) and ends == []
+        else:
+            assert found == [] and ends == [f[-1] if f[0] == 80 else f[0]]
+
+
 def test_points_that_failed_say_nothing() -> None:
     """The end is the last point that is known."""
     f = np.linspace(50, 99, 50)

@@ -46,7 +46,7 @@ def rising(
     for normal, r in responses.items():
         ok = r.converged
         f, a = r.frequency[ok], np.abs(r.monitor[ok])
-        if len(f) < 3:
+        if len(f) < 2:
             continue
         peaks = resonances.get(normal, ())
         least = OF_THE_HIGHEST * max((height for _, height in peaks), default=0.0)

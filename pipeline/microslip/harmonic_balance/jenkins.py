@@ -274,16 +274,27 @@ def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
     higher than beside it inwards, for the peak may lie just inside."""
     found = [(int(i) - 1, int(i), int(i) + 1) for i in tops(response)]
     a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
-    ends = [(0, 0, 1), (last - 1, last, last)] if last > 1 else []
+    ends = [(0, 0, 1), (last - 1, last, last)] if last else []
     inside = ((end, high if end == low else low) for low, end, high in ends)
     rise = [0 < a[beside] < a[end] for end, beside in inside]
     return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
 
 
-def within(response: FrequencyResponse, bracket: tuple[int, int, int], peak: float) -> bool:
-    """Whether what was found between three points is a peak and no flank or ripple of an end: `DIP` higher than it."""
+def inside(
+    response: FrequencyResponse, bracket: tuple[int, int, int], peak: float, amplitude: Callable[[float], float]
+) -> bool:
+    """Whether what was found between three points is a peak, and no flank or ripple of an end of the band: the response
+    is lower by `DIP` at that end, or as far beyond it as the points are apart.
+
+    Args:
+        amplitude: m, at another frequency (Hz).
+    """
     low, top, high = bracket
-    return low < top < high or abs(response.monitor[top]) < (1 - DIP) * peak
+    if low < top < high:
+        return True
+    f, end = response.frequency, float(abs(response.monitor[top]))
+    beyond = max(2 * f[top] - f[low if top == high else high], 0.5 * f[top])
+    return end < (1 - 1e-9) * peak and min(end, amplitude(float(beyond))) < (1 - DIP) * peak
 
 
 def overhanging(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -353,7 +364,7 @@ def refined_peaks(
             a = np.where(r.converged, np.abs(r.monitor), 0.0)
             top = int(np.clip(a.argmax(), 1, 7))
             low, high = float(r.frequency[top - 1]), float(r.frequency[top + 1])
-        if within(response, bracket, float(a.max())):
+        if inside(response, bracket, float(a.max()), lambda f: float(abs(respond(np.array([f])).monitor[0]))):
             found.append((float(r.frequency[a.argmax()]), float(a.max())))
     return resonances(response, found)
 

@@ -16,7 +16,7 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
-from .jenkins import FrequencyResponse, brackets, resonances, within
+from .jenkins import FrequencyResponse, brackets, inside, resonances
 from .patch import Cycle, Traced
 from .problem import Problem
 from .readout import Watched, measured
@@ -232,32 +232,27 @@ def highest(
     the curve turns back or the contacts switch, it is climbed to along the curve, which may lead beyond the three
     points but not beyond the band. Where the climb fails the highest of the points stands for it.
     """
-    low, top, high = bracket
-    tried = [(Point(2 * np.pi * response.frequency[top], response.x[top], CONVERGED, response.error[top], 0),
-              float(abs(response.monitor[top])))]  # fmt: skip
+    f, (low, top, high) = response.frequency, bracket
+    own = Point(2 * np.pi * float(f[top]), response.x[top], CONVERGED, response.error[top], 0)
+    tried = [(own, float(abs(response.monitor[top])))]
 
-    def lowered(f: float) -> float:
-        point = solve(problem, 2 * np.pi * f, [response.x[top]])
-        if not point.converged:
-            return 0.0
-        tried.append((point, float(abs(operating(problem, point).watched[0, 1]))))
-        return -tried[-1][1]
+    def amplitude(at: float, start: Array = own.x) -> float:
+        point = solve(problem, 2 * np.pi * at, [start])
+        tried.append((point, float(abs(operating(problem, point).watched[0, 1])) if point.converged else 0.0))
+        return tried[-1][1]
 
-    f = response.frequency
     options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 12}
-    scipy.optimize.minimize_scalar(lowered, bounds=(float(f[low]), float(f[high])), method="bounded", options=options)
+    ends = float(f[low]), float(f[high])
+    scipy.optimize.minimize_scalar(lambda at: -amplitude(at), bounds=ends, method="bounded", options=options)
     near, height = max(tried, key=lambda one: one[1])
-    if not within(response, bracket, height):
+    if not inside(response, bracket, height, amplitude):
         return None
     if _closed_in(tried):
         return near, height
     band = replace(SEARCH, low=2 * np.pi * float(f[0]), high=2 * np.pi * float(f[-1]))
     found = climbed(Watched(problem), near.x, near.Omega, band)
-    if found.converged and band.low < found.lam < band.high:
-        point = solve(problem, found.lam, [found.x])
-        size = float(abs(operating(problem, point).watched[0, 1]))
-        if point.converged and size >= height:
-            return point, size
+    if found.converged and band.low < found.lam < band.high and amplitude(found.lam / (2 * np.pi), found.x) >= height:
+        return tried[-1]
     return near, height
 
 
