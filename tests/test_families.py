@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_assembly import sector
-from test_harmonic_balance_time import cantilever, duffing
+from test_harmonic_balance_time import cantilever, duffing, group, held
 
+from microslip.contact.friction import Coulomb
+from microslip.contact.normal import Penalty
+from microslip.contact.point import PointContact
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.families import OverNormal, over_frequency, over_load, over_normal_force
@@ -34,6 +38,21 @@ def test_folds_over_the_frequency() -> None:
     assert np.count_nonzero(np.diff(np.sign(passed))) == 3 and "Hz" in told[-1]
     at = response.of_points(problem, up.points[::20], np.zeros(1))
     assert at.converged.all() and np.abs(at.frequency - up.parameter[::20]).max() < 1e-12
+
+
+@pytest.mark.parametrize("gap", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
+def test_contacts_that_nothing_presses_give_the_scale_by_their_gap_or_the_load(gap: float) -> None:
+    """q'' + 0.02 q' + q = 0.1 cos t against a wall of stiffness 1: begun open or just touching, the curve reaches its end
+    in some hundred points; touching, it peaks at 2 / (1 + 1 / sqrt 2), the frequency of the spring of two slopes."""
+    one = np.ones(1)
+    body = group(one, {"face": np.outer([1, 0, 0, 0, 0, 0], one), "push": one, "tip": one}, 0.01)
+    wall = PointContact(Penalty(jnp.asarray(1.0)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1.0))
+    problem = balance.of(held(body, wall, [0], np.zeros(1), np.array([-gap]), 0.1), 5, 128)
+    found = over_frequency(problem, 0.7 / (2 * np.pi), 1.7 / (2 * np.pi))
+    assert found.status.startswith("bound") and len(found.points) < 1000
+    if not gap:
+        tip = np.abs(response.of_points(problem, found.points, np.ones(1)).monitor)
+        assert 2 * np.pi * found.parameter[np.argmax(tip)] == pytest.approx(2 / (1 + 0.5**0.5), rel=2e-3)
 
 
 def test_over_the_load() -> None:

@@ -441,6 +441,12 @@ def _equal(assembly: Assembly) -> list[list[int]]:
 
 
 def moves_by(assembly: Assembly) -> float:
-    """About how far the contacts move before they slide, m: the unit of the unknowns."""
+    """About how far the contacts move before they slide or close, m: the unit of the unknowns. Where none is pressed or
+    gapes, how far the loads move the stiffest."""
     pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
-    return max([*(limit / k for limit, k in pairs if k), 1e-9])
+    gaps = [-float(c.offset[0]) for c in assembly.contacts]
+    moved = max([*(limit / k for limit, k in pairs if k), *gaps], default=0.0)
+    if moved <= 0:
+        stiffest = max((float(np.diag(c.stiffness)[:3].max()) for c in assembly.contacts), default=0.0)
+        moved = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0
+    return max(moved, 1e-9)
