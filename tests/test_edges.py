@@ -63,7 +63,7 @@ def test_a_resonance_inside_the_outermost_points_is_no_end_that_rises(between: t
 @pytest.mark.parametrize("points", [2, 3, 9])
 @pytest.mark.parametrize("past", [0.02, -0.02])
 def test_a_flat_top_close_by_an_end(points: int, past: float) -> None:
-    """The top lies 0.02 Hz inside of either end, where the response has fallen by less than `DIP`, or as far outside."""
+    """The top lies 0.02 Hz inside either end, where the response has fallen by less than `DIP`, or as far outside."""
     damping = 0.05
     top = 100 * np.sqrt(1 - 2 * damping**2)
     for f in (np.linspace(80.0, top + past, points), np.linspace(top - past, 125.0, points)):

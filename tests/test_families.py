@@ -42,7 +42,7 @@ def test_folds_over_the_frequency() -> None:
 
 @pytest.mark.parametrize("gap", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_contacts_that_nothing_presses_give_the_scale_by_their_gap_or_the_load(gap: float) -> None:
-    """q'' + 0.02 q' + q = 0.1 cos t against a wall of stiffness 1: begun open or just touching, the curve reaches its end
+    """q'' + 0.02 q' + q = 0.1 cos t on a wall of stiffness 1: begun open or just touching, the curve reaches its end
     in some hundred points; touching, it peaks at 2 / (1 + 1 / sqrt 2), the frequency of the spring of two slopes."""
     one = np.ones(1)
     body = group(one, {"face": np.outer([1, 0, 0, 0, 0, 0], one), "push": one, "tip": one}, 0.01)
