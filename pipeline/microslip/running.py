@@ -69,7 +69,7 @@ def response_stage(
         if log:
             _write_log(read_response(folder / "response.h5"), folder, report)
         summary = json.loads(summary_file.read_text())
-        _say_stuck_modes(summary, report)
+        _tell(summary, report)
         return summary, summary["failed_points"] == 0
     bases = {name: read_basis(file) for name, file in files.items()}
     keeper = Keeper(folder, raw, hashes, {n: str(f) for n, f in files.items()}, force)
@@ -82,19 +82,20 @@ def response_stage(
     summary = _finished(keeper, result, report)
     if log:
         _write_log(read_response(folder / "response.h5"), folder, report)
-    _say_stuck_modes(summary, report)
-    for remark in result.remarks:
-        report(f"warning: {remark}")
+    _tell(summary, report)
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
     store.note_product(summary_file, inputs, [*pictures, *(folder / name for name in summary["files"])])
     return summary, summary["failed_points"] == 0
 
 
-def _say_stuck_modes(summary: Mapping[str, Any], report: Report) -> None:
+def _tell(summary: Mapping[str, Any], report: Report) -> None:
+    """The stuck modes and what a reader must know."""
     for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
         f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
         report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
+    for remark in summary["remarks"]:
+        report(f"warning: {remark}")
 
 
 def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
@@ -557,9 +558,10 @@ def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], 
     name, said = b.body or b.name, " or ".join(map(str, looked))
     begun = f"{path}: there is no modal file of '{name}': no {said} in {root.resolve()}"
     with contextlib.suppress(UserError):
-        if _lumped(path, name) is None:
+        by_hand = _lumped(path, name)
+        if by_hand is None:
             find_body(path, name, root)
-        return f"{begun}; microslip run {shlex.quote(str(path))} makes it"
+        return f"{begun}; microslip run {shlex.quote(str(by_hand.parent if by_hand else path))} makes it"
     give = "give it after the case" if len(case.members) == 1 else f"name one in bodies.{b.name}.file"
     return f"{begun}; {_elsewhere(path, name, root) or f'correct the name, or {give}'}"
 

@@ -257,11 +257,15 @@ def highest(
 
 
 CLOSE = 1e-3
-"""Share of a peak by which the response may be lower on both sides of it for it to be the highest between them."""
+"""Share of a peak by which the response may be lower on both sides of it for it to be the highest between them, and by
+which it may fall and rise again on the way there."""
 
 
 def _closed_in(tried: list[tuple[Point, float]]) -> bool:
-    """Whether the highest of some points has one on either side that is hardly lower: no fold is between them."""
-    height = [a for _, a in sorted(tried, key=lambda one: one[0].Omega)]
-    i = max(range(len(height)), key=height.__getitem__)
-    return 0 < i < len(height) - 1 and min(height[i - 1], height[i + 1]) > (1 - CLOSE) * height[i]
+    """Whether some points rise to the highest and fall from it, those beside it hardly lower: no fold is between them,
+    and no ripple hides a higher one."""
+    height = np.array([a for _, a in sorted(tried, key=lambda one: one[0].Omega)])
+    i, little = int(height.argmax()), CLOSE * height.max()
+    if not 0 < i < len(height) - 1 or min(height[i - 1], height[i + 1]) < height[i] - little:
+        return False
+    return bool((np.diff(height[: i + 1]) > -little).all() and (np.diff(height[i:]) < little).all())
