@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+import wrong_laws
 from microslip.contact import EXAMPLES
-from microslip.contact.law import history, march
+from microslip.contact.friction import Scattered
+from microslip.contact.law import Step, history, march
 from microslip.contact.periodic import cycles
 
 SAMPLES = 256
@@ -199,3 +201,42 @@ def test_dissipated_energy_grows(example) -> None:
     samples = 2048
     lost = np.array(history(example.law, path(4, example, samples=samples), example.period / samples).dissipated)
     assert np.diff(lost, axis=0).min() >= -1e-4 * lost[-1].max() and np.all(lost[-1] > 0)
+
+
+def _counted(law, u, dt):
+    """Forces of the fourth cycle and (n,) J that the law counts as lost in it."""
+
+    def one(carried, sample):
+        state, before, at = carried
+        force, after = law.step(*sample, dt, state)
+        return (after, force, sample[0]), (force, law.lost(Step(sample[0], sample[0] - at, dt, before, force, state, after)))
+
+    v = (u - jnp.roll(u, 1, axis=0)) / dt
+    begin = law.init(u.shape[1]), jnp.zeros_like(u[0]), u[-1]
+    force, lost = jax.lax.scan(one, begin, (jnp.tile(u, (4, 1, 1)), jnp.tile(v, (4, 1, 1))))[1]
+    return force[-len(u) :], lost[-len(u) :].sum(axis=0)
+
+
+COUNTED = jax.jit(_counted)
+
+
+@LAWS
+def test_a_law_counts_what_a_cycle_takes(example) -> None:
+    """Friction along the path slid, dampers and area that opens make up the work, but for the order of the steps: the
+    second one, of the motion of a mass the first."""
+    if isinstance(getattr(example.law, "friction", None), Scattered):
+        pytest.skip("random in time: no cycle is like the other")
+    off = []
+    for samples in (64, 512):
+        paths = [path(seed, example, samples=samples, harmonics=2) for seed in range(3)]
+        found = [COUNTED(example.law, u, 0.01 / samples) for u in paths]
+        taken = np.concatenate([work(np.asarray(F), np.asarray(u))[0] for (F, _), u in zip(found, paths, strict=True)])
+        off.append(np.abs(np.concatenate([lost for _, lost in found]) - taken).max() / np.abs(taken).max())
+    assert off[0] < 0.05 and off[1] < max(off[0] / 4, 1e-12)
+
+
+@pytest.mark.parametrize("wrong", [wrong_laws.PRINTED, wrong_laws.BOX], ids=["printed", "box"])
+def test_a_wrong_law_does_not_count_what_it_takes(wrong) -> None:
+    u = path(1, wrong, samples=256, harmonics=2) * jnp.array([1.0, 0.3, 0.3])
+    force, lost = COUNTED(wrong.law, u, 1e-5)
+    assert np.abs(lost - work(np.asarray(force), np.asarray(u))[0]).max() > 0.05 * np.abs(lost).max()

@@ -25,7 +25,8 @@ from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.jenkins import overhanging
-from microslip.harmonic_balance.kept import beside, kept_response, labels, record, restored
+from microslip.harmonic_balance.checks import forces_on
+from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
@@ -156,7 +157,8 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     assert point.converged
     found = response.operating(problem, point)
     assert 0 < found.cycles["rub"].slipping.mean()
-    forces = np.array([beside(problem, member, h, found) for h in range(4)])
+    labels_of = group.residual.labels
+    forces = np.array([sum(forces_on(problem, member, h, found, labels_of)) for h in range(4)])
     motion = motion_of(point.Omega, np.array(found.q["small"]), group, forces=forces)
     node, away = nearest_point(basis, group.monitors["tip-probe"].point)
     assert away < 1e-12

@@ -7,7 +7,7 @@ import tempfile
 import warnings
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
 import jax
 import jax.numpy as jnp
@@ -84,6 +84,23 @@ def point_axes(law: Any, n: int) -> list[int | None]:
     return axes
 
 
+class Step(NamedTuple):
+    """A step of n points as `Law.lost` looks back on it.
+
+    Attributes:
+        u: (n, 3) m at its end. moved: (n, 3) m. dt: s. force_before, force: (n, 3) N at its beginning and end. before,
+            after: states there.
+    """
+
+    u: Array
+    moved: Array
+    dt: Array | float
+    force_before: Array
+    force: Array
+    before: State
+    after: State
+
+
 class Law:
     """Base of the contact laws.
 
@@ -135,6 +152,15 @@ class Law:
     def stored(self, u: Array, state: State) -> Array:
         """(n,) energy in J that an unloading can give back at most."""
         raise NotImplementedError
+
+    def lost(self, step: Step) -> Array:
+        """(n,) energy in J that a step takes for good, counted where it goes: friction times the path slid, dampers,
+        stretched area that opens.
+
+        Over a closed cycle it is the work done on the contact, but for the second order of the steps: the balance of
+        every solution is checked by that. NaN, the default: the law does not count it, and nothing is checked.
+        """
+        return jnp.full(step.u.shape[0], jnp.nan)
 
 
 @settings

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from ..compliance import BULK_AND_SURFACE
 from .friction import Friction
-from .law import Array, Law, norm, ratio, root, settings, static
+from .law import Array, Law, Step, norm, ratio, root, settings, static
 from .normal import Normal
 
 
@@ -100,6 +100,26 @@ class PointContact(Law):
         stretched = ratio(state.elastic**2, self._springs(state.share))
         return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
 
+    def lost(self, step: Step) -> Array:
+        before, after = step.before, step.after
+        slid = norm(after.slipped - before.slipped)
+        held = [self.friction.coefficient(slid / step.dt, f[:, 0], after.time) * f[:, 0]
+                for f in (step.force_before, step.force)]  # fmt: skip
+        if not self.friction.constant:  # friction that falls with the speed lets the contact jump from what it held
+            held[0] = jnp.maximum(held[0], norm(step.force_before.T[1:]))
+        stretch = [ratio(one.elastic, self._springs(one.share)) for one in (before, after)]
+        changed = self._springs(jnp.abs(after.share - before.share))
+        return 0.5 * (held[0] + held[1]) * slid + let_go(changed, *stretch) + self._damped(step)
+
+    def _damped(self, step: Step) -> Array:
+        """(n,) J that the dampers take."""
+        if self.damping is None:
+            return jnp.zeros(step.u.shape[0])
+        spring = self.normal.force(step.u[:, 0])
+        stretched = step.moved.T[1:] - (step.after.slipped - step.before.slipped)
+        across = jnp.sum((step.force.T[1:] - step.after.elastic) * stretched, axis=0)
+        return (step.force[:, 0] - spring) * step.moved[:, 0] + across
+
     def _pressed(self, u: Array, v: Array) -> Array:
         force = self.normal.force(u)
         if self.damping is not None:
@@ -129,6 +149,12 @@ def met(after: Array, before: Array) -> Array:
     Half of what came, on average; what goes takes its force with it, exactly as if it had been gone all the time.
     """
     return 0.5 * (after + jnp.minimum(after, before))
+
+
+def let_go(springs: Array, before: Array, after: Array) -> Array:
+    """(...) energy in J that springs (2, ...) N/m take with them, which open or come unstretched to others stretched by
+    (2, ...) m before and after."""
+    return 0.25 * jnp.sum(springs * (before**2 + after**2), axis=0)
 
 
 def touching(normal: Normal, approach: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .law import Array, Law, State, settings
+from .law import Array, Law, State, Step, settings
 
 
 @settings
@@ -40,3 +40,7 @@ class Portion(Law):
 
     def stored(self, u: Array, state: State) -> Array:
         return self.share * self.whole.stored(u, state)
+
+    def lost(self, step: Step) -> Array:
+        before, force = ((f.T / self.share).T for f in (step.force_before, step.force))
+        return self.share * self.whole.lost(step._replace(force_before=before, force=force))

@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
 from .friction import Friction, creep
-from .law import Array, Law, norm, ratio, settings, static
+from .law import Array, Law, Step, norm, ratio, settings, static
 from .normal import Normal
 from .point import met, touching
 
@@ -96,6 +96,20 @@ class MassContact(Law):
         """Of the springs, and the motion of P."""
         tangential = jnp.sum(self._springs() * state.stretch**2 + self.mass * state.velocity**2, axis=0)
         return self.normal.stored(u[:, 0]) + 0.5 * state.share * tangential
+
+    def lost(self, step: Step) -> Array:
+        """The steps' own loss of the motion of P, which is of first order, is none of it."""
+        before, after = step.before, step.after
+        speed, closed = norm(after.velocity), after.share > 0
+        drag = self._drag(speed, 0.5 * (step.force_before + step.force)[:, 0], after.share, after.time)
+        rubbed = jnp.where(closed, after.share * drag * speed**2 * step.dt, 0.0)
+        growth = step.moved.T[1:] - after.velocity * step.dt
+        across = after.share * jnp.sum(self._springs() * self.damping / step.dt * growth**2, axis=0)
+        normal = (step.force[:, 0] - self.normal.force(step.u[:, 0])) * step.moved[:, 0]
+        moving = [jnp.sum(self._springs() * s.stretch**2 + self.mass * s.velocity**2, axis=0) for s in (before, after)]
+        change = before.share - after.share
+        area = 0.25 * (change if self.printed else jnp.abs(change)) * (moving[0] + moving[1])
+        return rubbed + across + normal + area
 
     def rate(self, u: Array, v: Array, state: MassState) -> MassState:
         """Time derivative of the state, for integrators: the differential equation itself.

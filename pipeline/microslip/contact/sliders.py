@@ -18,10 +18,10 @@ from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
 from .friction import Coulomb
 from .heights import Heights, as_table
-from .law import Array, Law, ratio, settings, static
+from .law import Array, Law, Step, norm, ratio, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
-from .point import PointContact, dragged, met, slide, touching, weight
+from .point import PointContact, dragged, let_go, met, slide, touching, weight
 from .series import BULK
 
 
@@ -68,11 +68,8 @@ class Sliders(Law):
 
     def step(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> tuple[Array, SliderState]:
         pressed, springs, limits = self.local(u.T[0])
-        moved = u.T[1:] - state.tangential
-        left = jnp.minimum(ratio(springs, state.springs), 1.0)
-        relaxed = state.elastic * left[:, None]
-        both = self._both(met(springs, jnp.maximum(state.springs, self.touching(u.T[0]))))
-        way = both * moved
+        left, relaxed, both = self._met(u.T[0], springs, state)
+        way = both * (u.T[1:] - state.tangential)
         if self.stiffness_ratio is None:
             of_each = (jnp.moveaxis(part, 1, 0) for part in (relaxed, way))
             elastic = jnp.moveaxis(dragged(*of_each, state.limits * left, limits), 0, 1)
@@ -97,6 +94,22 @@ class Sliders(Law):
     def stored(self, u: Array, state: SliderState) -> Array:
         stretched = ratio(state.elastic**2, self._both(state.springs))
         return self.pressed_energy(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=(0, 1))
+
+    def lost(self, step: Step) -> Array:
+        before, after = step.before, step.after
+        _, relaxed, both = self._met(step.u[:, 0], after.springs, before)
+        slid = jnp.moveaxis(step.moved.T[1:] - ratio(after.elastic - relaxed, both), 1, 0)
+        rubbed = 0.5 * (before.limits + after.limits) * norm(slid)
+        stretch = (jnp.moveaxis(ratio(one.elastic, self._both(one.springs)), 1, 0) for one in (before, after))
+        changed = jnp.moveaxis(self._both(jnp.abs(after.springs - before.springs)), 1, 0)
+        return jnp.sum(rubbed + let_go(changed, *stretch), axis=0)
+
+    def _met(self, approach: Array, springs: Array, state: SliderState) -> tuple[Array, Array, Array]:
+        """Of springs (m, n) N/m at the end of a step: (m, n) share of each that was there before, (m, 2, n) N what it
+        carried then, (m, 2, n) N/m what the springs count over the step."""
+        left = jnp.minimum(ratio(springs, state.springs), 1.0)
+        both = self._both(met(springs, jnp.maximum(state.springs, self.touching(approach))))
+        return left, state.elastic * left[:, None], both
 
     def pressed_energy(self, approach: Array) -> Array:
         """(n,) energy of the normal springs, J."""

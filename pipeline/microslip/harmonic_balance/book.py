@@ -506,7 +506,7 @@ class BookPatch:
         """What the points of each contact do in a cycle; a point that slips at all counts as slipping all of it."""
         self._one_harmonic(u)
         parts = [np.asarray(p) for p in _watched(self.points, self.kinematics, u)]
-        return [Cycle(lost, lost, slips, open_, 0.0) for lost, slips, open_ in zip(*parts, strict=True)]
+        return [Cycle(lost, lost, lost, slips, open_, 0.0) for lost, slips, open_ in zip(*parts, strict=True)]
 
     def traced(self, u: Array, period: float = 1.0) -> list[Traced]:
         """`watch` and the points' forces in time: mean and first harmonic, which is all that the mode knows of them."""

@@ -3,6 +3,7 @@ was."""
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.journal import Journal
 from ..system.assembly import Assembly, Member, Watch
+from .checks import Checks, forces_on, judged
 from .families import Family, followed
 from .jenkins import brackets, resonances
 from .patch import Cycle
@@ -147,18 +149,18 @@ def _begun(family: Family, rows: list[dict[str, Any]], settings: Settings) -> Br
 
 
 def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
-    """A point as a journal keeps it; the names are those of docs/response_file.md."""
+    """A point as a journal keeps it, judged; the names are those of docs/response_file.md."""
     kept: dict[str, Any] = {
-        "frequency": point.Omega / (2 * np.pi), "status": point.status, "error": point.error,
+        "frequency": point.Omega / (2 * np.pi), "status": judged(point, found.checks).status, "error": point.error,
         "iterations": point.iterations, "seconds": point.seconds, "peak": 0.0, "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
-    }  # fmt: skip
+    } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
     for name, rows in _watches(problem).items():
         kept[name] = found.watched[list(rows.values())]
     for member in problem.assembly.members:
         kept[f"bodies/{member.name}/q"] = _rectangle(found.q[member.name])
-        forces = [beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
+        forces = [_beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
         if any(len(f) for f in forces):
             kept[f"bodies/{member.name}/forces"] = _rectangle(forces)
     for name, cycle in found.cycles.items():
@@ -169,7 +171,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
 def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[str, Any]:
     return {
         f"{name}/displacement": relative, f"{name}/force": force, f"{name}/dissipated": float(cycle.dissipated.sum()),
-        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/slipping": float(cycle.slipping.mean()),
+        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/lost": float(cycle.lost.sum()), f"{name}/slipping": float(cycle.slipping.mean()),
         f"{name}/open": float(cycle.open.mean()), f"{name}/unsteady": float(cycle.unsteady),
     }  # fmt: skip
 
@@ -183,10 +185,8 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     names = [c.name for c in problem.assembly.contacts]
     cycles = {}
     for name in names:
-        d, s, slips, opened = (
-            np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "slipping", "open")
-        )
-        cycles[name] = Cycle(d, s, slips, opened, row[f"contacts/{name}/unsteady"])
+        sums = (np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "lost", "slipping", "open"))
+        cycles[name] = Cycle(*sums, unsteady=row[f"contacts/{name}/unsteady"])
     found = Operating(
         point.Omega,
         {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
@@ -196,6 +196,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         row["supplied"],
         row["damped"],
         cycles,
+        Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)}),
     )
     return point, found
 
@@ -242,26 +243,9 @@ def _ragged(problem: Problem, member: Member, q: ComplexArray) -> list[ComplexAr
     return [row[: member.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
 
 
-def beside(problem: Problem, member: Member, harmonic: int, found: Operating) -> ComplexArray:
-    """(r,) amplitudes of the forces on the rows of a member's residual shapes, N and N m; (0,) where it has none.
-
-    From a contact a body gets minus what acts on the first side of it, and what acts on the second side.
-    """
-    a, index = problem.assembly, problem.assembly.index(harmonic)
-    residual = member.at(index).group.residual
+def _beside(problem: Problem, member: Member, harmonic: int, found: Operating) -> ComplexArray:
+    """(r,) amplitudes of the forces on the rows of a member's residual shapes, N and N m; (0,) where it has none."""
+    residual = member.at(problem.assembly.index(harmonic)).group.residual
     if residual is None:
         return np.zeros(0, dtype=complex)
-    out = np.zeros(len(residual.labels), dtype=complex)
-    for i, second, side in a.sides(member.name):
-        contact, F = a.contacts[i], found.force[a.contacts[i].name]
-        at = F[:, 0] - contact.preload if harmonic == 0 else F[:, 2 * harmonic - 1] - 1j * F[:, 2 * harmonic]
-        six = np.conj(side.frame.T * side._phase(index, a.blades)) @ at * (1.0 if second else -1.0)
-        for label, value in zip(side.labels, six, strict=True):
-            if label in residual.labels:
-                out[residual.labels.index(label)] += value
-    for load in a.loads:
-        if load.member == member.name and load.harmonic == harmonic:
-            for i, label in enumerate(residual.labels):  # none of them for a pressure field, which has no shape beside
-                if label.startswith(f"excitation:{load.row}:"):
-                    out[i] += load.amplitude * (problem.share if harmonic else 1.0)
-    return out
+    return sum(forces_on(problem, member, harmonic, found, residual.labels), np.zeros(len(residual.labels)))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import waves
-from ..contact.law import Law, State
+from ..contact.law import Law, State, Step
 from ..contact.periodic import cycles
 from ..contact.point import PointContact
 from ..data import Array
@@ -26,12 +26,14 @@ class Cycle(NamedTuple):
 
     Attributes:
         dissipated: (n,) J, work done on the points. by_slip: (n,) J, friction force times the path slid; without what
-            area that opens under load takes with it. slipping, open: (n,) share of the cycle.
+            area that opens under load takes with it. lost: (n,) J that the law itself counts, see `Law.lost`.
+            slipping, open: (n,) share of the cycle.
         unsteady: largest change of a resultant's sample against the cycle before, over the largest resultant force.
     """
 
     dissipated: Array
     by_slip: Array
+    lost: Array
     slipping: Array
     open: Array
     unsteady: float
@@ -55,8 +57,8 @@ def traced(
         samples: of a cycle. count: cycles marched at most before. settled: see `contact.periodic.periodic`.
     """
     parts = _watched(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
-    dissipated, by_slip, slipping, open_ = (np.asarray(p) for p in parts[:4])
-    return Traced(parts[5], Cycle(dissipated, by_slip, slipping, open_, float(parts[4])))
+    *sums, unsteady, force = parts
+    return Traced(force, Cycle(*(np.asarray(p) for p in sums), unsteady=float(unsteady)))
 
 
 def above_rounding(terms: Any, axes: Any) -> Any:
@@ -69,29 +71,38 @@ ROUNDING = 1e-13
 """Share of the work that goes to and fro in a cycle below which what is lost is not told from zero."""
 
 
+def derivative(waves: int) -> Array:
+    """(W, W) harmonics mean, cos, sin, cos 2, ... of a signal's derivative over Omega t from its own."""
+    out = np.zeros((waves, waves))
+    for h in range(1, waves // 2 + 1):
+        out[2 * h - 1, 2 * h], out[2 * h, 2 * h - 1] = h, -h
+    return out
+
+
 @partial(jax.jit, static_argnames=("samples", "count"))
 def _watched(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
     settled: jax.Array | float,
 ) -> tuple[jax.Array, ...]:  # fmt: skip
     values, _ = waves(u.shape[1] // 2, samples)
-    path = jnp.einsum("sk,nia,ak->sni", values, G, u)
+    path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, values @ derivative(u.shape[1])))
     before, state = cycles(law, path, period, count, settled)
-    speed = (path - jnp.roll(path, 1, axis=0)) * (samples / period)
-
-    def one(state: State, sample: tuple[jax.Array, jax.Array]) -> tuple[State, tuple[jax.Array, jax.Array]]:
-        force, after = law.step(sample[0], sample[1], period / samples, state)
-        return after, (force, law.slip(after) - law.slip(state))
-
-    _, (force, slid) = jax.lax.scan(one, state, (path, speed))
-    mean = 0.5 * (force + jnp.roll(force, 1, axis=0))
     moved = path - jnp.roll(path, 1, axis=0)
+    dt = period / samples
+
+    def one(state: State, row: tuple[jax.Array, ...]) -> tuple[State, tuple[jax.Array, ...]]:
+        force, after = law.step(row[0], row[1] / dt, dt, state)
+        lost = law.lost(Step(row[0], row[1], dt, row[2], force, state, after))
+        return after, (force, law.slip(after) - law.slip(state), lost)
+
+    _, (force, slid, lost) = jax.lax.scan(one, state, (path, moved, jnp.roll(before, 1, axis=0)))
+    mean = 0.5 * (force + jnp.roll(force, 1, axis=0))
     open_ = force[..., 0] <= 0
-    least = 1e-9 * jnp.abs(moved).max()
-    moves = jnp.abs(slid).max(axis=-1) > least
+    moves = jnp.abs(slid).max(axis=-1) > 1e-9 * jnp.abs(moved).max()
     slips = moves & ~open_
     change = jnp.einsum("nia,sni->sa", G, force - before)[:, :3]
     size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
     unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
     by_slip = jnp.sum(mean[..., 1:] * slid * moves[..., None], axis=(0, 2))
-    return above_rounding(mean * moved, (0, 2)), by_slip, slips.mean(axis=0), open_.mean(axis=0), unsteady, force
+    work = above_rounding(force * ahead * (2 * jnp.pi / samples), (0, 2))
+    return work, by_slip, lost.sum(axis=0), slips.mean(axis=0), open_.mean(axis=0), unsteady, force

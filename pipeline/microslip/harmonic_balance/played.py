@@ -21,7 +21,7 @@ from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..data import Array, Indices
 from .forces import Forces, Marched
-from .patch import Cycle, Traced, above_rounding
+from .patch import Cycle, Traced, above_rounding, derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,11 @@ class Played(Marched):
         force, none = self.spring * (path - places), np.zeros(1)
         mean = 0.5 * (force + np.roll(force, 1, axis=1))
         moved, slid = (x - np.roll(x, 1, axis=1) for x in (path, places))
+        ahead = u[:, 0] @ (self._waves(u)[0] @ derivative(u.shape[2])).T * (2 * np.pi / self.samples)
         slips = np.abs(slid) > 1e-9 * np.abs(moved).max(initial=0.0)
-        work = above_rounding(mean * moved, 1)[:, None], (mean * slid * slips).sum(axis=1)[:, None]
-        cycles = [Cycle(a, b, c, none, 0.0) for a, b, c in zip(*work, slips.mean(axis=1)[:, None], strict=True)]
+        lost = self.spring * self.width * (np.abs(slid) * slips).sum(axis=1)
+        work = above_rounding(force * ahead, 1), (mean * slid * slips).sum(axis=1), lost, slips.mean(axis=1)
+        cycles = [Cycle(*row[:, None], none, 0.0) for row in np.transpose(work)]
         return [Traced(f, one) for f, one in zip(self._of_points(force), cycles, strict=True)]
 
     def _of_points(self, force: Array) -> Array:

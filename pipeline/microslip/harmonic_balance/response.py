@@ -16,6 +16,7 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
 from . import reduced
+from .checks import UNCHECKED, Checks, checks, judged
 from .jenkins import FrequencyResponse, brackets, inside, resonances
 from .patch import Cycle, Traced
 from .problem import Problem
@@ -34,7 +35,7 @@ class Operating:
         Omega: rad/s. q: member -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
             mean from the preloaded state. watched: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
             the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J a cycle.
-        cycles: contact -> what its points do.
+        cycles: contact -> what its points do. checks: of all this.
     """
 
     Omega: float
@@ -45,6 +46,7 @@ class Operating:
     supplied: float
     damped: float
     cycles: Mapping[str, Cycle]
+    checks: Checks = UNCHECKED
 
 
 def operating(problem: Problem, point: Point) -> Operating:
@@ -63,7 +65,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         watched.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
         if h:
             work += np.sum([reduced.work(part, at.Omega, h, own, F, share) for part, own, F in each], axis=0)
-    return Operating(
+    found = Operating(
         at.Omega,
         {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.members)},
         np.array(watched).T,
@@ -73,6 +75,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         float(work[1]),
         _by_contact(p, cycles),
     )
+    return replace(found, checks=checks(p, found))
 
 
 def traced(problem: Problem, found: Operating) -> dict[str, Traced]:
@@ -108,7 +111,7 @@ class HarmonicResponse(FrequencyResponse):
         dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J. supplied: (f,)
             work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
         slipping, open: (f, patches) share of points times cycle that slips, or is open; the rest sticks.
-        unsteady: (f,) see `patch.Cycle`. status: of every point. error, iterations, seconds: (f,), see `Point`.
+        unsteady: (f,) see `patch.Cycle`. balance, counted, motion: (f,) see `checks.Checks`. status: of every point. error, iterations, seconds: (f,), see `Point`.
     """
 
     x: Array
@@ -121,6 +124,9 @@ class HarmonicResponse(FrequencyResponse):
     slipping: Array
     open: Array
     unsteady: Array
+    balance: Array
+    counted: Array
+    motion: Array
     status: tuple[str, ...]
     error: Array
     iterations: Array
@@ -153,7 +159,9 @@ def of_points(
     problem: Problem, points: Sequence[Point], limit: Array, found: Sequence[Operating] = ()
 ) -> HarmonicResponse:  # fmt: skip
     """What a reader asks of solved points. found: what belongs to them, if it is known."""
-    rows = [_looked_at(problem, f) for f in found or [operating(problem, p) for p in points]]
+    found = found or [operating(problem, p) for p in points]
+    points = [judged(p, f.checks) for p, f in zip(points, found, strict=True)]
+    rows = [_looked_at(problem, f) for f in found]
     parts = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     return HarmonicResponse(
         frequency=np.array([p.Omega for p in points]) / (2 * np.pi),
@@ -188,6 +196,7 @@ def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
         "slipping": [float(c.slipping.mean()) for c in cycles],
         "open": [float(c.open.mean()) for c in cycles],
         "unsteady": max((c.unsteady for c in cycles), default=0.0),
+        **vars(found.checks),
     }
 
 
@@ -238,7 +247,9 @@ def highest(
 
     def amplitude(at: float, start: Array = own.x) -> float:
         point = solve(problem, 2 * np.pi * at, [start])
-        tried.append((point, float(abs(operating(problem, point).watched[0, 1])) if point.converged else 0.0))
+        found = operating(problem, point)
+        point = judged(point, found.checks)
+        tried.append((point, float(abs(found.watched[0, 1])) if point.converged else 0.0))
         return tried[-1][1]
 
     options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 12}

@@ -173,9 +173,10 @@ class Side:
             own = self.rows[index]
         else:
             own = self.rows[0] if len(self.rows) == 1 else self.rows[(blades - index) % blades].conj()
-        return own * self._phase(index, blades)
+        return own * self.phase(index, blades)
 
-    def _phase(self, index: int, blades: int) -> complex | float:
+    def phase(self, index: int, blades: int) -> complex | float:
+        """Of the sector that the member stands in, against the one whose coordinates are used."""
         steps = (self.shift * index) % blades if blades else 0
         if 2 * steps in (0, blades):
             return -1.0 if steps else 1.0
@@ -371,7 +372,7 @@ class Assembly:
         rows = np.vstack(T) if T else np.zeros((0, m))
         amplitudes = np.array([x.amplitude for x in loads], dtype=complex)
         f = sum((np.conj(at.excitation(x.row)) * x.amplitude for x in loads), np.zeros(m, dtype=complex))
-        frames = [s.frame * s._phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
+        frames = [s.frame * s.phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
                   for s, t in zip(sides, T, strict=True)]  # fmt: skip
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]

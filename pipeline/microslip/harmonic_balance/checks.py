@@ -1,0 +1,148 @@
+"""What a solution has to satisfy besides the equations that it was solved from: its energy is in balance, the contacts
+take what their laws count, and the bodies move at their contacts as the contacts do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import ComplexArray
+from ..system.assembly import Member
+from ..units import percent
+from .problem import Problem
+from .solver import Point
+
+if TYPE_CHECKING:
+    from .response import Operating
+
+BALANCE = 1e-4
+"""Share of the energy that may be missing between what is supplied, damped and taken by the contacts: they follow from
+the same solution, so that no more than what Newton's method leaves is missing."""
+
+COUNTED = 0.05
+"""Share of the energy by which the work on the contacts may differ from the loss that their laws count. It falls with
+the square of the samples: of 64, smooth motions leave a few thousandths, and at most about this."""
+
+MOTION = 1e-4
+"""Share of the contacts' motion by which the bodies' may differ from it."""
+
+EXCHANGED = 1e-6
+"""Of the energy that goes to and fro in the contacts without loss, this much counts as supplied: differences of less
+cannot be told from rounding."""
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Three numbers that a solution leaves, NaN where nothing can be said.
+
+    Attributes:
+        balance: energy supplied less damped less work on the contacts, over the largest of them. counted: work on the
+            contacts less what their laws count as lost, over the same. motion: largest difference of the motion at the
+            contacts' points as read from the bodies' coordinates and as the laws saw it, over the largest motion.
+    """
+
+    balance: float
+    counted: float
+    motion: float
+
+    @property
+    def failure(self) -> str:
+        """Why the solution is none; empty if it is one."""
+        if abs(self.balance) > BALANCE:
+            return f"energy: {percent(abs(self.balance))} of what is supplied is missing in the balance; report it"
+        if abs(self.counted) > COUNTED:
+            more = "more" if self.counted > 0 else "less"
+            return f"energy: contacts take {more} than their laws count, by {percent(abs(self.counted))}; raise samples"
+        if self.motion > MOTION:
+            return f"read-out: bodies and contacts differ by {percent(self.motion)} of their motion; report it"
+        return ""
+
+
+UNCHECKED = Checks(np.nan, np.nan, np.nan)
+
+
+def judged(point: Point, checks: Checks) -> Point:
+    """A point that is not called converged if it fails its checks."""
+    return replace(point, status=checks.failure) if point.converged and checks.failure else point
+
+
+def checks(problem: Problem, found: Operating) -> Checks:
+    """The checks of a solution and what belongs to it."""
+    work = exchanged = 0.0
+    for u, F in ((found.relative[name], found.force[name]) for name in found.force):
+        h = np.arange(1, problem.harmonics + 1)
+        c, s = slice(1, None, 2), slice(2, None, 2)
+        work += np.pi * float((h * (F[:, c] * u[:, s] - F[:, s] * u[:, c])).sum())
+        exchanged += np.pi * float((h * np.hypot(F[:, c], F[:, s]) * np.hypot(u[:, c], u[:, s])).sum())
+    lost = sum(float(c.lost.sum()) for c in found.cycles.values())
+    size = max(abs(found.supplied), abs(found.damped), abs(work), EXCHANGED * exchanged, 1e-300)
+    missing = found.supplied - found.damped - work
+    return Checks(missing / size, (work - lost) / size, _apart(problem, found))
+
+
+def _apart(problem: Problem, found: Operating) -> float:
+    """See `Checks.motion`."""
+    away = largest = 0.0
+    each = [_moving(problem, m, found) for m in problem.assembly.members]
+    sides: dict[tuple[int, int], ComplexArray] = {key: moved for one in each for key, moved in one.items()}
+    for i, contact in enumerate(problem.assembly.contacts):
+        G, u = contact.patch.kinematics, found.relative[contact.name]
+        seen = np.column_stack([u[:, 0] - contact.offset, u[:, 1::2] - 1j * u[:, 2::2]])
+        read = sides[i, 0] - sides.get((i, 1), 0.0)
+        away = max(away, float(np.abs(G @ (read - seen)).max(initial=0.0)))
+        largest = max(largest, float(np.abs(G @ seen).max(initial=0.0)))
+    return away / largest if largest else 0.0
+
+
+def _moving(problem: Problem, member: Member, found: Operating) -> dict[tuple[int, int], ComplexArray]:
+    """(contact, side) of a member -> (k, H + 1) its motion there, from its coordinates and the forces on it."""
+    a, moved = problem.assembly, []
+    sides = a.sides(member.name)
+    for h in range(problem.harmonics + 1):
+        index, q = a.index(h), found.q[member.name][h]
+        at = member.at(index)
+        labels = at.group.compliance.labels
+        touched, loaded = forces_on(problem, member, h, found, labels)
+        if h and at.loss is not None:
+            touched = (1 - 1j * member.residual_loss) * touched
+        row = []
+        for _, _, s in sides:
+            own = s.motion(at, index, a.blades) @ q
+            if s.rows is None:
+                own = own + s.frame @ at.residual(s.labels, labels) @ (touched + loaded) * s.phase(index, a.blades)
+            row.append(own)
+        moved.append(row)
+    return {(i, j): np.column_stack([row[n] for row in moved]) for n, (i, j, _) in enumerate(sides)}
+
+
+def forces_on(
+    problem: Problem, member: Member, harmonic: int, found: Operating, labels: Sequence[str]
+) -> tuple[ComplexArray, ComplexArray]:
+    """(r,) amplitudes of the forces that the contacts and that the loads put on some rows of a member, N and N m.
+
+    From a contact a body gets minus what acts on the first side of it, and what acts on the second side.
+
+    Args:
+        labels: of the rows, those of `Compliance.labels`.
+    """
+    a, index = problem.assembly, problem.assembly.index(harmonic)
+    place = {label: i for i, label in enumerate(labels)}
+    touched, loaded = np.zeros((2, len(labels)), dtype=complex)
+    for i, second, side in a.sides(member.name):
+        if side.rows is not None:  # a patch that deforms has no rows of the compliance
+            continue
+        contact, F = a.contacts[i], found.force[a.contacts[i].name]
+        at = F[:, 0] - contact.preload if harmonic == 0 else F[:, 2 * harmonic - 1] - 1j * F[:, 2 * harmonic]
+        six = np.conj(side.frame.T * side.phase(index, a.blades)) @ at * (1.0 if second else -1.0)
+        for label, value in zip(side.labels, six, strict=True):
+            if label in place:
+                touched[place[label]] += value
+    for load in a.loads:
+        if load.member == member.name and load.harmonic == harmonic:
+            for label, i in place.items():  # none of them for a pressure field, which has no shape beside
+                if label.startswith(f"excitation:{load.row}:"):
+                    loaded[i] += load.amplitude * (problem.share if harmonic else 1.0)
+    return touched, loaded
