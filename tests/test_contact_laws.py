@@ -4,11 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import wrong_laws
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-import wrong_laws
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Scattered
 from microslip.contact.law import Step, history, march
@@ -209,7 +209,8 @@ def _counted(law, u, dt):
     def one(carried, sample):
         state, before, at = carried
         force, after = law.step(*sample, dt, state)
-        return (after, force, sample[0]), (force, law.lost(Step(sample[0], sample[0] - at, dt, before, force, state, after)))
+        lost = law.lost(Step(sample[0], sample[0] - at, dt, before, force, state, after))
+        return (after, force, sample[0]), (force, lost)
 
     v = (u - jnp.roll(u, 1, axis=0)) / dt
     begin = law.init(u.shape[1]), jnp.zeros_like(u[0]), u[-1]

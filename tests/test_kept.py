@@ -24,8 +24,8 @@ from microslip.contact.point import PointContact
 from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.jenkins import overhanging
 from microslip.harmonic_balance.checks import forces_on
+from microslip.harmonic_balance.jenkins import overhanging
 from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis

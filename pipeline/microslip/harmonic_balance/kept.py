@@ -171,7 +171,8 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
 def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[str, Any]:
     return {
         f"{name}/displacement": relative, f"{name}/force": force, f"{name}/dissipated": float(cycle.dissipated.sum()),
-        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/lost": float(cycle.lost.sum()), f"{name}/slipping": float(cycle.slipping.mean()),
+        f"{name}/by_slip": float(cycle.by_slip.sum()), f"{name}/lost": float(cycle.lost.sum()),
+        f"{name}/slipping": float(cycle.slipping.mean()),
         f"{name}/open": float(cycle.open.mean()), f"{name}/unsteady": float(cycle.unsteady),
     }  # fmt: skip
 
@@ -185,8 +186,10 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     names = [c.name for c in problem.assembly.contacts]
     cycles = {}
     for name in names:
-        sums = (np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "lost", "slipping", "open"))
-        cycles[name] = Cycle(*sums, unsteady=row[f"contacts/{name}/unsteady"])
+        d, s, lost, slips, opened = (
+            np.array([row[f"contacts/{name}/{k}"]]) for k in ("dissipated", "by_slip", "lost", "slipping", "open")
+        )
+        cycles[name] = Cycle(d, s, lost, slips, opened, row[f"contacts/{name}/unsteady"])
     found = Operating(
         point.Omega,
         {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
@@ -248,4 +251,5 @@ def _beside(problem: Problem, member: Member, harmonic: int, found: Operating) -
     residual = member.at(problem.assembly.index(harmonic)).group.residual
     if residual is None:
         return np.zeros(0, dtype=complex)
-    return sum(forces_on(problem, member, harmonic, found, residual.labels), np.zeros(len(residual.labels)))
+    touched, loaded = forces_on(problem, member, harmonic, found, residual.labels)
+    return touched + loaded

@@ -57,8 +57,8 @@ def traced(
         samples: of a cycle. count: cycles marched at most before. settled: see `contact.periodic.periodic`.
     """
     parts = _watched(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
-    *sums, unsteady, force = parts
-    return Traced(force, Cycle(*(np.asarray(p) for p in sums), unsteady=float(unsteady)))
+    dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
+    return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 
 
 def above_rounding(terms: Any, axes: Any) -> Any:

@@ -60,7 +60,7 @@ class Played(Marched):
         slips = np.abs(slid) > 1e-9 * np.abs(moved).max(initial=0.0)
         lost = self.spring * self.width * (np.abs(slid) * slips).sum(axis=1)
         work = above_rounding(force * ahead, 1), (mean * slid * slips).sum(axis=1), lost, slips.mean(axis=1)
-        cycles = [Cycle(*row[:, None], none, 0.0) for row in np.transpose(work)]
+        cycles = [Cycle(d, s, f, c, none, 0.0) for d, s, f, c in np.transpose(work)[..., None]]
         return [Traced(f, one) for f, one in zip(self._of_points(force), cycles, strict=True)]
 
     def _of_points(self, force: Array) -> Array:

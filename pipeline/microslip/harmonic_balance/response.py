@@ -111,7 +111,8 @@ class HarmonicResponse(FrequencyResponse):
         dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J. supplied: (f,)
             work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
         slipping, open: (f, patches) share of points times cycle that slips, or is open; the rest sticks.
-        unsteady: (f,) see `patch.Cycle`. balance, counted, motion: (f,) see `checks.Checks`. status: of every point. error, iterations, seconds: (f,), see `Point`.
+        unsteady: (f,) see `patch.Cycle`. balance, counted, motion: (f,) see `checks.Checks`.
+        status: of every point. error, iterations, seconds: (f,), see `Point`.
     """
 
     x: Array
