@@ -25,9 +25,10 @@ from .case.settings import FIRST_HARMONICS
 from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
+from .results.checks import sentence
 from .results.files import unit_of
 from .results.names import apart
-from .units import Quantity, amplitude_of
+from .units import Quantity, amplitude_of, counted
 from .workflow import Job, Report, code_hash, modes_stage, open_job, report_stage, system_file, system_stage
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
     for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
         f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
         report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
+    report(summary["checked"])
     for remark in summary["remarks"]:
         report(f"warning: {remark}")
 
@@ -180,6 +182,9 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
         summary["remarks"] += more.remarks
+    summary["checked"] = sentence(response, result.truncation)
+    if result.rising:
+        summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
     summary["response_sha256"] = store.hash_file(folder / "response.h5")
     summary["pictures"] = {title: path.name for title, path in drawn.items()}
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]

@@ -16,6 +16,7 @@ from ..harmonic_balance import (
     refined_peaks,
     stuck_resonances,
 )
+from ..harmonic_balance.jenkins import hidden
 from ..harmonic_balance.readout import measured
 from .assemble import Built
 from .counting import Springs
@@ -46,7 +47,10 @@ def in_closed_form(
             found = frequency_response(group, pressed, force, row, at, residual=residual, amplitude=amplitude)
             return replace(found, quantity=of)
 
-        responses[normal] = respond(frequency)
+        modes = [stuck_resonances(group, *with_) for with_ in ((pressed, residual), ([], None))]
+        more = hidden(frequency, *map(np.concatenate, zip(*modes, strict=True)))
+        at = np.union1d(frequency, more)
+        responses[normal] = replace(respond(at), added=np.isin(at, more))
         resonances[normal] = refined_peaks(responses[normal], respond)
         at_peaks[normal] = respond(np.array([f for f, _ in resonances[normal]]))
     closed = [jenkins_contact(c, max(forces), s) for c, s in zip(built.contacts, built.springs, strict=True)]

@@ -14,6 +14,7 @@ from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.readout import measured
 from ..results import Body
+from ..results.files import CONVERGED
 from ..results.names import exact
 from ..store import fingerprint
 from .assemble import Built, Loaded
@@ -147,8 +148,11 @@ def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[s
     points: dict[float, dict[str, Any]] = {}
     for i, f in enumerate(map(float, r.frequency)):
         row: dict[str, Any] = {
-            "frequency": f, "status": "converged" if r.converged[i] else "no convergence", "peak": float(peak * f),
+            "frequency": f, "status": CONVERGED if r.converged[i] else "iteration limit: no solution was found",
+            "peak": float(peak * f), "added": int(not peak and not r.asked[i]),
             f"{kind}/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
+            "supplied": float(r.supplied[i]), "damped": float(r.damped[i]), "checks/balance": float(r.balance[i]),
+            "checks/counted": float(r.counted[i]), "checks/motion": float(r.motion[i]),
             f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
         }  # fmt: skip
         for c, six in zip(built.contacts, r.force[i].reshape(-1, 6), strict=True):

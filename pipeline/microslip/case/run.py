@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.jenkins import overhanging
 from ..harmonic_balance.readout import measured
 from ..results import Journal
+from ..results.checks import cause
 from ..units import Quantity, counted, percent
 from . import edges
 from .assemble import Built, build, swept
@@ -26,9 +26,11 @@ from .keeping import series_name
 from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
+    from ..harmonic_balance.accuracy import Error
     from ..harmonic_balance.book import BookPatch
     from ..harmonic_balance.problem import Forces, Problem
     from ..harmonic_balance.response import HarmonicResponse
+    from ..harmonic_balance.solver import Point
     from ..system.assembly import Assembly, Linear
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
@@ -42,8 +44,8 @@ class CaseResult:
 
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
-    peaks. rising: ends of the band at which responses still rise. truncation: largest estimated error of a resonance
-    for want of harmonics, where their number was looked for.
+    peaks. rising: ends of the band at which responses still rise. truncation: largest estimated error of an amplitude
+    for want of harmonics and samples, over it; None where it is not estimated.
     """
 
     settings: CaseSettings
@@ -123,7 +125,7 @@ def _run(
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     forces = normal_forces(built, path)
     at_peaks: dict[float, FrequencyResponse] = {}
-    left = None if tolerance is None else _Left(tolerance)
+    left = _Left(built, tolerance)
     _book_can(built, path)
     if settings.has_laws or not settings.contacts:
         with keep(built) if keep else nullcontext() as journal:
@@ -148,7 +150,7 @@ def _run(
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built, at_peaks,
-        tuple(at_the_ends), left.most if left else None, stuck[1],
+        tuple(at_the_ends), left.most, stuck[1],
     )  # fmt: skip
 
 
@@ -190,7 +192,7 @@ def _idle(forces: Sequence[float]) -> list[str]:
 
 def _by_laws(
     built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
-    left: _Left | None,
+    left: _Left,
 ) -> Answer:  # fmt: skip
     """With the laws of the contact room and as many harmonics as the case asks for."""
     responses: dict[float, FrequencyResponse] = {}
@@ -204,8 +206,7 @@ def _by_laws(
         responses[key] = found
         remarks += _not_periodic(key, found.unsteady, built.settings)
         remarks += _lifting(built, problem, found, key)
-        few = left.out if left else partial(_truncated, built)
-        remarks += [] if _still(found) else few(problem, found, resonances[key], key)
+        remarks += [] if _still(found) else left.out(problem, found, resonances[key], key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, remarks
@@ -227,7 +228,7 @@ def _swept(
     from ..harmonic_balance import kept, response
 
     if journal is None:
-        found = response.harmonic_response(problem, frequency, limits, report)
+        found = response.filled_response(problem, frequency, limits, report)
         return found, response.refined_peaks(problem, found)
     name = series_name(normal)
     parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
@@ -352,65 +353,65 @@ TRUNCATION = 0.01
 
 
 class _Left:
-    """What harmonics and samples that are left out would change. tolerance, most: shares of the amplitude."""
+    """What harmonics and samples that are left out would change.
 
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance, self.most = tolerance, 0.0
+    tolerance: their number is looked for, until the share of an amplitude is within it; None: it is given. most: the
+    largest share, None where nothing is judged.
+    """
+
+    def __init__(self, built: Built, tolerance: float | None) -> None:
+        self.built, self.tolerance, self.most = built, tolerance, None
+
+    most: float | None
 
     def out(
         self, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
     ) -> list[str]:
-        """A remark where no number of harmonics is enough at a place that is judged (`accuracy.judged`).
+        """A remark where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
+
+        The book's mode is one harmonic by what it is, and of a whole ring its sector says the same: neither is judged.
 
         Raises:
-            _TooFew: more of them are.
+            _TooFew: more of them are enough, where their number is looked for.
         """
-        from ..harmonic_balance.accuracy import FLOOR, enough, judged
+        from ..harmonic_balance.accuracy import judged
 
-        floor, worst = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0)), (0.0, 0.0)
-        for point, estimate, share in judged(problem, found, [f for f, _ in peaks]) if problem.groups else []:
-            f, e = point.Omega / (2 * np.pi), enough(problem, point, self.tolerance, floor=floor, first=estimate)
-            if e.problem.harmonics > problem.harmonics:
-                n = e.problem.harmonics
-                said = f"at F_N = {normal:g} N and {f:.6g} Hz an error of about {percent(share)} is left with "
-                raise _TooFew(n, said + f"{counted(problem.harmonics, 'harmonic')}; all once more with {n}")
-            worst = max(worst, (share, f))
-        self.most = max(self.most, worst[0])
-        if worst[0] <= self.tolerance:
+        settings = self.built.settings
+        whole = settings.ring is not None and settings.ring.model == "full"
+        if not problem.groups or settings.mode == "book" or (whole and self.tolerance is None):
             return []
-        return [
-            f"At F_N = {normal:g} N the amplitude at {worst[1]:.6g} Hz is uncertain by about {percent(worst[0])} "
-            f"with {counted(problem.harmonics, 'harmonic')}, above harmonics_error; no solution with more was found."
-        ]
+        looked_at = judged(problem, found, [f for f, _ in peaks])
+        for point, estimate, share in looked_at if self.tolerance is not None else ():
+            self._enough(problem, found, point, estimate, share, normal)
+        if not looked_at:
+            return []
+        point, e, share = max(looked_at, key=lambda one: one[2])
+        self.most = max(self.most or 0.0, share)
+        where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
+        balanced = counted(problem.harmonics, "harmonic")
+        if share <= (TRUNCATION if self.tolerance is None else self.tolerance):
+            return []
+        if self.tolerance is not None:
+            return [f"{where} by about {percent(share)} with {balanced}, above harmonics_error; no solution with more "
+                    "was found."]  # fmt: skip
+        if not np.isfinite(share):
+            finer = f"twice the harmonics ({e.harmonics}) and samples ({e.samples})"
+            return [f"{where}: with {finer} no solution was found."]
+        what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
+        said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}."
+        return [f"{where} by about {percent(share)}, {said}"]
 
+    def _enough(
+        self, problem: Problem, found: HarmonicResponse, point: Point, estimate: Error, share: float, normal: float
+    ) -> None:
+        """Raise `_TooFew` where more harmonics are enough for a point."""
+        from ..harmonic_balance.accuracy import FLOOR, enough
 
-def _truncated(
-    built: Built, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
-) -> list[str]:
-    """A remark where harmonics or samples are too few, see `harmonic_balance.accuracy`.
-
-    Not of the book's mode, which is one harmonic by what it is, nor of a whole ring, whose sector says the same.
-    """
-    from ..harmonic_balance.accuracy import judged
-
-    settings = built.settings
-    whole = settings.ring is not None and settings.ring.model == "full"
-    if not problem.groups or settings.mode == "book" or whole:
-        return []
-    looked_at = judged(problem, found, [f for f, _ in peaks])
-    if not looked_at:
-        return []
-    point, e, share = max(looked_at, key=lambda one: one[2])
-    if share <= TRUNCATION:
-        return []
-    where = f"At F_N = {normal:g} N the amplitude at {point.Omega / (2 * np.pi):.6g} Hz is uncertain"
-    if not np.isfinite(share):
-        return [f"{where}: with twice the harmonics ({e.harmonics}) and samples ({e.samples}) no solution was found."]
-    what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
-    return [
-        f"{where} by about {percent(share)}, mostly for want of {what}, with "
-        f"{counted(e.harmonics, 'harmonic')} and {e.samples} samples; raise {what}."
-    ]
+        floor = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0))
+        e = enough(problem, point, self.tolerance or TRUNCATION, floor=floor, first=estimate)
+        if (n := e.problem.harmonics) > problem.harmonics:
+            said = f"at F_N = {normal:g} N and {point.Omega / (2 * np.pi):.6g} Hz an error of about {percent(share)}"
+            raise _TooFew(n, f"{said} is left with {counted(problem.harmonics, 'harmonic')}; all once more with {n}")
 
 
 OPEN = 0.01
@@ -484,14 +485,13 @@ def _static_force(interface: str, group: ModalGroup) -> float | None:
 
 def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
     """How much more damping of the stuck modes takes where contacts slide or open. normal: N, see `Built.pressed`."""
-    from ..harmonic_balance.reduced import stuck, stuck_damping
+    from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 
     asked = built.settings.stuck_ratios
     if asked is None or not built.settings.contacts:
         return []
     part = built.pressed(normal).joined(1)
-    open_ = replace(part, rows=part.rows[:0], residual=part.residual[:0, :0])
-    f, D = (of(open_, np.zeros((0, 0))) for of in (stuck, stuck_damping))
+    f, D = (of(untouched(part), np.zeros((0, 0))) for of in (stuck, stuck_damping))
     inside = np.flatnonzero((D > 2 * max(asked)) & (f < built.settings.sweep.stop * built.settings.balanced))
     if not len(inside):
         return []
@@ -531,10 +531,28 @@ def _too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[st
     ]
 
 
+REMEDIES = {
+    "energy": "",
+    "fold": "microslip respond CASE --over frequency draws the curve",
+    "gaping contacts": "press them by a normal force or an interference, or hold the bodies",
+    "iteration limit": "change sweep.points a little or the normal force",
+    "no balance": "",
+    "not a number": "see the law's settings",
+    "read-out": "",
+}
+"""What to do about a cause, where the status of the point does not say it."""
+
+
 def _not_converged(responses: dict[float, FrequencyResponse]) -> list[str]:
-    return [
-        f"At F_N = {normal:g} N {int(np.sum(~r.converged))} of {len(r.frequency)} points did not converge (first at "
-        f"{r.frequency[~r.converged][0]:.6g} Hz); change sweep.points a little or the normal force."
-        for normal, r in responses.items()
-        if not r.converged.all()
-    ]
+    """A remark for each normal force and cause."""
+    found = []
+    for normal, r in responses.items():
+        texts = getattr(r, "status", ("iteration limit: Newton's method found no solution",) * len(r.frequency))
+        failed = {f: text for f, text, ok in zip(r.frequency, texts, r.converged, strict=True) if not ok}
+        for why in dict.fromkeys(map(cause, failed.values())):
+            at = [f for f, text in failed.items() if cause(text) == why]
+            remedy = REMEDIES.get(why, REMEDIES["iteration limit"])
+            many = f"At F_N = {normal:g} N {len(at)} of {len(r.frequency)} points did not converge"
+            said = f"{many}, first at {at[0]:.6g} Hz: {failed[at[0]]}"
+            found.append(said + (f"; {remedy}." if remedy else "."))
+    return found

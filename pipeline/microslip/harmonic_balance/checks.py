@@ -1,67 +1,21 @@
-"""What a solution has to satisfy besides the equations that it was solved from: its energy is in balance, the contacts
-take what their laws count, and the bodies move at their contacts as the contacts do."""
+"""The checks of a solution: its energy, and the motion of its contacts read from the bodies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import ComplexArray
+from ..results.checks import Checks, shares, work
 from ..system.assembly import Member
-from ..units import percent
 from .problem import Problem
 from .solver import Point
 
 if TYPE_CHECKING:
     from .response import Operating
-
-BALANCE = 1e-4
-"""Share of the energy that may be missing between what is supplied, damped and taken by the contacts: they follow from
-the same solution, so that no more than what Newton's method leaves is missing."""
-
-COUNTED = 0.05
-"""Share of the energy by which the work on the contacts may differ from the loss that their laws count. It falls with
-the square of the samples: of 64, smooth motions leave a few thousandths, and at most about this."""
-
-MOTION = 1e-4
-"""Share of the contacts' motion by which the bodies' may differ from it."""
-
-EXCHANGED = 1e-6
-"""Of the energy that goes to and fro in the contacts without loss, this much counts as supplied: differences of less
-cannot be told from rounding."""
-
-
-@dataclass(frozen=True)
-class Checks:
-    """Three numbers that a solution leaves, NaN where nothing can be said.
-
-    Attributes:
-        balance: energy supplied less damped less work on the contacts, over the largest of them. counted: work on the
-            contacts less what their laws count as lost, over the same. motion: largest difference of the motion at the
-            contacts' points as read from the bodies' coordinates and as the laws saw it, over the largest motion.
-    """
-
-    balance: float
-    counted: float
-    motion: float
-
-    @property
-    def failure(self) -> str:
-        """Why the solution is none; empty if it is one."""
-        if abs(self.balance) > BALANCE:
-            return f"energy: {percent(abs(self.balance))} of what is supplied is missing in the balance; report it"
-        if abs(self.counted) > COUNTED:
-            more = "more" if self.counted > 0 else "less"
-            return f"energy: contacts take {more} than their laws count, by {percent(abs(self.counted))}; raise samples"
-        if self.motion > MOTION:
-            return f"read-out: bodies and contacts differ by {percent(self.motion)} of their motion; report it"
-        return ""
-
-
-UNCHECKED = Checks(np.nan, np.nan, np.nan)
 
 
 def judged(point: Point, checks: Checks) -> Point:
@@ -71,16 +25,10 @@ def judged(point: Point, checks: Checks) -> Point:
 
 def checks(problem: Problem, found: Operating) -> Checks:
     """The checks of a solution and what belongs to it."""
-    work = exchanged = 0.0
-    for u, F in ((found.relative[name], found.force[name]) for name in found.force):
-        h = np.arange(1, problem.harmonics + 1)
-        c, s = slice(1, None, 2), slice(2, None, 2)
-        work += np.pi * float((h * (F[:, c] * u[:, s] - F[:, s] * u[:, c])).sum())
-        exchanged += np.pi * float((h * np.hypot(F[:, c], F[:, s]) * np.hypot(u[:, c], u[:, s])).sum())
+    taken = sum(float(work(F, found.relative[name])) for name, F in found.force.items())
     lost = sum(float(c.lost.sum()) for c in found.cycles.values())
-    size = max(abs(found.supplied), abs(found.damped), abs(work), EXCHANGED * exchanged, 1e-300)
-    missing = found.supplied - found.damped - work
-    return Checks(missing / size, (work - lost) / size, _apart(problem, found))
+    missing, uncounted = shares(found.supplied, found.damped, taken, lost, found.exchanged)
+    return Checks(float(missing), float(uncounted), _apart(problem, found))
 
 
 def _apart(problem: Problem, found: Operating) -> float:

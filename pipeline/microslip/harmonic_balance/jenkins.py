@@ -17,7 +17,8 @@ import scipy.linalg
 import scipy.optimize
 
 from ..data import Array, ComplexArray, Indices, ModalGroup
-from ..results.names import apart
+from ..results.checks import Checks, shares
+from ..results.names import apart as told_apart
 from ..units import METRES, Quantity
 
 Report = Callable[[str], None]
@@ -65,6 +66,9 @@ class FrequencyResponse:
         converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
             amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
         quantity: what the monitored row measures; m stands for its unit.
+        supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
+        balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
+        added: (f,) bool, points between those asked for, see `hidden`; empty: none.
         modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
             0-peak; of the closed form alone.
     """
@@ -77,8 +81,19 @@ class FrequencyResponse:
     limit: Array
     normal_swing: Array
     quantity: Quantity = field(kw_only=True, default=METRES)
+    supplied: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    damped: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    balance: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
     modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
     force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
+
+    @property
+    def asked(self) -> Array:
+        """(f,) bool, points of the sweep itself."""
+        return ~self.added if len(self.added) else np.ones(len(self.frequency), dtype=bool)
 
     def columns(self) -> dict[str, Array]:
         """What stands in a table beside the frequency, by name and unit."""
@@ -86,6 +101,7 @@ class FrequencyResponse:
             self.quantity.column("amplitude"): np.abs(self.monitor),
             "phase_rad": np.angle(self.monitor),
             "dissipated_J": self.dissipated,
+            **({"supplied_J": self.supplied, "damped_J": self.damped} if len(self.supplied) else {}),
             "converged": self.converged.astype(float),
         }
 
@@ -132,6 +148,7 @@ def frequency_response(
     dissipated, converged = np.zeros(points), np.zeros(points, bool)
     swing = np.zeros((points, len(contacts)))
     modal, forces = np.zeros((points, len(group.M_r)), complex), np.zeros((points, count), complex)
+    energies = np.zeros((5, points))
     u = np.zeros(count, complex)
     for i, f in enumerate(frequency):
         Omega = 2 * np.pi * f
@@ -146,14 +163,29 @@ def frequency_response(
         slips[i], swing[i] = u[slider], np.abs(springs[::6] * u[::6])
         modal[i], forces[i] = answer[:, 0] - answer[:, 1:] @ (k * u), k * u
         dissipated[i] = np.pi * float(np.sum(k.imag * np.abs(u) ** 2))
+        given = force @ modal[i] - residual.force_on_contacts * amplitude @ forces[i]
+        damped = np.pi * Omega * float((modal[i].conj() @ group.C_r @ modal[i]).real)
+        lost, moved = _slid(springs, limits, u), np.pi * (abs(given) + float(np.abs(forces[i]) @ np.abs(u)))
+        apart = u - rows @ modal[i] - residual.force_on_contacts * amplitude + residual.contacts @ forces[i]
+        supplied = -np.pi * float(given.imag)
+        energies[:4, i] = supplied, damped, *shares(supplied, damped, dissipated[i], lost, moved)
+        energies[4, i] = np.abs(apart).max(initial=0.0) / max(np.abs(u).max(initial=0.0), 1e-300)
         if not converged[i]:
             u = np.zeros(count, complex)
         if (i + 1) % max(points // 2, 1) == 0:
             report(f"{i + 1} of {points} frequencies")
     limit = np.array([c.limit for c in contacts])
+    converged &= np.array([not Checks(*row).failure for row in energies[2:].T], dtype=bool)
     return FrequencyResponse(
-        frequency, monitored, slips, dissipated, converged, limit, swing, modal=modal, force=forces
-    )
+        frequency, monitored, slips, dissipated, converged, limit, swing, modal=modal, force=forces,
+        supplied=energies[0], damped=energies[1], balance=energies[2], counted=energies[3], motion=energies[4],
+    )  # fmt: skip
+
+
+def _slid(springs: Array, limits: Array, u: ComplexArray) -> float:
+    """J that the sliders take in a cycle, friction times the path slid: 4 R (|u| - R / k) of each that slides."""
+    path = np.abs(u) - np.divide(limits, springs, out=np.full(len(u), np.inf), where=springs > 0)
+    return float(np.sum(np.where(path > 0, 4 * np.where(path > 0, limits * path, 0.0), 0.0)))
 
 
 def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:
@@ -264,20 +296,35 @@ def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
 
 def tops(response: FrequencyResponse) -> Indices:
     """Points of the local maxima that `peaks` lists."""
-    a, ok = np.abs(response.monitor), response.converged
-    whole = ok[1:-1] & ok[:-2] & ok[2:]
-    return np.flatnonzero(whole & (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
+    good = np.flatnonzero(response.converged)
+    a = np.abs(response.monitor[good])
+    return good[1:-1][(a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])]
 
 
 def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
     """Points (low, top, high) between which a sweep may have a peak: about its tops, and from an end at which it is
-    higher than beside it inwards, for the peak may lie just inside."""
-    found = [(int(i) - 1, int(i), int(i) + 1) for i in tops(response)]
+    higher than beside it inwards, for the peak may lie just inside. Points that did not converge are passed over."""
+    good = np.flatnonzero(response.converged)
+    where = np.searchsorted(good, tops(response))
+    found = [(int(good[i - 1]), int(good[i]), int(good[i + 1])) for i in where]
     a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
     ends = [(0, 0, 1), (last - 1, last, last)] if last else []
     inside = ((end, high if end == low else low) for low, end, high in ends)
     rise = [0 < a[beside] < a[end] for end, beside in inside]
     return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
+
+
+def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
+    """Hz of resonances that a sweep may step over: of modes inside the band whose half-power width is less than a step.
+
+    Args:
+        frequency: (f,) Hz, rising. modes: (m,) Hz, with sticking contacts or without contacts: where these dissipate
+            most, between both, no resonance is as narrow. damping: (m,) their ratios.
+    """
+    inside = (modes > frequency[0]) & (modes < frequency[-1]) & ~np.isin(modes, frequency)
+    modes, damping = modes[inside], damping[inside]
+    steps = np.diff(frequency)[np.searchsorted(frequency, modes) - 1]
+    return sorted({float(f) for f in modes[2 * damping * modes < steps]})
 
 
 def inside(
@@ -370,12 +417,13 @@ def refined_peaks(
 
 
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
-    """CSV text: frequency and, per normal force, amplitude, phase, dissipated energy and what else a response has."""
+    """CSV text: the frequencies asked for and, per normal force, amplitude, phase, energies and what else a response
+    has."""
     head, columns = ["frequency_Hz"], []
-    for force, r in zip(apart(list(responses)), responses.values(), strict=True):
+    for force, r in zip(told_apart(list(responses)), responses.values(), strict=True):
         head += [f"{name}_FN_{force}_N" for name in r.columns()]
-        columns += list(r.columns().values())
+        columns += [column[r.asked] for column in r.columns().values()]
     first = next(iter(responses.values()))
-    table = np.column_stack([first.frequency, *columns])
+    table = np.column_stack([first.frequency[first.asked], *columns])
     lines = [",".join(head)] + [",".join(f"{v:.9g}" for v in row) for row in table]
     return "\n".join(lines) + "\n"

@@ -3,6 +3,7 @@ was."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
@@ -12,14 +13,15 @@ from .. import continuation
 from ..continuation import Branch, Settings, State
 from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
+from ..results.checks import Checks
 from ..results.journal import Journal
 from ..system.assembly import Assembly, Member, Watch
-from .checks import Checks, forces_on, judged
+from .checks import forces_on, judged
 from .families import Family, followed
 from .jenkins import brackets, resonances
 from .patch import Cycle
 from .problem import Problem
-from .response import HarmonicResponse, Operating, highest, of_points, operating
+from .response import HarmonicResponse, Operating, between, hidden, highest, of_points, operating
 from .solver import CONVERGED, Point, Report, sweep
 
 
@@ -35,20 +37,29 @@ def kept_response(
             ``peak`` = the frequency, Hz, of the point that they were searched from.
 
     Returns:
-        The response at `frequency`, and (Hz, m) of its resonances: of the maxima of one plateau the highest.
+        The response at `frequency` and at points that are added, see `response.hidden`, and (Hz, m) of its resonances:
+        of the maxima of one plateau the highest.
     """
     held = {key: restored(problem, row) for key, row in journal.of(series).items()}
-    known = {f: held[f][0] for f in map(float, frequency) if f in held}
+    more = hidden(problem, frequency)
+    known = {f: held[f][0] for f in [*map(float, frequency), *more] if f in held}
     found = {f: held[f][1] for f in known}
 
-    def keep(point: Point) -> None:
+    def keep(point: Point, among: Iterable[float] = frequency) -> None:
         f = point.Omega / (2 * np.pi)
-        at = min(frequency, key=lambda x: abs(x - f))  # the number asked for, not the one divided back
-        found[float(at)] = operating(problem, point)
-        journal.keep(series, float(at), record(problem, point, found[float(at)]) | {"frequency": float(at)})
+        at = float(min(among, key=lambda x: abs(x - f)))  # the number asked for, not the one divided back
+        found[at] = operating(problem, point)
+        added = {"frequency": at, "added": int(among is more)}
+        journal.keep(series, at, record(problem, point, found[at]) | added)
 
     points = sweep(problem, frequency, report, known=known, keep=keep)
-    response = of_points(problem, points, limit, [found[float(f)] for f in frequency])
+    for f in more:
+        if f not in known:
+            report(f"{series}: a mode at {f:.6g} Hz between two frequencies")
+            known[f] = between(problem, points, f)
+            keep(known[f], more)
+    points += [known[f] for f in more]
+    response = of_points(problem, points, limit, [found[f] for f in [*map(float, frequency), *more]], frequency)
     peaks = [_peak(problem, response, bracket, journal, series, report) for bracket in brackets(response)]
     return response, resonances(response, [peak for peak in peaks if peak])
 
@@ -152,9 +163,10 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     """A point as a journal keeps it, judged; the names are those of docs/response_file.md."""
     kept: dict[str, Any] = {
         "frequency": point.Omega / (2 * np.pi), "status": judged(point, found.checks).status, "error": point.error,
-        "iterations": point.iterations, "seconds": point.seconds, "peak": 0.0, "x": point.x,
+        "iterations": point.iterations, "seconds": point.seconds, "peak": 0.0, "added": 0, "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
+        "exchanged": found.exchanged,
     } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
     for name, rows in _watches(problem).items():
         kept[name] = found.watched[list(rows.values())]
@@ -198,6 +210,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         {name: row[f"contacts/{name}/force"] for name in names},
         row["supplied"],
         row["damped"],
+        row["exchanged"],
         cycles,
         Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)}),
     )

@@ -22,7 +22,7 @@ resonance of the body with sticking contacts, without damping, another k does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -233,13 +233,20 @@ def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float =
 
 def work(
     part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
-) -> tuple[float, float]:
-    """Work of a share of the loads and loss in the bodies' own damping, J a cycle, in one harmonic that is not 0."""
+) -> tuple[float, float, float]:
+    """Work of a share of the loads, loss in the bodies' own damping, and what the loads would do in phase with the
+    speed, J a cycle, in one harmonic that is not 0."""
     moved = share * (part.load.conj() @ q - part.given.conj() @ force)
     lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
     if part.residual_loss is not None:
         lost += (force.conj() @ part.residual_loss @ force).real
-    return -np.pi * harmonic * float(moved.imag), np.pi * harmonic * float(lost)
+    return -np.pi * harmonic * float(moved.imag), np.pi * harmonic * float(lost), np.pi * harmonic * float(abs(moved))
+
+
+def untouched(part: Linear) -> Linear:
+    """The same without its contacts."""
+    lost = None if part.residual_loss is None else part.residual_loss[:0, :0]
+    return replace(part, rows=part.rows[:0], residual=part.residual[:0, :0], residual_loss=lost)
 
 
 def stuck(part: Linear, stiffness: Array) -> Array:

@@ -13,10 +13,11 @@ from ..contact.patch import Patch
 from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
+from ..results.checks import UNCHECKED, Checks, exchanged
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
+from . import jenkins, reduced
 from . import problem as balance
-from . import reduced
-from .checks import UNCHECKED, Checks, checks, judged
+from .checks import checks, judged
 from .jenkins import FrequencyResponse, brackets, inside, resonances
 from .patch import Cycle, Traced
 from .problem import Problem
@@ -35,6 +36,7 @@ class Operating:
         Omega: rad/s. q: member -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
             mean from the preloaded state. watched: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
             the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J a cycle.
+        exchanged: J that loads and contacts would do and take were they in phase with the speed.
         cycles: contact -> what its points do. checks: of all this.
     """
 
@@ -45,6 +47,7 @@ class Operating:
     force: Mapping[str, Array]
     supplied: float
     damped: float
+    exchanged: float
     cycles: Mapping[str, Cycle]
     checks: Checks = UNCHECKED
 
@@ -58,7 +61,7 @@ def operating(problem: Problem, point: Point) -> Operating:
     cycles = [g.watch(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
-    watched, work = [], np.zeros(2)
+    watched, work = [], np.zeros(3)
     for h, parts in enumerate(p.parts):
         each = list(zip(parts, q[h], [f[h][s] for s in p.slices()], strict=True))
         share = p.share if h else 1.0
@@ -73,6 +76,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         _by_contact(p, forces),
         float(work[0]),
         float(work[1]),
+        float(work[2]) + sum(float(exchanged(F, u).sum()) for F, u in zip(forces, relative, strict=True)),
         _by_contact(p, cycles),
     )
     return replace(found, checks=checks(p, found))
@@ -108,10 +112,9 @@ class HarmonicResponse(FrequencyResponse):
         x: (f, k) unknowns, see `Problem`. harmonics: (f, H + 1) complex 0-peak amplitudes of the first read-out, m; the
             mean is measured from the preloaded state. watched: (f, w, H + 1) all read-outs. contact: (f, c, 2 H + 1)
             displacements of the contacts, m and rad.
-        dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J. supplied: (f,)
-            work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
+        dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J.
         slipping, open: (f, patches) share of points times cycle that slips, or is open; the rest sticks.
-        unsteady: (f,) see `patch.Cycle`. balance, counted, motion: (f,) see `checks.Checks`.
+        unsteady: (f,) see `patch.Cycle`.
         status: of every point. error, iterations, seconds: (f,), see `Point`.
     """
 
@@ -120,14 +123,9 @@ class HarmonicResponse(FrequencyResponse):
     watched: ComplexArray
     contact: Array
     by_slip: Array
-    supplied: Array
-    damped: Array
     slipping: Array
     open: Array
     unsteady: Array
-    balance: Array
-    counted: Array
-    motion: Array
     status: tuple[str, ...]
     error: Array
     iterations: Array
@@ -141,7 +139,6 @@ class HarmonicResponse(FrequencyResponse):
             name("mean"): self.harmonics[:, 0].real,
             **more,
             "slip_dissipated_J": self.by_slip,
-            "supplied_J": self.supplied,
             "slipping": self.slipping.sum(axis=1) / max(self.slipping.shape[1], 1),
             "open": self.open.sum(axis=1) / max(self.open.shape[1], 1),
             "harmonics": np.full(len(self.frequency), self.harmonics.shape[1] - 1.0),
@@ -156,12 +153,46 @@ def harmonic_response(
     return of_points(problem, sweep(problem, frequency, report, start), limit)
 
 
-def of_points(
-    problem: Problem, points: Sequence[Point], limit: Array, found: Sequence[Operating] = ()
+def filled_response(
+    problem: Problem, frequency: Array, limit: Array, report: Report = lambda _: None
 ) -> HarmonicResponse:  # fmt: skip
-    """What a reader asks of solved points. found: what belongs to them, if it is known."""
+    """`harmonic_response`, with points added where the sweep may step over a resonance, see `hidden`."""
+    points = sweep(problem, frequency, report)
+    points += [between(problem, points, f) for f in hidden(problem, frequency)]
+    return of_points(problem, points, limit, asked=frequency)
+
+
+def hidden(problem: Problem, frequency: Array) -> list[float]:
+    """Hz of resonances that a sweep may step over, see `jenkins.hidden`: of sticking contacts, and of none."""
+    a = problem.assembly
+    if not a.loads:
+        return []
+    part = a.joined(1)
+    pairs = [(part, a.stiffness), (reduced.untouched(part), np.zeros((0, 0)))]
+    modes, damping = (np.concatenate([of(one, k) for one, k in pairs]) for of in (reduced.stuck, reduced.stuck_damping))
+    return jenkins.hidden(np.asarray(frequency, dtype=float), modes, damping)
+
+
+def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
+    """The solution at a frequency (Hz), begun at the nearest of others."""
+    Omega = 2 * np.pi * frequency
+    good = sorted((p for p in points if p.converged), key=lambda p: abs(p.Omega - Omega))
+    return solve(problem, Omega, [p.x for p in good[:1]])
+
+
+def of_points(
+    problem: Problem, points: Sequence[Point], limit: Array, found: Sequence[Operating] = (), asked: Array | None = None
+) -> HarmonicResponse:  # fmt: skip
+    """What a reader asks of solved points, in order of their frequencies where some of them were added.
+
+    Args:
+        found: what belongs to them, if it is known. asked: Hz, the others were added; None: all were asked for.
+    """
     found = found or [operating(problem, p) for p in points]
     points = [judged(p, f.checks) for p, f in zip(points, found, strict=True)]
+    if asked is not None and len(points) > len(asked):
+        order = np.argsort([p.Omega for p in points], kind="stable")
+        points, found = [points[i] for i in order], [found[i] for i in order]
     rows = [_looked_at(problem, f) for f in found]
     parts = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     return HarmonicResponse(
@@ -174,8 +205,15 @@ def of_points(
         iterations=np.array([p.iterations for p in points]),
         seconds=np.array([p.seconds for p in points]),
         quantity=measured(problem.assembly),
+        added=np.zeros(len(points), bool) if asked is None else _not_in([p.Omega for p in points], asked),
         **parts,
     )
+
+
+def _not_in(Omega: Sequence[float], asked: Array) -> Array:
+    """(f,) whether a point (rad/s) is none of the frequencies (Hz) asked for."""
+    near = np.abs(np.asarray(Omega)[:, None] / (2 * np.pi) - np.asarray(asked)).min(axis=1)
+    return near > 1e-12 * np.abs(asked).max()
 
 
 def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:

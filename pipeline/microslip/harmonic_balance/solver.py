@@ -18,6 +18,7 @@ from .problem import AtFrequency, Problem
 Report = Callable[[str], None]
 CONVERGED = "converged"
 AWAY = "slides away"
+TURNS = "turns back"
 
 
 @dataclass(frozen=True)
@@ -25,9 +26,10 @@ class Point:
     """A solution at one frequency.
 
     Attributes:
-        Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong. error: largest entry of R over the
-            largest of x. iterations: Newton steps, all attempts together. seconds: spent. slope: the last derivative of
-            the contact forces, if it is kept. history: `error` before every Newton step, attempt after attempt.
+        Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong, the cause before a colon.
+        error: largest entry of R over the largest of x. iterations: Newton steps, all attempts together.
+        seconds: spent. slope: the last derivative of the contact forces, if it is kept. history: `error` before every
+            Newton step, attempt after attempt.
     """
 
     Omega: float
@@ -116,7 +118,21 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
             break
+    if not point.converged:
+        point = replace(point, status=f"{_cause(at, point)}: {point.status}")
     return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
+
+
+def _cause(at: AtFrequency, point: Point) -> str:
+    """Why there is no solution, as far as its last approximation tells."""
+    if point.away:
+        return "no balance"
+    if not np.isfinite(point.error):
+        return "not a number"
+    p, v = at.problem, at.problem.displacement(point.x)
+    if p.groups and not any(np.abs(g.force(g.relative(v), at.period)).any() for g in p.groups):
+        return "gaping contacts"
+    return "fold" if TURNS in point.status else "iteration limit"
 
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
@@ -210,7 +226,9 @@ def _raised(problem: Problem, Omega: float, most: int = 150) -> Point:
     x = branch.points[-1].x if branch.points else at.reference
     reached = branch.points[-1].lam / whole if branch.points and whole else 0.0
     error = float(np.abs(at.residual(x)).max() / max(np.abs(x).max(), 1e-300))
-    return Point(Omega, x, f"{branch.status}, at {reached:.3g} of the load", error, spent)
+    turned = sum(p.kind == "fold" for p in branch.points)
+    words = f"the curve over the load {TURNS} {turned} times and ends" if turned else branch.status
+    return Point(Omega, x, f"{words} at {reached:.3g} of the load", error, spent)
 
 
 def sweep(
