@@ -275,7 +275,10 @@ def respond(
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
         return
-    with progress(f"respond {case}", quiet) as report:
+    with (
+        progress(f"respond {case}", quiet) as report,
+        running.making_response(Path("build") / running.load_case(case, list(set_))[0].name, report),
+    ):
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
         else:
@@ -339,12 +342,14 @@ def backbone(
         high: largest amplitude, m; thirty times that if not given.
     """
     from . import following
+    from .store import making
 
     case = _case_file(case)
     with progress(f"backbone {case}", quiet) as report:
         opened = _followed(case, basis, set_)
-        found = following.backbones(opened, mode, low, high, report)
-        files = following.write_backbones(found, opened)
+        with making(opened.folder / "backbone.csv", report):
+            found = following.backbones(opened, mode, low, high, report)
+            files = following.write_backbones(found, opened)
     for file in files:
         _say(file, quiet)
     if not all(one.complete for one in found.values()):
@@ -368,12 +373,14 @@ def optimum(
         points: values from one end to the other at which a sweep looks for it first.
     """
     from . import following
+    from .store import making
 
     case = _case_file(case)
     with progress(f"optimum {case}", quiet) as report:
         opened = _followed(case, basis, set_)
-        found = following.optimum_over(opened, over, low, high, points, report)
-        files = following.write_optimum(found, over, opened)
+        with making(opened.folder / "optimum.csv", report):
+            found = following.optimum_over(opened, over, low, high, points, report)
+            files = following.write_optimum(found, over, opened)
     _say(following.told(found, over, opened.quantity), quiet)
     for file in files:
         _say(file, quiet)
@@ -528,11 +535,12 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     from .basis import read_basis
     from .campbell import engine_orders
     from .report import write_report
+    from .store import making
 
     file = _modal_file(file)
     basis = read_basis(file)
     page = output or file.with_name("report.html")
-    with progress(f"report of {basis.name}", quiet) as tell:
+    with progress(f"report of {basis.name}", quiet) as tell, making(page, tell):
         reason = pictures.can_draw()
         orders = engine_orders(basis)
         drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell, orders)

@@ -18,7 +18,7 @@ from .basis import write_basis
 from .data import Mesh, UserError
 from .exchange.measured import holds_modes, read_measured
 from .mesh import UNITS, mesh_problems, read_mesh
-from .store import write_text
+from .store import ordinary, write_text
 from .units import SYSTEMS, usual_system
 
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
@@ -47,7 +47,7 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     """
     if unit not in UNITS:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
-    if not file.is_file():
+    if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     stem = (folder.resolve().name if folder else "") or file.stem
     name = re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"

@@ -9,6 +9,7 @@ import json
 import re
 import shlex
 from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +60,19 @@ def response_stage(
     Returns:
         The summary, and whether every point converged.
     """
+    with making_response(folder, report):
+        return _response_stage(case_path, files, folder, assignments, force, report, log)
+
+
+def making_response(folder: Path, report: Report) -> AbstractContextManager[None]:
+    """A response and what belongs to it are made by one process at a time, see `store.making`."""
+    return store.making(folder / "response.json", report)
+
+
+def _response_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None, force: bool,
+    report: Report, log: bool,
+) -> tuple[dict[str, Any], bool]:  # fmt: skip
     settings, raw = load_case(case_path, assignments)
     summary_file = folder / "response.json"
     hashes = {name: store.hash_file(file) for name, file in files.items()}
@@ -368,8 +382,10 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
     if job.case_file is not None:
         files = {b.name: job.basis_file for b in case.members if (b.body or b.name) == job.settings.name}
         files |= modal_files(case, job.case_file, job.root, report, known=files)
-        response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
-    return report_stage(job, response, force, report), converged
+    with making_response(job.build_folder, report):
+        if job.case_file is not None:
+            response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
+        return report_stage(job, response, force, report), converged
 
 
 def run_case_file(
@@ -384,8 +400,9 @@ def run_case_file(
     files = modal_files(case, path, Path("."), report)
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
-        response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
-        return report_stage(job, response, force, report), converged
+        with making_response(job.build_folder, report):
+            response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
+            return report_stage(job, response, force, report), converged
     folder = Path(".") / "build" / case.name
     _, converged = response_stage(path, files, folder, assignments, force, report)
     return folder / "response.csv", converged
@@ -545,7 +562,7 @@ def _named(path: Path, b: BodyOfCase) -> Path:
         UserError: it is not there.
     """
     file = path.parent / (b.file or "")
-    if not file.is_file():
+    if not store.ordinary(file).is_file():
         raise UserError(
             f"{path}: bodies.{b.name}.file: there is no file {file}; paths in a case start in the folder of the case: "
             "correct it"

@@ -39,7 +39,7 @@ from ..data import (
     UserError,
 )
 from ..hostile import inspect, trial
-from ..store import complete_or_absent
+from ..store import complete_or_absent, ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
 from .hdf5 import IMAGINARY, create, put, put_scale, seal, seal_state
@@ -470,7 +470,7 @@ def open_file(path: Path | str) -> h5py.File:
         UserError: missing, damaged, foreign or of another major version.
     """
     path = Path(path)
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
     try:
         state = seal_state(path)
