@@ -1,4 +1,5 @@
-"""The command line: one verb per stage. Exit codes: 0 done, 1 check failed or not converged, 2 bad input, 130."""
+"""The command line: one verb per stage. Exit codes: 0 done, 1 check failed or not converged, 2 bad input, 130
+interrupted, 143 ended by SIGTERM."""
 
 from __future__ import annotations
 
@@ -82,7 +83,7 @@ def init(name: str, folder: Path | None = None, /) -> None:
         raise UserError(f"init {name}: there is no such body; choose one of {', '.join([*known, *more])}")
     target = folder or Path(name)
     files = _to_copy(name)
-    there = [p for p in (target / copy for _, copy in files) if p.exists()] if target.is_dir() else [target]
+    there = [p for p in (target / copy for _, copy in files) if os.path.lexists(p)] if target.is_dir() else [target]
     if target.exists() and there:
         raise UserError(f"{there[0]}: is there already; give another folder as second argument (nothing was changed)")
     try:
@@ -708,13 +709,16 @@ def _fail(text: str, code: int) -> int:
 
 
 def entry() -> None:
-    """Console script. A request to end (SIGTERM) is Ctrl-C: what is finished is kept."""
-    signal.signal(signal.SIGTERM, _ended)
-    sys.exit(main())
+    """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
+    asked = []
 
+    def end(number: int, _: object) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt
 
-def _ended(*_: object) -> None:
-    raise KeyboardInterrupt
+    signal.signal(signal.SIGTERM, end)
+    code = main()
+    sys.exit(128 + asked[0] if asked and code == 130 else code)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,6 @@ import json
 import os
 import re
 import shlex
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +18,7 @@ from .exchange.measured import holds_modes, read_measured
 from .mesh import UNITS, mesh_problems, read_mesh
 from .store import ordinary, write_text
 from .units import SYSTEMS, usual_system
+from .workflow import run_apart
 
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
@@ -136,15 +135,10 @@ def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, 
     Raises:
         UserError: what the CAD kernel says.
     """
-    package = Path(__file__).parent
-    paths = [str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
     with tempfile.TemporaryDirectory() as scratch:
         triangles = Path(scratch) / "triangles.npz"
-        words = [sys.executable, "-m", "microslip.cad", "--list", str(file), unit]
-        done = subprocess.run(
-            [*words, str(triangles)] if picture else words, capture_output=True, text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-        )  # fmt: skip
+        words = ["-m", "microslip.cad", "--list", str(file), unit]
+        done = run_apart([*words, str(triangles)] if picture else words, scratch)
         if done.returncode:
             raise UserError((done.stderr.strip().splitlines() or [f"{file}: cannot be read"])[-1])
         return done.stdout.strip(), "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)

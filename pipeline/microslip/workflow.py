@@ -181,26 +181,57 @@ def _refuse_unnamed_faces(job: Job) -> None:
 def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
     """Run gmsh in its own process; returns its warnings."""
     settings = {**job.raw, "folder": str(job.folder.resolve())}
-    if job.settings.geometry.build:
-        command = [sys.executable, str(source.resolve())]
-    else:
-        command = [sys.executable, "-m", "microslip.cad"]
+    words = [str(source.resolve())] if job.settings.geometry.build else ["-m", "microslip.cad"]
     with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
         table = Path(scratch) / "settings.json"
         table.write_text(json.dumps(settings))
         made = Path(scratch) / "mesh.msh"
-        paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
         try:
-            done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+            done = run_apart([*words, str(table), str(made)], scratch)
         except OSError as error:  # not to be told as the product's: it is Python that this user may not start
             raise UserError(
-                f"{command[0]}: cannot be started to draw the body ({error.strerror}); let this user read and run it"
+                f"{sys.executable}: cannot be started to draw the body ({error.strerror}); let this user read and "
+                "run it"
             ) from error
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
     return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+
+
+def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
+    """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
+
+    It ends when this process does, however that ends, and then removes the folder `scratch`.
+    """
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    read, write = os.pipe()  # which nobody writes to: its end is the end of this process
+    try:
+        command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
+        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+    finally:
+        os.close(read)
+        os.close(write)
+
+
+_TO_THE_END = """
+import os, runpy, shutil, sys, threading
+
+def end(scratch):
+    os.read(0, 1)
+    shutil.rmtree(scratch, ignore_errors=True)
+    os._exit(1)
+
+threading.Thread(target=end, args=[sys.argv[1]], daemon=True).start()
+module = sys.argv[2] == "-m"
+sys.argv = sys.argv[2 + module :]
+if module:
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+else:
+    sys.path[0] = os.path.dirname(sys.argv[0])
+    runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 
 
 def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
