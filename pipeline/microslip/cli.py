@@ -41,12 +41,22 @@ Set = Annotated[
 ]
 Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, help="say nothing but errors")]
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
-Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
+
+
+def _in_a_folder(_: object, path: Path) -> None:
+    """Refuse a product, or a folder of them, in a folder that is not there: it may be misspelt."""
+    if not path.parent.is_dir():
+        raise UserError(f"--output {path}: there is no folder {path.parent}; make it or correct the path")
+
+
+Output = Annotated[
+    Path | None, Parameter(name=("--output", "-o"), help="where to write the product", validator=_in_a_folder)
+]
 
 Stability = Annotated[bool, Parameter(show_default=False, help="Floquet multipliers of every point as well")]
 Log = Annotated[bool, Parameter(show_default=False, help="write convergence.csv: Newton's method at every point")]
 Book = Annotated[bool, Parameter(show_default=False, help="in the book's mode too, and what that leaves out")]
-Short = Annotated[bool, Parameter(show_default=False, help="each check once, the worst speed and nodal diameter")]
+Short = Annotated[bool, Parameter(show_default=False, help="what fails, at its worst speed, and the verdict alone")]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -409,25 +419,54 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
 
 @app.command
 def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
-    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate.
+    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate; or a response file.
 
     Args:
-        file: a basis.h5.
+        file: a basis.h5, or a response.h5, which is read and its points counted.
     """
     from .basis import check_basis, read_basis
     from .basis.checks import worst_of_each
+    from .basis.files import OtherFormat
+    from .results.files import FORMAT
     from .ring import ring_checks
 
     file = _modal_file(file)
-    basis = read_basis(file)
+    try:
+        basis = read_basis(file)
+    except OtherFormat as other:
+        if other.form != FORMAT:
+            raise
+        return _check_response(file, quiet)
     findings = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in findings if not c.passed]
-    for c in failed if quiet else worst_of_each(findings) if short else findings:
+    for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
+    _say_seal(file, quiet)
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
     _say(f"{file}: all {len(findings)} checks passed", quiet)
+
+
+def _check_response(file: Path, quiet: bool) -> None:
+    """What a response file holds, once it has been read."""
+    from .results import read_response
+
+    found = read_response(file)
+    converged = [ok for series in found.series for ok in series.converged]
+    _say_seal(file, quiet)
+    if not all(converged):
+        raise NotConverged(f"{file}: {converged.count(False)} of {len(converged)} points did not converge")
+    more = "" if found.finished else ", more are missing"
+    _say(f"{file}: all {len(converged)} points of '{found.case}' converged{more}", quiet)
+
+
+def _say_seal(file: Path, quiet: bool) -> None:
+    """A line if a file that could be read has no seal."""
+    from .basis.hdf5 import seal_state
+
+    if seal_state(file) == "absent":
+        _say(f"{file}: not sealed: written by another program, or changed since it was written", quiet)
 
 
 @app.command(name="import")
@@ -619,12 +658,31 @@ def _modal_file(path: Path) -> Path:
     Raises:
         UserError: another folder.
     """
-    if not path.is_dir() or (path / "basis.h5").is_file():
-        return path / "basis.h5" if path.is_dir() else path
+    if not path.is_dir():
+        return _not_foreign(path)
+    if (path / "basis.h5").is_file():
+        return path / "basis.h5"
     if (path / "body.toml").is_file():
         raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which "
                         f"microslip modes {shlex.quote(str(path))} makes")  # fmt: skip
     raise UserError(f"{path}: is a folder without a modal file basis.h5; correct the path")
+
+
+def _not_foreign(path: Path) -> Path:
+    """The path of what may be a modal file.
+
+    Raises:
+        UserError: by its name and bytes it is another program's file, or settings.
+    """
+    import h5py
+
+    from .importing import KINDS
+
+    what = KINDS.get(path.suffix.lower())
+    if what is None or not path.is_file() or h5py.is_hdf5(path):
+        return path
+    way = "run" if path.suffix == ".toml" else "import"
+    raise UserError(f"{path}: is {what} and no modal file; type: microslip {way} {shlex.quote(str(path))}")
 
 
 def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:

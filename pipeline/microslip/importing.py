@@ -24,6 +24,12 @@ MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".st
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
 _MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
 CAD = (".step", ".stp", ".brep", ".iges", ".igs")
+KINDS = {
+    **dict.fromkeys(CAD, "a CAD file"), **dict.fromkeys((s for s in MATRICES if s[1] != "h"), "a file of matrices"),
+    ".inp": "a deck of Abaqus or CalculiX", ".cdb": "a deck of Ansys", ".bdf": "a deck of Nastran",
+    ".msh": "a mesh of gmsh", ".unv": "a universal file", ".uff": "a universal file", ".toml": "a settings file",
+}  # fmt: skip
+"""What a file is by its suffix, where that is no modal file's."""
 
 
 @dataclass(frozen=True)

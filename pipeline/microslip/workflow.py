@@ -145,6 +145,11 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     if not store.ordinary(source).is_file():
         key = "build" if geometry.build else "cad"
         raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+    if geometry.build and not source.resolve().is_relative_to(job.folder.resolve()):
+        raise UserError(
+            f"{job.path}: geometry.build: {source.resolve()} is outside the body's folder, and only what stands in it "
+            "is run; copy it there"
+        )
     if geometry.cad:
         _refuse_unnamed_faces(job)
     with store.making(product, report):

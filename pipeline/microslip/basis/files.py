@@ -460,6 +460,14 @@ def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset
 # reading ---------------------------------------------------------------------------------------------------------
 
 
+class OtherFormat(UserError):
+    """A sound HDF5 file that is no modal file. `form`: what its attribute 'format' says."""
+
+    def __init__(self, path: Path, form: object) -> None:
+        super().__init__(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+        self.form = form
+
+
 def open_file(path: Path | str) -> h5py.File:
     """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
@@ -508,7 +516,7 @@ def _accept(file: h5py.File, path: Path) -> None:
     except _DAMAGE as error:
         raise UserError(f"{path}: is damaged ({_short(error)}); write it again") from error
     if not known:
-        raise UserError(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+        raise OtherFormat(path, form)
     if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
         raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
     try:
