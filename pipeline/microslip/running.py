@@ -8,6 +8,7 @@ import importlib.util
 import json
 import re
 import shlex
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -605,21 +606,33 @@ def is_case(path: Path) -> bool:
 
 
 def find_body(case_path: Path, name: str, root: Path) -> Path:
-    """The body file a case refers to: beside the case, in geometry/<name>/ or a folder of that name, or any file
-    of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
+    """The body file of a name that a case gives.
+
+    It stands beside the case, or in NAME/ or geometry/ of the case's folder, of one above it, or of `root`, the nearest
+    first, so that a case means the same body wherever it is run. In geometry/ it is geometry/NAME/body.toml, or any
+    file of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
 
     Raises:
         UserError: if there is none.
     """
-    for place in (case_path.parent, root / "geometry" / name, root / name):
-        if (place / "body.toml").is_file() and load_toml(place / "body.toml").get("name") == name:
-            return place / "body.toml"
-    for file in sorted((root / "geometry").glob("*/*.toml")):
-        if load_toml(file).get("name") == name:
-            return file
-    places = [case_path.parent, root / "geometry" / name, root / name]
-    advice = _elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is"
+    for folder in dict.fromkeys((*_above(case_path, root), root)):
+        own = [folder / "body.toml"] if folder.resolve() == case_path.parent.resolve() else []
+        usual = [*own, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
+        for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
+            if load_toml(file).get("name") == name:
+                return file
     raise UserError(
-        f"{case_path}: body: no body.toml of a body '{name}' is in {', '.join(map(str, places[:-1]))} or {places[-1]}, "
-        f"seen from {root.resolve()}; {advice}"
+        f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
+        f"of one above it or of {root.resolve()}; "
+        + (_elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is")
     )
+
+
+def _above(path: Path, root: Path) -> Iterator[Path]:
+    """The folder of a file and those above it, seen from `root`, up to one in which anybody may write: what is found
+    there may be anybody's."""
+    here = root.resolve()
+    for folder in path.resolve().parents:
+        if folder != path.resolve().parent and folder.stat().st_mode & stat.S_IWOTH:
+            return
+        yield root / folder.relative_to(here) if folder.is_relative_to(here) else folder
