@@ -105,7 +105,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "reduction": ("", "method of reduction, see reduction.md"),
     "free": ("", "the body is meant to float; rigid motions are kept and flagged"),
     "note": ("", "a remark the report repeats"),
-    "geometry.build": ("", "a Python file in the body's folder that draws it with gmsh; one outside, by a path or a link, is not run"),
+    "geometry.build": ("", "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, "
+                       "is refused"),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
     "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .op4, DMIG cards, .sti"),

@@ -43,9 +43,9 @@ Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, he
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
 
 
-def _in_a_folder(_: object, path: Path) -> None:
+def _in_a_folder(_: object, path: Path | None) -> None:
     """Refuse a product, or a folder of them, in a folder that is not there: it may be misspelt."""
-    if not path.parent.is_dir():
+    if path is not None and not path.parent.is_dir():
         raise UserError(f"--output {path}: there is no folder {path.parent}; make it or correct the path")
 
 
