@@ -30,14 +30,18 @@ pytestmark = POSIX
 BUILD = "build/vane"
 
 
-def never_ends(*_: object) -> None:
-    raise TimeoutError("waited for what never comes")
+class Stuck(BaseException):
+    """Waited for what never comes."""
+
+
+def stuck(*_: object) -> None:
+    raise Stuck
 
 
 @pytest.fixture(autouse=True)
 def soon() -> Iterator[None]:
     """A pipe that is opened after all is waited for half a minute."""
-    before = signal.signal(signal.SIGALRM, never_ends)
+    before = signal.signal(signal.SIGALRM, stuck)
     signal.alarm(30)
     yield
     signal.alarm(0)
@@ -231,36 +235,43 @@ def test_a_mistake_leaves_no_folder_behind(folder: Path, capsys: pytest.CaptureF
 
 
 RACER = """
-import sys
+import sys, time
 from microslip import cli, running
 from microslip.pictures import response
 running._assessed = lambda *_: None
-response.response_picture = lambda _, path: path.write_bytes(b"picture")
+pause = float(sys.argv[1])
+response.response_picture = lambda _, path: (path.write_bytes(b"picture"), time.sleep(pause))
 print("ready", flush=True)
-sys.stdin.readline()
-sys.exit(cli.main(sys.argv[1:]))
+time.sleep(float(sys.stdin.readline()))
+sys.exit(cli.main(sys.argv[2:]))
 """
 
 
 @pytest.mark.slow
 def test_runs_of_two_cases_at_once_leave_one(folder: Path) -> None:
-    """Twenty times two settings in one folder, begun together: table, HDF5 and summary are of the same one, and a
-    plain run then says that this is up to date, or makes its own."""
+    """Two settings in one folder, the second run begun while the first is between two products: table, HDF5 and
+    summary are of the same one, and a plain run then leaves its own."""
     changes = [[], ["--set", "amplitude=4.0"]]
     whole = []
     for change in changes:
         assert main(["respond", ".", "-q", *change]) == 0
         whole.append({n: (folder / BUILD / n).read_bytes() for n in ("response.csv", "response.h5", "response.json")})
-    signal.alarm(600)
-    for _ in range(20):
+    signal.alarm(100)
+    for later in ("0.2", "0.4", "0.6"):
         shutil.rmtree(BUILD)
-        command = [sys.executable, "-c", RACER, "respond", ".", "-q"]
-        both = [subprocess.Popen([*command, *c], stdin=-1, stdout=-1, text=True, env=environment()) for c in changes]
-        for process in both:
-            assert process.stdout is not None and process.stdout.readline() == "ready\n"
-        for process in both:
-            process.communicate("go\n")
-            assert process.returncode == 0
+        both = [
+            subprocess.Popen(
+                [sys.executable, "-c", RACER, pause, "respond", ".", "-q", *change],
+                stdin=-1, stdout=-1, text=True, env=environment(),
+            )
+            for change, pause in zip(changes, ("1.0", "0.0"), strict=True)
+        ]  # fmt: skip
+        for process, begins in zip(both, ("0", later), strict=True):
+            assert process.stdin is not None and process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            process.stdin.write(f"{begins}\n")
+            process.stdin.flush()
+        assert [process.wait() for process in both] == [0, 0]
         assert {n: (folder / BUILD / n).read_bytes() for n in whole[0]} in whole
         assert main(["respond", ".", "-q"]) == 0
         assert {n: (folder / BUILD / n).read_bytes() for n in whole[0]} == whole[0]
