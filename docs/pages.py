@@ -105,7 +105,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "reduction": ("", "method of reduction, see reduction.md"),
     "free": ("", "the body is meant to float; rigid motions are kept and flagged"),
     "note": ("", "a remark the report repeats"),
-    "geometry.build": ("", "a Python file that draws the body with gmsh"),
+    "geometry.build": ("", "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, "
+                       "is refused"),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
     "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .op4, DMIG cards, .sti"),
@@ -357,8 +358,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "settled": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles are "
                 "marched"),
     "bodies.name": ("", "in this case"),
-    "bodies.body": ("", "whose modal file it is: `geometry/NAME`, a folder or a system.toml beside the case; the name "
-                    "if not given"),
+    "bodies.body": ("", "name of the body whose modal file it is, looked for as said above; the name if not given"),
     "bodies.file": ("", "a modal file beside the case instead"),
     "bodies.speed": ("", "which speed of the modal file, from 0"),
     "bodies.speed_rpm": ("rpm", "or a speed of the file or of its range"),

@@ -392,7 +392,7 @@ def refusal(path: Path) -> str:
 
 def test_missing_foreign_and_text_files(tmp_path: Path) -> None:
     assert "no such modal file" in refusal(tmp_path / "none.h5")
-    assert "no such modal file" in refusal(tmp_path)
+    assert "is a folder" in refusal(tmp_path)
     (tmp_path / "text.h5").write_text("hello")
     assert "no HDF5" in refusal(tmp_path / "text.h5")
     (tmp_path / "empty.h5").write_bytes(b"")

@@ -122,16 +122,6 @@ def test_coordinates_in_modes_are_read_in_modes():
     np.testing.assert_allclose(u[0], u[1], rtol=1e-9)
 
 
-def test_two_writers_do_not_share_a_journal(tmp_path):
-    path = tmp_path / "response.points"
-    with (
-        open_journal(path, "abc", HEAD),
-        pytest.raises(UserError, match="another run"),
-        open_journal(path, "abc", HEAD),
-    ):
-        pass
-
-
 @pytest.mark.parametrize("cut", [1, 3, 17, 21, 200, 500])
 def test_a_torn_record_is_left_out_and_cut_off(tmp_path, cut):
     path = tmp_path / "response.points"

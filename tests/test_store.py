@@ -154,7 +154,7 @@ def test_no_room_gives_one_sentence_and_leaves_the_old_file(tmp_path: Path) -> N
     lines = done.stdout.splitlines()
     assert len(lines) == 3 * len(limits)
     h5 = lines[::3]
-    assert all("basis.h5: cannot be written (File too large); nothing was changed" in line for line in h5)
+    assert all("basis.h5: cannot be written (File too large)" in line for line in h5)
     assert (folder / "basis.h5").read_bytes() == before
     assert hidden(folder) == []
 
@@ -174,7 +174,7 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_full_disk(tiny_disk: Path) -> None:
     store.write_text(tiny_disk / "basis.h5", "old")
     for write in (lambda p: write_basis(p, small.basis()), lambda p: write_mat(small.basis(), p)):
-        with pytest.raises(UserError, match=r"No space left on device\); nothing was changed, free some space"):
+        with pytest.raises(UserError, match=r"No space left on device\).*free some space"):
             write(tiny_disk / "basis.h5")
         assert (tiny_disk / "basis.h5").read_text() == "old"
         assert hidden(tiny_disk) == []

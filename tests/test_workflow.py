@@ -170,17 +170,29 @@ def test_a_case_of_another_name_has_its_own_folder(box: Path, monkeypatch: pytes
     assert (box / BASIS).is_file() and not (box / "build/stiff/basis.h5").exists()
 
 
-def test_a_case_finds_its_body(box: Path, tmp_path: Path) -> None:
-    far = tmp_path / "far"
-    far.mkdir()
-    case = Path(shutil.copy(box / "case.toml", far))
-    with pytest.raises(UserError, match="no body.toml of a body 'box'"):
-        running.find_body(case, "box", tmp_path / "nowhere")
-    shutil.copytree(box, tmp_path / "geometry" / "box")
-    assert running.find_body(case, "box", tmp_path) == tmp_path / "geometry" / "box" / "body.toml"
-    other = tmp_path / "geometry" / "box" / "other.toml"
-    other.write_text('name = "box-other"\n')
-    assert running.find_body(case, "box-other", tmp_path) == other
+def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
+    """Around the case first, the nearest first; where it is run last; not where anybody may write."""
+    case, elsewhere = tmp_path / "mine/project/cases/case.toml", tmp_path / "elsewhere"
+
+    def found(place: str, name: str = "box", root: Path = elsewhere) -> bool:
+        file = tmp_path / place
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f'name = "{name}"\n')
+        return running.find_body(case, name, root) == file
+
+    for folder in (case.parent, elsewhere / "geometry"):
+        folder.mkdir(parents=True)
+    with pytest.raises(UserError, match="body: no body.toml of a body 'box'"):
+        running.find_body(case, "box", elsewhere)
+    for place in ("elsewhere/box", "mine/geometry/box", "mine/project/box", "mine/project/geometry/box"):
+        assert found(f"{place}/body.toml")
+    assert found("mine/project/geometry/box/other.toml", "box-other")
+    for place in ("geometry/box", "box"):
+        shutil.rmtree(tmp_path / "mine/project" / place)
+    (tmp_path / "mine").chmod(0o777)
+    assert running.find_body(case, "box", elsewhere) == elsewhere / "box/body.toml"
+    for place in ("cases/box", "cases"):
+        assert found(f"mine/project/{place}/body.toml")
 
 
 @pytest.mark.parametrize(

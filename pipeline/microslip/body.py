@@ -27,6 +27,7 @@ from .data import Array, Material, UserError
 from .elasticity import isotropic, orthotropic, turned_strain
 from .mesh import UNITS
 from .mistakes import validate
+from .store import ordinary
 
 _LENGTH = "length"  # metadata that marks a number as a length in the file's unit
 
@@ -652,7 +653,7 @@ def load_toml(path: Path | str) -> dict[str, Any]:
     """
     path = Path(path)
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(ordinary(path).read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
     except OSError as error:

@@ -1,4 +1,5 @@
-"""The command line: one verb per stage. Exit codes: 0 done, 1 check failed or not converged, 2 bad input, 130."""
+"""The command line: one verb per stage. Exit codes: 0 done, 1 check failed or not converged, 2 bad input, 130
+interrupted, 143 ended by SIGTERM."""
 
 from __future__ import annotations
 
@@ -40,12 +41,22 @@ Set = Annotated[
 ]
 Quiet = Annotated[bool, Parameter(name=("--quiet", "-q"), show_default=False, help="say nothing but errors")]
 Force = Annotated[bool, Parameter(show_default=False, help="do the work even if the products are up to date")]
-Output = Annotated[Path | None, Parameter(name=("--output", "-o"), help="where to write the product")]
+
+
+def _in_a_folder(_: object, path: Path | None) -> None:
+    """Refuse a product, or a folder of them, in a folder that is not there: it may be misspelt."""
+    if path is not None and not path.parent.is_dir():
+        raise UserError(f"--output {path}: there is no folder {path.parent}; make it or correct the path")
+
+
+Output = Annotated[
+    Path | None, Parameter(name=("--output", "-o"), help="where to write the product", validator=_in_a_folder)
+]
 
 Stability = Annotated[bool, Parameter(show_default=False, help="Floquet multipliers of every point as well")]
 Log = Annotated[bool, Parameter(show_default=False, help="write convergence.csv: Newton's method at every point")]
 Book = Annotated[bool, Parameter(show_default=False, help="in the book's mode too, and what that leaves out")]
-Short = Annotated[bool, Parameter(show_default=False, help="each check once, the worst speed and nodal diameter")]
+Short = Annotated[bool, Parameter(show_default=False, help="what fails, at its worst speed, and the verdict alone")]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -82,7 +93,7 @@ def init(name: str, folder: Path | None = None, /) -> None:
         raise UserError(f"init {name}: there is no such body; choose one of {', '.join([*known, *more])}")
     target = folder or Path(name)
     files = _to_copy(name)
-    there = [p for p in (target / copy for _, copy in files) if p.exists()] if target.is_dir() else [target]
+    there = [p for p in (target / copy for _, copy in files) if os.path.lexists(p)] if target.is_dir() else [target]
     if target.exists() and there:
         raise UserError(f"{there[0]}: is there already; give another folder as second argument (nothing was changed)")
     try:
@@ -275,7 +286,10 @@ def respond(
     if over is not None:
         _survey(case, basis, over.replace("-", "_"), set_, force, quiet)
         return
-    with progress(f"respond {case}", quiet) as report:
+    with (
+        progress(f"respond {case}", quiet) as report,
+        running.making_response(Path("build") / running.load_case(case, list(set_))[0].name, report),
+    ):
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
         else:
@@ -339,12 +353,14 @@ def backbone(
         high: largest amplitude, m; thirty times that if not given.
     """
     from . import following
+    from .store import making
 
     case = _case_file(case)
     with progress(f"backbone {case}", quiet) as report:
         opened = _followed(case, basis, set_)
-        found = following.backbones(opened, mode, low, high, report)
-        files = following.write_backbones(found, opened)
+        with making(opened.folder / "backbone.csv", report):
+            found = following.backbones(opened, mode, low, high, report)
+            files = following.write_backbones(found, opened)
     for file in files:
         _say(file, quiet)
     if not all(one.complete for one in found.values()):
@@ -368,12 +384,14 @@ def optimum(
         points: values from one end to the other at which a sweep looks for it first.
     """
     from . import following
+    from .store import making
 
     case = _case_file(case)
     with progress(f"optimum {case}", quiet) as report:
         opened = _followed(case, basis, set_)
-        found = following.optimum_over(opened, over, low, high, points, report)
-        files = following.write_optimum(found, over, opened)
+        with making(opened.folder / "optimum.csv", report):
+            found = following.optimum_over(opened, over, low, high, points, report)
+            files = following.write_optimum(found, over, opened)
     _say(following.told(found, over, opened.quantity), quiet)
     for file in files:
         _say(file, quiet)
@@ -401,25 +419,54 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
 
 @app.command
 def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
-    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate.
+    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate; or a response file.
 
     Args:
-        file: a basis.h5.
+        file: a basis.h5, or a response.h5, which is read and its points counted.
     """
     from .basis import check_basis, read_basis
     from .basis.checks import worst_of_each
+    from .basis.files import OtherFormat
+    from .results.files import FORMAT
     from .ring import ring_checks
 
     file = _modal_file(file)
-    basis = read_basis(file)
+    try:
+        basis = read_basis(file)
+    except OtherFormat as other:
+        if other.form != FORMAT:
+            raise
+        return _check_response(file, quiet)
     findings = [*check_basis(basis), *ring_checks(basis)]
     failed = [c for c in findings if not c.passed]
-    for c in failed if quiet else worst_of_each(findings) if short else findings:
+    for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
         print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
+    _say_seal(file, quiet)
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
     _say(f"{file}: all {len(findings)} checks passed", quiet)
+
+
+def _check_response(file: Path, quiet: bool) -> None:
+    """What a response file holds, once it has been read."""
+    from .results import read_response
+
+    found = read_response(file)
+    converged = [ok for series in found.series for ok in series.converged]
+    _say_seal(file, quiet)
+    if not all(converged):
+        raise NotConverged(f"{file}: {converged.count(False)} of {len(converged)} points did not converge")
+    more = "" if found.finished else ", more are missing"
+    _say(f"{file}: all {len(converged)} points of '{found.case}' converged{more}", quiet)
+
+
+def _say_seal(file: Path, quiet: bool) -> None:
+    """A line if a file that could be read has no seal."""
+    from .basis.hdf5 import seal_state
+
+    if seal_state(file) == "absent":
+        _say(f"{file}: not sealed: written by another program, or changed since it was written", quiet)
 
 
 @app.command(name="import")
@@ -528,11 +575,12 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     from .basis import read_basis
     from .campbell import engine_orders
     from .report import write_report
+    from .store import making
 
     file = _modal_file(file)
     basis = read_basis(file)
     page = output or file.with_name("report.html")
-    with progress(f"report of {basis.name}", quiet) as tell:
+    with progress(f"report of {basis.name}", quiet) as tell, making(page, tell):
         reason = pictures.can_draw()
         orders = engine_orders(basis)
         drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell, orders)
@@ -610,12 +658,31 @@ def _modal_file(path: Path) -> Path:
     Raises:
         UserError: another folder.
     """
-    if not path.is_dir() or (path / "basis.h5").is_file():
-        return path / "basis.h5" if path.is_dir() else path
+    if not path.is_dir():
+        return _not_foreign(path)
+    if (path / "basis.h5").is_file():
+        return path / "basis.h5"
     if (path / "body.toml").is_file():
         raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which "
                         f"microslip modes {shlex.quote(str(path))} makes")  # fmt: skip
     raise UserError(f"{path}: is a folder without a modal file basis.h5; correct the path")
+
+
+def _not_foreign(path: Path) -> Path:
+    """The path of what may be a modal file.
+
+    Raises:
+        UserError: by its name and bytes it is another program's file, or settings.
+    """
+    import h5py
+
+    from .importing import KINDS
+
+    what = KINDS.get(path.suffix.lower())
+    if what is None or not path.is_file() or h5py.is_hdf5(path):
+        return path
+    way = "run" if path.suffix == ".toml" else "import"
+    raise UserError(f"{path}: is {what} and no modal file; type: microslip {way} {shlex.quote(str(path))}")
 
 
 def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
@@ -700,13 +767,16 @@ def _fail(text: str, code: int) -> int:
 
 
 def entry() -> None:
-    """Console script. A request to end (SIGTERM) is Ctrl-C: what is finished is kept."""
-    signal.signal(signal.SIGTERM, _ended)
-    sys.exit(main())
+    """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
+    asked = []
 
+    def end(number: int, _: object) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt
 
-def _ended(*_: object) -> None:
-    raise KeyboardInterrupt
+    signal.signal(signal.SIGTERM, end)
+    code = main()
+    sys.exit(128 + asked[0] if asked and code == 130 else code)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,6 @@ import json
 import os
 import re
 import shlex
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +16,20 @@ from .basis import write_basis
 from .data import Mesh, UserError
 from .exchange.measured import holds_modes, read_measured
 from .mesh import UNITS, mesh_problems, read_mesh
-from .store import write_text
+from .store import ordinary, write_text
 from .units import SYSTEMS, usual_system
+from .workflow import run_apart
 
 MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
 _MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
 CAD = (".step", ".stp", ".brep", ".iges", ".igs")
+KINDS = {
+    **dict.fromkeys(CAD, "a CAD file"), **dict.fromkeys((s for s in MATRICES if s[1] != "h"), "a file of matrices"),
+    ".inp": "a deck of Abaqus or CalculiX", ".cdb": "a deck of Ansys", ".bdf": "a deck of Nastran",
+    ".msh": "a mesh of gmsh", ".unv": "a universal file", ".uff": "a universal file", ".toml": "a settings file",
+}  # fmt: skip
+"""What a file is by its suffix, where that is no modal file's."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     """
     if unit not in UNITS:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
-    if not file.is_file():
+    if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     stem = (folder.resolve().name if folder else "") or file.stem
     name = re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
@@ -136,15 +141,10 @@ def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, 
     Raises:
         UserError: what the CAD kernel says.
     """
-    package = Path(__file__).parent
-    paths = [str(package.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
     with tempfile.TemporaryDirectory() as scratch:
         triangles = Path(scratch) / "triangles.npz"
-        words = [sys.executable, "-m", "microslip.cad", "--list", str(file), unit]
-        done = subprocess.run(
-            [*words, str(triangles)] if picture else words, capture_output=True, text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-        )  # fmt: skip
+        words = ["-m", "microslip.cad", "--list", str(file), unit]
+        done = run_apart([*words, str(triangles)] if picture else words, scratch)
         if done.returncode:
             raise UserError((done.stderr.strip().splitlines() or [f"{file}: cannot be read"])[-1])
         return done.stdout.strip(), "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)

@@ -8,7 +8,9 @@ import importlib.util
 import json
 import re
 import shlex
+import stat
 from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,6 +62,19 @@ def response_stage(
     Returns:
         The summary, and whether every point converged.
     """
+    with making_response(folder, report):
+        return _response_stage(case_path, files, folder, assignments, force, report, log)
+
+
+def making_response(folder: Path, report: Report) -> AbstractContextManager[None]:
+    """A response and what belongs to it are made by one process at a time, see `store.making`."""
+    return store.making(folder / "response.json", report)
+
+
+def _response_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None, force: bool,
+    report: Report, log: bool,
+) -> tuple[dict[str, Any], bool]:  # fmt: skip
     settings, raw = load_case(case_path, assignments)
     summary_file = folder / "response.json"
     hashes = {name: store.hash_file(file) for name, file in files.items()}
@@ -373,8 +388,10 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
     if job.case_file is not None:
         files = {b.name: job.basis_file for b in case.members if (b.body or b.name) == job.settings.name}
         files |= modal_files(case, job.case_file, job.root, report, known=files)
-        response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
-    return report_stage(job, response, force, report), converged
+    with making_response(job.build_folder, report):
+        if job.case_file is not None:
+            response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
+        return report_stage(job, response, force, report), converged
 
 
 def run_case_file(
@@ -389,8 +406,9 @@ def run_case_file(
     files = modal_files(case, path, Path("."), report)
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
-        response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
-        return report_stage(job, response, force, report), converged
+        with making_response(job.build_folder, report):
+            response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
+            return report_stage(job, response, force, report), converged
     folder = Path(".") / "build" / case.name
     _, converged = response_stage(path, files, folder, assignments, force, report)
     return folder / "response.csv", converged
@@ -550,7 +568,7 @@ def _named(path: Path, b: BodyOfCase) -> Path:
         UserError: it is not there.
     """
     file = path.parent / (b.file or "")
-    if not file.is_file():
+    if not store.ordinary(file).is_file():
         raise UserError(
             f"{path}: bodies.{b.name}.file: there is no file {file}; paths in a case start in the folder of the case: "
             "correct it"
@@ -593,21 +611,33 @@ def is_case(path: Path) -> bool:
 
 
 def find_body(case_path: Path, name: str, root: Path) -> Path:
-    """The body file a case refers to: beside the case, in geometry/<name>/ or a folder of that name, or any file
-    of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
+    """The body file of a name that a case gives.
+
+    It stands beside the case, or in NAME/ or geometry/ of the case's folder, of one above it, or of `root`, the nearest
+    first, so that a case means the same body wherever it is run. In geometry/ it is geometry/NAME/body.toml, or any
+    file of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
 
     Raises:
         UserError: if there is none.
     """
-    for place in (case_path.parent, root / "geometry" / name, root / name):
-        if (place / "body.toml").is_file() and load_toml(place / "body.toml").get("name") == name:
-            return place / "body.toml"
-    for file in sorted((root / "geometry").glob("*/*.toml")):
-        if load_toml(file).get("name") == name:
-            return file
-    places = [case_path.parent, root / "geometry" / name, root / name]
-    advice = _elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is"
+    for folder in dict.fromkeys((*_above(case_path, root), root)):
+        own = [folder / "body.toml"] if folder.resolve() == case_path.parent.resolve() else []
+        usual = [*own, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
+        for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
+            if load_toml(file).get("name") == name:
+                return file
     raise UserError(
-        f"{case_path}: body: no body.toml of a body '{name}' is in {', '.join(map(str, places[:-1]))} or {places[-1]}, "
-        f"seen from {root.resolve()}; {advice}"
+        f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
+        f"of one above it or of {root.resolve()}; "
+        + (_elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is")
     )
+
+
+def _above(path: Path, root: Path) -> Iterator[Path]:
+    """The folder of a file and those above it, seen from `root`, up to one in which anybody may write: what is found
+    there may be anybody's."""
+    here = root.resolve()
+    for folder in path.resolve().parents:
+        if folder != path.resolve().parent and folder.stat().st_mode & stat.S_IWOTH:
+            return
+        yield root / folder.relative_to(here) if folder.is_relative_to(here) else folder

@@ -13,6 +13,8 @@ import glob
 import hashlib
 import json
 import os
+import platform
+import stat
 import subprocess
 import tempfile
 import time
@@ -26,18 +28,44 @@ import numpy as np
 
 from .data import UserError
 
+_ODD = {
+    stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
+}  # fmt: skip
+
+
+def _odd(path: Path) -> str:
+    """What stands under a name, or at the end of a link, if it is neither a file nor nothing."""
+    try:
+        return _ODD.get(stat.S_IFMT(path.stat().st_mode), "")
+    except (OSError, ValueError):  # whoever opens it tells why
+        return ""
+
+
+def ordinary(path: Path | str) -> Path:
+    """The path of something to read, before it is opened: pipes and devices may be waited for without end.
+
+    Raises:
+        UserError: something else than a file stands there, or a link leads to it.
+    """
+    path = Path(path)
+    if odd := _odd(path):
+        raise UserError(f"{path}: is {odd}, not a file; correct the path")
+    return path
+
 
 @contextlib.contextmanager
 def complete_or_absent(path: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it is synced and renamed onto `path`, else removed.
 
     A process killed at any instant leaves the old file or the new one, and perhaps a hidden temporary one, which
-    the next write of the same product removes.
+    the next write of the same product removes. A link under the name gives way; what it leads to stays as it is.
 
     Raises:
-        UserError: if the folder is missing, not writable, or the disk is full.
+        UserError: if the folder is missing, not writable, the disk is full, or something else than a file stands there.
     """
     path = Path(path)
+    _refuse_odd(path)
     temporary: Path | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,6 +87,33 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
                 temporary.unlink(missing_ok=True)
 
 
+def open_to_append(path: Path | str) -> int:
+    """Descriptor of a file that grows, made if it is not there.
+
+    A link under its name, hard or symbolic, gives way to a copy of the file, which stays as it is.
+
+    Raises:
+        UserError: no right to, or something else than a file stands there.
+    """
+    path = Path(path)
+    _refuse_odd(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_symlink() or (path.exists() and path.stat().st_nlink > 1):
+            data = path.read_bytes() if path.exists() else b""
+            with complete_or_absent(path) as temporary:
+                temporary.write_bytes(data)
+        flags = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | flags, 0o666)
+    except OSError as error:
+        raise UserError(refused(path, error)) from error
+
+
+def _refuse_odd(path: Path) -> None:
+    if odd := _odd(path):
+        raise UserError(f"{path}: cannot be written: {odd} has that name; choose another one")
+
+
 def refused(path: Path, error: OSError) -> str:
     """Why a file could not be written, and what to do, in one sentence."""
     reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())[:120] or "unknown reason"
@@ -69,12 +124,11 @@ def refused(path: Path, error: OSError) -> str:
         errno.EACCES: "choose a folder you may write to",
         errno.EPERM: "choose a folder you may write to",
         errno.EROFS: "choose a folder you may write to",
-        errno.EISDIR: "a folder has that name, choose another one",
         errno.EEXIST: "a file stands where its folder should be, choose another one",
         errno.ENOTDIR: "a file stands where its folder should be, choose another one",
     }
     remedy = remedies.get(error.errno or 0, "choose another folder")
-    return f"{path}: cannot be written ({reason}); nothing was changed, {remedy}"
+    return f"{path}: cannot be written ({reason}); this file was not changed, {remedy}"
 
 
 def _remove_leftovers(path: Path) -> None:
@@ -127,7 +181,7 @@ def write_text(path: Path | str, text: str) -> None:
 
 def hash_file(path: Path | str) -> str:
     """SHA-256 of a file's bytes, as hexadecimal text."""
-    with open(path, "rb") as file:
+    with open(ordinary(path), "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -178,6 +232,76 @@ def _add(sha: Any, value: Any) -> None:
         sha.update(f"{array.dtype.str} {array.shape};".encode() + np.ascontiguousarray(array).tobytes())
 
 
+_MINE: set[Path] = set()
+"""Products that this process is making."""
+
+
+@contextlib.contextmanager
+def making(product: Path | str, report: Callable[[str], None] = lambda _: None) -> Iterator[None]:
+    """Let one process at a time make a product and what is written with it; another one says so, and waits here.
+
+    The lock is one of the operating system on a hidden file beside the product. It ends with its process, however that
+    ends; a file that is left means nothing. Where a folder takes no file or has no locks nobody waits.
+    """
+    product = Path(product)
+    place = product.parent.resolve() / product.name
+    if place in _MINE:
+        yield
+        return
+    new = [folder for folder in product.parents if not folder.exists()]
+    file = product.with_name(f".{product.name}.lock")
+    lock = _locked(file, f"is making {product}", report)
+    _MINE.add(place)
+    try:
+        yield
+    finally:
+        _MINE.discard(place)
+        if lock is not None:
+            with contextlib.suppress(OSError):
+                file.unlink()
+            os.close(lock)
+            with contextlib.suppress(OSError):  # as it was, if nothing was made
+                for folder in new:
+                    folder.rmdir()
+
+
+def _locked(file: Path, why: str, report: Callable[[str], None]) -> int | None:
+    """Descriptor of a locked file, which is waited for, or None where there are no locks."""
+    try:
+        import fcntl  # noqa: F401
+
+        for _ in range(100):
+            with contextlib.suppress(FileNotFoundError):  # whoever had it has removed it, or its folder
+                file.parent.mkdir(parents=True, exist_ok=True)
+                lock = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+                if _taken(lock, file, why, report):
+                    return lock
+    except (ImportError, OSError):  # Windows; no right to write here, no locks on this file system
+        pass
+    return None
+
+
+def _taken(lock: int, file: Path, why: str, report: Callable[[str], None]) -> bool:
+    """Whether an open file, once it is locked, still is the one of that name; else it is closed."""
+    import fcntl
+
+    taken = False
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            report(f"waiting for {os.pread(lock, 100, 0).decode(errors='replace') or 'a process'}, which {why}")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        if taken := os.path.samestat(os.fstat(lock), os.stat(file)):
+            with contextlib.suppress(OSError):  # a full disk: then nobody is named
+                os.ftruncate(lock, 0)
+                os.pwrite(lock, f"process {os.getpid()} on {platform.node()}".encode(), 0)
+        return taken
+    finally:
+        if not taken:
+            os.close(lock)
+
+
 def sidecar_path(product: Path | str) -> Path:
     """Where the sidecar of a product stands."""
     product = Path(product)
@@ -194,8 +318,9 @@ def nothing_to_do(
     if force or not is_up_to_date(product, inputs):
         return False
     report(f"{product} is up to date")
-    with contextlib.suppress(OSError):  # others' products stay as they are
-        os.utime(product)
+    with contextlib.suppress(OSError):  # others' products stay as they are, and so does what a link leads to
+        if not Path(product).is_symlink():
+            os.utime(product)
     return True
 
 
@@ -203,7 +328,7 @@ def is_up_to_date(product: Path | str, inputs: Mapping[str, Any]) -> bool:
     """True if `product` and the files beside it are what its sidecar describes, and were made from these `inputs`."""
     product = Path(product)
     try:
-        note = json.loads(sidecar_path(product).read_text())
+        note = json.loads(ordinary(sidecar_path(product)).read_text())
         made = {product.name: note["product"], **note["files"]}
         same = note["inputs"] == hash_settings(inputs)
         return same and all(hash_file(product.parent / name) == digest for name, digest in made.items())

@@ -97,7 +97,16 @@ def survey_stage(
     """
     settings, raw = load_case(case_path, assignments)
     files = existing_files(settings, case_path, basis_file, root)
-    folder, said = root / "build" / settings.name, f"{kind}.txt"
+    folder = root / "build" / settings.name
+    with store.making(folder / f"{kind}.txt", report):
+        return _survey_stage(settings, raw, case_path, files, kind, folder, force, report)
+
+
+def _survey_stage(
+    settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path], kind: str, folder: Path,
+    force: bool, report: Report,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    said = f"{kind}.txt"
     settings = settings if kind == "identification" else keeping.as_found(settings, folder, case_path)
     hashes, named = hashes_of(files), hashes_of(keeping.files_of(settings, case_path))
     code = code_hash((*CASE_CODE, *_DRAWN_BY, "surveying.py"))

@@ -137,29 +137,34 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
     if geometry.matrices is not None:
         raise UserError(f"{job.path}: geometry.matrices: there is nothing to mesh; type: microslip modes {job.folder}")
     if geometry.mesh is not None:
-        if not job.mesh_file.is_file():
+        if not store.ordinary(job.mesh_file).is_file():
             raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
         return job.mesh_file
     product = output or job.mesh_file
     source = job.folder / (geometry.build or geometry.cad or "")
-    if not source.is_file():
+    if not store.ordinary(source).is_file():
         key = "build" if geometry.build else "cad"
         raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+    if geometry.build and not source.resolve().is_relative_to(job.folder.resolve()):
+        raise UserError(
+            f"{job.path}: geometry.build: {source.resolve()} is outside the body's folder, and only what stands in it "
+            "is run; copy it there"
+        )
     if geometry.cad:
         _refuse_unnamed_faces(job)
-    inputs = {
-        "geometry": job.raw["geometry"],
-        "mesh": job.raw.get("mesh", {}),
-        "unit": job.settings.length_unit,
-        "source": store.hash_file(source),
-        "code": code_hash(_MESH_CODE),
-    }
-    if store.nothing_to_do(product, inputs, force, report):
-        return product
-    report(f"meshing {source.name}")
-    for line in _run_mesher(job, source, product):
-        report(line)
-    store.note_product(product, inputs)
+    with store.making(product, report):
+        inputs = {
+            "geometry": job.raw["geometry"],
+            "mesh": job.raw.get("mesh", {}),
+            "unit": job.settings.length_unit,
+            "source": store.hash_file(source),
+            "code": code_hash(_MESH_CODE),
+        }
+        if not store.nothing_to_do(product, inputs, force, report):
+            report(f"meshing {source.name}")
+            for line in _run_mesher(job, source, product):
+                report(line)
+            store.note_product(product, inputs)
     return product
 
 
@@ -181,26 +186,57 @@ def _refuse_unnamed_faces(job: Job) -> None:
 def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
     """Run gmsh in its own process; returns its warnings."""
     settings = {**job.raw, "folder": str(job.folder.resolve())}
-    if job.settings.geometry.build:
-        command = [sys.executable, str(source.resolve())]
-    else:
-        command = [sys.executable, "-m", "microslip.cad"]
+    words = [str(source.resolve())] if job.settings.geometry.build else ["-m", "microslip.cad"]
     with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
         table = Path(scratch) / "settings.json"
         table.write_text(json.dumps(settings))
         made = Path(scratch) / "mesh.msh"
-        paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
         try:
-            done = subprocess.run([*command, str(table), str(made)], capture_output=True, text=True, env=environment)
+            done = run_apart([*words, str(table), str(made)], scratch)
         except OSError as error:  # not to be told as the product's: it is Python that this user may not start
             raise UserError(
-                f"{command[0]}: cannot be started to draw the body ({error.strerror}); let this user read and run it"
+                f"{sys.executable}: cannot be started to draw the body ({error.strerror}); let this user read and "
+                "run it"
             ) from error
         if done.returncode or not made.is_file():
             raise UserError(_mesher_failure(job, done))
         temporary.write_bytes(made.read_bytes())
     return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+
+
+def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
+    """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
+
+    It ends when this process does, however that ends, and then removes the folder `scratch`.
+    """
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    read, write = os.pipe()  # which nobody writes to: its end is the end of this process
+    try:
+        command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
+        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+    finally:
+        os.close(read)
+        os.close(write)
+
+
+_TO_THE_END = """
+import os, runpy, shutil, sys, threading
+
+def end(scratch):
+    os.read(0, 1)
+    shutil.rmtree(scratch, ignore_errors=True)
+    os._exit(1)
+
+threading.Thread(target=end, args=[sys.argv[1]], daemon=True).start()
+module = sys.argv[2] == "-m"
+sys.argv = sys.argv[2 + module :]
+if module:
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+else:
+    sys.path[0] = os.path.dirname(sys.argv[0])
+    runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 
 
 def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
@@ -336,12 +372,18 @@ def modes_stage(
     Raises:
         UserError, NotConverged: see `modes.modal_basis`.
     """
+    product = output or job.basis_file
+    with store.making(product, report):
+        return product, _modes(job, product, force, report)
+
+
+def _modes(job: Job, product: Path, force: bool, report: Report) -> list[str]:
+    """Compute the modal file if it is not up to date; returns warnings."""
     matrices = job.settings.geometry.matrices
     mesh_file = mesh_stage(job, report=report) if matrices is None else job.path
-    product = output or job.basis_file
     inputs = modes_inputs(job, mesh_file) if matrices is None else matrices_inputs(job, matrices)
     if store.nothing_to_do(product, inputs, force, report):
-        return product, []
+        return []
     if matrices is None:
         basis, warnings = _assembled_here(job, mesh_file, report)
     else:
@@ -349,7 +391,7 @@ def modes_stage(
     report(f"writing {product}")
     write_basis(product, basis)
     store.note_product(product, inputs, warnings=warnings)
-    return product, warnings
+    return warnings
 
 
 def _assembled_here(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, list[str]]:
@@ -398,8 +440,9 @@ def closure_stage(
         raise UserError(f"{job.path}: {error}") from error
     folder = output or job.basis_file.parent
     table, picture = folder / f"closure_{chosen}.csv", folder / f"closure_{chosen}.png"
-    store.write_text(table, curve.table())
-    return [table, closure_curve_plot(curve, f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm", picture)]
+    with store.making(table, report):
+        store.write_text(table, curve.table())
+        return [table, closure_curve_plot(curve, f"{job.settings.name}: closure '{chosen}' at {rpm:g} rpm", picture)]
 
 
 def contact_stage(
@@ -420,14 +463,14 @@ def contact_stage(
     report("laws and motions")
     found = study(path, assignments)
     folder = output or Path("build") / found.contact.settings.name
-    report("pictures and tables")
-    files = draw(found, folder)
-    for name, columns in found.tables.items():
-        files.append(folder / f"{name}.csv")
-        store.write_text(files[-1], _columns_csv(columns))
-    files.append(folder / "summary.csv")
+    summary = folder / "summary.csv"
     rows = [*found.told, *(("judgement", s) for s in found.sentences)]
-    store.write_text(files[-1], "\n".join(["what,value", *(f'"{a}","{b}"' for a, b in rows)]) + "\n")
+    report("pictures and tables")
+    with store.making(summary, report):
+        files = [*draw(found, folder), *(folder / f"{name}.csv" for name in found.tables), summary]
+        for name, columns in found.tables.items():
+            store.write_text(folder / f"{name}.csv", _columns_csv(columns))
+        store.write_text(summary, "\n".join(["what,value", *(f'"{a}","{b}"' for a, b in rows)]) + "\n")
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]
     return [*lines, *found.sentences, *map(str, sorted(files))]
@@ -461,7 +504,7 @@ def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
 
     settings = {k: v for k, v in job.raw.items() if k not in ("description", "note")}
     files = [job.folder / name for name in files_of(given)]
-    if missing := [f for f in files if not f.is_file()]:
+    if missing := [f for f in files if not store.ordinary(f).is_file()]:
         raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
     return {"settings": settings, "files": [store.hash_file(f) for f in files], "code": code_hash(_FOREIGN_CODE)}
 
@@ -500,7 +543,7 @@ def provenance(job: Job, mesh_file: Path) -> dict[str, str]:
 
 def _temperature_file(job: Job) -> Path:
     path = job.folder / (job.settings.temperature.file or "")
-    if not path.is_file():
+    if not store.ordinary(path).is_file():
         raise UserError(f"{job.path}: temperature.file: there is no file {path}; correct the path")
     return path
 
@@ -560,11 +603,17 @@ def nodal_temperature(job: Job, mesh: Mesh) -> Array | None:
 
 def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report: Report) -> Path:
     """Pictures and the self-contained page of a body."""
+    product = job.build_folder / "report.html"
+    with store.making(product, report):
+        _report(job, product, response, force, report)
+    return product
+
+
+def _report(job: Job, product: Path, response: dict[str, Any] | None, force: bool, report: Report) -> None:
     from . import pictures
     from .report import write_report
 
-    product, folder = job.build_folder / "report.html", job.build_folder / "pictures"
-    remarks = _remarks(job)
+    folder, remarks = job.build_folder / "pictures", _remarks(job)
     if response is not None:
         remarks += response.get("remarks", [])
         shown = dict(response.get("pictures", {}))
@@ -577,7 +626,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         "code": code_hash(_REPORT_CODE),
     }
     if store.nothing_to_do(product, inputs, force, report):
-        return product
+        return
     basis = read_basis(job.basis_file)
     store.unfinished(product)
     report("starting PyVista")
@@ -598,7 +647,6 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
     write_report(basis, drawn, product, remarks, response)
     if reason is None:  # else the next run tries again
         store.note_product(product, inputs, [*drawn.values(), *tables])
-    return product
 
 
 def _remarks(job: Job) -> list[str]:
@@ -636,10 +684,10 @@ def system_stage(
     system = load_system(path, assignments)
     product = output or root / "build" / system.name / "basis.h5"
     inputs = {"settings": dict(system.settings), "code": code_hash(_SYSTEM_CODE)}
-    if store.nothing_to_do(product, inputs, force, report):
-        return product
-    write_basis(product, system_basis(path, assignments))
-    store.note_product(product, inputs)
+    with store.making(product, report):
+        if not store.nothing_to_do(product, inputs, force, report):
+            write_basis(product, system_basis(path, assignments))
+            store.note_product(product, inputs)
     return product
 
 

@@ -39,7 +39,7 @@ from ..data import (
     UserError,
 )
 from ..hostile import inspect, trial
-from ..store import complete_or_absent
+from ..store import complete_or_absent, ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
 from .hdf5 import IMAGINARY, create, put, put_scale, seal, seal_state
@@ -460,6 +460,14 @@ def _write_stress(group: h5py.Group, name: str, s: StressSet, mode: h5py.Dataset
 # reading ---------------------------------------------------------------------------------------------------------
 
 
+class OtherFormat(UserError):
+    """A sound HDF5 file that is no modal file. `form`: what its attribute 'format' says."""
+
+    def __init__(self, path: Path, form: object) -> None:
+        super().__init__(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+        self.form = form
+
+
 def open_file(path: Path | str) -> h5py.File:
     """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
@@ -470,7 +478,7 @@ def open_file(path: Path | str) -> h5py.File:
         UserError: missing, damaged, foreign or of another major version.
     """
     path = Path(path)
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
     try:
         state = seal_state(path)
@@ -508,7 +516,7 @@ def _accept(file: h5py.File, path: Path) -> None:
     except _DAMAGE as error:
         raise UserError(f"{path}: is damaged ({_short(error)}); write it again") from error
     if not known:
-        raise UserError(f"{path}: is no modal file (its attribute 'format' is {form!r}, not '{FORMAT}')")
+        raise OtherFormat(path, form)
     if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
         raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
     try:

@@ -17,7 +17,7 @@ import numpy as np
 
 from microslip.cad.curved import refuse_inverted, straighten
 from microslip.data import UserError
-from microslip.store import complete_or_absent
+from microslip.store import complete_or_absent, ordinary
 
 warnings: list[str] = []
 MOST_ELEMENTS = 5e6  # beyond it a size is taken for a mistake in the unit
@@ -64,7 +64,7 @@ def warn(text: str) -> None:
 def read_settings(path: str) -> dict[str, Any]:
     """A body file (.toml) or its resolved copy (.json); relative CAD paths start at settings["folder"]."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = ordinary(path).read_text(encoding="utf-8")
         settings = json.loads(text) if path.endswith(".json") else tomllib.loads(text)
     except (OSError, ValueError) as error:
         raise UserError(f"cannot be read: {error}") from None

@@ -20,6 +20,7 @@ from microslip.cad.drawing import boundary_surfaces, warn
 from microslip.cad.marks import Marks, marks_of
 from microslip.data import UserError
 from microslip.mesh import UNITS
+from microslip.store import ordinary
 
 OCC_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "in": "INCH", "ft": "FT"}
 ENDS = {  # how a complete text file of the kind ends; OpenCASCADE takes half files for whole, or hangs in them
@@ -36,7 +37,7 @@ def load(path: Path, unit: str) -> Marks:
     """Import a CAD file, in `unit`, with touching solids joined; label and colour of its boundary surfaces."""
     if unit not in UNITS:
         raise UserError(f"length_unit = {unit!r} is unknown; it is one of {', '.join(UNITS)}")
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"geometry.cad: there is no file {path}")
     import_shapes(path, unit)
     solids = gmsh.model.getEntities(3)

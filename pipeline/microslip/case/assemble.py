@@ -15,6 +15,7 @@ from ..coordinates import first_modes, in_modes, of_density
 from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserError
 from ..frames import rotation
 from ..speed_range import basis_at
+from ..store import ordinary
 from .counting import Face, Springs, brought, counted_once
 from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
 from .patches import curved_springs, fitting_forces, follows_the_force, nodal_patch, patch_of, resolved, waves
@@ -396,7 +397,7 @@ def _of_file(c: ContactSettings, path: Path | str) -> tuple[ContactSettings, Law
     from ..contact.settings import load_contact
 
     file = Path(path).parent / str(c.file)
-    if not file.is_file():
+    if not ordinary(file).is_file():
         raise UserError(f"{path}: contacts.{c.interface}.file: there is no file {file}; correct the path")
     found = compose(load_contact(file), file)
     if found.law is None or found.stiffness is None:

@@ -44,11 +44,25 @@ SAMPLES_EACH = 8
 Radius = Annotated[float, BeforeValidator(_float), Field(gt=0)]
 
 
+def _no_path(value: Any) -> Any:
+    if isinstance(value, str) and ("/" in value or "\\" in value):
+        raise ValueError(
+            f'"{value}" is a path, and this is the name that a body.toml gives itself, which is looked for beside the '
+            "case and in geometry/ of the folders above it; write the name, or the path of a modal file as file of "
+            "[[bodies]]"
+        )
+    return value
+
+
+BodyName = Annotated[Name, BeforeValidator(_no_path)]
+
+
 class BodyOfCase(Model):
     """A body of an assembly.
 
-    name: in this case. body: whose modal file it is (geometry/<body>, or a folder or system.toml beside the case); the
-    name if not given. file: a modal file instead, beside the case. speed: of the file, counted from 0, or speed_rpm.
+    name: in this case. body: the name of a body.toml (see `running.find_body`) or of a system.toml beside the case,
+    whose modal file it is; the name if not given. file: a modal file instead, beside the case. speed: of the file,
+    counted from 0, or speed_rpm.
     turn: degrees about the body's rotation axis, and shift: m, from where its file has it to where it stands here.
     damping_ratio: instead of the file's, one for all modes or one a mode, the last one for all that follow.
     aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,
@@ -60,7 +74,7 @@ class BodyOfCase(Model):
     """
 
     name: Name
-    body: Name | None = None
+    body: BodyName | None = None
     file: str | None = None
     speed: Annotated[int, Field(ge=0)] = 0
     speed_rpm: NotNegative | None = None
@@ -219,7 +233,7 @@ class CaseSettings(Model):
 
     name: Name
     description: str = ""
-    body: Name | None = None
+    body: BodyName | None = None
     bodies: Annotated[tuple[BodyOfCase, ...], BeforeValidator(_tuple)] = ()
     ring: RingSettings | None = None
     speed: Annotated[int, Field(ge=0)] = 0

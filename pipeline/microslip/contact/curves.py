@@ -20,6 +20,7 @@ from scipy.optimize import isotonic_regression
 
 from ..compliance import BULK_AND_SURFACE
 from ..data import Array, Indices, UserError
+from ..store import ordinary
 from .hertz import Hertz
 from .profiles import RoundContact
 from .series import BULK, INCLUDES
@@ -284,7 +285,7 @@ _DECIMALS = re.compile(r"[^\s,]+(,[^\s,]+)?(\s+[^\s,]+(,[^\s,]+)?)+")
 
 def _text(path: Path) -> str:
     try:
-        raw = path.read_bytes()
+        raw = ordinary(path).read_bytes()
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
     if b"\0" in raw:

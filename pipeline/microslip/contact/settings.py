@@ -32,6 +32,7 @@ from ..body import (
 )
 from ..errors import UserError
 from ..mesh import UNITS
+from ..store import ordinary
 from .curves import FORCES, LENGTHS
 from .layer import BOUNDARIES
 from .topography import UNITS as PROFILE_UNITS
@@ -495,7 +496,7 @@ def beside(path: Path, name: str, key: str) -> Path:
         UserError: there is no such file.
     """
     found = path.parent / name
-    if not found.is_file():
+    if not ordinary(found).is_file():
         raise UserError(f"{path}: {key}: there is no file {found}; correct the name (it is sought beside this file)")
     return found
 

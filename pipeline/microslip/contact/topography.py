@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UserError
+from ..store import ordinary
 from .curves import LENGTHS, read_columns
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def read_instrument(path: str | Path, level: int | None = 1) -> Profile:
             f"{path}: files of instruments are read by SurfaceTopography; "
             'pip install "microslip[profile]", or write two columns x, z to a .txt file'
         ) from None
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: no such file")
     try:
         topography = read_topography(str(path))

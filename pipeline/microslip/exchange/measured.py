@@ -20,6 +20,7 @@ from ..canonical import signs
 from ..correlation import DIRECTIONS, POINT
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
 from ..mesh import UNITS
+from ..store import ordinary
 from .functions import fits
 from .functions import told as functions_told
 
@@ -107,7 +108,7 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     """
     import pyuff
 
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: there is no such file; correct the path")
     wanted = (15, 2411, 55, 58, 164, 2420)
     try:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
+from ..store import ordinary
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
 from .supports import Constraints, add_supports
@@ -124,7 +125,7 @@ def _lines(path: Path, depth: int) -> Iterator[str]:
     if depth > 10:
         raise Damaged(f"the file includes itself by way of {path.name}")
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
     for line in text.splitlines():

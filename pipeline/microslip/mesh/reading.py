@@ -19,6 +19,7 @@ import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
 from ..hostile import tried
+from ..store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf import read_bdf
 from .cdb import read_cdb
@@ -57,7 +58,7 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
     path = Path(path)
     if unit not in UNITS:
         raise UserError(f"{path}: the unit of length '{unit}' is unknown; choose one of {', '.join(UNITS)}")
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: no such mesh file; make it first or correct the path")
     try:
         raw = _read_raw(path)

@@ -16,7 +16,7 @@ from ..coordinates import first_modes, in_modes
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..hostile import HostileFile, inspect, trial
 from ..operating.motion import Motion, motion_of
-from ..store import complete_or_absent
+from ..store import complete_or_absent, ordinary
 from .journal import is_journal, read_journal
 
 FORMAT = "microslip-response"
@@ -280,7 +280,7 @@ def read_response(path: Path | str) -> Response:
         UserError: missing, damaged, foreign or of another major version.
     """
     path = Path(path)
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: no such response; run the case first or correct the path")
     try:
         if is_journal(path):

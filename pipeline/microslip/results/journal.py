@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, UserError
-from ..store import refused
+from ..store import open_to_append, ordinary, refused
 
 FORMAT = "microslip-points"
 FORMAT_VERSION = "0.1"
@@ -70,34 +70,32 @@ class Journal:
         return dict(sorted(self.series.get(series, {}).items()))
 
     def _append(self, words: dict[str, Any], point: Point) -> None:
+        whole = os.fstat(self._file).st_size
         try:
             _write_all(self._file, _packed(words, point))
             if time.monotonic() - self._synced > _SYNC:
                 os.fsync(self._file)
                 self._synced = time.monotonic()
         except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, whole)
             raise UserError(refused(self.path, error)) from error
 
 
 @contextlib.contextmanager
 def open_journal(path: Path | str, inputs: str, head: Mapping[str, Any], fresh: bool = False) -> Iterator[Journal]:
-    """A journal to add points to, with the points it holds of the same inputs.
+    """A journal to add points to, with the points it holds of the same inputs. One process at a time (`store.making`).
 
     Args:
         inputs: hash of all that the value of a point depends on (not of which points are asked for); a journal of
             other inputs is begun anew. head: what JSON can hold, for readers. fresh: forget what is there.
 
     Raises:
-        UserError: another process writes to it, or no permission, no space.
+        UserError: no permission, no space, or no file.
     """
     path = Path(path)
+    file = open_to_append(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0), 0o666)
-    except OSError as error:
-        raise UserError(refused(path, error)) from error
-    try:
-        _lock(file, path)
         journal = None if fresh else _continued(file, path, inputs)
         if journal is None:
             os.ftruncate(file, 0)
@@ -107,20 +105,6 @@ def open_journal(path: Path | str, inputs: str, head: Mapping[str, Any], fresh: 
         os.fsync(file)
     finally:
         os.close(file)
-
-
-def _lock(file: int, path: Path) -> None:
-    """One writer at a time; the lock goes with the process."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: files open for writing are not shared by habit
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise UserError(f"{path}: another run is adding points to it; wait for it or stop it") from None
-    except OSError:
-        return  # a file system without locks
 
 
 def _continued(file: int, path: Path, inputs: str) -> Journal | None:
@@ -142,7 +126,7 @@ def read_journal(path: Path | str) -> tuple[dict[str, Any], dict[str, dict[float
         UserError: no such file, no journal, or one of another major version.
     """
     try:
-        data = Path(path).read_bytes()
+        data = ordinary(path).read_bytes()
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
     return _parsed(data, Path(path))[:2]

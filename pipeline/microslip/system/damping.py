@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Array, ModalGroup, UserError
 from ..ring import BACKWARD, FORWARD
+from ..store import ordinary
 from .assembly import Member
 from .excitation import Turning, direction, index_of
 
@@ -99,7 +100,7 @@ def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> di
 
 def _table(path: Path) -> list[dict[str, str]]:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with ordinary(path).open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(k).strip(): str(v or "").strip() for k, v in row.items()} for row in reader]
             names = [str(n).strip() for n in reader.fieldnames or ()]

@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 
 from ..data import Array, ComplexArray, Interface, ModalGroup, Rows, UserError
 from ..mesh import UNITS, point_data
+from ..store import ordinary
 from .assembly import Load, Member
 
 COLUMNS = ("x", "y", "z", "p_real", "p_imag")
@@ -78,7 +79,7 @@ def read_field(path: Path | str, length_unit: str, conjugate: bool = False) -> P
     path = Path(path)
     if length_unit not in UNITS:
         raise UserError(f"{path}: length_unit: '{length_unit}' is none of {', '.join(UNITS)}")
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: there is no such file of a pressure field; correct the name")
     readers = {".csv": _from_csv, ".npz": _from_npz}
     columns = readers.get(path.suffix.lower(), _from_mesh)(path)

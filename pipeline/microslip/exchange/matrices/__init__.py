@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...data import Array, Indices, Matrices, Mesh, UserError
+from ...store import ordinary
 from ...units import SYSTEMS, usual_system
 from . import calculix, hdf5, market, matlab, nastran
 from .found import Found, Unreadable, pick
@@ -106,7 +107,7 @@ def _reader(path: Path) -> ModuleType:
         raise UserError(
             f"{path}: matrices are not read from a file '{path.suffix}'; use one of {', '.join(sorted(READERS))}"
         )
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: there is no such file; correct the path")
     return READERS[path.suffix.lower()]
 
@@ -130,7 +131,7 @@ def _read(folder: Path, reference: str, role: str) -> Found:
 def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
     file, name = split(given.nodes)
     path = folder / file
-    if not path.is_file():
+    if not ordinary(path).is_file():
         raise UserError(f"{path}: there is no such file; correct geometry.matrices.nodes")
     try:
         mesh = read_nodes(path, name, unit)
@@ -151,7 +152,7 @@ def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh)
     """(k, 2) node number and component of the rows, and where that is said."""
     if given.dofs is not None:
         path = folder / given.dofs
-        if not path.is_file():
+        if not ordinary(path).is_file():
             raise UserError(f"{path}: there is no such file; correct geometry.matrices.dofs")
         try:
             return read_dofs(path, mesh), path.name
