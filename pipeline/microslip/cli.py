@@ -23,8 +23,10 @@ from .errors import NotConverged, UserError
 from .progress import progress
 
 if TYPE_CHECKING:
+    from .basis.checks import Check
     from .data import ModalBasis
     from .following import Case
+    from .results import Response
 
 app = App(
     name="microslip",
@@ -419,13 +421,13 @@ def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Cas
 
 @app.command
 def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
-    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate; or a response file.
+    """Verify a modal file: shapes, orthogonality, frames, compliances, the solver's certificate; or a response file:
+    energy, read-outs, tables.
 
     Args:
-        file: a basis.h5, or a response.h5, which is read and its points counted.
+        file: a basis.h5, or a response.h5.
     """
     from .basis import check_basis, read_basis
-    from .basis.checks import worst_of_each
     from .basis.files import OtherFormat
     from .results.files import FORMAT
     from .ring import ring_checks
@@ -436,8 +438,44 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     except OtherFormat as other:
         if other.form != FORMAT:
             raise
-        return _check_response(file, quiet)
-    findings = [*check_basis(basis), *ring_checks(basis)]
+        return _check_response(file, short, quiet)
+    _verdict(file, [*check_basis(basis), *ring_checks(basis)], short, quiet)
+
+
+def _check_response(file: Path, short: bool, quiet: bool) -> None:
+    """What a response file claims, and what its modal files say of it where they are still there."""
+    from .results import read_response
+    from .results.checks import check_response, sentence
+
+    found = read_response(file)
+    bases, missing = _modal_files(found)
+    findings = check_response(found, bases)
+    if missing and not short:
+        _say(f"{file}: read-outs of {', '.join(missing)} are not compared, there is no modal file that fits", quiet)
+    if not found.finished:
+        _say(f"{file}: points are missing", quiet)
+    _say(f"{file}: {sentence(found, found.estimated)}", quiet)
+    _verdict(file, findings, short, quiet)
+
+
+def _modal_files(response: Response) -> tuple[dict[str, ModalBasis], list[str]]:
+    """Member -> modal file that a response was computed with, and the members whose files are gone or others."""
+    from .basis import read_basis
+    from .store import hash_file
+
+    there = {name: Path(b.file) for name, b in response.bodies.items() if Path(b.file).is_file()}
+    fits = {name: file for name, file in there.items() if hash_file(file) == response.bodies[name].sha256}
+    return {name: read_basis(file) for name, file in fits.items()}, [n for n in response.bodies if n not in fits]
+
+
+def _verdict(file: Path, findings: list[Check], short: bool, quiet: bool) -> None:
+    """The findings line by line, what fails alone if short or quiet, and the verdict.
+
+    Raises:
+        NotConverged: one failed.
+    """
+    from .basis.checks import worst_of_each
+
     failed = [c for c in findings if not c.passed]
     for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
@@ -446,19 +484,6 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")
     _say(f"{file}: all {len(findings)} checks passed", quiet)
-
-
-def _check_response(file: Path, quiet: bool) -> None:
-    """What a response file holds, once it has been read."""
-    from .results import read_response
-
-    found = read_response(file)
-    converged = [ok for series in found.series for ok in series.converged]
-    _say_seal(file, quiet)
-    if not all(converged):
-        raise NotConverged(f"{file}: {converged.count(False)} of {len(converged)} points did not converge")
-    more = "" if found.finished else ", more are missing"
-    _say(f"{file}: all {len(converged)} points of '{found.case}' converged{more}", quiet)
 
 
 def _say_seal(file: Path, quiet: bool) -> None:

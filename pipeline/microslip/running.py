@@ -197,7 +197,7 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
         summary["remarks"] += more.remarks
-    summary["checked"] = sentence(response, result.truncation)
+    summary["checked"] = sentence(response, response.estimated)
     if result.rising:
         summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
     summary["response_sha256"] = store.hash_file(folder / "response.h5")
@@ -221,6 +221,7 @@ def _response(keeper: Keeper, result: CaseResult, summary: Mapping[str, Any]) ->
         low, high = result.settings.sweep.start, result.settings.sweep.stop
         found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
     told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
+    told["estimated"] = result.truncation
     told |= {key: summary[key] for key in ("resonances", "stuck_modes", "remarks")}
     return response_of({**head, **told}, found)
 

@@ -82,7 +82,15 @@ def head_of(
     }
     mode = s.mode if s.has_laws else "jenkins"
     told = {"case": s.name, "description": s.description, "mode": mode, "settings": dict(raw), "bodies": bodies}
-    return told | ({"harmonics": s.balanced} if mode != "jenkins" else {})
+    if mode == "jenkins":
+        return told | {"labels": {_read_out(built): [built.assembly.watches[0].label]}}
+    return told | {"harmonics": s.balanced}
+
+
+def _read_out(built: Built) -> str:
+    """Name of the array of the first read-out in the response file."""
+    kind = "gauges" if measured(built.assembly).unit == "1" else "monitors"
+    return f"{kind}/{built.assembly.watches[0].monitor}"
 
 
 def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSettings:
@@ -143,14 +151,13 @@ def closed_points(
 
 def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[str, Any]]:
     (member,) = built.assembly.members
-    group, watch = member.groups[0], built.assembly.watches[0]
-    kind = "gauges" if measured(built.assembly).unit == "1" else "monitors"
+    group = member.groups[0]
     points: dict[float, dict[str, Any]] = {}
     for i, f in enumerate(map(float, r.frequency)):
         row: dict[str, Any] = {
             "frequency": f, "status": CONVERGED if r.converged[i] else "iteration limit: no solution was found",
             "peak": float(peak * f), "added": int(not peak and not r.asked[i]),
-            f"{kind}/{watch.monitor}": np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
+            _read_out(built): np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
             "supplied": float(r.supplied[i]), "damped": float(r.damped[i]), "checks/balance": float(r.balance[i]),
             "checks/counted": float(r.counted[i]), "checks/motion": float(r.motion[i]),
             f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),

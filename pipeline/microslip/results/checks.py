@@ -96,12 +96,13 @@ def sentence(response: Response, estimated: float | None) -> str:
     Args:
         estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not known.
     """
-    guess = "not estimated" if estimated is None else f"{percent(estimated)} as estimated"
+    guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)}"
+    guess = guess if estimated is None or np.isfinite(estimated) else "unknown, no finer solution was found"
     words = [
         _to("energy in balance", _worst(response.series, "balance")),
         _to("contacts take what their laws count", _worst(response.series, "counted")),
         _to("bodies move as their contacts", _worst(response.series, "motion")),
-        f"error of harmonics and samples {guess}",
+        f"error of harmonics and samples: {guess}",
     ]
     return f"checked: {', '.join(words)}; {_of_points(response.series)}"
 

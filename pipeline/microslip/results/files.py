@@ -101,9 +101,10 @@ class Response:
     Attributes:
         case: its name. description. mode: how the contacts were treated (``marched``, ``book``, ``jenkins``).
             settings: the case file. inputs: hash of all that a point depends on. bodies: member -> `Body`. labels: name
-            of an array -> its rows. series: in the order they were computed. resonances: rows of a table. finished:
-            whether every point that was asked for is there. remarks: sentences a reader must know. stuck_modes: rows of
-            the modes with sticking contacts and their damping.
+            of an array -> its rows. series: in the order they were computed. resonances: rows of a table.
+            estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not
+            estimated. finished: whether every point that was asked for is there. remarks: sentences a reader must know.
+            stuck_modes: rows of the modes with sticking contacts and their damping.
     """
 
     case: str
@@ -118,6 +119,7 @@ class Response:
     finished: bool = True
     remarks: tuple[str, ...] = ()
     stuck_modes: tuple[Mapping[str, float], ...] = ()
+    estimated: float | None = None
 
     def one(self, **parameters: float) -> Series:
         """The series whose parameters have these values.
@@ -192,6 +194,7 @@ def response_of(head: Mapping[str, Any], series: Mapping[str, Mapping[float, Map
         finished=bool(head.get("finished", False)),
         remarks=tuple(head.get("remarks", ())),
         stuck_modes=tuple(head.get("stuck_modes", ())),
+        estimated=head.get("estimated"),
     )
 
 
@@ -250,7 +253,7 @@ def _write(file: h5py.File, r: Response) -> None:
     for name in _TEXTS:
         file.attrs[name] = getattr(r, name)
     file.attrs["finished"] = int(r.finished)
-    for name in ("settings", "labels", "resonances", "remarks", "stuck_modes"):
+    for name in ("settings", "labels", "resonances", "remarks", "stuck_modes", "estimated"):
         _put_text(file, name, json.dumps(getattr(r, name)))
     bodies = {k: {**vars(b), "harmonics": [[n, int(c)] for n, c in b.harmonics]} for k, b in r.bodies.items()}
     _put_text(file, "bodies", json.dumps(bodies))
@@ -337,6 +340,7 @@ def _response(file: h5py.File) -> Response:
         finished=bool(file.attrs["finished"]),
         remarks=tuple(told["remarks"]),
         stuck_modes=tuple(json.loads(file["stuck_modes"][()].tobytes())) if "stuck_modes" in file else (),
+        estimated=json.loads(file["estimated"][()].tobytes()) if "estimated" in file else None,
     )
 
 
