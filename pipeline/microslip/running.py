@@ -621,9 +621,9 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
     Raises:
         UserError: if there is none.
     """
-    for folder in dict.fromkeys((*_above(case_path, root), root)):
-        own = [folder / "body.toml"] if folder.resolve() == case_path.parent.resolve() else []
-        usual = [*own, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
+    for number, folder in enumerate((*_above(case_path.parent, root), root)):
+        beside = [folder / "body.toml"] if number == 0 else []
+        usual = [*beside, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
         for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
             if load_toml(file).get("name") == name:
                 return file
@@ -634,11 +634,12 @@ def find_body(case_path: Path, name: str, root: Path) -> Path:
     )
 
 
-def _above(path: Path, root: Path) -> Iterator[Path]:
-    """The folder of a file and those above it, seen from `root`, up to one in which anybody may write: what is found
-    there may be anybody's."""
+def _above(first: Path, root: Path) -> Iterator[Path]:
+    """A folder and those above it, seen from `root`, up to one in which anybody may write: what is found there may be
+    anybody's."""
+    yield first
     here = root.resolve()
-    for folder in path.resolve().parents:
-        if folder != path.resolve().parent and folder.stat().st_mode & stat.S_IWOTH:
+    for folder in first.resolve().parents:
+        if folder.stat().st_mode & stat.S_IWOTH:
             return
         yield root / folder.relative_to(here) if folder.is_relative_to(here) else folder
