@@ -1217,6 +1217,16 @@ def followed() -> None:
     save(drawn(study.three(figure(13.0, 3.9), plain)), "followed")
 
 
+def accuracy() -> None:
+    """Estimates and checks of a response against what is true."""
+    import accuracy_study as study
+
+    found = study.measured()
+    head = ["harmonics", "samples", "true error, median", "largest", "not counted, median", "largest", "covered"]
+    fill("accuracy.md", "accuracy", table(head, study.rows(found)))
+    save(drawn(study.figure(figure(10.2, 4.2), found)), "accuracy")
+
+
 def microslip() -> None:
     """Microslip: errors of the strips over their number."""
     import microslip_study as study
@@ -1376,7 +1386,7 @@ STUDIES = {
         bolts, contact, convergence, sensitivity,
         arrangement2,
         first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough, laws, microslip, continuation, followed, book_mode, patches, results,
+        stiffness_sources, rough, laws, microslip, continuation, followed, accuracy, book_mode, patches, results,
         ring, rig, multicoupling, bolted_pipes,
     )  # fmt: skip
 }

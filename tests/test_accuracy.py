@@ -10,7 +10,7 @@ import pytest
 from test_harmonic_balance_laws import oscillator, point, three_dof, value
 from test_harmonic_balance_time import group, held
 
-from microslip.case.run import _truncated
+from microslip.case.run import _Left
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
@@ -146,7 +146,7 @@ def test_harmonics_are_added_to_a_slider_and_too_few_are_told():
     assert not found.reached and [e.harmonics for e in found.errors] == [1, 5]
     assert found.errors[1].readout < found.errors[0].readout / 8
     assert enough(problem, start, tolerance=1.01 * found.errors[0].readout).reached
-    (remark,) = _truncated(built, problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    (remark,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
     assert "At F_N = 8 N the amplitude at 17 Hz" in remark
 
 
@@ -157,6 +157,6 @@ def test_a_case_says_where_its_harmonics_are_too_few():
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
         found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
-        remarks = _truncated(built, problem, found, [], 8.0)
+        remarks = _Left(built, None).out(problem, found, [], 8.0)
         assert len(remarks) == count
         assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in remarks)
