@@ -85,6 +85,7 @@ def figure(fig: Any, found: list[dict[tuple[int, int], tuple[float, float, float
     right.loglog(SAMPLES, 100 * np.median(counted, axis=0), "o-", color=BLUE, label="median of the systems")
     right.loglog(SAMPLES, 5.0 * np.ones(len(SAMPLES)), color=RED, lw=1.2, label="above it a point has not converged")
     right.set(xlabel="samples of a cycle", ylabel="work less counted loss, in %")
+    right.set_ylim(1e-4, 20)  # sticking contacts leave 1e-12
     right.set_xticks(SAMPLES, [str(n) for n in SAMPLES])
     right.minorticks_off()
     right.set_title("energy of the contacts, 3 harmonics", fontsize=10)
