@@ -19,7 +19,8 @@ from .case.assemble import Built
 from .case.curves import Followed, curves
 from .data import Array, ModalBasis
 from .report import survey_page
-from .results import Journal, open_journal, read_journal, response_of, write_response
+from .results import Journal, Response, open_journal, read_journal, response_of, write_response
+from .results.checks import sentence
 from .running import CASE_CODE, existing_files, hashes_of, inputs_of_points
 from .workflow import Report, code_hash
 
@@ -250,18 +251,19 @@ def _curve(over: str, kept: Kept, settings: CaseSettings, bases: Bases, path: Pa
         raise KeyboardInterrupt
     columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
-    _write_curves(kept, found, whole)
+    response = _written(kept, found, whole)
+    failed = sum(int((~s.converged).sum()) for s in response.series)
     drawn = [one for one in found if len(one.rows) > 1]
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
-        [words for one in found for words in one.sentences()],
-        sum(not one.complete for one in found),
+        [*(words for one in found for words in one.sentences()), sentence(response, None)],
+        sum(not one.complete for one in found) + failed,
         whole,
     )
 
 
-def _write_curves(kept: Kept, found: list[Followed], whole: bool) -> None:
+def _written(kept: Kept, found: list[Followed], whole: bool) -> Response:
     """The points as a response file, beside their journal."""
     from .harmonic_balance.kept import OF_THE_WAY
 
@@ -273,7 +275,9 @@ def _write_curves(kept: Kept, found: list[Followed], whole: bool) -> None:
         for one in found
         if one.rows
     }
-    write_response(kept.file.with_suffix(".h5"), response_of({**head, "finished": whole}, series))
+    response = response_of({**head, "finished": whole}, series)
+    write_response(kept.file.with_suffix(".h5"), response)
+    return response
 
 
 KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Path, Report], Survey]] = {

@@ -61,19 +61,18 @@ class OverNormal:
 
     def at(self, factor: float) -> Problem:
         """The balance with normal forces multiplied; by zero, if the factor is negative."""
-        p, groups = self.problem, []
+        p, groups, contacts = self.problem, [], list(self.problem.assembly.contacts)
         for g in p.groups:
             known: dict[float, Any] = {}
-            pressed = []
             for i in g.contacts:
-                c = p.assembly.contacts[i]
+                c = contacts[i]
                 normal = max(factor, 0.0) * float(c.preload[0])
                 if c.preload[0] > 0 and (self.contacts is None or i in self.contacts):
-                    c = known[normal] = known.get(normal) or c.pressed(normal)
-                pressed.append(c)
-            offset, preload = (np.array([getattr(c, key) for c in pressed]) for key in ("offset", "preload"))
+                    alike = known[normal] = known.get(normal) or c.pressed(normal)
+                    contacts[i] = replace(c, offset=alike.offset, preload=alike.preload)
+            offset, preload = (np.array([getattr(contacts[i], k) for i in g.contacts]) for k in ("offset", "preload"))
             groups.append(replace(g, offset=offset, preload=preload))
-        return replace(p, groups=tuple(groups))
+        return replace(p, assembly=replace(p.assembly, contacts=tuple(contacts)), groups=tuple(groups))
 
     def evaluate(self, x: Array, factor: float) -> tuple[Array, Array, Array]:
         """R, dR/dx, and dR/dfactor by differences, central where there is room."""
