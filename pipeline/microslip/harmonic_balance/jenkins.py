@@ -185,7 +185,7 @@ def frequency_response(
 def _slid(springs: Array, limits: Array, u: ComplexArray) -> float:
     """J that the sliders take in a cycle, friction times the path slid: 4 R (|u| - R / k) of each that slides."""
     path = np.abs(u) - np.divide(limits, springs, out=np.full(len(u), np.inf), where=springs > 0)
-    return float(np.sum(np.where(path > 0, 4 * np.where(path > 0, limits * path, 0.0), 0.0)))
+    return float(4 * (limits[path > 0] @ path[path > 0]))
 
 
 def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:
