@@ -299,6 +299,7 @@ friction = 0.3
         ("friction = 0.3", 'friction = 0.3\npatch = "nodal"\npoints = [2, 2]', "those of the mesh"),
         ("friction = 0.3", "friction = 0.3\ncurvature = [0.0, 1.0]", "curvature"),
         ("friction = 0.3", "friction = 0.3\nnormal_force = -1.0", "normal_force"),
+        ("friction = 0.3", "friction = 20.0", "friction"),
     ):
         case.write_text(text.replace(old, new))
         capsys.readouterr()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..body import (
+    Coefficient,
     Model,
     Name,
     NotNegative,
@@ -123,7 +124,7 @@ class ContactSettings(Model):
     tangential_stiffness: Positive = 0.0
     width: Positive | None = None
     height: Positive | None = None
-    friction: NotNegative = 0.0
+    friction: Coefficient = 0.0
     slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
     law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
@@ -259,6 +260,9 @@ class CaseSettings(Model):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
         if said := self._whose():
             raise ValueError(said)
+        if all(x.is_zero for x in self.loads):
+            key = "excitations" if self.excitations else "amplitude"
+            raise ValueError(f"{key}: a force of 0 moves nothing; give its size in N (Pa of a pressure)")
         laws = {self.law_of(c) == "jenkins" for c in self.contacts}
         if len(laws) > 1:
             raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')

@@ -17,7 +17,7 @@ from jax.scipy.stats import norm as normal_distribution
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from .law import Array, settings, table
+from .law import Array, number, settings, table
 
 
 class Heights:
@@ -97,7 +97,7 @@ class Exponential(Heights):
     law that separates takes `Cut(Exponential(rate))`.
     """
 
-    rate: Array | float = 4.0
+    rate: Array | float = number(gt=0, default=4.0)
 
     def area(self, x: Array) -> Array:
         return jnp.exp(self.rate * (jnp.minimum(x, 1.0) - 1))
@@ -120,8 +120,8 @@ class Gaussian(Heights):
     It has no highest peak, so the contact never opens; a law that separates takes `Cut(Gaussian(mean, deviation))`.
     """
 
-    mean: Array | float = 0.5
-    deviation: Array | float = 20**-0.5
+    mean: Array | float = number(default=0.5)
+    deviation: Array | float = number(gt=0, default=20**-0.5)
 
     def area(self, x: Array) -> Array:
         return normal_distribution.cdf(self._s(x))

@@ -18,7 +18,7 @@ from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
 from .friction import Coulomb
 from .heights import Heights, as_table
-from .law import Array, Law, ratio, settings, static
+from .law import Array, Law, number, ratio, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, dragged, met, slide, touching, weight
@@ -136,14 +136,14 @@ class Strips(Sliders):
             stiffnesses count, one of `series.INCLUDES`.
     """
 
-    at: Array
-    shares: Array
-    depth: Array
-    stiffness_0: Array
-    stiffness_t: Array
-    mu: Array
-    held: Array | None = None
-    stiffness_ratio: Array | None = None
+    at: Array = number()
+    shares: Array = number(ge=0)
+    depth: Array = number(gt=0)
+    stiffness_0: Array = number(ge=0)
+    stiffness_t: Array = number(ge=0)
+    mu: Array = number(ge=0)
+    held: Array | None = number(default=None)
+    stiffness_ratio: Array | None = number(gt=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:
@@ -207,11 +207,11 @@ class Iwan(Sliders):
     """
 
     normal: Normal
-    mu: Array
-    stiffness: Array
-    shares: Array
-    strengths: Array
-    stiffness_ratio: Array | None = None
+    mu: Array = number(ge=0)
+    stiffness: Array = number(ge=0)
+    shares: Array = number(ge=0)
+    strengths: Array = number(ge=0)
+    stiffness_ratio: Array | None = number(gt=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from .. import continuation
-from ..data import Array
+from ..data import Array, UserError
+from ..mistakes import bounded
 from . import slow
-from .problem import AtFrequency, Problem
+from .problem import NO_NUMBER, AtFrequency, Problem
 
 Report = Callable[[str], None]
 CONVERGED = "converged"
@@ -48,6 +49,11 @@ class Point:
         """Whether a body slides away, so that there is no periodic motion to be found."""
         return AWAY in self.status
 
+    @property
+    def undefined(self) -> bool:
+        """Whether a law had no value on the way."""
+        return NO_NUMBER in self.status
+
 
 ROUNDING = 4.0
 """Times the rounding of the preloads, at which R counts as nothing, if that is less than `AT_MOST` of x: forces that
@@ -72,17 +78,19 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
         slope: derivative of the forces somewhere near, to begin with.
     """
     R, fresh, history = at.residual(x), False, list[float]()
-    reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
+    reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
         error = float(np.abs(R).max(initial=0.0) / size)
         history.append(error)
         if not np.isfinite(error):
-            return Point(at.Omega, x, "not a number", error, count, history=tuple(history))
+            return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
         if error <= max(tolerance, min(ROUNDING * at.rounding / size, AT_MOST)):
             return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
         if slope is None:
             slope, fresh = at.forces(x)[1], True
+            if not all(np.isfinite(S).all() for S in slope):
+                return Point(at.Omega, x, at.undefined(x), error, count, history=tuple(history))
         step = at.jacobian(slope).solve(-R)
         trial, left = x + step, at.residual(x + step)
         if np.linalg.norm(left) <= CONTRACTION * np.linalg.norm(R):
@@ -108,14 +116,21 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
     """Newton's method from one start after the other, then from the sticking contact, then along the load.
 
     Where nothing but contacts holds a body, it comes from rest in slow time before it follows the load.
+
+    Raises:
+        UserError: a frequency that is not positive.
     """
-    began, at, spent = time.perf_counter(), problem.at(Omega), 0
+    bounded("frequency", Omega / (2 * np.pi), gt=0)
+    began, at, spent, status = time.perf_counter(), problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
     for way in _ways(problem, at, [*starts, at.reference], slope):
         point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
             break
+        status = status or (point.status if point.undefined else "")
+    else:
+        point = replace(point, status=status or point.status)
     return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
 
 
@@ -224,7 +239,13 @@ def sweep(
     Args:
         start: (k,) where the first point starts; the sticking contact if None. known: Hz -> point that was found
             before. keep: told of every other point as soon as it is found.
+
+    Raises:
+        UserError: no frequency, or one that is not positive.
     """
+    if not len(frequency):
+        raise UserError("frequency: a sweep needs one or more, Hz")
+    bounded("frequency", frequency, gt=0)
     done: list[Point] = []
     slope: Any = None
     known = known or {}
