@@ -412,8 +412,9 @@ def of(
             group of equal ones -> its force model, if it is not the marched law.
 
     Raises:
-        UserError: no harmonic or cycle, a length or a share that is none.
+        UserError: no harmonic or cycle, a length or a share that is none, a name that no member has.
     """
+    assembly.check_names()
     for name, value, bounds in (
         ("harmonics", harmonics, {"ge": 1}), ("cycles", cycles, {"ge": 1}), ("settled", settled, {"ge": 0}),
         ("length", length, {"gt": 0}),

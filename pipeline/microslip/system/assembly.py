@@ -342,9 +342,6 @@ class Assembly:
         members, contacts, loads, watches. ring: if the members are one sector that stands for N, or N sectors.
         stuck_damping: ratios of the modes with sticking contacts, one for all or one a mode from the lowest, the last
             one for all that follow; None: what the members bring. It couples them, so they are eliminated together.
-
-    Raises:
-        UserError: no member; a side, a load or a read-out of what is not there.
     """
 
     members: tuple[Member, ...]
@@ -354,10 +351,11 @@ class Assembly:
     ring: Ring | None = None
     stuck_damping: tuple[float, ...] | None = None
 
-    def __post_init__(self) -> None:
+    def check_names(self) -> None:
+        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no member."""
         if not self.members:
             raise UserError("an assembly needs a member")
-        has = {m.name: next(iter(m.groups.values()), None) for m in self.members}
+        has = {m.name: next(iter(m.groups.values())) for m in self.members}
         sides = [s for c in self.contacts for s in (c.first, c.second) if s]
         named = [("interface", s.member, s.interface, lambda g: g.interfaces) for s in sides if s.rows is None]
         named += [("load", x.member, x.row, lambda g: g.excitations) for x in self.loads]
@@ -365,8 +363,7 @@ class Assembly:
         for what, member, row, known in named:
             if member not in has:
                 raise UserError(f"{what} '{row}': there is no member '{member}'; the assembly has {', '.join(has)}")
-            group = has[member]
-            if group is not None and row not in (rows := known(group)):
+            if row not in (rows := known(has[member])):
                 raise UserError(f"{what} '{row}': '{member}' has none of this name, but {', '.join(rows) or 'none'}")
 
     def index(self, harmonic: int) -> int:
