@@ -356,6 +356,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "cycles": ("", "marched at most until the sliders are periodic"),
     "settled": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles are "
                 "marched"),
+    "memory_limit": ("GiB", "that the points of contact may take, by [an estimate](harmonic_balance.md#what-it-costs) "
+                     "before they begin; that of the machine if not given"),
     "bodies.name": ("", "in this case"),
     "bodies.body": ("", "whose modal file it is: `geometry/NAME`, a folder or a system.toml beside the case; the name "
                     "if not given"),

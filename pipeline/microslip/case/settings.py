@@ -209,7 +209,8 @@ class CaseSettings(Model):
     [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
     many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
     a cycle), cycles (marched at most until the sliders are periodic) and settled (within which share of the largest
-    force they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
+    force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
+    before they begin, the machine's if not given. mode: ``marched``, their laws in time, or ``book``
     (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
     touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
     Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
@@ -241,6 +242,7 @@ class CaseSettings(Model):
     samples: Annotated[int, Field(ge=8, le=100000)] = 48
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
     settled: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    memory_limit: Positive | None = None
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
     material_limits: MaterialLimits | None = None

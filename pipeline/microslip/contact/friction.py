@@ -310,13 +310,15 @@ def _parts(heights: Heights, u: float, v: np.ndarray, film: float) -> tuple[np.n
     """(v,) dry and fluid integral of (3.6-21) at the approach u, between the breaks of the heights."""
     breaks = np.unique(np.asarray(heights.breaks(), float))
     x, w = _panels(np.append(breaks[breaks < u], u))
-    share = (u - x) * _density(heights, x) * w
-    dry = np.sum(share / (1 + v[:, None] * (u - x)), axis=1)
+    at, size = heights.jumps()
+    x, weight = np.append(x, at[at < u]), np.append(_density(heights, x) * w, size[at < u])
+    dry = np.sum((u - x) * weight / (1 + v[:, None] * (u - x)), axis=1)
     x, w = _panels(np.clip(np.append(breaks[(breaks > u) & (breaks < u + film)], [u, u + film]), u, breaks[-1]))
     thin = np.sum(_density(heights, x) * w) / film
     wide = np.append(breaks[breaks > u + film], u + film)
     x, w = _panels(np.log(wide - u))  # of a constant density the integrand is constant over the logarithm
-    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w))
+    level = np.sum(size[at > u] / np.maximum(at[at > u] - u, film))
+    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w) + level)
 
 
 def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

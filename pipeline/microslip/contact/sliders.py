@@ -334,9 +334,10 @@ def rough_strips(
         raise UserError("height distribution: one table per point; make the strips of each point apart")
     if float(table.x[0]) < 0:
         raise UserError("height distribution: begins below x = 0, where the contact is open; take Cut(...) of it")
-    edges = jnp.asarray(_edges(np.asarray(table.x), np.asarray(table.area_at), count))
-    area = np.asarray(heights.area(edges))
-    within = np.diff(np.asarray(edges * heights.area(edges) - heights.volume(edges)))  # integral of x over the area
+    edges = _edges(np.asarray(table.x), np.asarray(table.area_at), count)
+    area = np.array(heights.area(jnp.asarray(edges)))
+    area[0] = 0.0  # level parts at the highest peak belong to the first strip
+    within = np.diff(edges * area - np.asarray(heights.volume(jnp.asarray(edges))))  # integral of x over the area
     return _strips(within / np.diff(area), np.diff(area), roughness, stiffness_0, stiffness_t, mu)
 
 

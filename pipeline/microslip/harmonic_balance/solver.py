@@ -247,7 +247,7 @@ def sweep(
         raise UserError("frequency: a sweep needs one or more, Hz")
     bounded("frequency", frequency, gt=0)
     done: list[Point] = []
-    slope: Any = None
+    slope, solved = None, 0
     known = known or {}
     for i, f in enumerate(frequency):
         if float(f) in known:
@@ -263,12 +263,29 @@ def sweep(
         slope = point.slope
         done.append(replace(point, slope=None))
         keep(done[-1])
+        solved += 1
+        if solved == 2 and (said := _long(point.seconds, sum(float(f) not in known for f in frequency[i + 1 :]))):
+            report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
             report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
     return done
+
+
+LONG = 600.0
+"""s that a sweep may take before it is told how long it will: from its second point, as the first one compiles."""
+
+
+def _long(each: float, left: int) -> str:
+    """What to say of so many points that take so many seconds each."""
+    if each * left <= LONG:
+        return ""
+    return (
+        f"warning: {left} frequencies are left and the last one took {each:.3g} s, so they take about "
+        f"{each * left / 60:.3g} minutes; fewer points, harmonics or samples of the contacts take less"
+    )
 
 
 def _walked(problem: Problem, known: Point, failed: Point) -> Point:
