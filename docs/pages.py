@@ -357,6 +357,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "cycles": ("", "marched at most until the sliders are periodic"),
     "settled": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles are "
                 "marched"),
+    "memory_limit": ("GiB", "that the points of contact may take, by [an estimate](harmonic_balance.md#what-it-costs) "
+                     "before they begin; that of the machine if not given"),
     "bodies.name": ("", "in this case"),
     "bodies.body": ("", "name of the body whose modal file it is, looked for as said above; the name if not given"),
     "bodies.file": ("", "a modal file beside the case instead"),

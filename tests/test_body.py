@@ -117,7 +117,18 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"interfaces__0__sector_shift": 2}, "interfaces.right.sector_shift: must be -1, 0 or 1 (it is 2)"),
     ({"interfaces__0__sector_shift": True}, "interfaces.right.sector_shift: must be a whole number, not true"),
     ({"excitations__0__face": "tip"}, "excitations.shaker: needs exactly one of point, node, face, and has point"),
-    ({"excitations__0__direction": ...}, "excitations.shaker: needs a direction that is not zero"),
+    ({"excitations__0__direction": ...}, "excitations.shaker: needs a direction"),
+    *[
+        ({key: [1e300, 0, 0]}, said)
+        for key, said in {
+            "excitations__0__direction": "excitations.shaker.direction: a direction",
+            "interfaces__0__t2": "interfaces.right.t2: a direction",
+            "rotation__axis": "rotation.axis: a direction",
+        }.items()
+    ],
+    ({"gauges__0__direction": [0, 0, 1e-300]}, "gauges.root.direction: a direction"),
+    ({"damping": {"ratio": 5.0}}, "damping.ratio: a damping ratio of 5"),
+    ({"damping": {"table": [0.01, 2.0]}}, "damping.table: a damping ratio of 2"),
     ({"excitations__1__direction": [1, 0, 0]}, "excitations.gas: pressure = true needs a face and no direction"),
     ({"monitors__0__point": [1, 2]}, "monitors.tip-probe.point: must have 3 entries and has 2"),
     ({"gauges__0__direction": [0, 0, 0]}, "gauges.root.direction: a direction must not be [0, 0, 0]"),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import copy
+import shutil
+import subprocess
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -15,7 +18,7 @@ from microslip import running, store
 from microslip.basis import write_basis
 from microslip.body import validate
 from microslip.case import CaseSettings, run_case
-from microslip.case.assemble import build
+from microslip.case.assemble import build, memory_of
 from microslip.case.curves import curves
 from microslip.case.keeping import files_of, of_points
 from microslip.cli import main
@@ -23,6 +26,8 @@ from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.data import UserError
+from microslip.harmonic_balance.accuracy import more
+from microslip.harmonic_balance.cost import marched_bytes
 
 PATH = Path("case.toml")
 HEIGHT, DEPTH = small.SIZE[2], small.SIZE[1]
@@ -299,6 +304,7 @@ friction = 0.3
         ("friction = 0.3", 'friction = 0.3\npatch = "nodal"\npoints = [2, 2]', "those of the mesh"),
         ("friction = 0.3", "friction = 0.3\ncurvature = [0.0, 1.0]", "curvature"),
         ("friction = 0.3", "friction = 0.3\nnormal_force = -1.0", "normal_force"),
+        ("friction = 0.3", "friction = 20.0", "friction"),
     ):
         case.write_text(text.replace(old, new))
         capsys.readouterr()
@@ -307,3 +313,82 @@ friction = 0.3
         assert words in said.err and "Traceback" not in said.err + said.out
         now = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file() and p != case}
         assert now == {p: b for p, b in before.items() if p != case}
+
+
+# memory ----------------------------------------------------------------------------------------------------------
+
+
+def sample_case(folder: Path, monkeypatch: pytest.MonkeyPatch, **keys: Any) -> list[str]:
+    """The vane that travels with the package, its contacts smooth; what to type after `respond`."""
+    import microslip
+
+    monkeypatch.chdir(folder)
+    for file in ("case.toml", "basis.h5"):
+        shutil.copy(Path(microslip.__file__).parent / "samples" / file, folder)
+    more = {"contacts.right.law": '"smooth"', "contacts.left.law": '"smooth"', "sweep.normal_forces": [20.0]}
+    more |= {"sweep.points": 2, "sweep.start": 300, "sweep.stop": 310} | keys
+    return ["case.toml", "basis.h5", *(f"--set={key}={value}" for key, value in more.items())]
+
+
+@pytest.mark.parametrize("keys", [{"contacts.right.points": [1000, 1000]}, {"harmonics": 200, "samples": 100000}])
+def test_what_does_not_fit_into_the_memory_is_refused(tmp_path, monkeypatch, capsys, keys) -> None:
+    """It ran for minutes at gigabytes. Half a TiB is what the larger machines have."""
+    many = {"contacts.right.points": [1000, 1000], "harmonics": 20, "samples": 400} if len(keys) == 1 else keys
+    words = sample_case(tmp_path, monkeypatch, **many)
+    with monkeypatch.context() as patched:
+        patched.setattr("microslip.harmonic_balance.cost.of_this_machine", lambda: 0.5 * 2.0**40)
+        assert main(["respond", *words]) == 2
+    said = capsys.readouterr().err
+    assert "contacts.right: points" in said and "memory_limit = " in said
+    assert not (tmp_path / "build").exists()
+
+
+def test_the_limit_of_the_memory_is_ones_own(tmp_path, monkeypatch, capsys) -> None:
+    words = sample_case(tmp_path, monkeypatch, harmonics=1, samples=8, memory_limit=0.4)
+    assert main(["respond", *words]) == 2 and "memory_limit is 0.4" in capsys.readouterr().err
+    settings = made(table(**STIFF, law="smooth", points=[6, 5]) | {"harmonics": 4})
+    assert 0.5 < memory_of(settings, 30, 6) / 2**30 < 0.6
+    monkeypatch.setattr("microslip.harmonic_balance.cost.of_this_machine", lambda: 0.5 * 2.0**30)
+    with pytest.raises(UserError, match="this machine has 0.5;"):
+        build(settings, {"small": small.basis()}, PATH)
+    build(settings.model_copy(update={"memory_limit": 3.0}), {"small": small.basis()}, PATH)
+
+
+PEAK = "import resource, sys; from microslip.cli import main; code = main(sys.argv[1:]); "
+PEAK += "print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "keys", [{"harmonics": 6, "samples": 96, "contacts.right.points": [60, 60]}, {"harmonics": 24, "samples": 500}]
+)
+def test_the_estimated_memory_is_that_of_a_response_within_a_factor_of_two(tmp_path, monkeypatch, keys) -> None:
+    """Peak of a process of its own: derivatives of many points, tangents of many harmonics and samples."""
+    words = sample_case(tmp_path, monkeypatch, cycles=4, **keys)
+    done = subprocess.run([sys.executable, "-c", PEAK, "respond", *words, "-q"], capture_output=True, text=True)
+    code, peak = done.stdout.split()[-2:]
+    assert code == "0", done.stderr
+    points = int(np.prod(keys.get("contacts.right.points", [24, 5])))
+    H, S = more(keys["harmonics"]), 2 * keys["samples"]
+    unit = 1 if sys.platform == "darwin" else 1024
+    assert 0.5 < marched_bytes(points, 6, H, S) / (unit * int(peak)) < 2
+
+
+def test_a_sweep_that_takes_long_is_told_from_its_second_point(monkeypatch) -> None:
+    """By the time of the second point, since the first one compiles; once."""
+    from microslip.harmonic_balance import solver
+
+    clock = {}
+
+    def slow(problem, Omega, starts, slope=None):
+        clock["n"] = clock.get("n", 0) + 1
+        return solver.Point(Omega, np.zeros(1), "converged", 0.0, 1, seconds=100.0 if clock["n"] == 1 else 7.0)
+
+    monkeypatch.setattr(solver, "solve", slow)
+    told: list[str] = []
+    solver.sweep(None, np.arange(1.0, 101.0), told.append)
+    assert sum("98 frequencies are left" in text for text in told) == 1
+    told.clear()
+    clock.clear()
+    solver.sweep(None, np.arange(1.0, 51.0), told.append)
+    assert not any("are left" in text for text in told)

@@ -214,6 +214,8 @@ def test_a_pressure_field_in_a_case(tmp_path) -> None:
     (GAS + "engine_order = 3", "engine_order = 2", "no multiple of the base order 2"),
     (GAS + "engine_order = 3\n" + GAS + "engine_order = -9", "", "the other way round"),
     ('[[excitations]]\nfield = "a.csv"\nface = "right"\nlength_unit = "m"', "", "no such file"),
+    (GAS + "amplitude = 0.0", "", "moves nothing"),
+    (GAS + "stimulus = 0\nsteady = 3\n" + GAS + "magnets = {angles = [0], force = 0, width = 9}", "", "moves nothing"),
 ])  # fmt: skip
 def test_mistakes_are_told_by_key(tmp_path, more: str, ring: str, words: str) -> None:
     with pytest.raises(UserError, match=words) as told:

@@ -332,6 +332,7 @@ MISTAKES = {
     "zero area": ("area = 360e6", "area = 0", "stiffness.area: must be greater than 0 (it is 0)"),
     "frequency 0": ("frequency = 140.0", "frequency = 0.0", "motion.frequency: must be greater than 0 (it is 0.0)"),
     "NaN": ("mu = 0.3", "mu = nan", "friction.mu: must be a finite number (it is nan)"),
+    "friction in percent": ("mu = 0.3", "mu = 30.0", "friction.mu: a friction coefficient of 30"),
     "slope 0": (
         "[motion]", '[element]\nkind = "with-mass"\nmass = 0.1\nslope = 0.0\n[motion]',
         "element.slope: must be greater than 0 (it is 0.0)",

@@ -174,7 +174,7 @@ def test_temperature_may_differ_from_point_to_point() -> None:
         ([0.1, 0.1], [0.3, 0.2], {}, "must be positive and rise"),
         ([0.1, 0.2, 0.3], [0.3, -0.2, -0.5], {}, "coefficient 2 is negative"),
         ([0.1, 0.2], [0.3, 0.2], {"temperature": 150.0}, "no value at 150 K; it needs more than 191.55 K"),
-        ([0.1, 0.2], [0.3, 0.2], {"temperature": np.nan}, "no value at nan K"),
+        ([0.1, 0.2], [0.3, 0.2], {"temperature": np.nan}, "temperature: must be a finite number"),
     ],
 )
 def test_bad_tables_are_told_in_a_sentence(speeds, values, shift, said) -> None:

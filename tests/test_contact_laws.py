@@ -1,5 +1,7 @@
 """What every contact law must satisfy, on random closed paths: `contact.EXAMPLES` decides which laws are tried."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,9 +12,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from microslip.contact import EXAMPLES
-from microslip.contact.friction import Scattered
+from microslip.contact.friction import Coulomb, Scattered
 from microslip.contact.law import Step, history, march
 from microslip.contact.periodic import cycles
+from microslip.errors import UserError
 
 SAMPLES = 256
 TRIES = hypothesis_settings(max_examples=12, deadline=None, derandomize=True)
@@ -241,3 +244,37 @@ def test_a_wrong_law_does_not_count_what_it_takes(wrong) -> None:
     u = path(1, wrong, samples=256, harmonics=2) * jnp.array([1.0, 0.3, 0.3])
     force, lost = COUNTED(wrong.law, u, 1e-5)
     assert np.abs(lost - work(np.asarray(force), np.asarray(u))[0]).max() > 0.05 * np.abs(lost).max()
+
+
+SIGNED = {"gap", "mean", "x", "area_at", "volume_at", "energy_at", "u", "stored_at", "slopes", "phases", "at"}
+"""Numbers of laws that may be negative, or are integrals that rounding leaves below zero."""
+
+
+def made_again(law):
+    """Every number of a law and of what it is made of: (its name, the law made again with what it becomes)."""
+    for f in dataclasses.fields(law):
+        value = getattr(law, f.name)
+        if dataclasses.is_dataclass(value):
+            yield from made_again(value)
+        elif value is not None and not f.metadata.get("static"):
+            yield f.name, lambda change, f=f, value=value: dataclasses.replace(law, **{f.name: change(value)})
+
+
+@LAWS
+def test_nonsense_is_refused_where_a_law_is_made(example) -> None:
+    """Not a number and infinite anywhere, negative where that means nothing; also in one of many points."""
+    found = dict(made_again(example.law))
+    assert found
+    for name, again in found.items():
+        again(lambda value: value)
+        for bad in (np.nan, np.inf, *([] if name in SIGNED else [-0.2])):
+            for change in (lambda value, bad=bad: bad, lambda value, bad=bad: jnp.append(value, bad)):
+                with pytest.raises(UserError, match=name):
+                    again(change)
+
+
+def test_derivatives_with_respect_to_a_law_have_any_sign() -> None:
+    """They have its form; so has a law that is made of traced numbers."""
+    slope = jax.grad(lambda law: -law.stiffness_1 * law.friction.mu)(EXAMPLES["rough point"].law)
+    assert slope.stiffness_1 < 0 and slope.friction.mu < 0
+    assert jax.jit(jax.grad(lambda mu: -Coulomb(mu).coefficient(jnp.ones(1), jnp.ones(1))[0]))(0.3) == -1

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from microslip.contact.curves import curve
+from microslip.contact.friction import lubricated
 from microslip.contact.heights import (
     Cut,
     Exponential,
@@ -25,6 +26,8 @@ from microslip.contact.heights import (
     tabulated,
 )
 from microslip.contact.normal import Greenwood, Hyperbolic, Penalty, Potential, Rough, measured
+from microslip.contact.sliders import rough_strips
+from microslip.contact.wear import course
 from microslip.errors import UserError
 
 TRIES = hypothesis_settings(max_examples=25, deadline=None, derandomize=True)
@@ -145,6 +148,39 @@ def test_a_distribution_with_tails_is_cut_when_told_to() -> None:
     assert np.abs(VOLUME(table, x) - VOLUME(Cut(Gaussian()), x)).max() < 1e-6
 
 
+LEVEL = tabulated([0, 0, 0.4, 0.4, 1, 1], [0, 0.2, 0.3, 0.6, 0.7, 1])
+"""Level parts at the highest peak, in between and at the deepest valley: x = 0, 0.4 and 1 stand twice."""
+
+
+def test_level_parts_are_jumps_and_integrated_exactly() -> None:
+    """Against the closed form piece by piece, and against jumps of a small width in its limit."""
+    x = np.array([-0.1, 0, 0.2, 0.3999, 0.4, 0.7, 0.9999, 1, 1.5])
+    np.testing.assert_allclose(AREA(LEVEL, x), [0, 0.2, 0.25, 0.299975, 0.6, 0.65, 0.69998333, 1, 1], atol=1e-8)
+    to_0, to_1 = 0.2 * 0.4 + 0.05 * 0.4, 0.6 * 0.6 + 0.05 * 0.6
+    exact = {0.2: 0.2 * 0.2 + 0.125 * 0.04, 0.4: to_0, 1.0: to_0 + to_1, 1.5: to_0 + to_1 + 0.5}
+    np.testing.assert_allclose(VOLUME(LEVEL, np.array([*exact])), [*exact.values()], rtol=1e-14)
+    nodes, area = np.asarray(LEVEL.x), np.asarray(LEVEL.area_at)
+    wide = tabulated(nodes + 1e-9 * np.array([0, 1, 0, 1, 0, 1]), area)
+    for f in (VOLUME, ENERGY):
+        np.testing.assert_allclose(f(LEVEL, x), f(wide, x), atol=1e-9)
+
+
+def test_level_parts_in_everything_that_heights_are_made_into() -> None:
+    """Strips, two surfaces, wear and a lubricated surface: the same as with jumps of a small width."""
+    nodes, area = np.asarray(LEVEL.x), np.asarray(LEVEL.area_at)
+    wide = tabulated(nodes + 1e-9 * np.array([0, 1, 0, 1, 0, 1]), area)
+    u = np.linspace(-0.2, 1.6, 37)
+    for made in (
+        lambda h: [AREA(combined(h, 3e-6, Linear(), 4e-6)[0], u[::3] + 0.013)],
+        lambda h: [rough_strips(1e8, 1e-5, h, 1e8, 0.3, 7).local(jnp.asarray(1e-5 * u))[0] / 1e3],
+        lambda h: course(h, 0.3, np.array([0.5, 2.0])).approach,
+        lambda h: lubricated(h, [0.3, 0.7], [0.0, 2.0], 0.1),
+    ):
+        for one, other in zip(made(LEVEL), made(wide), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-6)
+    assert float(rough_strips(1e8, 1e-5, LEVEL, 1e8, 0.3, 7).shares.sum()) == pytest.approx(1, rel=1e-12)
+
+
 @TRIES
 @given(seed=st.integers(0, 10**6))
 def test_one_table_per_point_is_each_table_alone(seed) -> None:
@@ -220,7 +256,7 @@ def test_different_shapes_combine_by_the_squares_of_their_depths() -> None:
 @pytest.mark.parametrize(
     ("x", "area", "sentence"),
     [
-        ([0, 1, 1], [0, 0.5, 1], r"x\[2\] = 1 does not lie above"),
+        ([0, 1, 0.5], [0, 0.5, 1], r"x\[2\] = 0.5 lies below"),
         ([0, 0.5, 1], [0, 0.6, 0.5], "falls from 0.6 to 0.5"),
         ([0, 0.5, 1], [0, np.nan, 1], r"area\[1\] is not a finite number"),
         ([0, 0.5, 1], [0.1, 0.5, 1], "must go from 0 to 1"),

@@ -542,6 +542,8 @@ def test_two_layers_in_series_are_one_layer_of_both_depths():
         ContactStiffness(1e9, (1e9, 1e9), "all")
     with pytest.raises(UserError, match="tangential: 0 N/m"):
         ContactStiffness(1e9, (0.0, 1e9), SURFACE)
+    with pytest.raises(UserError, match="tangential: nan N/m"):
+        ContactStiffness(1e9, (1e9, np.nan), SURFACE)
 
 
 def test_two_bodies_of_a_point_contact_are_in_series():

@@ -94,7 +94,7 @@ def test_the_trust_region_finds_what_newton_does_not():
     [
         (lambda x: x * x + 1, lambda x: 2 * x, "start"),  # no solution
         (lambda x: 1.0, lambda x: 0.0, "singular"),
-        (lambda x: np.nan, lambda x: 1.0, "singular"),
+        (lambda x: np.nan, lambda x: 1.0, "not a number"),
     ],
 )
 def test_failure_is_a_result_that_says_what_to_try(f, slope, word):

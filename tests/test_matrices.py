@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.linalg
+import scipy.optimize
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -396,6 +397,97 @@ def test_a_node_with_rotations_is_an_interface_of_its_own(tmp_path):
     np.testing.assert_allclose(g.interfaces["hub"].rotation, R, atol=1e-15)
     static = scipy.linalg.block_diag(R, R) @ np.linalg.inv(K) @ scipy.linalg.block_diag(R, R).T
     np.testing.assert_allclose(g.compliance.static, static, atol=1e-14)
+
+
+LINE_K = 1e6 * np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
+LINE_CASE = """
+name = "line"
+body = "line"
+excitation = "push"
+amplitude = 2.0
+monitor = "at"
+harmonics = 1
+samples = 512
+[[contacts]]
+interface = "rub"
+normal_stiffness = 1e6
+tangential_stiffness = 5e5
+friction = 0.3
+law = "LAW"
+[sweep]
+start = 90.0
+stop = 110.0
+points = 3
+normal_forces = [5.0]
+"""
+
+
+def line(folder: Path, each: int) -> None:
+    """Three masses of 1 kg in a line, spring by spring, as two .mtx files: `each` directions a node, one or three."""
+    for name, A in (("K", LINE_K), ("M", np.eye(3))):
+        scipy.io.mmwrite(folder / f"{name}.mtx", sp.csr_matrix(np.kron(A, np.eye(each))), precision=17)
+    (folder / "nodes.csv").write_text("node,x,y,z\n1,0,0,0\n2,0.1,0,0\n3,0.2,0,0\n")
+    (folder / "dofs.csv").write_text("node,direction\n1,1\n2,1\n3,1\n")
+    (folder / "body.toml").write_text(
+        'name = "line"\nlength_unit = "m"\n[geometry.matrices]\nstiffness = "K.mtx"\nmass = "M.mtx"\n'
+        'nodes = "nodes.csv"\ngrounded = true\nsets = { end = [3] }\n' + ('dofs = "dofs.csv"\n' if each == 1 else "")
+        + '[[interfaces]]\nname = "rub"\nface = "end"\nnormal = [0, 0, 1]\nt2 = [0, 1, 0]\n'
+        '[[excitations]]\nname = "push"\nnode = 1\ndirection = [1, 0, 0]\n[[monitors]]\nname = "at"\nnode = 3\n'
+        "[damping]\nratio = 0.01\n[modes]\ncount = 9\n"
+    )  # fmt: skip
+
+
+def rubbing_line(frequency: float, samples: int) -> complex:
+    """The motion of the last mass with one harmonic: dense matrices, a Jenkins element marched in steps of time."""
+    w, (values, X) = 2 * np.pi * frequency, np.linalg.eigh(LINE_K)
+    S = np.linalg.inv(LINE_K + 1j * w * X @ np.diag(0.02 * np.sqrt(values)) @ X.T - w**2 * np.eye(3))
+    turns, k, limit = np.exp(2j * np.pi * np.arange(samples) / samples), 5e5, 0.3 * 5.0
+
+    def friction(u: complex) -> complex:
+        path, force, out = (u * turns).real, 0.0, np.zeros(samples)
+        for _ in range(3):
+            for i in range(samples):
+                force = float(np.clip(force + k * (path[i] - path[i - 1]), -limit, limit))
+                out[i] = force
+        return 2 * np.mean(out / turns)
+
+    def left(x):
+        u = 1e-6 * complex(*x)
+        r = u - S[2, 0] * 2.0 + S[2, 2] * friction(u)
+        return 1e6 * np.array([r.real, r.imag])
+
+    stuck = S[2, 0] * 2.0 / (1 + S[2, 2] * k) * 1e6
+    return 1e-6 * complex(*scipy.optimize.root(left, [stuck.real, stuck.imag], tol=1e-10).x)
+
+
+@pytest.mark.parametrize(
+    ("each", "law"),
+    [(1, "jenkins"), *(pytest.param(*how, marks=pytest.mark.slow) for how in ((3, "jenkins"), (1, "smooth")))],
+)
+def test_masses_in_a_line_rub_at_a_single_node(tmp_path, capsys, monkeypatch, each, law):
+    """Two .mtx files, an interface on one node without rotations, a Jenkins element there; against dense matrices.
+
+    The march of this page is off by the second order of a step of 2 pi/2048, some 1e-5 of the friction.
+    """
+    pytest.importorskip("jax")
+    monkeypatch.chdir(tmp_path)
+    line(tmp_path, each)
+    (tmp_path / "case.toml").write_text(LINE_CASE.replace("LAW", law))
+    assert main(["modes", "body.toml"]) == 0
+    said = capsys.readouterr().err
+    assert "'rub'" in said and "phi_x phi_y phi_z" in said and ("u_y" in said) == (each == 1)
+    assert main(["check", "build/line/basis.h5"]) == 0
+    still = "u_n, u_t2, phi_n, phi_t1, phi_t2" if each == 1 else "along phi_n, phi_t1, phi_t2"
+    assert still in capsys.readouterr().out
+    basis = read_basis(tmp_path / "build/line/basis.h5")
+    rows = basis.groups[0, 0].interfaces["rub"].rows
+    assert basis.mass == pytest.approx(3.0) and rows.shape == (6, 3 * each) and not rows[3:].any()
+    assert main(["respond", "case.toml", "-q"]) == 0
+    table = np.genfromtxt(tmp_path / "build/line/response.csv", delimiter=",", names=True)
+    found = table["amplitude_m_FN_5_N"] * np.exp(1j * table["phase_rad_FN_5_N"])
+    exact = np.array([rubbing_line(f, 2048) for f in table["frequency_Hz"]])
+    assert (np.abs(exact) > 0.3 * 5.0 / 5e5).all()  # it slides
+    np.testing.assert_allclose(found, exact, rtol=1e-4 if law == "jenkins" else 1e-3)
 
 
 def beam_with_rotations(folder: Path, support: str) -> None:

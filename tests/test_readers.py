@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import random
 import re
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 from test_bdf import bulk
 from test_cdb import archive
 from test_fuzz import flipped, user_errors_only
+from test_mesh import TET
 
 from microslip.cli import main
 from microslip.data import Mesh, UserError
@@ -403,3 +405,52 @@ def test_changed_bytes_of_med_are_read_or_refused(tmp_path: Path) -> None:
         (tmp_path / f"{seed}.med").write_bytes(flipped(whole, random.Random(seed)))
         with user_errors_only():
             read_mesh(tmp_path / f"{seed}.med", "m")
+
+
+# files that were cut -------------------------------------------------------------------------------------------------
+
+
+def samples(folder: Path) -> dict[str, bytes]:
+    """Suffix -> a file with cells, sets and materials of each reader."""
+    mesh = tetrahedra()
+    lines = [*decks.mesh_lines(mesh, 1.0, ("z0",)), *decks.MATERIAL, decks.section()]
+    root = f"SPC1,7,123,{','.join(map(str, mesh.node_id[mesh.face_points('z0')]))}\n"
+    return {
+        ".msh": TET.encode(), ".inp": ("\n".join(lines) + "\n").encode(), ".unv": unv(mesh).encode(),
+        ".cdb": archive(mesh, ("z0",), scale=1.0).encode(), ".bdf": deck(bulk(mesh), STEEL + root).encode(),
+        ".med": med(folder / "whole.med").read_bytes(),
+    }  # fmt: skip
+
+
+def whole_by_itself(suffix: str, data: bytes) -> bool:
+    """Whether what is left is a whole file of its format: cells and sets one by one in lines, or data sets."""
+    if suffix == ".inp":
+        return data.endswith(b"\n")
+    return suffix == ".unv" and data.split().count(b"-1") % 2 == 0 and data.rstrip(b" \n").endswith(b"\n    -1")
+
+
+TEXTS = [".msh", ".inp", ".cdb", ".bdf", ".unv"]
+
+
+@pytest.mark.parametrize("suffix", [*TEXTS, pytest.param(".med", marks=pytest.mark.slow)])
+def test_a_file_that_was_cut_is_refused_or_doubted(tmp_path: Path, suffix: str) -> None:
+    """At thirty places: the same mesh, a refusal, or a warning that it may be cut."""
+    data = samples(tmp_path)[suffix]
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(data)
+    whole = read_mesh(path, "m", "m-kg-s")
+    assert not any("cut" in text for text in mesh_problems(whole)[1])
+    content = [repr(getattr(whole, f.name)) for f in dataclasses.fields(whole)]
+    told = []
+    for place in random.Random(suffix).sample(range(len(data)), 30):
+        path.write_bytes(data[:place])
+        if whole_by_itself(suffix, data[:place]):
+            continue
+        try:
+            mesh = read_mesh(path, "m", "m-kg-s")
+        except UserError:
+            told.append("refused")
+            continue
+        same = content == [repr(getattr(mesh, f.name)) for f in dataclasses.fields(mesh)]
+        assert same or any("cut" in text for text in mesh_problems(mesh)[1]), (place, data[:place][-80:])
+    assert told

@@ -16,7 +16,7 @@ import scipy.linalg
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
 from microslip.data import UserError
-from microslip.harmonic_balance import JenkinsContact, frequency_response, stuck_frequencies
+from microslip.harmonic_balance import JenkinsContact, frequency_response, refined_peaks, stuck_frequencies
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -327,3 +327,164 @@ def test_three_masses_of_the_page(tmp_path: Path) -> None:
         [sys.executable, "three.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == pages.filled("your_own_model.md", "three").strip("`\n")
+
+
+# nonsense given in Python --------------------------------------------------------------------------------------------
+
+LIMIT = np.array([0.3])
+
+
+def rubbed(g=None, law=None, **changed):
+    """The chain whose end rubs on the ground, under 2 N on its first mass."""
+    pytest.importorskip("jax")
+    from microslip.contact.patch import Patch
+    from microslip.contact.sliders import jenkins
+    from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+
+    g = g or chain().basis().groups[0, 0]
+    patch = Patch("rub", np.zeros((1, 2)), np.ones(1), law or jenkins(2e3, 0.3, 1.0))
+    parts = {
+        "members": (Member("m", {0: g}),),
+        "contacts": (touching("rub", patch, Side("m", "rub"), None, normal=1.0),),
+        "loads": (Load("m", "shaker", 2.0),),
+        "watches": (Watch("m", "end", "u_x"),),
+    }
+    if "amplitude" in changed:
+        changed = {"loads": (Load("m", "shaker", changed["amplitude"]),)}
+    for key in ("loads", "watches"):
+        if isinstance(name := changed.get(key), tuple) and isinstance(name[0], str):
+            changed[key] = (replace(parts[key][0], **dict([name])),)
+    return Assembly(**(parts | changed))
+
+
+def swept(assembly=None, frequency=(5.0,), **more):
+    from microslip.harmonic_balance import problem
+    from microslip.harmonic_balance.response import harmonic_response
+
+    return harmonic_response(problem.of(assembly or rubbed(), **more), np.array(frequency, dtype=float), LIMIT)
+
+
+def closed_form(frequency=(5.0,), interface="rub", slider=1, stiffness=0.0, tangential=1e3, limit=0.3):
+    g = chain().basis().groups[0, 0]
+    contact = JenkinsContact(interface, np.full(6, stiffness), slider, tangential, limit)
+    force, read = g.excitations["shaker"].rows[0], g.monitors["end"].rows[0]
+    return frequency_response(g, [contact], force, read, np.array(frequency, dtype=float))
+
+
+def one(mass=1.0, k=1.0, axis=None, normal=(0, 0, 1), direction=(1, 0, 0), inertia=None, at=(0, 0, 0), ratio=0.0):
+    springs = [Spring("ground", "a", (k, k, k))] + ([Spring("ground", "a", k, axis=axis)] if axis else [])
+    contacts, forces = [Contact("c", "a", normal)], [Force("f", "a", direction)]
+    return System("s", [Body("a", mass, at, inertia)], springs, contacts, forces, ratio=ratio).basis()
+
+
+def shaken(**changed):
+    return swept(rubbed(**changed))
+
+
+def twice_refined(frequency):
+    return refined_peaks(closed_form(frequency), closed_form)
+
+
+@pytest.mark.parametrize(
+    ("what", "given", "key"),
+    [
+        *[(made, {"frequency": f}, "frequency") for made in (closed_form, swept) for f in ([0.0], [-5.0], [5, np.nan])],
+        (swept, {"frequency": []}, "frequency"),
+        (swept, {"harmonics": 0}, "harmonics"),
+        (swept, {"harmonics": -1}, "harmonics"),
+        (swept, {"cycles": 0}, "cycles"),
+        (swept, {"settled": np.nan}, "settled"),
+        (swept, {"length": -1.0}, "length"),
+        (shaken, {"amplitude": np.nan}, "amplitude"),
+        (shaken, {"amplitude": complex(0, np.inf)}, "amplitude"),
+        (shaken, {"members": ()}, "member"),
+        (shaken, {"loads": ("member", "x")}, "x"),
+        (shaken, {"loads": ("row", "x")}, "x"),
+        (shaken, {"watches": ("member", "x")}, "x"),
+        (shaken, {"watches": ("monitor", "x")}, "x"),
+        (closed_form, {"stiffness": np.inf}, "stiffness"),
+        (closed_form, {"tangential": -1.0}, "tangential"),
+        (closed_form, {"limit": np.nan}, "limit"),
+        (closed_form, {"interface": "x"}, "x"),
+        (closed_form, {"slider": 4}, "slider"),
+        *[(one, {key: bad}, key) for key in ("mass", "ratio") for bad in (np.nan, np.inf, -1.0)],
+        (one, {"ratio": 5.0}, "ratio"),
+        (one, {"k": np.inf}, "link"),
+        (one, {"inertia": (np.nan, 1, 1)}, "inertia"),
+        (one, {"at": (np.nan, 0, 0)}, "at"),
+        *[
+            (one, {key: v}, key)
+            for key in ("axis", "normal", "direction")
+            for v in ((0, 0, 0), (0, np.nan, 1), (0, 1e300, 0), (1e-300, 0, 0))
+        ],
+    ],
+)
+def test_nonsense_given_in_python_is_one_sentence(what, given, key) -> None:
+    """It ended in a ZeroDivisionError, a LinAlgError, rows of zeros, or in an answer."""
+    with pytest.raises(UserError, match=key) as told:
+        what(**given)
+    assert "\n" not in str(told.value)
+
+
+def test_a_sweep_without_points_has_no_peaks() -> None:
+    assert twice_refined([]) == []
+
+
+def test_what_nothing_drives_stays_where_it_is() -> None:
+    """It ended without an answer, the residual's rounding being infinite against a motion of zero."""
+    found = shaken(amplitude=0.0)
+    assert found.converged.all() and np.abs(found.monitor).max() < 1e-15
+
+
+@pytest.mark.parametrize("by", [pytest.param("sweep", marks=pytest.mark.slow), "curve"])
+def test_a_law_without_a_value_is_named(by) -> None:
+    """Its force is not a number beyond 10 um of sliding, or its derivative is not: name of law and contact are told, by
+    a sweep and by a curve, instead of a step that is too long."""
+    pytest.importorskip("jax")
+    import jax.numpy as jnp
+
+    from microslip.contact.friction import Coulomb
+    from microslip.contact.law import settings
+    from microslip.contact.normal import Penalty
+    from microslip.contact.point import PointContact
+    from microslip.harmonic_balance import families, problem
+
+    @settings
+    class Broken(PointContact):
+        def step(self, u, v, dt, state):
+            force, after = super().step(u, v, dt, state)
+            return jnp.where(jnp.abs(u[:, 1:2]) < 1e-5, force, jnp.nan), after
+
+    @settings
+    class Rooted(PointContact):
+        def step(self, u, v, dt, state):
+            force, after = super().step(u, v, dt, state)
+            far = jnp.abs(u[:, 1:2]) - 1e-5
+            return force + 0 * jnp.where(far > 0, jnp.sqrt(jnp.minimum(far, 0.0)), 0.0), after
+
+    parts, few = (Penalty(1e5), Coulomb(0.3), 1e5), {"harmonics": 1, "samples": 8, "cycles": 2}
+    if by == "sweep":
+        found = swept(rubbed(law=Broken(*parts)), **few)
+        assert not found.converged.any() and "Broken" in found.status[0] and "'rub'" in found.status[0]
+    else:
+        status = families.over_load(problem.of(rubbed(law=Rooted(*parts)), **few), 5.0, 1e-3, 1.0).status
+        assert "Rooted" in status and "'rub'" in status
+
+
+def test_a_law_without_a_value_under_its_preload_is_named() -> None:
+    """LAPACK's own complaint went to the screen."""
+    pytest.importorskip("jax")
+    import jax.numpy as jnp
+
+    from microslip.contact.law import Law, settings
+
+    @settings
+    class Pressed(Law):
+        def init(self, n):
+            return jnp.zeros(n)
+
+        def step(self, u, v, dt, state):
+            return jnp.sqrt(-u * u - 1), state
+
+    with pytest.raises(UserError, match="Pressed"):
+        rubbed(law=Pressed())

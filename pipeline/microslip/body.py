@@ -65,9 +65,40 @@ def _nodal_diameters(value: Any) -> Any:
     return tuple(value)
 
 
-def _has_length(value: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(value):
-        raise ValueError("a direction must not be [0, 0, 0]")
+def has_length(value: tuple[float, ...]) -> tuple[float, ...]:
+    """A direction as it is, if the square of its length neither overflows nor vanishes.
+
+    Raises:
+        ValueError: it does.
+    """
+    largest = max(map(abs, value))
+    if not 1e-100 < largest < 1e100:
+        what = "must not be [0, 0, 0]" if largest == 0 else f"has entries of {largest:g}"
+        raise ValueError(f"a direction {what}; only its direction counts, so write numbers about 1")
+    return value
+
+
+def damping_ratio(value: float) -> float:
+    """A damping ratio as it is, if a vibration with it swings at all.
+
+    Raises:
+        ValueError: it does not.
+    """
+    if not 0 <= value < 1:
+        raise ValueError(f"a damping ratio of {value:g} must lie below 1 and not below 0; 0.01 is 1 % of the critical")
+    return value
+
+
+MOST_FRICTION = 5.0
+"""Rubber on a rough road reaches 2 to 4, metals in air stay below 2: what is larger is a percentage or an angle."""
+
+
+def _friction(value: float) -> float:
+    if value > MOST_FRICTION:
+        raise ValueError(
+            f"a friction coefficient of {value:g} must not be greater than {MOST_FRICTION:g}; 0.3 is usual of dry "
+            "metals, and a contact sticks if it is pressed harder"
+        )
     return value
 
 
@@ -75,11 +106,12 @@ NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_no
 Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
 Positive = Annotated[float, BeforeValidator(_float), Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_nan=False)]
-Ratio = Annotated[NotNegative, Field(lt=1)]
+Ratio = Annotated[NotNegative, AfterValidator(damping_ratio), Field(lt=1)]
+Coefficient = Annotated[NotNegative, AfterValidator(_friction), Field(le=MOST_FRICTION)]
 Length = Annotated[Number, _LENGTH]
 PositiveLength = Annotated[Positive, _LENGTH]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)]
-Direction = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), AfterValidator(_has_length)]
+Direction = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), AfterValidator(has_length)]
 Point = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
 Box = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
@@ -466,7 +498,7 @@ class Excitation(Model):
     point: Point | None = None
     node: NodeNumber | None = None
     face: FaceName | None = None
-    direction: Vector | None = None
+    direction: Direction | None = None
     pressure: bool = False
     centrifugal: bool = False
 
@@ -479,8 +511,8 @@ class Excitation(Model):
         only_one(self, "point", "node", "face")
         if self.pressure and (self.face is None or self.direction is not None):
             raise ValueError("pressure = true needs a face and no direction")
-        if not self.pressure and (self.direction is None or not any(self.direction)):
-            raise ValueError("needs a direction that is not zero (or pressure = true)")
+        if not self.pressure and self.direction is None:
+            raise ValueError("needs a direction (or pressure = true)")
         return self
 
 
@@ -519,7 +551,7 @@ class Damping(Model):
     """Modal damping: one ratio, a table of ratios per mode, or Rayleigh D = alpha M + beta K (Sextro Eq. (2.4-3))."""
 
     ratio: Ratio | None = None
-    table: Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)] | None = None
+    table: Ratios | None = None
     alpha: NotNegative | None = None
     beta: NotNegative | None = None
 

@@ -71,7 +71,7 @@ class Mesh:
             of the cells, or nothing.
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
         supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
-            that are not among them, in words.
+            that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
     """
 
     points: Array
@@ -86,6 +86,7 @@ class Mesh:
     inner: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     supports: Mapping[str, str] = field(default_factory=dict)
     not_held: tuple[str, ...] = ()
+    unended: str = ""
 
     @property
     def n_points(self) -> int:

@@ -1,4 +1,4 @@
-"""Mistakes in settings files, one sentence each in the words of the trade: file, key, what is wrong, what to do."""
+"""Mistakes in settings, one sentence each in the words of the trade: file, key, what is wrong, what to do."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from .data import UserError
@@ -44,6 +45,30 @@ def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
     except ValidationError as error:
         lines = _sentences(error.errors(include_url=False), raw, model)
         raise UserError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from error
+
+
+def bounded(
+    what: str, value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None
+) -> None:  # fmt: skip
+    """Check a number, or an array of them, that is given in Python and not in a file.
+
+    Args:
+        what: class and field, for the sentence. gt, ge, le: bounds, as pydantic calls them.
+
+    Raises:
+        UserError: one that is not finite or out of its bounds.
+    """
+    at = np.asarray(value, dtype=float)
+    for kind, bound, good in (
+        ("finite_number", None, np.isfinite(at)),
+        ("greater_than", gt, gt is None or at > gt),
+        ("greater_than_equal", ge, ge is None or at >= ge),
+        ("less_than_equal", le, le is None or at <= le),
+    ):
+        if not np.all(good):
+            wrong = at[~np.broadcast_to(good, at.shape)].ravel()[0]
+            words = _WORDS[kind].format(gt=bound, ge=bound, le=bound)
+            raise UserError(f"{what}: {words} (it is {wrong:g}); correct it")
 
 
 def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -> Iterator[str]:

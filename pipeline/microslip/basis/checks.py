@@ -11,6 +11,7 @@ import numpy as np
 
 from ..coordinates import compliance_row, held, in_modes
 from ..data import (
+    INTERFACE_ROWS,
     MOTIONS,
     Array,
     ContactState,
@@ -406,6 +407,10 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
     R = item.rotation
     frame = float(np.abs(R @ R.T - np.eye(3)).max() + abs(np.linalg.det(R) - 1))
     found: _Findings = [(f"interface {name}: frame is right-handed", frame, 1e-9, "")]
+    still = [label for label, row in zip(INTERFACE_ROWS, item.rows, strict=True) if not row.any()]
+    if still:
+        remark = f"nothing moves it along {', '.join(still)}"
+        found.append((f"interface {name}: rows of zeros", float(len(still)), np.inf, remark))
     top = max(_largest(item.rows[:3]), 1e-300)
     if item.shapes.shape[0]:
         mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()

@@ -18,7 +18,16 @@ from ..speed_range import basis_at
 from ..store import ordinary
 from .counting import Face, Springs, brought, counted_once
 from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
-from .patches import curved_springs, fitting_forces, follows_the_force, nodal_patch, patch_of, resolved, waves
+from .patches import (
+    curved_springs,
+    fitting_forces,
+    follows_the_force,
+    nodal_patch,
+    number_of_points,
+    patch_of,
+    resolved,
+    waves,
+)
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
@@ -307,6 +316,7 @@ def _contact(
 
     @lru_cache(maxsize=64)
     def at(load: float | None) -> tuple[Contact, list[str]]:
+        _told(path, c, lambda: _refuse_too_many(settings, c, load, found))
         k, words = (springs, "") if c.young is None else _told(path, c, lambda: curved_springs(c, load))
         if found is not None:
             patch = nodal_patch(c, k, law, found, whole)
@@ -316,6 +326,32 @@ def _contact(
         return touching(c.interface, patch, first, second, c.normal_force, c.interference or 0.0, compliance), more
 
     return at, said
+
+
+def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
+    """Bytes that a response with a patch of so many points and coordinates takes, the finer balance that tells its
+    error included; none in the book's mode, which has tables."""
+    from ..harmonic_balance.accuracy import more
+    from ..harmonic_balance.cost import marched_bytes
+
+    contacts = settings.ring.blades if settings.ring and settings.ring.model == "full" else 1
+    finer = more(settings.balanced), 2 * settings.samples
+    return 0.0 if settings.mode == "book" else marched_bytes(points, coordinates, *finer, contacts)
+
+
+def _refuse_too_many(settings: CaseSettings, c: ContactSettings, load: float | None, found: Nodal | None) -> None:
+    """Raise `UserError` for points, harmonics and samples that would not fit into the memory."""
+    from ..harmonic_balance.cost import GIB, of_this_machine
+
+    points, coordinates = (number_of_points(c, load), 6) if found is None else (len(found.points), found.count)
+    needed, given = memory_of(settings, points, coordinates) / GIB, settings.memory_limit
+    has = of_this_machine() / GIB if given is None else given
+    if needed > has:
+        raise UserError(
+            f"points: {points} with {settings.balanced} harmonics and {settings.samples} samples need about "
+            f"{needed:.3g} GiB, and {'this machine has' if given is None else 'memory_limit is'} {has:.3g}; take fewer "
+            f"of them, or write memory_limit = {np.ceil(needed):g} to try it all the same"
+        )
 
 
 def _of_force(at: At, normal: float) -> Contact:

@@ -106,6 +106,12 @@ class ExcitationOfCase(Model):
         return complex((self.amplitude if share is None else share) * np.exp(1j * np.radians(self.phase)))
 
     @property
+    def is_zero(self) -> bool:
+        """Whether it pushes with nothing."""
+        force = self.size if self.magnets is None else self.magnets.force
+        return self.speed_rpm in (None, 0.0) and not np.any(force)
+
+    @property
     def orders(self) -> tuple[int, ...]:
         """Engine orders that it names."""
         if self.magnets is not None:

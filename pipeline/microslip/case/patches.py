@@ -84,6 +84,12 @@ def _counts(c: ContactSettings, load: float | None) -> tuple[int, int]:
     return counts[0], counts[1]
 
 
+def number_of_points(c: ContactSettings, load: float | None) -> int:
+    """Of a patch that moves as a rigid body, before they are made; an outline may leave fewer."""
+    sizes = zip(_counts(c, load), (c.width, c.height), strict=True)
+    return int(np.prod([count if size else 1 for count, size in sizes]))
+
+
 def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tuple[Array, Array]:
     """Places and areas: a rectangle as the settings have it, or what the outline leaves of it."""
     from ..contact.patch import grid

@@ -19,7 +19,7 @@ from ..results import Journal
 from ..results.checks import cause
 from ..units import Quantity, counted, percent
 from . import edges
-from .assemble import Built, build, swept
+from .assemble import Built, build, memory_of, swept
 from .closed_form import Answer, in_closed_form
 from .edges import Rising
 from .keeping import series_name
@@ -197,6 +197,7 @@ def _by_laws(
     """With the laws of the contact room and as many harmonics as the case asks for."""
     responses: dict[float, FrequencyResponse] = {}
     resonances, stiff, remarks = {}, (np.zeros(0), np.zeros(0)), []
+    _say_what_it_takes(built, report)
     for normal in forces or (None,):
         problem = problem_of(built, normal)
         key = pressed_by(built, problem) if normal is None else normal
@@ -210,6 +211,17 @@ def _by_laws(
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, remarks
+
+
+def _say_what_it_takes(built: Built, report: Callable[[str], None]) -> None:
+    """The memory of the contacts' points, where it is more than a GiB."""
+    from ..harmonic_balance.cost import GIB
+
+    s, patches = built.settings, [c.patch for c in built.assembly.contacts]
+    needed = max((memory_of(s, len(p.points), p.count) for p in patches), default=0.0) / GIB
+    if needed > 1:
+        points = max(len(p.points) for p in patches)
+        report(f"up to {points} points, {s.balanced} harmonics, {s.samples} samples: about {needed:.3g} GiB of memory")
 
 
 def _stuck(assembly: Assembly) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..body import (
+    Coefficient,
     Model,
     Name,
     NotNegative,
@@ -137,7 +138,7 @@ class ContactSettings(Model):
     tangential_stiffness: Positive = 0.0
     width: Positive | None = None
     height: Positive | None = None
-    friction: NotNegative = 0.0
+    friction: Coefficient = 0.0
     slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
     law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
@@ -222,7 +223,8 @@ class CaseSettings(Model):
     [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
     many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
     a cycle), cycles (marched at most until the sliders are periodic) and settled (within which share of the largest
-    force they count as periodic, 0: never): of contacts with a law. mode: ``marched``, their laws in time, or ``book``
+    force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
+    before they begin, the machine's if not given. mode: ``marched``, their laws in time, or ``book``
     (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
     touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
     Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
@@ -254,6 +256,7 @@ class CaseSettings(Model):
     samples: Annotated[int, Field(ge=8, le=100000)] = 48
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
     settled: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    memory_limit: Positive | None = None
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
     material_limits: MaterialLimits | None = None
@@ -273,6 +276,9 @@ class CaseSettings(Model):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
         if said := self._whose():
             raise ValueError(said)
+        if all(x.is_zero for x in self.loads):
+            key = "excitations" if self.excitations else "amplitude"
+            raise ValueError(f"{key}: a force of 0 moves nothing; give its size in N (Pa of a pressure)")
         laws = {self.law_of(c) == "jenkins" for c in self.contacts}
         if len(laws) > 1:
             raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')

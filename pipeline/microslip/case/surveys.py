@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..body import Model, NotNegative, Positive, _finite_vector, _tuple
+from ..body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
 from ..data import Array, ModalBasis, UserError
 from ..results.names import apart
 from .keys import Orders, Positives
@@ -81,9 +81,9 @@ class RangesOfCase(Model):
     values are the ends of a range; give more where the smallest amplitude matters, which may lie between them.
     """
 
-    damping_ratio: NotNegatives = ()
+    damping_ratio: Ratios = ()
     load: NotNegatives = ()
-    friction: NotNegatives = ()
+    friction: Annotated[tuple[Coefficient, ...], BeforeValidator(_finite_vector)] = ()
     normal_force: NotNegatives = ()
 
     @model_validator(mode="after")

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from ..errors import UserError
+from ..mistakes import bounded
 from .heights import Heights
-from .law import Array, settings
+from .law import Array, number, settings
 
 
 class Friction:
@@ -45,7 +46,7 @@ class Friction:
 class Coulomb(Friction):
     """The same coefficient at every speed (Fig. 1.2-1 I)."""
 
-    mu: Array
+    mu: Array = number(ge=0)
     constant: ClassVar[bool] = True
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
@@ -56,8 +57,8 @@ class Coulomb(Friction):
 class StaticSliding(Friction):
     """One coefficient for sticking and a lower one for sliding (Coulomb and Amontons, Fig. 1.2-1 II)."""
 
-    static: Array
-    sliding: Array
+    static: Array = number(ge=0)
+    sliding: Array = number(ge=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return jnp.where(speed > 0, self.sliding, self.static)
@@ -70,8 +71,8 @@ class StaticSliding(Friction):
 class Falling(Friction):
     """mu_0 / (1 + p_v |v|) (Sextro Eq. (3.6-15)): heat softens the asperities. mu_0; p_v: s/m."""
 
-    mu_0: Array
-    p_v: Array
+    mu_0: Array = number(ge=0)
+    p_v: Array = number(ge=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return self.mu_0 / (1 + self.p_v * speed)
@@ -84,9 +85,9 @@ class Exponential(Friction):
     Rises if mu_inf is the larger. rate: lambda_e, s/m. `EXPONENTIAL_44` are the numbers of (4.4-9).
     """
 
-    mu_0: Array
-    mu_inf: Array
-    rate: Array
+    mu_0: Array = number(ge=0)
+    mu_inf: Array = number(ge=0)
+    rate: Array = number(ge=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return (self.mu_0 - self.mu_inf) * jnp.exp(-self.rate * speed) + self.mu_inf
@@ -111,10 +112,10 @@ class Heated(Friction):
         mu_0: cold. resistance: k_T, K m2/W. limit: dT_E, K, where nothing would be left. area: of a point, m2.
     """
 
-    mu_0: Array
-    resistance: Array
-    limit: Array
-    area: Array
+    mu_0: Array = number(ge=0)
+    resistance: Array = number(ge=0)
+    limit: Array = number(gt=0)
+    area: Array = number(gt=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         p_v = self.resistance * self.mu_0 * pressed / (self.area * self.limit)
@@ -140,13 +141,13 @@ class Measured(Friction):
         temperature, reference: K. c_1, c_2: -, K.
     """
 
-    speeds: Array
-    values: Array
-    slopes: Array
-    temperature: Array | float = 293.15
-    reference: Array | float = 293.15
-    c_1: Array | float = 8.86
-    c_2: Array | float = 101.6
+    speeds: Array = number(gt=0)
+    values: Array = number(ge=0)
+    slopes: Array = number()
+    temperature: Array | float = number(gt=0, default=293.15)
+    reference: Array | float = number(gt=0, default=293.15)
+    c_1: Array | float = number(ge=0, default=8.86)
+    c_2: Array | float = number(ge=0, default=101.6)
 
     def shift(self) -> Array:
         """a_T: factor on the speed."""
@@ -195,8 +196,10 @@ def characteristic(speeds: ArrayLike, values: ArrayLike, where: str = "the table
     slopes = PchipInterpolator(x, mu)(x, 1)
     slopes[[0, -1]] = 0.0  # constant outside
     speed, value, slope = (jnp.asarray(column)[:, None] for column in (v, mu, slopes))
+    for name, given in shift.items():
+        bounded(f"{where}: {name}", given)
     made = Measured(speed, value, slope, **shift)
-    if not (np.isfinite([*shift.values()]).all() and made.c_2 + made.temperature - made.reference > 0):
+    if not made.c_2 + made.temperature - made.reference > 0:
         raise UserError(
             f"{where}: the shift with the temperature has no value at {made.temperature:g} K; it needs more than "
             f"{made.reference - made.c_2:g} K (reference less c_2), where rubber is glass"
@@ -219,10 +222,10 @@ class Scattered(Friction):
     """
 
     mean: Friction
-    deviation: Array | Friction
-    memory: Array
-    phases: Array
-    quantiles: Array
+    deviation: Array | Friction = number(ge=0)
+    memory: Array = number(gt=0)
+    phases: Array = number()
+    quantiles: Array = number(ge=0, le=1)
 
     def noise(self, time: Array) -> Array:
         """xi at the times (any shape; the points last where phases differ)."""
@@ -307,13 +310,15 @@ def _parts(heights: Heights, u: float, v: np.ndarray, film: float) -> tuple[np.n
     """(v,) dry and fluid integral of (3.6-21) at the approach u, between the breaks of the heights."""
     breaks = np.unique(np.asarray(heights.breaks(), float))
     x, w = _panels(np.append(breaks[breaks < u], u))
-    share = (u - x) * _density(heights, x) * w
-    dry = np.sum(share / (1 + v[:, None] * (u - x)), axis=1)
+    at, size = heights.jumps()
+    x, weight = np.append(x, at[at < u]), np.append(_density(heights, x) * w, size[at < u])
+    dry = np.sum((u - x) * weight / (1 + v[:, None] * (u - x)), axis=1)
     x, w = _panels(np.clip(np.append(breaks[(breaks > u) & (breaks < u + film)], [u, u + film]), u, breaks[-1]))
     thin = np.sum(_density(heights, x) * w) / film
     wide = np.append(breaks[breaks > u + film], u + film)
     x, w = _panels(np.log(wide - u))  # of a constant density the integrand is constant over the logarithm
-    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w))
+    level = np.sum(size[at > u] / np.maximum(at[at > u] - u, film))
+    return dry, float(thin + np.sum(_density(heights, u + np.exp(x)) * w) + level)
 
 
 def _panels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

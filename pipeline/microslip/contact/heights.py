@@ -17,7 +17,7 @@ from jax.scipy.stats import norm as normal_distribution
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from .law import Array, settings, table
+from .law import Array, number, settings, table
 
 
 class Heights:
@@ -38,6 +38,10 @@ class Heights:
     def breaks(self) -> Array:
         """(m,) approaches between which `area` is smooth: before the first it is zero, after the last one it is 1."""
         return jnp.array([0.0, 1.0])
+
+    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
+        """(j,) approaches at which `area` jumps, and by how much: level parts of the surface."""
+        return np.zeros(0), np.zeros(0)
 
 
 @settings
@@ -73,6 +77,9 @@ class Smooth(Heights):
     def breaks(self) -> Array:
         return jnp.zeros(1)
 
+    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.ones(1)
+
 
 @settings
 class Linear(Heights):
@@ -97,7 +104,7 @@ class Exponential(Heights):
     law that separates takes `Cut(Exponential(rate))`.
     """
 
-    rate: Array | float = 4.0
+    rate: Array | float = number(gt=0, default=4.0)
 
     def area(self, x: Array) -> Array:
         return jnp.exp(self.rate * (jnp.minimum(x, 1.0) - 1))
@@ -120,8 +127,8 @@ class Gaussian(Heights):
     It has no highest peak, so the contact never opens; a law that separates takes `Cut(Gaussian(mean, deviation))`.
     """
 
-    mean: Array | float = 0.5
-    deviation: Array | float = 20**-0.5
+    mean: Array | float = number(default=0.5)
+    deviation: Array | float = number(gt=0, default=20**-0.5)
 
     def area(self, x: Array) -> Array:
         return normal_distribution.cdf(self._s(x))
@@ -183,11 +190,13 @@ class Cut(Heights):
 
 @settings
 class Tabulated(Heights):
-    """A table of the area, linear between its nodes: the force is quadratic, C1 and exact, the energy cubic.
+    """A table of the area, linear between its nodes: the force is quadratic and exact, the energy cubic.
+
+    The force is C1 where the area does not jump.
 
     Attributes:
-        x: (k,) approaches x*, or (n, k) one table per point. area_at: the area there, from 0 to 1. volume_at,
-            energy_at: its integrals. `tabulated` makes all of them from the first two.
+        x: (k,) approaches x*, or (n, k) one table per point; where one stands twice the area jumps. area_at: the area
+            there, from 0 to 1. volume_at, energy_at: its integrals. `tabulated` makes all of them from the first two.
     """
 
     x: Array = table()
@@ -211,6 +220,11 @@ class Tabulated(Heights):
     def breaks(self) -> Array:
         return self.x
 
+    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
+        x, rises = np.asarray(self.x), np.diff(np.asarray(self.area_at))
+        twice = np.diff(x) == 0
+        return x[1:][twice], rises[twice]
+
     def _cell(self, x: Array) -> tuple[Array, Array, Array, Array]:
         """Values at the beginning of the cell of x* (3, ...), slope of the area, way inside it and beyond the table."""
         columns = jnp.stack([self.area_at, self.volume_at, self.energy_at, self.x], axis=-2)
@@ -222,8 +236,8 @@ class Tabulated(Heights):
 def _looked_up(columns: Array, x: Array) -> tuple[Array, Array, Array, Array]:
     """`Tabulated._cell` of one table (4, k)."""
     nodes = columns[3]
-    j = jnp.clip(jnp.searchsorted(nodes, x, side="right") - 1, 0, len(nodes) - 2)
-    start, end = columns[:, j], columns[:, j + 1]
+    j = jnp.clip(jnp.searchsorted(nodes, x, side="right") - 1, 0, len(nodes) - 1)
+    start, end = columns[:, j], columns[:, jnp.minimum(j + 1, len(nodes) - 1)]
     width = end[3] - start[3]
     slope = jnp.where(width > 0, (end[0] - start[0]) / jnp.where(width > 0, width, 1.0), 0.0)
     return start[:3], slope, jnp.clip(x - start[3], 0.0, width), jnp.maximum(x - nodes[-1], 0.0)
@@ -233,12 +247,12 @@ def tabulated(x: ArrayLike, area: ArrayLike, name: str = "height distribution") 
     """A table of the cumulative height distribution, checked.
 
     Args:
-        x: (k,) approaches x* = depth below the highest peak / R_Z, rising. area: (k,) share of the area that lies
-            higher, from 0 to 1. name: of the table in messages.
+        x: (k,) approaches x* = depth below the highest peak / R_Z, rising; one that stands twice is a jump, of a level
+            part. area: (k,) share of the area that lies higher, from 0 to 1. name: of the table in messages.
 
     Raises:
-        UserError: fewer than two nodes, numbers that are not finite, x that does not rise, an area that falls or does
-            not go from 0 to 1.
+        UserError: fewer than two nodes, numbers that are not finite, x that falls, an area that falls or does not go
+            from 0 to 1.
     """
     x, area = np.asarray(x, float), np.asarray(area, float)
     if x.ndim != 1 or x.shape != area.shape or len(x) < 2:
@@ -246,12 +260,9 @@ def tabulated(x: ArrayLike, area: ArrayLike, name: str = "height distribution") 
     for what, values in (("x", x), ("area", area)):
         if not np.all(np.isfinite(values)):
             raise UserError(f"{name}: {what}[{np.argmin(np.isfinite(values))}] is not a finite number; leave it out")
-    if np.any(np.diff(x) <= 0):
-        i = int(np.argmax(np.diff(x) <= 0))
-        raise UserError(
-            f"{name}: x[{i + 1}] = {x[i + 1]:g} does not lie above x[{i}] = {x[i]:g}; "
-            "sort the nodes, and give a jump of the area a width"
-        )
+    if np.any(np.diff(x) < 0):
+        i = int(np.argmax(np.diff(x) < 0))
+        raise UserError(f"{name}: x[{i + 1}] = {x[i + 1]:g} lies below x[{i}] = {x[i]:g}; sort the nodes")
     if np.any(np.diff(area) < 0):
         i = int(np.argmax(np.diff(area) < 0))
         raise UserError(
@@ -334,7 +345,5 @@ def combined(
     depths = [np.interp(area, np.asarray(t.area_at), np.asarray(t.x)) for t in tables]
     total = float(np.hypot(roughness_1, roughness_2))
     x = np.hypot(roughness_1 * depths[0], roughness_2 * depths[1]) / total
-    rises = np.concatenate([[True], np.diff(x) > 0])
-    x, area = x[rises], area[rises]
     area[-1] = 1.0
     return tabulated(x, area, "combined height distribution"), total

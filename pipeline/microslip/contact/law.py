@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import tempfile
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+from ..mistakes import bounded
 
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
 
@@ -57,16 +61,54 @@ def static(**options: Any) -> Any:
     return field(metadata={"static": True}, **options)
 
 
-def table(**options: Any) -> Any:
-    """A field that holds a table: (k,) the same for all points, or (n, k) with one for each, however long k is."""
-    return field(metadata={"table": True}, **options)
+def number(gt: float | None = None, ge: float | None = None, le: float | None = None, **options: Any) -> Any:
+    """A field of numbers that are finite and within bounds wherever a person gives them (`mistakes.bounded`)."""
+    return field(metadata={"bounds": (gt, ge, le)}, **options)
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(static, table))
+def table(gt: float | None = None, ge: float | None = None, le: float | None = None, **options: Any) -> Any:
+    """A `number` that holds a table: (k,) the same for all points, or (n, k) with one for each, however long k is."""
+    return field(metadata={"table": True, "bounds": (gt, ge, le)}, **options)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(static, number, table))
 def settings(cls: type[T]) -> type[T]:
-    """Class decorator: a frozen dataclass that is a jax pytree. Its numbers are leaves; see `static` for the rest."""
-    frozen = dataclass(frozen=True)(cls)
-    return jax.tree_util.register_dataclass(frozen)
+    """Class decorator: a frozen dataclass that is a jax pytree. Its numbers are leaves; see `static` for the rest.
+
+    What a person makes is checked against the bounds of its fields, what jax makes of leaves is not: a derivative with
+    respect to a law has its form, and any sign.
+    """
+    if not hasattr(cls, "__post_init__"):
+        cls.__post_init__ = _check_bounds  # type: ignore[attr-defined]
+    frozen: Any = dataclass(frozen=True)(cls)
+    leaves, words = ([f.name for f in fields(frozen) if f.metadata.get("static", False) is s] for s in (False, True))
+    keys = [jax.tree_util.GetAttrKey(name) for name in leaves]
+
+    def apart(made: Any) -> tuple[list[Any], tuple[Any, ...]]:
+        return [getattr(made, name) for name in leaves], tuple(getattr(made, name) for name in words)
+
+    def keyed(made: Any) -> tuple[list[Any], tuple[Any, ...]]:
+        values, rest = apart(made)
+        return list(zip(keys, values, strict=True)), rest
+
+    def together(rest: tuple[Any, ...], values: Iterable[Any]) -> Any:
+        made = object.__new__(frozen)
+        made.__dict__.update(zip(leaves + words, (*values, *rest), strict=True))
+        return made
+
+    jax.tree_util.register_pytree_with_keys(frozen, keyed, together, apart)
+    return frozen
+
+
+def _check_bounds(made: Any) -> None:
+    """Raise `UserError` for the first number out of its bounds; what is traced has no value yet."""
+    for f in fields(made):
+        value = getattr(made, f.name)
+        if "bounds" in f.metadata and isinstance(value, _KNOWN) and not isinstance(value, jax.core.Tracer):
+            bounded(f"{type(made).__name__}.{f.name}", value, *f.metadata["bounds"])
+
+
+_KNOWN = (int, float, np.number, np.ndarray, jax.Array)
 
 
 def point_axes(law: Any, n: int) -> list[int | None]:

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import UserError
 from .curves import NormalCurve
 from .heights import Heights
-from .law import Array, settings, table
+from .law import Array, number, settings, table
 
 
 class Normal:
@@ -35,8 +35,8 @@ class Normal:
 class Penalty(Normal):
     """A spring that cannot pull (Sextro Eq. (3.3-33)). stiffness_0: N/m. gap: m, at u = 0."""
 
-    stiffness_0: Array
-    gap: Array | float = 0.0
+    stiffness_0: Array = number(ge=0)
+    gap: Array | float = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.stiffness_0 * jnp.maximum(u - self.gap, 0.0)
@@ -55,7 +55,7 @@ class Penalty(Normal):
 class Preload(Normal):
     """A constant normal force, N, that no motion changes: the book's mode of chapter 5. The contact never opens."""
 
-    constant: Array
+    constant: Array = number(ge=0)
 
     def force(self, u: Array) -> Array:
         return jnp.broadcast_to(self.constant, u.shape)
@@ -78,8 +78,8 @@ class Rough(Normal):
         stiffness_0: c_N0 of the full area, N/m. roughness: R_Z, m. heights: the cumulative height distribution.
     """
 
-    stiffness_0: Array
-    roughness: Array
+    stiffness_0: Array = number(ge=0)
+    roughness: Array = number(gt=0)
     heights: Heights
 
     def force(self, u: Array) -> Array:
@@ -100,7 +100,7 @@ class Gapped(Normal):
     """Another law that begins to touch later. gap: m, at u = 0; of a curved face one for each point."""
 
     normal: Normal
-    gap: Array
+    gap: Array = number()
 
     def force(self, u: Array) -> Array:
         return self.normal.force(u - self.gap)
@@ -132,11 +132,11 @@ class Hyperbolic(Normal):
             height distribution. length: l_0 of the undeformed layer, m. shortest: length l* that the law is used to.
     """
 
-    stiffness_0: Array
-    roughness: Array
+    stiffness_0: Array = number(ge=0)
+    roughness: Array = number(gt=0)
     heights: Heights
-    length: Array
-    shortest: Array | float = 0.1
+    length: Array = number(gt=0)
+    shortest: Array | float = number(gt=0, le=1, default=0.1)
 
     def force(self, u: Array) -> Array:
         inside, beyond = self._parts(u)
@@ -187,10 +187,10 @@ class Potential(Normal):
         force_s: F_NS, N. depth: u_NS, m. exponent: k, above 1 (1 is `Penalty`). gap: u_N0, m.
     """
 
-    force_s: Array
-    depth: Array
-    exponent: Array
-    gap: Array | float = 0.0
+    force_s: Array = number(ge=0)
+    depth: Array = number(gt=0)
+    exponent: Array = number(ge=1)
+    gap: Array | float = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.force_s * self._power(u, self.exponent)
@@ -219,9 +219,9 @@ class Greenwood(Normal):
         force_s: F_NS, N. deviation: sigma_S, m. offset: u_N0, m.
     """
 
-    force_s: Array
-    deviation: Array
-    offset: Array | float = 0.0
+    force_s: Array = number(ge=0)
+    deviation: Array = number(gt=0)
+    offset: Array | float = number(default=0.0)
 
     def force(self, u: Array) -> Array:
         return self.force_s * self.share(u)
@@ -248,10 +248,10 @@ class Measured(Normal):
     """
 
     u: Array = table()
-    force_at: Array = table()
-    slope_at: Array = table()
+    force_at: Array = table(ge=0)
+    slope_at: Array = table(ge=0)
     stored_at: Array = table()
-    nominal: Array
+    nominal: Array = number(gt=0)
 
     def force(self, u: Array) -> Array:
         j, h, s, beyond = self._cell(u)

@@ -76,7 +76,7 @@ def equilibrium(
             e = -C f in all coordinates beyond the first six; None: it keeps its shape.
 
     Raises:
-        UserError: a normal force that is negative, or that the law reaches at no approach.
+        UserError: a normal force that is negative, or that the law reaches at no approach; a law without a value.
         NotConverged: moments that tilt the patch off the neighbour.
     """
     if normal < 0:
@@ -198,8 +198,20 @@ def _deep_enough(patch: Patch, normal: float) -> float:
 def _pressed(patch: Patch, u: Array) -> tuple[Array, Array]:
     """(k,) forces of the normal pressure at (k,) coordinates, and (k, k) their derivative."""
     G = patch.kinematics[:, 0]
-    force, slope = _normal(patch.law, jnp.asarray(G @ u))
-    return G.T @ np.asarray(force), G.T @ (np.asarray(slope)[:, None] * G)
+    force, slope = (_known(patch, part) for part in _normal(patch.law, jnp.asarray(G @ u)))
+    return G.T @ force, G.T @ (slope[:, None] * G)
+
+
+def _known(patch: Patch, values: jax.Array) -> Array:
+    """Forces or derivatives by the law of a patch.
+
+    Raises:
+        UserError: the law has none.
+    """
+    if np.isnan(found := np.asarray(values)).any():
+        law = type(patch.law).__name__
+        raise UserError(f"{patch.interface}: its law, {law}, pressed by itself gives what is not a number; correct it")
+    return found
 
 
 @jax.jit
@@ -212,9 +224,13 @@ def _normal(law: Law, approach: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 
 def stuck_stiffness(patch: Patch, u: Array) -> Array:
-    """(k, k) tangent of the patch about (k,) coordinates, every point sticking (Sextro Eq. (5.2-32), linear)."""
+    """(k, k) tangent of the patch about (k,) coordinates, every point sticking (Sextro Eq. (5.2-32), linear).
+
+    Raises:
+        UserError: a law without one.
+    """
     G = patch.kinematics
-    return np.einsum("nia,nij,njb->ab", G, np.asarray(_tangent(patch.law, jnp.asarray(G @ u))), G)
+    return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, jnp.asarray(G @ u))), G)
 
 
 @jax.jit

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from ..compliance import BULK_AND_SURFACE
 from .friction import Friction
-from .law import Array, Law, Step, norm, ratio, root, settings, static
+from .law import Array, Law, Step, norm, number, ratio, root, settings, static
 from .normal import Normal
 
 
@@ -52,9 +52,9 @@ class PointContact(Law):
 
     normal: Normal
     friction: Friction
-    stiffness_1: Array
-    stiffness_2: Array | None = None
-    damping: Array | None = None
+    stiffness_1: Array = number(ge=0)
+    stiffness_2: Array | None = number(ge=0, default=None)
+    damping: Array | None = number(ge=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
 
     def init(self, n: int) -> PointState:

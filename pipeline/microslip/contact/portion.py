@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .law import Array, Law, State, Step, settings
+from .law import Array, Law, State, Step, number, settings
 
 
 @settings
@@ -17,7 +17,7 @@ class Portion(Law):
     """
 
     whole: Law
-    share: Array
+    share: Array = number(gt=0)
 
     def init(self, n: int) -> State:
         return self.whole.init(n)

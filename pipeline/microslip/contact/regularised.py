@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
 from .friction import Friction, creep
-from .law import Array, Law, Step, norm, ratio, settings, static
+from .law import Array, Law, Step, norm, number, ratio, settings, static
 from .normal import Normal
 from .point import met, touching
 
@@ -57,11 +57,11 @@ class MassContact(Law):
 
     normal: Normal
     friction: Friction
-    stiffness_1: Array
-    stiffness_2: Array | None
-    mass: Array
-    damping: Array
-    slope: Array
+    stiffness_1: Array = number(ge=0)
+    stiffness_2: Array | None = number(ge=0)
+    mass: Array = number(gt=0)
+    damping: Array = number(ge=0)
+    slope: Array = number(gt=0)
     printed: bool = static(default=False)
     includes: str = static(default=BULK_AND_SURFACE)
 

@@ -40,7 +40,7 @@ class ContactStiffness:
     def __post_init__(self) -> None:
         if self.includes not in INCLUDES:
             raise UserError(f"includes: '{self.includes}' is unknown; choose one of {', '.join(INCLUDES)}")
-        for name, value in (("normal", self.normal), ("tangential", min(self.tangential))):
+        for name, value in (("normal", self.normal), *(("tangential", t) for t in self.tangential)):
             if not value > 0:
                 raise UserError(f"{name}: {value:g} N/m ({self.source}) is no stiffness; it must be greater than 0")
 

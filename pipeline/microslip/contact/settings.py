@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from ..body import (
+    Coefficient,
     Model,
     Name,
     NotNegative,
@@ -198,22 +199,22 @@ class CoulombFriction(Random):
     """The same coefficient at every speed."""
 
     kind: Literal["coulomb"]
-    mu: NotNegative
+    mu: Coefficient
 
 
 class StaticSlidingFriction(Random):
     """One coefficient for sticking, a lower one for sliding."""
 
     kind: Literal["static-sliding"]
-    static: NotNegative
-    sliding: NotNegative
+    static: Coefficient
+    sliding: Coefficient
 
 
 class FallingFriction(Random):
     """mu_0/(1 + p_v v) (3.6-15)."""
 
     kind: Literal["falling"]
-    mu_0: NotNegative
+    mu_0: Coefficient
     p_v: NotNegative
 
 
@@ -221,8 +222,8 @@ class ExponentialFriction(Random):
     """(mu_0 - mu_inf) exp(-rate v) + mu_inf (4.1-22)."""
 
     kind: Literal["exponential"]
-    mu_0: NotNegative
-    mu_inf: NotNegative
+    mu_0: Coefficient
+    mu_inf: Coefficient
     rate: NotNegative
 
 
@@ -230,7 +231,7 @@ class HeatedFriction(Random):
     """Linear loss with the temperature that sliding makes (3.6-3, 3.6-5); needs [temperature] and an area."""
 
     kind: Literal["heated"]
-    mu_0: NotNegative
+    mu_0: Coefficient
 
 
 class TableFriction(Random):
@@ -249,7 +250,7 @@ class LubricatedFriction(Random):
     """Dry and fluid part of a lubricated rough surface (3.6-21): drawn; laws take the dry part (heated)."""
 
     kind: Literal["lubricated"]
-    mu_0: Positive
+    mu_0: Annotated[Coefficient, Field(gt=0)]
     viscosity: NotNegative
     film: Annotated[Number, Field(gt=0, lt=1)] = 0.01
 
@@ -349,7 +350,7 @@ class Temperature(Model):
 class Microslip(Model):
     """First loading with shear strength and heating (3.8): tangential force over displacement."""
 
-    mu: Positive | None = None
+    mu: Annotated[Coefficient, Field(gt=0)] | None = None
     speed: NotNegative = 0.0
     yield_shear: Positive | None = None
     approaches: PositiveLengths = ()
@@ -369,7 +370,7 @@ class Wear(Model):
     normal_force: Positive
     speed: Positive
     time: Positive
-    mu: Positive | None = None
+    mu: Annotated[Coefficient, Field(gt=0)] | None = None
     coefficient: Positive | None = None
     archard: Positive | None = None
     hardness: Positive | None = None

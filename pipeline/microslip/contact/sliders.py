@@ -18,7 +18,7 @@ from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
 from .friction import Coulomb
 from .heights import Heights, as_table
-from .law import Array, Law, Step, norm, ratio, settings, static
+from .law import Array, Law, Step, norm, number, ratio, settings, static
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, dragged, let_go, met, slide, touching, weight
@@ -149,14 +149,14 @@ class Strips(Sliders):
             stiffnesses count, one of `series.INCLUDES`.
     """
 
-    at: Array
-    shares: Array
-    depth: Array
-    stiffness_0: Array
-    stiffness_t: Array
-    mu: Array
-    held: Array | None = None
-    stiffness_ratio: Array | None = None
+    at: Array = number()
+    shares: Array = number(ge=0)
+    depth: Array = number(gt=0)
+    stiffness_0: Array = number(ge=0)
+    stiffness_t: Array = number(ge=0)
+    mu: Array = number(ge=0)
+    held: Array | None = number(default=None)
+    stiffness_ratio: Array | None = number(gt=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:
@@ -220,11 +220,11 @@ class Iwan(Sliders):
     """
 
     normal: Normal
-    mu: Array
-    stiffness: Array
-    shares: Array
-    strengths: Array
-    stiffness_ratio: Array | None = None
+    mu: Array = number(ge=0)
+    stiffness: Array = number(ge=0)
+    shares: Array = number(ge=0)
+    strengths: Array = number(ge=0)
+    stiffness_ratio: Array | None = number(gt=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
 
     def count(self) -> int:
@@ -347,9 +347,10 @@ def rough_strips(
         raise UserError("height distribution: one table per point; make the strips of each point apart")
     if float(table.x[0]) < 0:
         raise UserError("height distribution: begins below x = 0, where the contact is open; take Cut(...) of it")
-    edges = jnp.asarray(_edges(np.asarray(table.x), np.asarray(table.area_at), count))
-    area = np.asarray(heights.area(edges))
-    within = np.diff(np.asarray(edges * heights.area(edges) - heights.volume(edges)))  # integral of x over the area
+    edges = _edges(np.asarray(table.x), np.asarray(table.area_at), count)
+    area = np.array(heights.area(jnp.asarray(edges)))
+    area[0] = 0.0  # level parts at the highest peak belong to the first strip
+    within = np.diff(edges * area - np.asarray(heights.volume(jnp.asarray(edges))))  # integral of x over the area
     return _strips(within / np.diff(area), np.diff(area), roughness, stiffness_0, stiffness_t, mu)
 
 

@@ -189,16 +189,22 @@ def evolve(
         After every step, the first row new.
 
     Raises:
-        UserError: a force or time that is not positive. NotConverged: the step falls below 1e-12 of the time.
+        UserError: a force, a time or a step that is not positive, a fixed step beyond the bound. NotConverged: the
+            step falls below 1e-12 of the time.
     """
     if not force > 0 or not time > 0:
         raise UserError(f"wear: a normal force of {force:g} and a time of {time:g}; both must be positive")
+    if step is not None and not step > 0:
+        raise UserError(f"wear: a step of {step:g}; it must be positive")
     table = as_table(heights, count)
     x, share = np.array(table.x), np.asarray(table.area_at)
     rate = rate or (lambda p: p)
     times, depths, h = [0.0], [x], time if step is None else step
     while times[-1] < time * (1 - 1e-12):
-        h = min(h, time - times[-1], np.inf if step else 1 / max(_steepest(x, share, force, rate), 1e-300))
+        bound = 1 / max(_steepest(x, share, force, rate), 1e-300)
+        h = min(h, time - times[-1], np.inf if step else bound)
+        if h > bound * (1 + 1e-9):
+            raise UserError(f"wear: a step of {h:g} puts strips out of order; take one of at most {bound:.3g}, or none")
         first = stepped(x, share, force, h, rate)
         after = 0.5 * (x + stepped(first, share, force, h, rate))
         error = float(np.abs(after - first).max())

@@ -188,7 +188,8 @@ def correct(scaled: Scaled, y: Array, border: Array, value: float, settings: New
     for iteration in range(1, settings.iterations + 1):
         factors = _factor(here.B) if here.size < math.inf else None
         if factors is None:
-            return _resort(scaled, here.y, border, value, settings, iteration, "singular derivative: start elsewhere")
+            what = "singular derivative" if here.size < math.inf else "R or its derivative is not a number"
+            return _resort(scaled, here.y, border, value, settings, iteration, f"{what}: start elsewhere")
         dy = -_solve(factors, here.residual)
         sizes.append(norm(dy))
         if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y))):

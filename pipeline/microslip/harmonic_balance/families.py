@@ -181,22 +181,44 @@ def followed(
     Args:
         begun: goes on from its state. keep: told of every state as it is found, with the points that are new.
     """
-    settings = family.settings(settings)
+    settings, equations = family.settings(settings), _Noted(family)
     if begun is None or begun.state is None:
         first = solve(family.problem(family.begin), family.Omega(family.begin), [])
         if not first.converged:
             return Branch((), f"no start: {first.status}", None)
-        state = continuation.start(family.equations, first.x, family.begin, settings)
+        state = equations.told(continuation.start(equations, first.x, family.begin, settings))
         begun = Branch((), state.status, state)
         keep(state)
         points = list(state.found)
     else:
         state, points = begun.state, list(begun.points)
     while not state.status:
-        state = continuation.advance(family.equations, state, settings)
+        state = equations.told(continuation.advance(equations, state, settings))
         keep(state)
         points += state.found
         if state.found:
             said = f"{points[-1].lam / family.unit:.6g} {family.words}"
             report(f"{len(points)} of {settings.points} points at most, {said}")
     return Branch(tuple(points), state.status, state)
+
+
+class _Noted:
+    """The equations of a family; where they had no value last is kept, for whoever asks why a curve ended."""
+
+    def __init__(self, family: Family) -> None:
+        self.family, self.place = family, (np.zeros(0), 0.0)
+        self.x_scale, self.lam_scale = family.equations.x_scale, family.equations.lam_scale
+
+    def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
+        R, J, slope = self.family.equations.evaluate(x, lam)
+        if not (np.isfinite(R).all() and np.isfinite(J).all()):
+            self.place = x.copy(), lam
+        return R, J, slope
+
+    def told(self, state: State) -> State:
+        """A state; one that no step leads on from says so if that is because a law has no value."""
+        x, lam = self.place
+        if len(x) and state.status.startswith(("stuck", "no start")):
+            at = self.family.problem(lam).at(self.family.Omega(lam))
+            return replace(state, status=f"stuck: {at.undefined(x)}" if at.undefined(x) else state.status)
+        return state

@@ -16,7 +16,8 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from ..data import Array, ComplexArray, Indices, ModalGroup
+from ..data import Array, ComplexArray, Indices, ModalGroup, UserError
+from ..mistakes import bounded
 from ..results.checks import Checks, shares
 from ..results.names import apart as told_apart
 from ..units import METRES, Quantity
@@ -31,7 +32,10 @@ class JenkinsContact:
     Attributes:
         interface: name. stiffness: (6,) linear springs on u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 (N/m, N m/rad);
             the entry of the sliding direction is left to the slider. slider: index of the sliding direction (1 or 2).
-        tangential: stiffness of the slider's spring, N/m. limit: friction limit mu F_N, N.
+        tangential: stiffness of the slider's spring, N/m. limit: friction limit mu F_N, N; ``inf`` sticks for ever.
+
+    Raises:
+        UserError: a number that is negative or not finite, a direction in which nothing slides.
     """
 
     interface: str
@@ -39,6 +43,13 @@ class JenkinsContact:
     slider: int
     tangential: float
     limit: float
+
+    def __post_init__(self) -> None:
+        if self.slider not in (1, 2):
+            raise UserError(f"{self.interface}: slider: {self.slider} is no tangent; 1 is along t1, 2 along t2")
+        for name in ("stiffness", "tangential", "limit"):
+            if name != "limit" or self.limit != np.inf:
+                bounded(f"{self.interface}: {name}", getattr(self, name), ge=0)
 
 
 @dataclass(frozen=True)
@@ -138,7 +149,12 @@ def frequency_response(
 
     Returns:
         The response; points whose Newton iteration failed have ``converged`` False and the sweep goes on.
+
+    Raises:
+        UserError: a frequency that is not positive, a force that is not finite, an interface that is not there.
     """
+    bounded("frequency", frequency, gt=0)
+    bounded("force", np.abs(force))
     rows, springs, limits = contact_coordinates(group, contacts)
     count, points = len(springs), len(frequency)
     if residual is None:
@@ -190,6 +206,8 @@ def _slid(springs: Array, limits: Array, u: ComplexArray) -> float:
 
 def contact_coordinates(group: ModalGroup, contacts: list[JenkinsContact]) -> tuple[Array, Array, Array]:
     """(6c, m) rows, (6c,) springs and (6c,) friction limits (infinite where the spring is linear) of all contacts."""
+    if missing := [c.interface for c in contacts if c.interface not in group.interfaces]:
+        raise UserError(f"there is no interface '{missing[0]}'; the body has {', '.join(group.interfaces) or 'none'}")
     rows = [group.interfaces[c.interface].rows for c in contacts]
     springs, limits = np.zeros((len(contacts), 6)), np.full((len(contacts), 6), np.inf)
     for i, c in enumerate(contacts):
@@ -308,7 +326,7 @@ def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
     where = np.searchsorted(good, tops(response))
     found = [(int(good[i - 1]), int(good[i]), int(good[i + 1])) for i in where]
     a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
-    ends = [(0, 0, 1), (last - 1, last, last)] if last else []
+    ends = [(0, 0, 1), (last - 1, last, last)] if last > 0 else []
     inside = ((end, high if end == low else low) for low, end, high in ends)
     rise = [0 < a[beside] < a[end] for end, beside in inside]
     return found + [end for end, rises in zip(ends, rise, strict=True) if rises]

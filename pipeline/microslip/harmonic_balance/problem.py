@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, ComplexArray, Indices
+from ..mistakes import bounded
 from ..system.assembly import Assembly, Linear
 from . import blocks, played, reduced
 from .blocks import Matrix
@@ -26,6 +27,9 @@ from .reduced import Eliminated, Seen, View
 
 SOFTER = 0.7
 """Share of the reference stiffness that serves where the assembly with all of it is at resonance without damping."""
+
+NO_NUMBER = "is not a finite number"
+"""What is said of a law without a value."""
 
 RELATIVE_AT_MOST = 8
 """Members up to which all are eliminated together."""
@@ -254,6 +258,22 @@ class AtFrequency:
         both = [g.forces(g.relative(v), self.period) for g in self.problem.groups]
         return self.along([F for F, _ in both]), [S for _, S in both]
 
+    def undefined(self, x: Array) -> str:
+        """Whose law has no finite force, or derivative of it, at x; nothing if all have, or x is not finite itself."""
+        v = self.problem.displacement(x)
+        for g in self.problem.groups if np.isfinite(v).all() else ():
+            u = g.relative(v)
+            F, S = g.forces(u, self.period)
+            for what, value in (("force", F), ("derivative of its force", S)):
+                bad = np.flatnonzero(~np.isfinite(value).all(axis=tuple(range(1, value.ndim))))
+                if bad.size:
+                    c = self.problem.assembly.contacts[g.contacts[bad[0]]]
+                    return (
+                        f"contact '{c.name}': the {what} by its law, {type(c.patch.law).__name__}, {NO_NUMBER} where "
+                        f"it moves by {np.abs(u[bad[0], :3]).max():.3g} m"
+                    )
+        return ""
+
     def jacobian(self, slopes: list[Array]) -> Matrix:
         """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
         p = self.problem
@@ -390,7 +410,17 @@ def of(
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
             the number of members if not given; always relative where damping couples them. models: first contact of a
             group of equal ones -> its force model, if it is not the marched law.
+
+    Raises:
+        UserError: no harmonic or cycle, a length or a share that is none, a name that no member has.
     """
+    assembly.check_names()
+    for name, value, bounds in (
+        ("harmonics", harmonics, {"ge": 1}), ("cycles", cycles, {"ge": 1}), ("settled", settled, {"ge": 0}),
+        ("length", length, {"gt": 0}),
+    ):  # fmt: skip
+        if value is not None:
+            bounded(name, value, **bounds)
     together = len(assembly.members) <= RELATIVE_AT_MOST if form is None else form == "relative"
     together = together or assembly.stuck_damping is not None
     contacts = assembly.contacts

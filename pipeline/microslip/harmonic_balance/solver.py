@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from .. import continuation
-from ..data import Array
+from ..data import Array, UserError
+from ..mistakes import bounded
 from . import slow
-from .problem import AtFrequency, Problem
+from .problem import NO_NUMBER, AtFrequency, Problem
 
 Report = Callable[[str], None]
 CONVERGED = "converged"
@@ -50,6 +51,11 @@ class Point:
         """Whether a body slides away, so that there is no periodic motion to be found."""
         return AWAY in self.status
 
+    @property
+    def undefined(self) -> bool:
+        """Whether a law had no value on the way."""
+        return NO_NUMBER in self.status
+
 
 ROUNDING = 4.0
 """Times the rounding of the preloads, at which R counts as nothing, if that is less than `AT_MOST` of x: forces that
@@ -74,17 +80,19 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
         slope: derivative of the forces somewhere near, to begin with.
     """
     R, fresh, history = at.residual(x), False, list[float]()
-    reference, error = float(np.abs(at.reference).max(initial=1e-300)), np.inf
+    reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
         error = float(np.abs(R).max(initial=0.0) / size)
         history.append(error)
         if not np.isfinite(error):
-            return Point(at.Omega, x, "not a number", error, count, history=tuple(history))
+            return Point(at.Omega, x, at.undefined(x) or "not a number", error, count, history=tuple(history))
         if error <= max(tolerance, min(ROUNDING * at.rounding / size, AT_MOST)):
             return Point(at.Omega, x, CONVERGED, error, count, slope=slope, history=tuple(history))
         if slope is None:
             slope, fresh = at.forces(x)[1], True
+            if not all(np.isfinite(S).all() for S in slope):
+                return Point(at.Omega, x, at.undefined(x), error, count, history=tuple(history))
         step = at.jacobian(slope).solve(-R)
         trial, left = x + step, at.residual(x + step)
         if np.linalg.norm(left) <= CONTRACTION * np.linalg.norm(R):
@@ -110,14 +118,21 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
     """Newton's method from one start after the other, then from the sticking contact, then along the load.
 
     Where nothing but contacts holds a body, it comes from rest in slow time before it follows the load.
+
+    Raises:
+        UserError: a frequency that is not positive.
     """
-    began, at, spent = time.perf_counter(), problem.at(Omega), 0
+    bounded("frequency", Omega / (2 * np.pi), gt=0)
+    began, at, spent, status = time.perf_counter(), problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
     for way in _ways(problem, at, [*starts, at.reference], slope):
         point = way()
         spent, history = spent + point.iterations, (*history, *point.history)
         if point.converged or point.away:
             break
+        status = status or (point.status if point.undefined else "")
+    else:
+        point = replace(point, status=status or point.status)
     if not point.converged:
         point = replace(point, status=f"{_cause(at, point)}: {point.status}")
     return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
@@ -127,7 +142,7 @@ def _cause(at: AtFrequency, point: Point) -> str:
     """Why there is no solution, as far as its last approximation tells."""
     if point.away:
         return "no balance"
-    if not np.isfinite(point.error):
+    if point.undefined or not np.isfinite(point.error):
         return "not a number"
     p, v = at.problem, at.problem.displacement(point.x)
     if p.groups and not any(np.abs(g.force(g.relative(v), at.period)).any() for g in p.groups):
@@ -242,9 +257,15 @@ def sweep(
     Args:
         start: (k,) where the first point starts; the sticking contact if None. known: Hz -> point that was found
             before. keep: told of every other point as soon as it is found.
+
+    Raises:
+        UserError: no frequency, or one that is not positive.
     """
+    if not len(frequency):
+        raise UserError("frequency: a sweep needs one or more, Hz")
+    bounded("frequency", frequency, gt=0)
     done: list[Point] = []
-    slope: Any = None
+    slope, solved = None, 0
     known = known or {}
     for i, f in enumerate(frequency):
         if float(f) in known:
@@ -260,12 +281,29 @@ def sweep(
         slope = point.slope
         done.append(replace(point, slope=None))
         keep(done[-1])
+        solved += 1
+        if solved == 2 and (said := _long(point.seconds, sum(float(f) not in known for f in frequency[i + 1 :]))):
+            report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
             report(f"{i + 1} of {len(frequency)} frequencies: {frequency[i]:.6g} Hz once more, from above")
             done[i] = _walked(problem, done[i + 1], done[i])
             keep(done[i])
     return done
+
+
+LONG = 600.0
+"""s that a sweep may take before it is told how long it will: from its second point, as the first one compiles."""
+
+
+def _long(each: float, left: int) -> str:
+    """What to say of so many points that take so many seconds each."""
+    if each * left <= LONG:
+        return ""
+    return (
+        f"warning: {left} frequencies are left and the last one took {each:.3g} s, so they take about "
+        f"{each * left / 60:.3g} minutes; fewer points, harmonics or samples of the contacts take less"
+    )
 
 
 def _walked(problem: Problem, known: Point, failed: Point) -> Point:

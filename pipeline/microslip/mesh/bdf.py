@@ -57,6 +57,8 @@ def read_bdf(path: Path) -> RawMesh:
             members = np.array(_listed(card, first), dtype=np.int64)
             raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
     add_supports(raw, _constraints(cards, text), numbering)
+    if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
+        raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
     return raw
 
 

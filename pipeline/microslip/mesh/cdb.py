@@ -73,7 +73,10 @@ def read_cdb(path: Path) -> RawMesh:
         if command in _COMMANDS:
             _COMMANDS[command](archive, words)
         at += 1
-    return _assembled(archive)
+    raw = _assembled(archive)
+    if not any(line.strip().upper() == "FINISH" for line in lines[-20:]):
+        raw.unended = "no FINISH"  # a warning: archives that were shortened by hand have none
+    return raw
 
 
 # blocks --------------------------------------------------------------------------------------------------------------
@@ -134,11 +137,17 @@ def _read_nodes(archive: _Archive, words: list[str], lines: list[str], at: int) 
 def _read_elements(archive: _Archive, words: list[str], lines: list[str], at: int) -> int:
     fields = _widths(lines, at, "EBLOCK")
     solid = len(words) > 2 and words[2].upper() == "SOLID"
+    announced = _whole(words[4], "EBLOCK") if solid and len(words) > 4 and words[4] else 0
+    before = len(archive.elements)
     at += 1
     while at < len(lines):
         first = _row(lines[at], fields)
-        if first[:1] == [-1] or not lines[at].strip():
+        if first[:1] == [-1]:
+            if announced not in (0, len(archive.elements) - before):
+                raise Damaged(f"EBLOCK announces {announced} elements and holds {len(archive.elements) - before}")
             return at + 1
+        if not first:
+            raise Damaged("EBLOCK has an empty line instead of -1 at its end, the file is truncated")
         at += 1
         if not solid:
             continue
@@ -211,7 +220,7 @@ def _read_temperatures(archive: _Archive, words: list[str]) -> None:
 def _read_data(archive: _Archive, words: list[str]) -> None:
     """MPDATA[, R5.0, count], label, material, first place, values."""
     rest = words[3:] if len(words) > 1 and words[1].upper().startswith("R") else words[1:]
-    if len(rest) < 4:
+    if not any(rest[3:]):
         return
     material, label = _whole(rest[1], "MPDATA"), rest[0].upper()
     start = _whole(rest[2] or "1", "MPDATA")

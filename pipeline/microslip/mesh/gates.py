@@ -26,8 +26,9 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
-    examined at the quadrature points when they are assembled). Warnings: first-order cells, sets
-    of facets that cannot serve as faces, parts that share no points (`modes.loose` refuses those that nothing holds).
+    examined at the quadrature points when they are assembled). Warnings: a file without its end, first-order cells,
+    sets of facets that cannot serve as faces, parts that share no points (`modes.loose` refuses those that nothing
+    holds).
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():
@@ -54,6 +55,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
                 f"first-order cells ({cell_type}) are too stiff in bending (frequencies can be tens of per cents "
                 "high); use second-order ones"
             )
+    if mesh.unended:
+        warnings.append(f"the file has {mesh.unended}, so it may be cut; write it again, or add that if it is whole")
     warnings += [
         f"{inside} of {count} facets of the set '{name}' are not on the surface of the volume mesh; it is no face"
         for name, (inside, count) in mesh.inner.items()

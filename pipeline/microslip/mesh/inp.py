@@ -117,7 +117,10 @@ def read_inp(path: Path) -> RawMesh:
             if "INPUT" in parameters:
                 lines = [*lines, *(line for line in _lines(path.parent / parameters["INPUT"], 1))]
             _READERS[keyword](deck, parameters, lines)
-    return _assembled(deck)
+    raw = _assembled(deck)
+    if not path.read_bytes().endswith(b"\n"):
+        raw.unended = "a last line without an end"
+    return raw
 
 
 def _lines(path: Path, depth: int) -> Iterator[str]:

@@ -52,6 +52,7 @@ class RawMesh:
             unit, NaN where none is given, or None.
         cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
         supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
+        unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
     """
 
     points: Array
@@ -65,6 +66,7 @@ class RawMesh:
     cell_id: list[Indices] = field(default_factory=list)
     supports: dict[str, str] = field(default_factory=dict)
     not_held: list[str] = field(default_factory=list)
+    unended: str = ""
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

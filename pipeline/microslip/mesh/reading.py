@@ -260,7 +260,7 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices]) -> Me
         if face := faces_from_points(boundary, chosen, len(mesh.points)):
             faces[name] = face
     supports = {n: directions for n, directions in raw.supports.items() if n in mesh.point_sets}
-    return replace(mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held))
+    return replace(mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended)
 
 
 def _cell_numbers(raw: RawMesh) -> dict[str, Indices]:

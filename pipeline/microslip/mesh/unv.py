@@ -7,6 +7,7 @@ name corners and mid-side nodes in turn, layer after layer.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,11 +46,15 @@ def read_unv(path: Path) -> RawMesh:
     Raises:
         Damaged: content that is inconsistent, or whose meaning would be lost.
     """
-    sets = list(_data_sets(path.read_text(encoding="latin-1").splitlines()))
+    text = path.read_text(encoding="latin-1")
+    sets = list(_data_sets(text.splitlines()))
     raw = _nodes(sets)
     numbering = Numbering(raw.node_id)
     shells = _elements(sets, raw, numbering)
     _groups(sets, raw, numbering, shells)
+    marks = sum(line.strip() == "-1" for line in text.splitlines())
+    if marks % 2 or not re.search(r"^ *-1[ \t\r]*\n*\Z", text, re.MULTILINE):
+        raw.unended = "no data set that ends with its last line"
     return raw
 
 

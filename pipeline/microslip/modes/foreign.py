@@ -48,7 +48,8 @@ def foreign_basis(
     free = _free(body, settings)
     unknowns = Unknowns(layout.column[free], layout.width)
     _refuse_missing_nodes(body, settings)
-    rows = _padded(body_rows(body.mesh, settings), settings, body, layout)
+    rows, odd = _padded(body_rows(body.mesh, settings), settings, body, layout)
+    remarks += odd
     solver = eigen.new_solver(settings.modes.solver)
     try:
         pencil = _pencil(body.stiffness[free][:, free], body.mass[free][:, free], solver)
@@ -126,8 +127,10 @@ def _wide(B: sp.csr_matrix, width: int) -> sp.csr_matrix:
     return sp.csr_matrix((B.data, B.indices, B.indptr), shape=(B.shape[0], width))
 
 
-def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout) -> BodyRows:
-    """Rows over the whole layout; an interface on a single node gets that node's own rotations."""
+def _padded(
+    rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout
+) -> tuple[BodyRows, list[str]]:  # fmt: skip
+    """Rows over the whole layout, and what is odd about them; an interface on a single node has that node's own."""
 
     def wide(p: Patch) -> Patch:
         return replace(p, B=_wide(p.B, layout.width), N=_wide(p.N, layout.width // 3))
@@ -135,28 +138,31 @@ def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layo
     def named(group):  # noqa: ANN001
         return {k: replace(v, B=_wide(v.B, layout.width)) for k, v in group.items()}
 
-    patches = {k: wide(p) for k, p in rows.patches.items()}
+    patches, told = {k: wide(p) for k, p in rows.patches.items()}, []
     for item in settings.interfaces:
         nodes = body.mesh.face_points(item.face)
         if len(nodes) == 1:
-            patches[item.name] = replace(
-                patches[item.name], B=_six(body, layout, int(nodes[0]), patches[item.name].rotation, item.name)
-            )
-    return BodyRows(patches, named(rows.excitations), named(rows.monitors), {})
+            B, missing = _six(body, layout, int(nodes[0]), patches[item.name].rotation)
+            patches[item.name] = replace(patches[item.name], B=B)
+            if missing:
+                told.append(
+                    f"interface '{item.name}': node {body.mesh.node_id[nodes[0]]} has no {' '.join(missing)} in the "
+                    "matrices, so it stands still there: a contact on it meets no such motion"
+                )
+    return BodyRows(patches, named(rows.excitations), named(rows.monitors), {}), told
 
 
-def _six(body: Matrices, layout: Layout, node: int, rotation: Array, name: str) -> sp.csr_matrix:
-    """(6, width) displacements and rotations of one node in the interface's frame."""
-    B = np.zeros((6, layout.width))
-    for c in range(6):
+def _six(body: Matrices, layout: Layout, node: int, rotation: Array) -> tuple[sp.csr_matrix, list[str]]:
+    """(6, width) displacements and rotations of one node in the interface's frame, zero where the matrices have none,
+    and which these are along the body's axes."""
+    B, missing = np.zeros((6, layout.width)), []
+    for c, word in enumerate(("u_x", "u_y", "u_z", "phi_x", "phi_y", "phi_z")):
         row = np.flatnonzero((body.node == node) & (body.component == c))
-        if not len(row):
-            raise UserError(
-                f"interfaces.{name}.face: node {body.mesh.node_id[node]} alone has no rotation of its own in the "
-                "matrices; name three or more nodes"
-            )
-        B[3 * (c // 3) : 3 * (c // 3) + 3, layout.column[row[0]]] = rotation[:, c % 3]
-    return sp.csr_matrix(B)
+        if len(row):
+            B[3 * (c // 3) : 3 * (c // 3) + 3, layout.column[row[0]]] = rotation[:, c % 3]
+        else:
+            missing.append(word)
+    return sp.csr_matrix(B), missing
 
 
 def _refuse_missing_nodes(body: Matrices, settings: BodySettings) -> None:
@@ -221,7 +227,7 @@ def _inertia(body: Matrices, R: Array) -> tuple[float, Array, Array, list[str]]:
     """Mass, centre, inertia about the centre as the mass matrix has them, and what is odd about it."""
     gram = R.T @ (body.mass @ R)
     each = np.diag(gram)[:3]
-    m = float(each.mean())
+    m = float(each[each > 0].mean()) if (each > 0).any() else 0.0  # of the directions that the matrices have
     if not m > 0:
         raise UserError("geometry.matrices.mass: a translation moves no mass; is it the mass matrix?")
     told = []

@@ -22,6 +22,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import INTERFACE_ROWS, Array, ComplexArray, ModalGroup, Rows, UserError
+from ..mistakes import bounded
 
 if TYPE_CHECKING:
     from ..contact.patch import Patch
@@ -274,6 +275,9 @@ class Load:
     amplitude: complex = 1.0
     harmonic: int = 1
 
+    def __post_init__(self) -> None:
+        bounded(f"load on '{self.member}': amplitude", [complex(self.amplitude).real, complex(self.amplitude).imag])
+
 
 @dataclass(frozen=True)
 class Watch:
@@ -347,6 +351,21 @@ class Assembly:
     watches: tuple[Watch, ...]
     ring: Ring | None = None
     stuck_damping: tuple[float, ...] | None = None
+
+    def check_names(self) -> None:
+        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no member."""
+        if not self.members:
+            raise UserError("an assembly needs a member")
+        has = {m.name: next(iter(m.groups.values())) for m in self.members}
+        sides = [s for c in self.contacts for s in (c.first, c.second) if s]
+        named = [("interface", s.member, s.interface, lambda g: g.interfaces) for s in sides if s.rows is None]
+        named += [("load", x.member, x.row, lambda g: g.excitations) for x in self.loads]
+        named += [("read-out", w.member, w.monitor, lambda g: {**g.monitors, **g.gauges}) for w in self.watches]
+        for what, member, row, known in named:
+            if member not in has:
+                raise UserError(f"{what} '{row}': there is no member '{member}'; the assembly has {', '.join(has)}")
+            if row not in (rows := known(has[member])):
+                raise UserError(f"{what} '{row}': '{member}' has none of this name, but {', '.join(rows) or 'none'}")
 
     def index(self, harmonic: int) -> int:
         """Index of the wave that the members move in, see `Ring.index`; 0 without a ring."""

@@ -32,6 +32,8 @@ from ..body import (
     Vector,
     _finite_vector,
     _tuple,
+    damping_ratio,
+    has_length,
     load_toml,
     named_once,
     override,
@@ -40,6 +42,7 @@ from ..body import (
 from ..canonical import signs, turn_clusters
 from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
 from ..frames import skew
+from ..mistakes import bounded
 
 GROUND = "ground"
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -62,6 +65,12 @@ class Body:
     at: Sequence[float] = (0.0, 0.0, 0.0)
     inertia: Any = None
     free: str | None = None
+
+    def __post_init__(self) -> None:
+        bounded(f"{self.name}: mass", self.mass, ge=0)
+        bounded(f"{self.name}: at", self.at)
+        if self.inertia is not None:
+            bounded(f"{self.name}: inertia", self.inertia)
 
     @property
     def directions(self) -> list[int]:
@@ -142,14 +151,27 @@ class Contact:
     @property
     def rotation(self) -> Array:
         """(3, 3), rows n, t1, t2."""
-        n = np.asarray(self.normal, dtype=float)
-        n = n / np.linalg.norm(n)
-        hint = np.eye(3)[_across(n)] if self.t2 is None else np.asarray(self.t2, dtype=float)
+        n = _unit(self.normal, f"contact {self.name}: normal")
+        hint = np.eye(3)[_across(n)] if self.t2 is None else _unit(self.t2, f"contact {self.name}: t2")
         t2 = hint - (hint @ n) * n
-        if np.linalg.norm(t2) < 1e-6 * np.linalg.norm(hint):
+        if np.linalg.norm(t2) < 1e-6:
             raise UserError(f"contact {self.name}: t2 is parallel to the normal; choose another direction")
         t2 = t2 / np.linalg.norm(t2)
         return np.array([n, np.cross(t2, n), t2])
+
+
+def _unit(direction: Sequence[float], what: str) -> Array:
+    """(3,) a direction as a unit vector.
+
+    Raises:
+        UserError: it is none.
+    """
+    bounded(what, direction)
+    try:
+        v = np.asarray(has_length(tuple(direction)), dtype=float)
+    except ValueError as error:
+        raise UserError(f"{what}: {error}") from error
+    return v / np.linalg.norm(v)
 
 
 def _across(n: Array) -> int:
@@ -208,7 +230,8 @@ class System:
                 displacements along x of points ``1``, ``2``, ... one metre apart on the x axis.
             more: contacts, forces, monitors, ratio.
         """
-        points = members or [Body(str(i + 1), 0.0, (float(i), 0.0, 0.0), free="x") for i in range(len(np.asarray(M)))]
+        count = len(np.atleast_1d(M))
+        points = members or [Body(str(i + 1), 0.0, (float(i), 0.0, 0.0), free="x") for i in range(count)]
         return System(name, points, mass=M, stiffness=K, damping=C, **more)
 
     @cached_property
@@ -288,7 +311,7 @@ class System:
         size = max(len(v) for v in given)
         k, c = (np.broadcast_to(v, size) if v.any() or len(v) == size else np.zeros(size) for v in given)
         if size not in (1, 3, 6) or (np.concatenate([k, c]) < 0).any() or not np.isfinite([k, c]).all():
-            raise UserError(f"{self.name}: {what}: needs one, three or six numbers that are not negative")
+            raise UserError(f"{self.name}: {what}: needs one, three or six numbers, finite and not negative")
         if size > 1:
             return relative[:size], k, c
         axis = self._axis(link, ends, what)
@@ -301,14 +324,14 @@ class System:
 
     def _axis(self, link: Link, ends: list[tuple[Array, Array | None]], what: str) -> Array:
         if link.axis is not None:
-            axis = np.asarray(link.axis, dtype=float)
+            return _unit(link.axis, f"{self.name}: {what}: axis")
         elif link.at is None and ends[0][1] is not None and ends[1][1] is not None:
             axis = ends[1][1] - ends[0][1]
         else:
             axis = np.zeros(3)
         if not np.linalg.norm(axis):
             moving = {d for n in (link.first, link.second) if n != GROUND for d in self._member(n, what).directions}
-            if link.axis is not None or len(moving) != 1 or max(moving) > 2:
+            if len(moving) != 1 or max(moving) > 2:
                 raise UserError(f"{self.name}: {what}: along which direction does it act? Give its axis, [1, 0, 0] say")
             axis = np.eye(3)[min(moving)]
         return axis / np.linalg.norm(axis)
@@ -318,10 +341,11 @@ class System:
 
         Raises:
             UserError: a coordinate without mass, a stiffness that is not positive (semi)definite, a rigid motion that
-                a damper brakes, a name used twice.
+                a damper brakes, a name used twice, a damping ratio of 1 or more, a direction that is none.
         """
         try:
             named_once(self, "contacts", "forces", "monitors")
+            damping_ratio(self.ratio)
         except ValueError as error:
             raise UserError(f"{self.name}: {error}") from error
         M, C, K = self.matrices()
@@ -357,8 +381,7 @@ class System:
         loads, reads = {}, {}
         for f in self.forces:
             rows, point = self.rows_at(f.on, f.at, f"force {f.name}")
-            direction = np.asarray(f.direction, dtype=float)
-            along = (direction / np.linalg.norm(direction)) @ rows[:3]
+            along = _unit(f.direction, f"force {f.name}: direction") @ rows[:3]
             loads[f.name] = Rows(along[None] @ X, ("force",), "N", point, 0.0, np.zeros(1))
         for r in self.monitors:
             rows, point = self.rows_at(r.on, r.at, f"monitor {r.name}")
