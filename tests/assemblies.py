@@ -143,3 +143,50 @@ def turned(drawn: Drawn, Q: Array, places: dict[str, tuple[float, Array]]) -> Dr
     """The whole assembly turned, or mirrored (3, 3), its bodies written in axes that stand at other places."""
     systems = {n: moved(s, Q, np.zeros(3)) for n, s in drawn.systems.items()}
     return Drawn(systems, copy.deepcopy(drawn.case), places)
+
+
+# rings --------------------------------------------------------------------------------------------------------------
+
+RADIUS = 0.3  # m, at which neighbours touch
+
+
+def ring(seed: int, blades: int, order: int, harmonics: int = 2, samples: int = 32, damper: bool = False) -> Drawn:
+    """A blade that touches its neighbours in a ring; a damper on it besides that reaches to the next blade.
+
+    Args:
+        blades: N. order: engine order of the first harmonic.
+    """
+    rng = np.random.default_rng(seed)
+    drawn = Drawn({"blade": system(rng, "blade")}, {"name": "ring", "harmonics": harmonics, "samples": samples})
+    drawn.case |= {"ring": {"blades": blades, "engine_order": order}, "bodies": [{"name": "blade"}], "contacts": []}
+    _gap(rng, drawn, blades, "blade", "blade", "shroud")
+    if damper:
+        drawn.systems["damper"] = system(rng, "damper")
+        drawn.case["bodies"].append({"name": "damper"})
+        touch(rng, drawn, "damper", "blade", False)
+        _gap(rng, drawn, blades, "damper", "blade", "foot")
+    bodies = list(drawn.systems)
+    drawn.case["excitations"] = [
+        {"row": f"{b}:{x}", "amplitude": float(rng.uniform(5, 15)), "phase": float(rng.uniform(0, 360)),
+         "engine_order": h * order}
+        for b, x, h in zip(bodies, ("push", "shake"), (1, int(rng.integers(1, harmonics + 1))), strict=False)
+    ]  # fmt: skip
+    drawn.case["excitations"].append({"row": "blade:shake", "amplitude": 3.0, "harmonic": 0})
+    drawn.case["monitors"] = [{"monitor": f"{b}:{m}", "direction": d} for b in bodies
+                              for m, d in (("probe", "x"), ("eye", "z"))]  # fmt: skip
+    start = float(rng.uniform(90, 130))
+    drawn.case["sweep"] = {"start": start, "stop": start + 50.0, "points": 5, "normal_forces": [20.0]}
+    return drawn
+
+
+def _gap(rng: np.random.Generator, drawn: Drawn, blades: int, one: str, other: str, name: str) -> None:
+    """A contact between a body and one of the next sector."""
+    size = {"width": float(rng.uniform(0.01, 0.02)), "height": float(rng.uniform(0.01, 0.02))}
+    angle, away = rng.uniform(0, 2 * np.pi), rng.uniform(-0.02, 0.02)
+    tangent, at = np.array([0.0, np.cos(angle), np.sin(angle)]), np.array([0.0, away, RADIUS])
+    for body, side, sign in ((one, "right", 1.0), (other, "left", -1.0)):
+        R = rotation(Y, sign * np.pi / blades)
+        face = {"on": "hull", "at": R @ at, "normal": sign * R[:, 0], "t2": R @ tangent}
+        drawn.systems[body]["contacts"].append(size | face | {"name": f"{name}_{side}"})
+    ends = {"interface": f"{one}:{name}_right", "against": f"{other}:{name}_left", "against_sector": 1}
+    drawn.case["contacts"].append(ends | law(rng, False))
