@@ -236,10 +236,11 @@ class _Assessed:
 
 def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
     """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
-    member, monitor = keeping.drawn_monitor(result.built)
+    first = keeping.drawn_monitor(result.built)
     basis = result.built.bodies[result.built.assembly.watches[0].member].basis
-    if not assessment.has_stresses(basis, response, member):
+    if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
+    member, monitor = first
     lifted = {n: _lifting_at(result, n) for n in result.resonances}
     limits = result.settings.material_limits
     found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)

@@ -87,6 +87,8 @@ class ExcitationOfCase(Model):
             raise ValueError("engine_order and harmonic: an order is a harmonic of the base order; give one of them")
         if self.engine_order == 0:
             raise ValueError("engine_order: 0 is steady; write harmonic = 0")
+        if self.phase and self.engine_order is None and self.harmonic == 0:
+            raise ValueError("phase: a steady load (harmonic = 0) has none; leave it out")
         return self._alone(given)
 
     def _alone(self, given: set[str]) -> ExcitationOfCase:

@@ -110,9 +110,17 @@ def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSett
 
 
 def _standing(built: Built, name: str) -> list[str]:
-    """Names under which a body stands in the assembly that is balanced: N of a full ring."""
+    """Names under which a body stands in the assembly that is balanced, in coordinates of its modal file: N of a full
+    ring, none of cyclic sectors that are joined there, whose coordinates are those of `system.disc`."""
     ring = built.settings.ring
-    return [f"{name}_{j}" for j in range(ring.blades)] if ring and ring.model == "full" else [name]
+    if ring is None or ring.model == "sector":
+        return [name]
+    return [] if _joined(built, name) else [f"{name}_{j}" for j in range(ring.blades)]
+
+
+def _joined(built: Built, name: str) -> bool:
+    ring = built.settings.ring
+    return ring is not None and ring.model == "full" and built.bodies[name].basis.sectors > 1
 
 
 def _body(built: Built, name: str, sha256: str, file: str) -> Body:
@@ -131,9 +139,11 @@ def _wave(built: Built, b: Loaded, harmonic: int) -> tuple[int, bool]:
     return (index, False) if index in b.groups else (b.basis.sectors - index, True)
 
 
-def drawn_monitor(built: Built) -> tuple[str, str]:
-    """Member and array name of the first read-out."""
+def drawn_monitor(built: Built) -> tuple[str, str] | None:
+    """Member and array name of the first read-out; None where the member's coordinates are not those of its file."""
     watch = built.assembly.watches[0]
+    if _joined(built, watch.member):
+        return None
     member = _standing(built, watch.member)[0]
     several = len(built.bodies) > 1 or member != watch.member
     return member, f"{member}:{watch.monitor}" if several else watch.monitor

@@ -250,9 +250,11 @@ def _with_rows(group: ModalGroup, member: str, name: str, found: FacePressure) -
     return replace(group, excitations={**group.excitations, **rows})
 
 
-def field_loads(member: str, name: str, harmonic: int, factor: complex = 1.0) -> tuple[Load, Load]:
-    """The two loads of a pressure field that `with_pressure` put into a member, times a factor."""
-    return Load(member, f"{name}:real", factor, harmonic), Load(member, f"{name}:imag", 1j * factor, harmonic)
+def field_loads(member: str, name: str, harmonic: int, factor: complex = 1.0) -> tuple[Load, ...]:
+    """The two loads of a pressure field that `with_pressure` put into a member, times a factor; of one that is steady
+    the real part alone, Re(p exp(0))."""
+    real = Load(member, f"{name}:real", factor, harmonic)
+    return (real, Load(member, f"{name}:imag", 1j * factor, harmonic)) if harmonic else (real,)
 
 
 def load_face(member: Member, name: str) -> Interface:
