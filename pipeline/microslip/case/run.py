@@ -525,7 +525,7 @@ def _between(built: Built) -> list[str]:
 def _too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[str]:
     """Where the step is wider than the resonances with sticking contacts (Hz), the narrowest ones that friction leaves.
 
-    Peaks are searched for between the points, but one on the flank of another may show at none of them.
+    Modes narrower than the step have points of their own, but a peak on the flank of another may show at none of them.
     """
     sweep = settings.sweep
     step = (sweep.stop - sweep.start) / (sweep.points - 1)
@@ -538,8 +538,8 @@ def _too_coarse(settings: CaseSettings, stuck: Array, damping: Array) -> list[st
         return []
     return [
         f"The step of {step:.3g} Hz is wide against a resonance with sticking contacts ({at:.5g} Hz, half-power width "
-        f"{width:.3g} Hz). Peaks are searched for between the points, but one close beside a higher one may be "
-        "missing; raise sweep.points to see."
+        f"{width:.3g} Hz). Modes narrower than the step have points of their own and peaks are searched for between "
+        "the points, but one close beside a higher one may be missing; raise sweep.points to see."
     ]
 
 
