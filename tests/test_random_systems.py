@@ -1,0 +1,192 @@
+"""Random small systems by the harmonic balance: against an independent dense balance, against integration in time, and
+with mistakes put back on purpose, each of which has to be seen."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from typing import Any
+
+import dense
+import numpy as np
+import pytest
+from conftest import QUICK, locked
+from random_systems import Verdict, compared, drawn, integrated, right, totalled, verdict
+
+from microslip.harmonic_balance import accuracy, reduced, response
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.checks import COUNTED
+from microslip.harmonic_balance.patch import Cycle
+from microslip.system.assembly import Assembly
+
+COUNT = 40
+
+ALONE = (1, 16, 18, 23, 29)
+"""Of them, those whose contacts are sliders on a line: nothing is compiled for these."""
+
+DAMPED = (1, 2, 5, 6, 7, 9, 12, 13, 14, 16, 22, 23, 24, 26, 28, 29, 31, 34, 38, 39)
+"""Those with the largest damping, which come to a periodic motion soonest."""
+
+BETWEEN = 49
+"""A slider that turns less than a quarter of a step beside a sample, where twice the samples miss as much: its error
+was 2.7 times the estimate when samples were doubled only."""
+
+
+@pytest.fixture(scope="module")
+def apart() -> Iterator[ProcessPoolExecutor]:
+    """A process that compiles as quick tests do: the series spends most of its time on that."""
+    before = os.environ.get("XLA_FLAGS")
+    os.environ["XLA_FLAGS"] = QUICK if locked("jaxlib") else before or ""
+    try:
+        with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+            yield pool
+    finally:
+        os.environ.pop("XLA_FLAGS") if before is None else os.environ.update(XLA_FLAGS=before)
+
+
+# the program against others ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [*ALONE, BETWEEN])
+def test_sliders_on_a_line_are_within_their_estimate_of_a_dense_balance(seed: int) -> None:
+    agree(compared(seed))
+
+
+@pytest.mark.slow
+def test_random_systems_are_within_their_estimate_of_a_dense_balance(apart: ProcessPoolExecutor) -> None:
+    """Every one; and the estimate is of the size of the error: three times that, in the median."""
+    found = list(apart.map(compared, range(COUNT)))
+    for one in found:
+        agree(one)
+    shares = [one.off / one.estimate for one in found if one.off > 1e-6]
+    assert len(shares) > 0.7 * COUNT and 0.2 < np.median(shares) < 0.5
+    assert np.median([one.own / one.off for one in found if one.off > 1e-6]) < 0.1
+
+
+def agree(one: Verdict) -> None:
+    assert one.missing <= dense.TOLERANCE and one.status == "converged"
+    assert not one.flags, one
+
+
+@pytest.mark.parametrize("seed", [1, 23])
+def test_sliders_on_a_line_are_within_their_estimate_of_integration_in_time(seed: int) -> None:
+    off, estimate, own = integrated(seed)
+    assert off <= estimate + own and own < 2e-3
+
+
+@pytest.mark.slow
+def test_random_systems_are_within_their_estimate_of_integration_in_time(apart: ProcessPoolExecutor) -> None:
+    """Two bodies, four modes, points that lift off among them; second order in the step, as the sliders allow."""
+    assert sorted(sorted(range(COUNT), key=lambda seed: -drawn(seed).ratio)[: len(DAMPED)]) == list(DAMPED)
+    for seed, (off, estimate, own) in zip(DAMPED, apart.map(integrated, DAMPED), strict=True):
+        assert off <= estimate + own and own < 2e-3, seed
+
+
+# mistakes ----------------------------------------------------------------------------------------------------------
+
+PAIR = 124
+"""Two bodies of two modes each, two sliders on lines: one between the bodies, one to the ground; both slide."""
+
+
+def changed(patch: pytest.MonkeyPatch, where: Any, name: str, after: Callable) -> None:
+    """A function whose answer is made wrong. after: of its answer and its arguments."""
+    original = getattr(where, name)
+    patch.setattr(where, name, lambda *given, **more: after(original(*given, **more), *given))
+
+
+def alike(made: Assembly, signs: Callable = Assembly.signs.func) -> np.ndarray:
+    """What the sides of contacts count for, without a sign."""
+    return np.abs(signs(made))
+
+
+def of_parts(wrong: Callable) -> Callable:
+    """A mistake in what is linear in a harmonic. wrong: of a part and its harmonic."""
+    return lambda patch: changed(
+        patch, balance, "eliminated", lambda parts, _, harmonic, *more: tuple(wrong(p, harmonic) for p in parts)
+    )
+
+
+def damped(times: float) -> Callable:
+    """Damping of the first harmonic, so many times what it is."""
+    return of_parts(lambda part, harmonic: replace(part, C=(times if harmonic == 1 else 1.0) * part.C))
+
+
+def of_motion(**wrong: Callable) -> Callable:
+    """A mistake in what is told of a solution. wrong: attribute of `Operating` -> of its value."""
+
+    def after(found: response.Operating, *_: Any) -> response.Operating:
+        return replace(found, **{key: f(getattr(found, key)) for key, f in wrong.items()})
+
+    return lambda patch: changed(patch, response, "Operating", after)
+
+
+def of_cycles(**wrong: Callable) -> Callable:
+    """The same of what the points do in a cycle."""
+
+    def each(cycles: Mapping[str, Cycle]) -> dict[str, Cycle]:
+        return {n: c._replace(**{key: f(getattr(c, key)) for key, f in wrong.items()}) for n, c in cycles.items()}
+
+    return of_motion(cycles=each)
+
+
+def exchanged(values: Mapping[str, Any]) -> dict[str, Any]:
+    return dict(zip(values, reversed(list(values.values())), strict=True))
+
+
+MISTAKES = {
+    "read-outs exchanged": ("amplitude", lambda p: changed(p, reduced, "monitored", lambda found, *_: found[::-1])),
+    "rows of read-outs exchanged": ("amplitude", of_parts(lambda part, _: replace(part, watch=part.watch[::-1]))),
+    "damping twice": ("amplitude", damped(2.0)),
+    "damping left out": ("amplitude", damped(0.0)),
+    "second side like the first": ("amplitude", lambda p: p.setattr(Assembly, "signs", property(alike))),
+    "no error": (
+        "amplitude",
+        lambda p: changed(p, accuracy, "error", lambda e, *_: replace(e, by_harmonics=0.0, by_samples=0.0)),
+    ),
+    "damping counted twice": ("balance", lambda p: changed(p, reduced, "work", lambda w, *_: (w[0], 2 * w[1]))),
+    "loads counted twice": ("balance", lambda p: changed(p, reduced, "work", lambda w, *_: (2 * w[0], w[1]))),
+    "work of a contact with the other sign": ("balance", of_motion(force=lambda F: F | {"contact 0": -F["contact 0"]})),
+    "loss of the law counted twice": ("counted", of_cycles(lost=lambda lost: 2 * lost)),
+    "work of the points counted twice": ("taken", of_cycles(dissipated=lambda work: 2 * work)),
+    "work at the other contact": ("taken", of_motion(cycles=exchanged)),
+    "contacts exchanged": ("motion", of_motion(relative=exchanged)),
+    "bodies exchanged": ("motion", of_motion(q=exchanged)),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_seen(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what the program itself checks is then no solution."""
+    (flag, put_back), one = MISTAKES[mistake], right(PAIR)
+    put_back(monkeypatch)
+    found = verdict(drawn(PAIR), one)
+    assert flag in found.flags
+    assert bool(found.checks.failure) == bool(found.flags & {"balance", "counted", "motion"})
+
+
+def test_without_a_mistake_nothing_is_seen() -> None:
+    agree(verdict(drawn(PAIR), right(PAIR)))
+
+
+def test_samples_that_cut_off_reversals_are_seen() -> None:
+    """Eight of a slider that slides nearly all the time: by what the contact takes. With as few as hold the harmonics,
+    energies may agree; the estimate tells."""
+    assert "counted" in verdict(drawn(1), right(1), samples=8).flags
+    for seed, fewest in ((29, 7), (BETWEEN, 11)):
+        found = verdict(drawn(seed), right(seed), samples=fewest)
+        assert 0.05 < found.off <= found.estimate
+
+
+def test_an_estimate_that_only_doubles_samples_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(accuracy, "DENSER", 2)
+    assert verdict(drawn(BETWEEN), right(BETWEEN)).flags == {"amplitude"}
+
+
+@pytest.mark.slow
+def test_a_tangential_stiffness_in_its_total_form_is_seen(apart: ProcessPoolExecutor) -> None:
+    """A rough point that sticks while its normal force swings, by what it takes."""
+    honest, printed = (apart.submit(totalled, 19, total).result() for total in (False, True))
+    assert not honest.failure and printed.failure and abs(printed.counted) > COUNTED
