@@ -23,10 +23,10 @@ from microslip.contact.sliders import Iwan, rough_strips, uniform
 from microslip.data import Rows
 from microslip.harmonic_balance import accuracy, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.checks import BALANCE, COUNTED, MOTION, Checks
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import Point, solve
+from microslip.results.checks import BALANCE, COUNTED, MOTION, Checks
 from microslip.system.assembly import Assembly, Contact, Load, Member, Side, Watch
 
 Array = np.ndarray

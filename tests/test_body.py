@@ -226,7 +226,7 @@ def test_what_is_no_settings_file(tmp_path: Path, content: bytes, words: str) ->
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
     assert "cannot be read (No such file" in refusal(tmp_path / "none.toml")
-    assert "cannot be read" in refusal(tmp_path)
+    assert "is a folder" in refusal(tmp_path)
     assert "cannot be read" in refusal(tmp_path / "nul\0.toml")
 
 

@@ -375,7 +375,7 @@ def test_a_giant_range_takes_no_memory(tmp_path: Path) -> None:
 
 def test_unknown_missing_and_wrong_files(tmp_path: Path) -> None:
     assert "no such mesh file" in refusal(tmp_path / "none.msh")
-    assert "no such mesh file" in refusal(tmp_path)
+    assert "is a folder" in refusal(tmp_path)
     refusal(written(tmp_path, "hello", "a.xyz"))
     refusal(written(tmp_path, "hello", "no_suffix"))
     refusal(written(tmp_path, "hello", "a.med"))

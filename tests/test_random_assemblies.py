@@ -5,18 +5,13 @@ Answers are compared in table, response file, summary and page, see `answers.dif
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from answers import Answer, Change, differences
-from assemblies import Drawn, draw, turned
-from attack import Case, exchangeable, exchanged, opened, responded, shuffled
-
-from microslip.data import Array
-from microslip.frames import rotation
+from answers import Answer
+from assemblies import Drawn, draw
+from attack import Case, opened, responded
 
 pytest.importorskip("matplotlib")
 
