@@ -23,7 +23,8 @@ the same solution, so that no more than what Newton's method leaves is missing."
 
 COUNTED = 0.05
 """Share of the energy by which the work on the contacts may differ from the loss that their laws count. It falls with
-the square of the samples: of 64, smooth motions leave a few thousandths, and at most about this."""
+the square of the samples: 64 leave 2e-4 of forty random systems in the median and 5e-3 at most
+(`tests/test_random_systems.py`); bodies that hit each other between few samples leave more than this."""
 
 MOTION = 1e-4
 """Share of the contacts' motion by which the bodies' may differ from it."""
