@@ -118,15 +118,10 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"interfaces__0__sector_shift": True}, "interfaces.right.sector_shift: must be a whole number, not true"),
     ({"excitations__0__face": "tip"}, "excitations.shaker: needs exactly one of point, node, face, and has point"),
     ({"excitations__0__direction": ...}, "excitations.shaker: needs a direction"),
-    *[
-        ({key: [1e300, 0, 0]}, said)
-        for key, said in {
-            "excitations__0__direction": "excitations.shaker.direction: a direction",
-            "interfaces__0__t2": "interfaces.right.t2: a direction",
-            "rotation__axis": "rotation.axis: a direction",
-        }.items()
-    ],
-    ({"gauges__0__direction": [0, 0, 1e-300]}, "gauges.root.direction: a direction"),
+    ({"excitations__0__direction": [1e300, 0, 0]}, "excitations.shaker.direction: 1e+300 is beyond all bounds"),
+    ({"interfaces__0__t2": [0, 1, 1e-300]}, "interfaces.right.t2: 1e-300 is beyond all bounds"),
+    ({"material__density": -1e31}, "material.density: -1e+31 is beyond all bounds"),
+    ({"rotation__axis": [0, 1e300, 0]}, "rotation.axis: 1e+300 is beyond all bounds"),
     ({"damping": {"ratio": 5.0}}, "damping.ratio: a damping ratio of 5"),
     ({"damping": {"table": [0.01, 2.0]}}, "damping.table: a damping ratio of 2"),
     ({"excitations__1__direction": [1, 0, 0]}, "excitations.gas: pressure = true needs a face and no direction"),

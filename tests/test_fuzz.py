@@ -9,13 +9,16 @@ import contextlib
 import copy
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import decks
 import pytest
 import small
 from hypothesis import example, given, settings
@@ -25,6 +28,7 @@ from test_mesh import INP, TET
 from microslip.basis import read_basis, write_basis
 from microslip.body import BodySettings, load_body, override, validate
 from microslip.case import load_case
+from microslip.cli import main
 from microslip.data import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modes import modal_basis
@@ -316,6 +320,7 @@ import random, sys
 from pathlib import Path
 from microslip.basis import check_basis, files
 from microslip.case import load_case
+from microslip.cli import main
 from microslip.data import UserError
 from test_fuzz import flipped
 data, out = Path(sys.argv[1]).read_bytes()[:-120], Path(sys.argv[2])  # without its seal
@@ -360,3 +365,186 @@ def test_flipped_bytes_in_unsealed_modal_files(folder: Path, modal_file: Path, s
         with within(60), pytest.raises(UserError):
             read_basis(folder / "flipped.h5")
         first = int(last) + 1
+
+
+# ---------------------------------------------------------------- through the command line
+
+NONSENSE = [
+    "nan", "inf", "-inf", "-1", "0", "-0.5", "1e300", "-1e300", "1e-300", '"text"', '""', "true", "[]", "[nan]", "{}",
+    '"3 mm"', '"0.3"', "1979-05-27", "[1, 2, 3, 4, 5]", "9" * 400, "1e9", "1000000", "[[1, 2], [3]]", "[0, 0, 0]",
+    "[1e300, 0, 0]", "0.5", '"../x"', '["a", 3]', "[1, nan, 0]", "7",
+]  # fmt: skip
+SIZES = ["0", "-1", "0.5", "7", "1e9", "1e29", "-1e29", "1e-29", "1e12", "1e-12", "nan", "inf", "2", "-3", "1000000"]
+BEAM = """
+name = "beam"
+length_unit = "m"
+reduction = "eigenmodes"
+geometry = { mesh = "beam.inp" }
+material = { density = 7850.0, young = 2.1e11, poisson = 0.3, expansion = 1.2e-5 }
+temperature = { reference = 293.0, uniform = 300.0 }
+[[supports]]
+face = "clamp"
+directions = "xyz"
+[[loads]]
+kind = "gravity"
+vector = [0.0, 0.0, 9.81]
+[[interfaces]]
+name = "right"
+face = "contact_right"
+role = "right"
+t2 = [0.0, 0.0, 1.0]
+[[excitations]]
+name = "shaker"
+point = [0.01, 0.015, 0.12]
+direction = [1.0, 2.0, 0.0]
+[[monitors]]
+name = "probe"
+point = [0.01, 0.015, 0.12]
+[[gauges]]
+name = "root"
+point = [0.01, 0.0, 0.01]
+direction = [0.0, 0.0, 1.0]
+[rotation]
+axis = [0.0, 1.0, 0.0]
+point = [0.0, 0.0, -0.1]
+speeds_rpm = [0.0, 3000.0]
+prestress = "linear"
+[modes]
+count = 3
+solver = "superlu"
+certify = true
+[damping]
+ratio = 0.002
+[output]
+gauss = false
+"""
+ASSIGNED = re.compile(r"\s*[\w.]+\s*=")
+
+
+def spoiled(text: str, rng: random.Random) -> str:
+    """One or two settings of another type or size, a letter lost from a key, a line or a table twice."""
+    lines = text.splitlines()
+    for _ in range(rng.choice([1, 1, 1, 2])):
+        at = rng.choice([i for i, line in enumerate(lines) if ASSIGNED.match(line)])
+        (key, _, value), way = lines[at].partition("="), rng.randrange(10)
+        digits = re.findall(r"-?\d[\d.e-]*", value.split("#")[0])
+        if way < 5 and digits and "[" in value:
+            digits[rng.randrange(len(digits))] = rng.choice(SIZES)
+            lines[at] = f"{key}= [{', '.join(digits)}]"
+        elif way < 5 and digits:
+            lines[at] = f"{key}= {rng.choice(SIZES)}"
+        elif way < 7:
+            lines[at] = f"{key}= {rng.choice(NONSENSE)}"
+        elif way == 7:
+            lost = rng.randrange(len(key.strip()))
+            lines[at] = f"{key.strip()[:lost]}{key.strip()[lost + 1 :]} ={value}"
+        elif way == 8:
+            lines.insert(at, lines[at])
+        elif tables := [i for i, line in enumerate(lines) if line.startswith("[[")]:
+            first = rng.choice(tables)
+            last = next((i for i in range(first + 1, len(lines)) if lines[i].startswith("[")), len(lines))
+            lines[first:first] = lines[first:last]
+    return "\n".join(lines) + "\n"
+
+
+def typed(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    """Exit code and what is printed; a warning of NumPy's is an exception, and so a traceback."""
+    capsys.readouterr()
+    with warnings.catch_warnings(), within(120):
+        warnings.simplefilter("error")
+        for kind in (DeprecationWarning, ResourceWarning):
+            warnings.simplefilter("ignore", kind)
+        code = main(words)
+    said = capsys.readouterr()
+    text = said.out + said.err
+    assert code in (0, 1, 2) and "Traceback" not in text and "Warning" not in text, text
+    assert (code == 0) == (not said.err.strip().startswith("error:") and "\nerror:" not in said.err), said.err
+    return code, text
+
+
+def files_below(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def settings_of(kind: str, folder: Path) -> tuple[Path, list[str]]:
+    """A settings file in a folder, and what is typed to run it."""
+    if kind in ("case", "system"):
+        assert main(["init", "three-masses"]) == 0
+        case = folder / "three-masses" / "case.toml"
+        few = case.read_text().replace("points = 600", "points = 4").replace("[0.0, 2.0, 10.0, 1000.0]", "[2.0]")
+        case.write_text("harmonics = 3\nsamples = 48\nspeed = 0\nmodes = 3\ndamping_ratio = 0.01\n" + few)
+        if kind == "system":
+            return folder / "three-masses" / "system.toml", ["modes", "three-masses", "-q"]
+        assert main(["modes", "three-masses", "-q"]) == 0
+        return case, ["respond", str(case), "-q"]
+    if kind == "contact":
+        assert main(["init", "contact"]) == 0
+        return folder / "contact" / "contact.toml", ["contact", "contact", "-q", "-o", "out"]
+    (folder / "beam.inp").write_text("\n".join(decks.mesh_lines(small.beam((1, 1, 1)), 1.0, FACES)) + "\n")
+    (folder / "body.toml").write_text(BEAM)
+    return folder / "body.toml", ["modes", "body.toml", "-q"]
+
+
+FACES = ("clamp", "tip", "contact_left", "contact_right")
+SEEDS = [("case", 0, 15), ("system", 0, 40), ("body", 0, 20)]
+MORE = [("case", 15, 400), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 150)]
+"""Kind of a settings file, and which ones are drawn."""
+
+
+@pytest.mark.parametrize("drawn", [*SEEDS, *[pytest.param(one, marks=pytest.mark.slow) for one in MORE]])
+def test_nonsense_settings_through_the_command_line(
+    drawn: tuple[str, int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Done, not converged, or refused with a sentence; what is refused has overwritten nothing."""
+    monkeypatch.chdir(tmp_path)
+    kind, first, last = drawn
+    path, words = settings_of(kind, tmp_path)
+    text, refused = path.read_text(), 0
+    assert typed(words, capsys)[0] == 0
+    before = files_below(tmp_path)
+    for seed in range(first, last):
+        before[path] = spoiled(text, random.Random(f"{kind}{seed}")).encode()
+        path.write_bytes(before[path])
+        code, _ = typed(words, capsys)
+        refused += code == 2
+        now = files_below(tmp_path)
+        assert code != 2 or now == before, seed
+        before = now
+    assert (last - first) / 3 < refused < last - first
+
+
+@pytest.mark.parametrize(
+    ("suffix", "count"),
+    [
+        *[(suffix, 10) for suffix in (".inp", ".unv", ".cdb", ".bdf")],
+        *[(suffix, 2) for suffix in (".h5", ".med")],
+        *[pytest.param(suffix, 300, marks=pytest.mark.slow) for suffix in (".inp", ".unv", ".cdb", ".bdf", ".h5")],
+        *[pytest.param(suffix, 20, marks=pytest.mark.slow) for suffix in (".msh", ".med", ".step")],
+    ],
+)
+def test_changed_bytes_through_the_command_line(
+    suffix: str, count: int, tmp_path: Path, modal_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Read or refused; a sealed modal file is what it was, or refused."""
+    from test_readers import samples
+
+    if suffix == ".step":
+        pytest.importorskip("gmsh")
+        done = subprocess.run([sys.executable, "-c", BOX], cwd=tmp_path, capture_output=True)
+        assert done.returncode == 0
+        whole = (tmp_path / "box.step").read_bytes()
+    else:
+        whole = modal_file.read_bytes() if suffix == ".h5" else samples(tmp_path)[suffix]
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(whole)
+    words = ["check" if suffix == ".h5" else "info", str(path)]
+    first = typed(words, capsys)
+    assert first[0] == 0
+    for seed in range(count):
+        path.write_bytes(flipped(whole, random.Random(seed)))
+        found = typed(words, capsys)
+        assert found[0] in (0, 2) and (suffix != ".h5" or found[0] or found == first), seed
+
+
+BOX = "import gmsh; gmsh.initialize(interruptible=False); gmsh.model.occ.addBox(0, 0, 0, 10, 10, 10); "
+BOX += "gmsh.model.occ.synchronize(); gmsh.write('box.step')"

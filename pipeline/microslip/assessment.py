@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 LIFTS = "contacts would lift off: not valid"
 """Note on a resonance of the closed form."""
 
-ENDLESS = MaterialLimits(fatigue_strength=1e300, tensile_strength=1e301)
+ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
 """Limits of a case that gives none: the worst place is then that of the largest amplitude."""
 
 

@@ -66,16 +66,29 @@ def _nodal_diameters(value: Any) -> Any:
 
 
 def has_length(value: tuple[float, ...]) -> tuple[float, ...]:
-    """A direction as it is, if the square of its length neither overflows nor vanishes.
+    """A direction as it is, if it is one.
 
     Raises:
-        ValueError: it does.
+        ValueError: it has no length.
     """
-    largest = max(map(abs, value))
-    if not 1e-100 < largest < 1e100:
-        what = "must not be [0, 0, 0]" if largest == 0 else f"has entries of {largest:g}"
-        raise ValueError(f"a direction {what}; only its direction counts, so write numbers about 1")
+    if not any(value):
+        raise ValueError("a direction must not be [0, 0, 0]")
     return value
+
+
+def of_sensible_size(value: float) -> float:
+    """A number as it is, if its square and products with others neither overflow nor vanish, as no quantity's do.
+
+    Raises:
+        ValueError: they do.
+    """
+    if value and math.isfinite(value) and not 1 / BEYOND <= abs(value) <= BEYOND:
+        raise ValueError(f"{value:g} is beyond all bounds; write 0, or a number between {1 / BEYOND:g} and {BEYOND:g}")
+    return value
+
+
+BEYOND = 1e30
+"""Size of a number, in any unit that files are written in, that is a mistake; its inverse too."""
 
 
 def damping_ratio(value: float) -> float:
@@ -103,9 +116,9 @@ def _friction(value: float) -> float:
 
 
 NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_nodal_diameters)]
-Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False)]
-Positive = Annotated[float, BeforeValidator(_float), Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, BeforeValidator(_float), Field(ge=0, allow_inf_nan=False)]
+Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(of_sensible_size)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
 Ratio = Annotated[NotNegative, AfterValidator(damping_ratio), Field(lt=1)]
 Coefficient = Annotated[NotNegative, AfterValidator(_friction), Field(le=MOST_FRICTION)]
 Length = Annotated[Number, _LENGTH]

@@ -90,6 +90,7 @@ class Built:
     assembly: Assembly
     remarks: tuple[str, ...]
     fitted: Mapping[int, Callable[[float], Contact]] = field(default_factory=dict)
+    _pressed: dict[float | None, Assembly] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     @property
     def speed(self) -> float:
@@ -97,7 +98,16 @@ class Built:
         return next(iter(self.bodies.values())).group.speed
 
     def pressed(self, normal: float | None) -> Assembly:
-        """The assembly with a normal force (N) in every contact that the sweep presses; all of its ring if asked."""
+        """The assembly with a normal force (N) in every contact that the sweep presses; all of its ring if asked.
+
+        Raises:
+            UserError: a force that a law does not reach.
+        """
+        if normal not in self._pressed:
+            self._pressed[normal] = self._under(normal)
+        return self._pressed[normal]
+
+    def _under(self, normal: float | None) -> Assembly:
         whole = self.assembly
         if normal is not None:
             own = [self.fitted[i](normal) if i in self.fitted else c for i, c in enumerate(whole.contacts)]
@@ -323,7 +333,8 @@ def _contact(
         else:
             patch = _told(path, c, lambda: patch_of(c, k, law, faces[0], load, whole))
         more = [words] * bool(words) + _told(path, c, lambda: resolved(c, patch, load))
-        return touching(c.interface, patch, first, second, c.normal_force, c.interference or 0.0, compliance), more
+        press = partial(touching, second=second, normal=c.normal_force, interference=c.interference or 0.0)
+        return _told(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
 
     return at, said
 

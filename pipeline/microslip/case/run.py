@@ -128,6 +128,7 @@ def _run(
     left = _Left(built, tolerance)
     _book_can(built, path)
     if settings.has_laws or not settings.contacts:
+        _can_be_pressed(built, forces, path)
         with keep(built) if keep else nullcontext() as journal:
             responses, resonances, stuck, remarks = _by_laws(built, forces, frequency, report, journal, left)
     else:
@@ -271,6 +272,19 @@ def _book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
         if id(c.patch) not in made:
             made[id(c.patch)] = book_patch(c.patch, strips)
     return {i: made[id(c.patch)] for i, c in enumerate(assembly.contacts)}
+
+
+def _can_be_pressed(built: Built, forces: Sequence[float | None], path: Path | str) -> None:
+    """Press the contacts by all forces of the sweep before anything is kept.
+
+    Raises:
+        UserError: with the file's name.
+    """
+    try:
+        for normal in forces:
+            built.pressed(normal)
+    except UserError as error:
+        raise UserError(f"{path}: sweep.normal_forces: {error}") from error
 
 
 def _book_can(built: Built, path: Path | str) -> None:

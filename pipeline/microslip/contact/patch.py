@@ -192,7 +192,10 @@ def _deep_enough(patch: Patch, normal: float) -> float:
     for u[0] in 1e-9 * 2.0 ** np.arange(40):
         if _pressed(patch, u)[0][0] >= normal:
             return float(u[0])
-    raise UserError(f"{patch.interface}: no approach below {u[0]:.2g} m makes a normal force of {normal:g} N")
+    raise UserError(
+        f"{patch.interface}: no approach below {u[0]:.2g} m makes a normal force of {normal:g} N; press it less, or "
+        "make it stiffer"
+    )
 
 
 def _pressed(patch: Patch, u: Array) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ is smoothed by an arctan, so that P creeps where it should stick. As mass and cr
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -268,6 +269,9 @@ def _intervals(
     return [(a, b, bool(_closed(law, motion, np.array([0.5 * (a + b)]))[0])) for a, b in pairs]
 
 
+_MOST = 5_000_000  # evaluations of a closed interval, some minutes; the figures of the book take thousands
+
+
 def _solve(
     law: MassContact, motion: Callable[[Array], Array], y: np.ndarray, span: tuple[float, float], inside: np.ndarray,
     tolerance: float, absolute: np.ndarray, method: str,
@@ -276,7 +280,17 @@ def _solve(
     wanted = np.append(inside, span[1]) if len(inside) == 0 or inside[-1] < span[1] else inside
     options: dict[str, Any] = {"method": method, "rtol": tolerance, "atol": absolute, "t_eval": wanted}
     options["jac"] = lambda t, y: np.asarray(_jacobian(law, motion, t, y))
-    answer = solve_ivp(lambda t, y: np.asarray(_rate(law, motion, t, y)), span, y, **options)
+    spent = itertools.count()
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        if next(spent) > _MOST:
+            raise NotConverged(
+                f"the point contact element changes too fast to be integrated, first at {t:.6g} s: give it a larger "
+                "mass or damping, a smaller slope, or friction that scatters less fast"
+            )
+        return np.asarray(_rate(law, motion, t, y))
+
+    answer = solve_ivp(rate, span, y, **options)
     if not answer.success:
         raise NotConverged(f"the point contact element could not be integrated: {answer.message}")
     return answer.y[:, -1], answer.y[:, : len(inside)].T

@@ -113,7 +113,7 @@ def course(heights: Heights, force: float, times: np.ndarray, count: int = 257) 
         At the times; the first row is that of times[0].
 
     Raises:
-        UserError: a force that is not positive, times that fall or are negative.
+        UserError: a force that is not positive, or too small for the times; times that fall or are negative.
     """
     times = np.asarray(times, float)
     if not force > 0 or not np.isfinite(force):
@@ -124,7 +124,7 @@ def course(heights: Heights, force: float, times: np.ndarray, count: int = 257) 
     x, share = np.asarray(table.x), np.asarray(table.area_at)
     u = approach_under(heights, force * (1 + times))
     start = float(approach_under(heights, force))
-    edges, s, pushed = _pushed(heights, force, start, np.concatenate([x, u]))
+    edges, s, pushed = _pushed(heights, force, start, np.concatenate([x[x < u[-1]], u]))
     at_x, at_u = (np.searchsorted(edges, np.clip(v, start, edges[-1])) for v in (x, u))
     since = s[at_u][:, None] - s[at_x]  # time in contact; negative: not yet touched
     pressure = pushed[at_u][:, None] - np.exp(-np.maximum(since, 0)) * pushed[at_x]
@@ -135,6 +135,7 @@ def course(heights: Heights, force: float, times: np.ndarray, count: int = 257) 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _LONGEST = 0.5  # t* per cell: 8 nodes then integrate to rounding
+_MOST = 1e6  # cells: some seconds
 
 
 def _pushed(
@@ -145,9 +146,15 @@ def _pushed(
     The integral from ``start`` to each of them is carried from cell to cell, so that nothing overflows.
     """
     last, volume = float(np.asarray(heights.breaks())[-1]), _volume_of(heights)
-    edges = np.unique(np.concatenate([[start, max(start, last)], marks[marks > start]]))
+    edges = np.unique(np.clip(np.concatenate([[start, min(last, marks.max())], marks]), start, None))
     s = volume(edges) / force
-    parts = np.where(edges[1:] <= last, np.ceil(np.diff(s) / _LONGEST), 1).astype(int).clip(1)
+    parts = np.where(edges[1:] <= last, np.ceil(np.diff(s) / _LONGEST), 1).clip(1)
+    if parts.sum() > _MOST:
+        raise UserError(
+            f"wear: a normal force of {force:.3g} wears the surface over {parts.sum() * _LONGEST:.3g} of its own "
+            "times; give a larger force or less time"
+        )
+    parts = parts.astype(int)
     fine = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], parts, strict=True)]
     edges = np.append(np.concatenate(fine) if fine else np.zeros(0), edges[-1])
     s = volume(edges) / force

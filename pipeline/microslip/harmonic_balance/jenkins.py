@@ -126,14 +126,18 @@ def jenkins_harmonic(amplitude: Array, stiffness: float, limit: float) -> tuple[
     Args:
         amplitude: (c,) m, not negative. stiffness: N/m. limit: N.
     """
-    x = np.maximum(stiffness * np.asarray(amplitude, dtype=float) / max(limit, 1e-300), 1.0)
+    limit = max(limit, _NO_FRICTION)
+    x = np.clip(stiffness * np.asarray(amplitude, dtype=float) / limit, 1.0, 1e100)
     theta = np.arccos(1 - 2 / x)
     value = (theta - 0.5 * np.sin(2 * theta)) / np.pi + 4j * (x - 1) / (np.pi * x**2)
     slides = x > 1
     inside = np.where(slides, x - 1, 1.0)
     dtheta = -1 / (x * np.sqrt(inside))
     slope = (1 - np.cos(2 * theta)) / np.pi * dtheta + 4j * (2 - x) / (np.pi * x**3)
-    return stiffness * value, np.where(slides, stiffness * slope * stiffness / max(limit, 1e-300), 0.0)
+    return stiffness * value, np.where(slides, stiffness * slope * stiffness / limit, 0.0)
+
+
+_NO_FRICTION = 1e-150  # N, for a limit of 0: what it holds, and the cube of what slides over it, are numbers
 
 
 def frequency_response(
