@@ -321,10 +321,16 @@ def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
         frequency: (f,) Hz, rising. modes: (m,) Hz, with sticking contacts or without contacts: where these dissipate
             most, between both, no resonance is as narrow. damping: (m,) their ratios.
     """
-    inside = (modes > frequency[0]) & (modes < frequency[-1]) & ~np.isin(modes, frequency)
+    away = np.abs(modes[:, None] - frequency).min(axis=1, initial=np.inf)
+    inside = (modes > frequency[0]) & (modes < frequency[-1]) & (away > ONE * modes)
     modes, damping = modes[inside], damping[inside]
     steps = np.diff(frequency)[np.searchsorted(frequency, modes) - 1]
-    return sorted({float(f) for f in modes[2 * damping * modes < steps]})
+    found = np.sort(modes[2 * damping * modes < steps])
+    return found[np.diff(found, prepend=0.0) > ONE * found].tolist()
+
+
+ONE = 1e-9
+"""Relative distance of two modes up to which they are one frequency, as those of a ring's waves that run both ways."""
 
 
 def inside(
