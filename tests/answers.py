@@ -117,13 +117,13 @@ def of_summaries(a: Raw, b: Raw) -> dict[str, float]:
     """Entry -> largest relative difference."""
     found = {}
     for key in ("resonances", "rising_at_the_edge", "stuck_modes", "stuck_frequencies_Hz"):
-        x, y = (_numbers(s[key]) for s in (a, b))
+        x, y = (of_rows(s[key]) for s in (a, b))
         found[f"json {key}"] = float(np.abs(y / x - 1).max(initial=0.0)) if x.shape == y.shape else math.inf
     told = (len(a["remarks"]), a["failed_points"]) == (len(b["remarks"]), b["failed_points"])
     return found | {"json remarks": 0.0 if told else math.inf}
 
 
-def _numbers(rows: list[Any]) -> Array:
+def of_rows(rows: list[Any]) -> Array:
     """Numbers of rows but the normal force, by which they are only named."""
     each = [[v for k, v in r.items() if k != "normal_force_N" and isinstance(v, float)] if isinstance(r, dict) else [r]
             for r in rows]  # fmt: skip
