@@ -19,7 +19,8 @@ from microslip.units import amplitude_of
 
 Raw = dict[str, Any]
 Change = Callable[[str, Array], tuple[str, Array]]
-"""Name and values (f, ...) of an array of a response -> those that another way of writing the case gives."""
+"""Name and values (f, ...) of an array of a response -> those that another way of writing the case gives; no name: it
+says nothing of them."""
 
 OWN = ("seconds", "iterations", "history", "error", "x", "peak", "added", "checks/", "exchanged")
 """Arrays of the solver's way, or of rounding."""
@@ -76,9 +77,10 @@ def differences(a: Answer, b: Answer, change: Change = lambda name, values: (nam
     Args:
         change: see `Change`.
     """
-    found = _of_tables(a.table, b.table) | _of_summaries(a.summary, b.summary)
+    found = _of_tables(a.table, b.table) | of_summaries(a.summary, b.summary)
     for one, other in zip(a.response.series, b.response.series, strict=True):
         expected = dict(change(n, v) for n, v in known(one, a).items())
+        expected.pop("", None)
         found |= {f"h5 {n}": d for n, d in apart(expected, known(other, b)).items()}
     return found
 
@@ -111,16 +113,17 @@ def _kind(name: str) -> str:
     return "energy" if kind.endswith("_J") else "motion" if kind.startswith(("amplitude", "mean")) else kind
 
 
-def _of_summaries(a: Raw, b: Raw) -> dict[str, float]:
+def of_summaries(a: Raw, b: Raw) -> dict[str, float]:
+    """Entry -> largest relative difference."""
     found = {}
     for key in ("resonances", "rising_at_the_edge", "stuck_modes", "stuck_frequencies_Hz"):
-        x, y = (_numbers(s[key]) for s in (a, b))
+        x, y = (of_rows(s[key]) for s in (a, b))
         found[f"json {key}"] = float(np.abs(y / x - 1).max(initial=0.0)) if x.shape == y.shape else math.inf
     told = (len(a["remarks"]), a["failed_points"]) == (len(b["remarks"]), b["failed_points"])
     return found | {"json remarks": 0.0 if told else math.inf}
 
 
-def _numbers(rows: list[Any]) -> Array:
+def of_rows(rows: list[Any]) -> Array:
     """Numbers of rows but the normal force, by which they are only named."""
     each = [[v for k, v in r.items() if k != "normal_force_N" and isinstance(v, float)] if isinstance(r, dict) else [r]
             for r in rows]  # fmt: skip
@@ -137,8 +140,9 @@ def apart(a: dict[str, Array], b: dict[str, Array]) -> dict[str, float]:
             sizes[_unit(n), i] = max(sizes.get((_unit(n), i), 1e-300), float(np.abs(part).max(initial=0.0)))
     found = {}
     for n, v in a.items():
-        pairs = zip(_parts(n, v), _parts(n, b[n]) if n in b else [], strict=True)
-        found[n] = max(_apart(n, x, y) / sizes[_unit(n), i] for i, (x, y) in enumerate(pairs))
+        pairs = zip(_parts(n, v), _parts(n, b[n]) if n in b else [None, None], strict=False)
+        each = [math.inf if y is None else _apart(n, x, y) / sizes[_unit(n), i] for i, (x, y) in enumerate(pairs)]
+        found[n] = max(each)
     return found
 
 
@@ -171,7 +175,9 @@ def changed_bits(a: Answer, b: Answer) -> list[str]:
     found = ["csv"] * (a.text != b.text) + ["html"] * (a.page != b.page)
     told = [{k: v for k, v in x.summary.items() if not k.endswith("sha256")} for x in (a, b)]
     found += [f"json {k}" for k in told[0] | told[1] if told[0].get(k) != told[1].get(k)]
-    for one, other in zip(a.response.series, b.response.series, strict=True):
+    found += [f"h5 {n}" for n in ("labels", "settings", "inputs") if getattr(a.response, n) != getattr(b.response, n)]
+    found += ["h5 series"] * (len(a.response.series) != len(b.response.series))
+    for one, other in zip(a.response.series, b.response.series, strict=False):
         names = {*one.arrays, *other.arrays} - {"seconds"}
         same = {n for n in names & {*one.arrays} & {*other.arrays}
                 if one.arrays[n].tobytes() == other.arrays[n].tobytes()}  # fmt: skip

@@ -1,21 +1,25 @@
-"""Random assemblies of small bodies by hand, as the files of a case; the same ones turned, mirrored, or in a ring.
+"""Random assemblies as the files of a case; the same ones turned, mirrored, in other units, or in a ring.
 
-A body is a hull that turns and a tip beside it, on springs that couple all of their nine coordinates. It is drawn in
-the axes of the case and written in axes of its own, from which `turn` and `shift` of the case bring it back.
+Bodies by hand are a hull that turns and a tip beside it, on springs that couple all of their nine coordinates; bodies
+of finite elements are two beams side by side. Both are drawn in the axes of the case and written in axes of their own,
+from which `turn` and `shift` of the case bring them back.
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.linalg
+import small
 from attack import toml
+from decks import mesh_lines
 
-from microslip.data import Array
+from microslip.data import Array, Mesh
 from microslip.frames import rotation, skew
 
 Y = np.array([0.0, 1.0, 0.0])
@@ -89,7 +93,7 @@ def law(rng: np.random.Generator, rough: bool) -> Raw:
     own = {"law": "rough", "roughness": float(rng.uniform(2e-5, 4e-5))} if rough else {"law": "smooth"}
     k = float(rng.uniform(5e5, 2e6))
     return own | {"normal_stiffness": k, "tangential_stiffness": float(rng.uniform(0.4, 0.8)) * k,
-                  "friction": float(rng.uniform(0.1, 0.4)), "points": [2, 2]}  # fmt: skip
+                  "friction": float(rng.uniform(0.1, 0.4)), "points": [2, 2], "includes": "surface"}  # fmt: skip
 
 
 def touch(rng: np.random.Generator, drawn: Drawn, one: str, other: str | None, rough: bool) -> None:
@@ -135,8 +139,13 @@ def draw(seed: int, rough: bool = False, harmonics: int = 2, samples: int = 32, 
     start = float(rng.uniform(90, 130))
     drawn.case["sweep"] = {"start": start, "stop": start + 50.0, "points": int(rng.integers(5, 8))}
     drawn.case["sweep"]["normal_forces"] = [float(rng.uniform(15, 40))]
-    drawn.places = {n: (float(rng.uniform(-180, 180)), rng.normal(size=3)) for n in names}
+    drawn.places = places(rng, names)
     return drawn
+
+
+def places(rng: np.random.Generator, names: Iterable[str]) -> dict[str, tuple[float, Array]]:
+    """Random ones by whose turns axes become axes, see `Drawn`."""
+    return {n: (90.0 * float(rng.integers(4)), rng.normal(size=3)) for n in names}
 
 
 def turned(drawn: Drawn, Q: Array, places: dict[str, tuple[float, Array]]) -> Drawn:
@@ -190,3 +199,96 @@ def _gap(rng: np.random.Generator, drawn: Drawn, blades: int, one: str, other: s
         drawn.systems[body]["contacts"].append(size | face | {"name": f"{name}_{side}"})
     ends = {"interface": f"{one}:{name}_right", "against": f"{other}:{name}_left", "against_sector": 1}
     drawn.case["contacts"].append(ends | law(rng, False))
+
+
+# beams of finite elements -------------------------------------------------------------------------------------------
+
+CONTACT = {
+    "name": "rub",
+    "stiffness": {"kind": "given", "normal": 2e6, "tangential": 1e6, "includes": "surface"},
+    "roughness": {"kind": "polynomial", "R_Z": 2e-5},
+    "friction": {"kind": "coulomb", "mu": 0.3},
+}
+
+
+@dataclass
+class Beams:
+    """Two beams side by side, a clamped below and b above, rubbing by a contact.toml under forces and a pressure field;
+    a strain gauge is read first, whose sense no turning changes.
+
+    Attributes:
+        Q: (3, 3) by which all of it is turned or mirrored. places: see `Drawn`. unit: of length in every file but that
+            of the case, which is in SI.
+    """
+
+    Q: Array = field(default_factory=lambda: np.eye(3))
+    places: dict[str, tuple[float, Array]] = field(default_factory=dict)
+    unit: str = "m"
+    case: Raw = field(default_factory=lambda: {
+        "name": "beams", "harmonics": 2, "samples": 32,
+        "monitors": [{"monitor": "a:root"}, *({"monitor": f"{b}:tip", "direction": d} for b in "ab" for d in "xyz")],
+        "contacts": [{"interface": "a:right", "against": "b:left", "file": "contact.toml", "points": [2, 2]}],
+        "sweep": {"start": 900.0, "stop": 1400.0, "points": 6, "normal_forces": [30.0]},
+    })  # fmt: skip
+
+    @property
+    def scale(self) -> float:
+        return {"m": 1.0, "mm": 1e3, "in": 1 / 0.0254}[self.unit]
+
+    def written(self, folder: Path) -> Path:
+        """The files in a folder; the path of the case."""
+        x, y, z = small.SIZE
+        for name, start in (("a", 0.0), ("b", x)):
+            self._body(folder / name, name, np.array([start, 0.0, 0.0]))
+        ends = np.array([[x * i, 0.5 * y * j, 0.25 * z * k] for i in (0,) for j in range(3) for k in range(5)])
+        rows = [[*(self.scale * p), 2e4 * (1 + 5 * q[2]), 1e4 * q[1] / y]
+                for q, p in zip(ends, self.own("a", ends), strict=True)]  # fmt: skip
+        text = "\n".join(",".join(map(repr, map(float, row))) for row in rows)
+        (folder / "field.csv").write_text(f"x,y,z,p_real,p_imag\n{text}\n")
+        contact = copy.deepcopy(CONTACT) | {"length_unit": self.unit}
+        contact["roughness"]["R_Z"] *= self.scale
+        (folder / "contact.toml").write_text(toml(contact))
+        of_field = {"field": "field.csv", "face": "a:left", "length_unit": self.unit, "harmonic": 2, "amplitude": 10.0}
+        loads = {"excitations": [{"row": "a:shaker", "amplitude": 200.0, "phase": 30.0}, of_field]}
+        bodies = [{"name": n, "turn": self.place(n)[0], "shift": self.place(n)[1]} for n in "ab"]
+        (folder / "case.toml").write_text(toml(self.case | loads | {"bodies": bodies}))
+        return folder / "case.toml"
+
+    def place(self, name: str) -> tuple[float, Array]:
+        return self.places.get(name, (0.0, np.zeros(3)))
+
+    def axes(self, name: str) -> Array:
+        """(3, 3) axes of the drawing to those of a body's file."""
+        return rotation(Y, -np.radians(self.place(name)[0])) @ self.Q
+
+    def own(self, name: str, points: Array) -> Array:
+        """Places (p, 3) in a body's own axes, m."""
+        turn, shift = self.place(name)
+        return (points @ self.Q.T - shift) @ rotation(Y, np.radians(turn))
+
+    def _body(self, folder: Path, name: str, start: Array) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        mesh, s = small.beam((1, 1, 3)), small.SIZE
+        cells = mesh.cells["tetra10"]
+        if np.linalg.det(self.Q) < 0:
+            cells = cells[:, [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]]
+        placed = Mesh(self.own(name, mesh.points + start), {"tetra10": cells}, mesh.faces, {}, mesh.node_id)
+        sets = ("clamp", "tip", "contact_left", "contact_right")
+        (folder / "mesh.inp").write_text("\n".join(mesh_lines(placed, self.scale, sets)) + "\n")
+
+        def at(*point: float) -> Array:
+            return self.scale * self.own(name, np.array([point]) + start)[0]
+
+        R, middle = self.axes(name), at(s[0] / 2, s[1] / 2, s[2] / 2)
+        up = R @ np.array([0.0, 0.0, 1.0])
+        (folder / "body.toml").write_text(toml({
+            "name": name, "length_unit": self.unit, "geometry": {"mesh": "mesh.inp"}, "reduction": "rubin",
+            "material": {"density": 7850.0, "young": 2.1e11, "poisson": 0.3},
+            "supports": [{"face": "clamp" if name == "a" else "tip"}],
+            "interfaces": [{"name": n, "face": f"contact_{n}", "t2": up} for n in ("right", "left")],
+            "excitations": [{"name": "shaker", "point": middle, "direction": R @ [1, 2, 0.5]}],
+            "monitors": [{"name": "tip", "point": middle}],
+            "gauges": [{"name": "root", "point": at(0.7 * s[0], 0.0, s[2] / 5), "direction": up + 0.3 * R[:, 1]}],
+            "modes": {"count": 6, "solver": "superlu"}, "damping": {"ratio": 0.02},
+            "output": {"gauss": False, "nodal_stress": False},
+        }))  # fmt: skip

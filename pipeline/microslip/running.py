@@ -434,7 +434,7 @@ def modal_files(
         elif (lumped := _lumped(path, body)) is not None:
             found[b.name] = system_stage(lumped, report=report, root=root)
         else:
-            job = open_job(find_body(path, body, root))
+            job = open_job(find_body(path, body, root), root=root)
             modes_stage(job, report=report)
             found[b.name] = job.basis_file
     return found

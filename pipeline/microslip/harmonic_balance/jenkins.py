@@ -343,10 +343,16 @@ def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
         frequency: (f,) Hz, rising. modes: (m,) Hz, with sticking contacts or without contacts: where these dissipate
             most, between both, no resonance is as narrow. damping: (m,) their ratios.
     """
-    inside = (modes > frequency[0]) & (modes < frequency[-1]) & ~np.isin(modes, frequency)
+    inside = (modes > frequency[0]) & (modes < frequency[-1])
     modes, damping = modes[inside], damping[inside]
-    steps = np.diff(frequency)[np.searchsorted(frequency, modes) - 1]
-    return sorted({float(f) for f in modes[2 * damping * modes < steps]})
+    below, above = (frequency[np.searchsorted(frequency, modes) + i] for i in (-1, 0))
+    apart = np.minimum(modes - below, above - modes) > ONE * modes
+    found = np.sort(modes[apart & (2 * damping * modes < above - below)])
+    return found[np.diff(found, prepend=0.0) > ONE * found].tolist()
+
+
+ONE = 1e-9
+"""Relative distance of two modes up to which they are one frequency, as those of a ring's waves that run both ways."""
 
 
 def inside(
