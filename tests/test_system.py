@@ -292,6 +292,20 @@ def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 2
 
 
+def test_a_folder_with_a_case_alone_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    """It complained of a body.toml that nobody meant; what needs a body says that it is a case."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "three-masses"]) == 0
+    (tmp_path / "mine").mkdir()
+    write_basis(tmp_path / "mine" / "masses.h5", system_basis(tmp_path / "three-masses" / "system.toml"))
+    case = (tmp_path / "three-masses" / "case.toml").read_text().replace("points = 600", "points = 15")
+    case = case.replace('name = "three-masses"', 'name = "mine"').replace('body = "three-masses"\n', "")
+    (tmp_path / "mine" / "case.toml").write_text(case + '[[bodies]]\nname = "masses"\nfile = "masses.h5"\n')
+    assert main(["run", "mine", "-q"]) == 0
+    assert (tmp_path / "build" / "mine" / "response.csv").is_file()
+    assert main(["modes", "mine"]) == 2 and "microslip run mine" in capsys.readouterr().err
+
+
 def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
