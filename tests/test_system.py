@@ -440,6 +440,19 @@ def test_nonsense_given_in_python_is_one_sentence(what, given, key) -> None:
     assert "\n" not in str(told.value)
 
 
+def test_an_undamped_mode_that_is_met_exactly_is_answered() -> None:
+    """A singular matrix ended the run. Stuck to the ground by its contact the mass moves as a spring more lets it."""
+    mass, f, k = 2.0, 5.0, 4e3
+    own = mass * (2 * np.pi * f) ** 2
+    parts = [Body("a", mass, free="x")], [Spring("ground", "a", (own, 0, 0))]
+    contacts = [Contact("rub", "a", normal=(0, 0, 1), t2=(0, 1, 0))]
+    g = System("one", *parts, contacts, [Force("f", "a", (1, 0, 0))], [Monitor("m", "a")]).basis().groups[0, 0]
+    g = replace(g, K_r=(2 * np.pi * f) ** 2 * g.M_r)  # to the last bit
+    sticks = [JenkinsContact("rub", np.zeros(6), 1, k, 1e9)]
+    found = frequency_response(g, sticks, g.excitations["f"].rows[0], g.monitors["m"].rows[0], np.array([f]))
+    assert abs(found.monitor[0]) == pytest.approx(1 / k, rel=1e-6)
+
+
 def test_a_sweep_without_points_has_no_peaks() -> None:
     assert twice_refined([]) == []
 
