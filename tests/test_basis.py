@@ -23,8 +23,10 @@ import small
 from microslip.basis import check_basis, open_file, read_basis, write_basis
 from microslip.basis.hdf5 import seal, seal_state
 from microslip.basis.integrals import modal_mass
+from microslip.body import BodySettings
 from microslip.data import Mesh, ModalBasis, UserError
 from microslip.hostile import HostileFile, inspect, trial
+from microslip.modes import modal_basis
 from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -528,3 +530,19 @@ def test_open_file_leaves_nothing_open(copy: Path) -> None:
         open_file(copy)
     with h5py.File(copy, "r+"):  # a file still open for reading could not be opened for writing
         pass
+
+
+@pytest.mark.parametrize(
+    "reduction", ["eigenmodes", *(pytest.param(r, marks=pytest.mark.slow) for r in ("rubin", "massless-boundary"))]
+)
+def test_a_band_below_the_first_elastic_mode_keeps_the_rigid_motions(reduction: str) -> None:
+    """It was refused. All that is missing stands in the compliance; a held body has nothing in such a band."""
+    modes = {"count": 12, "max_frequency": 10.0, "solver": "superlu"}
+    table = small.table(free=True, reduction=reduction, modes=modes)
+    del table["supports"]
+    basis = modal_basis(small.beam((1, 1, 2)), BodySettings.model_validate(table))
+    group = basis.groups[0, 0]
+    assert (group.omega[:6] == 0).all() and "normal" not in group.kind
+    assert all(c.passed for c in check_basis(basis)) and not group.compliance.plain.any()
+    with pytest.raises(UserError, match="modes.max_frequency"):
+        modal_basis(small.beam((1, 1, 2)), BodySettings.model_validate(small.table(modes=modes)))

@@ -1,6 +1,7 @@
 """The book's contact: one harmonic, constant normal force, elliptic orbits (Sextro, section 5.2), and its tables."""
 
 import dataclasses
+import warnings
 
 import jax
 import jax.numpy as jnp
@@ -131,6 +132,15 @@ def test_a_cross_stiffness_that_is_neither_stick_nor_slip() -> None:
 
 
 @pytest.mark.slow
+def test_orbits_that_stick_circles_at_the_limit_and_lines() -> None:
+    """One stiffness while nothing slides, without a division of nothing by nothing; a line is the thinnest ellipse."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert (orbits.exact(np.array([0.0, 0.5, 1.0, 1.0]), np.array([0.0, 0.0, 1.0, 0.0])) == 1).all()
+        found = orbits.exact(np.array([2.0, 2.0]), np.array([0.0, 2 * orbits.THINNEST]))
+    assert np.allclose(found[:, 0], found[:, 1], rtol=1e-9, atol=0)
+
+
 def test_the_error_of_the_table_is_the_one_it_promises(computed: tuple) -> None:
     """At the places chosen at random."""
     A, B, K = (x[..., 2 * len(SIZES) :] for x in computed)

@@ -292,6 +292,20 @@ def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert main(["respond", "three-masses", "build/three-masses/basis.h5", "-q"]) == 2
 
 
+def test_a_folder_with_a_case_alone_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    """It complained of a body.toml that nobody meant; what needs a body says that it is a case."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "three-masses"]) == 0
+    (tmp_path / "mine").mkdir()
+    write_basis(tmp_path / "mine" / "masses.h5", system_basis(tmp_path / "three-masses" / "system.toml"))
+    case = (tmp_path / "three-masses" / "case.toml").read_text().replace("points = 600", "points = 15")
+    case = case.replace('name = "three-masses"', 'name = "mine"').replace('body = "three-masses"\n', "")
+    (tmp_path / "mine" / "case.toml").write_text(case + '[[bodies]]\nname = "masses"\nfile = "masses.h5"\n')
+    assert main(["run", "mine", "-q"]) == 0
+    assert (tmp_path / "build" / "mine" / "response.csv").is_file()
+    assert main(["modes", "mine"]) == 2 and "microslip run mine" in capsys.readouterr().err
+
+
 def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -424,6 +438,19 @@ def test_nonsense_given_in_python_is_one_sentence(what, given, key) -> None:
     with pytest.raises(UserError, match=key) as told:
         what(**given)
     assert "\n" not in str(told.value)
+
+
+def test_an_undamped_mode_that_is_met_exactly_is_answered() -> None:
+    """A singular matrix ended the run. Stuck to the ground by its contact the mass moves as a spring more lets it."""
+    mass, f, k = 2.0, 5.0, 4e3
+    own = mass * (2 * np.pi * f) ** 2
+    parts = [Body("a", mass, free="x")], [Spring("ground", "a", (own, 0, 0))]
+    contacts = [Contact("rub", "a", normal=(0, 0, 1), t2=(0, 1, 0))]
+    g = System("one", *parts, contacts, [Force("f", "a", (1, 0, 0))], [Monitor("m", "a")]).basis().groups[0, 0]
+    g = replace(g, K_r=(2 * np.pi * f) ** 2 * g.M_r)  # to the last bit
+    sticks = [JenkinsContact("rub", np.zeros(6), 1, k, 1e9)]
+    found = frequency_response(g, sticks, g.excitations["f"].rows[0], g.monitors["m"].rows[0], np.array([f]))
+    assert abs(found.monitor[0]) == pytest.approx(1 / k, rel=1e-6)
 
 
 def test_a_sweep_without_points_has_no_peaks() -> None:

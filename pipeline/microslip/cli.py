@@ -188,12 +188,13 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
     """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
 
     Args:
-        path: a body.toml, a system.toml, the folder that holds it, or a case.toml.
+        path: a body.toml, a system.toml, a case.toml, or the folder that holds it.
     """
     from .basis import read_basis
     from .running import is_case, run_body, run_case_file, run_system
-    from .workflow import frequency_lines, open_job, system_file
+    from .workflow import frequency_lines, holds_a_case_alone, open_job, system_file
 
+    path = path / "case.toml" if holds_a_case_alone(path) else path
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
             page, converged = run_system(system, list(set_), force, report)

@@ -109,6 +109,8 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
         UserError: see `load_body`.
     """
     path = Path(path)
+    if holds_a_case_alone(path):
+        raise UserError(f"{path}: holds a case and no body; run it with: microslip run {shlex.quote(str(path))}")
     if path.is_dir():
         path = path / "body.toml"
     if path.suffix.lower() in _NO_SETTINGS and path.is_file():
@@ -659,6 +661,11 @@ def _remarks(job: Job) -> list[str]:
 
 
 # systems by hand --------------------------------------------------------------------------------------------------
+
+
+def holds_a_case_alone(path: Path) -> bool:
+    """Whether a folder has a case.toml, and neither a body.toml nor a system.toml beside it."""
+    return [(path / f"{name}.toml").is_file() for name in ("case", "body", "system")] == [True, False, False]
 
 
 def system_file(path: Path) -> Path | None:

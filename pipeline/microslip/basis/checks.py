@@ -273,6 +273,8 @@ def _transformation_checks(g: ModalGroup) -> _Findings:
     V, top = g.to_diagonal, max(_largest(g.omega**2), 1.0)
     assert V is not None
     H = V.conj().T
+    if not g.omega.any():  # rigid motions alone: what their stiffness cancels from
+        top = max(_largest(np.abs(H) @ np.abs(g.K_r) @ np.abs(V)), 1.0)
     return [
         ("to_diagonal: V^T M_r V is the identity", _largest(H @ g.M_r @ V - np.eye(len(g.omega))), 1e-9, ""),
         ("to_diagonal: V^T K_r V is diag(omega^2)", _largest(H @ g.K_r @ V - np.diag(g.omega**2)) / top, 1e-9, ""),

@@ -364,7 +364,7 @@ def _about_resonances(part: Linear, frequency: Array) -> Array:
 
     A peak between two of them is drawn too low by 0.2 % at most. One without damping has no height to be drawn.
     """
-    n, unit = len(part.M), np.sqrt(np.linalg.norm(part.K) / np.linalg.norm(part.M))  # rad/s
+    n, unit = len(part.M), np.sqrt(np.linalg.norm(part.K) / np.linalg.norm(part.M)) or 1.0  # rad/s
     zero, one = np.zeros((n, n)), np.eye(n)
     A = np.block([[zero, one], [-part.stiff / unit**2, -part.C / unit]])
     roots = unit * scipy.linalg.eigvals(A, scipy.linalg.block_diag(one, part.M))

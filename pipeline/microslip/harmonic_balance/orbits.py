@@ -180,10 +180,14 @@ def _settled(A: Array, B: Array, samples: int = 128) -> Array:
 
 
 def exact(eta: Array, zeta: Array) -> ComplexArray:
-    """(2, n) K_eta*, K_zeta* of orbits with half-axes eta_A* >= zeta_A* > 0, computed and not looked up."""
+    """(2, n) K_eta*, K_zeta* of orbits with half-axes eta_A* >= zeta_A* >= 0, computed and not looked up; of lines the
+    limit of thin ellipses."""
     A, B = np.asarray(eta, dtype=float), np.asarray(zeta, dtype=float)
+    found, slides = np.ones((2, len(A)), dtype=complex), A > 1
+    A, B = A[slides], np.maximum(B, THINNEST * A)[slides]
     parts = _harmonics(A, B)
-    return np.where(A <= 1, 1.0 + 0j, (parts[::2] + 1j * parts[1::2]) / np.stack([A, B]))
+    found[:, slides] = (parts[::2] + 1j * parts[1::2]) / np.stack([A, B])
+    return found
 
 
 def _harmonics(A: Array, B: Array) -> Array:

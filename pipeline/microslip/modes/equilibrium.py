@@ -288,7 +288,9 @@ def _newton(
         except NotConverged as error:
             step *= 0.5
             if step < 1 / 64:
-                raise UserError(_unstable(speed, error.count)) if isinstance(error, Unstable) else error from None
+                if not isinstance(error, Unstable):
+                    raise error from None
+                raise UserError(_unstable(model, speed, error.count)) from None
             continue
         total += state.iterations
         report(f"static state: {100 * target:.0f} % of the load after {total} Newton steps")
@@ -356,11 +358,21 @@ def _factors_serve(steps: list[float]) -> bool:
     return bool(steps) and steps[-1] < 1e-3 and (len(steps) < 2 or steps[-1] <= 0.1 * steps[-2])
 
 
-def _unstable(speed: float, count: int) -> str:
+def _unstable(model: BodyModel, speed: float, count: int) -> str:
+    why = "buckling or centrifugal divergence); lower the speed or the loads" if speed else "buckling); lower them"
     return (
-        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} "
-        "negative directions: buckling or centrifugal divergence); lower the speed or the loads"
+        f"{what_loads(model, speed)}: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} "
+        f"negative directions: {why}"
     )
+
+
+def what_loads(model: BodyModel, speed: float) -> str:
+    """The key of body.toml behind the stresses of a state: of the first that is given, the speed before all others."""
+    if speed:
+        return "rotation.speeds_rpm"
+    if np.any(model.dead_load):
+        return "loads"
+    return "temperature" if model.thermal_strain is not None else "closures"
 
 
 def _no_equilibrium(speed: float) -> str:

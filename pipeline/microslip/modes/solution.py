@@ -19,7 +19,7 @@ from ..reduction import METHODS, Problem, Reduced, stuck
 from . import rigid
 from .body_rows import BodyRows
 from .common import SPARE
-from .equilibrium import BodyModel
+from .equilibrium import BodyModel, what_loads
 from .loose import refuse_loose_parts, refuse_unresolved
 from .spectrum import leading_rows, rigid_shift, static_answers
 
@@ -166,7 +166,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     vectors = canonical.turn_clusters(s.found.vectors, s.found.values, lead(phi), zero)
     phi = s.unknowns.expand(vectors, n)
     vectors = vectors * canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
-    keep = _band(s.found.values, settings, zero)
+    keep = _band(s.found.values, settings)
     exact = [i for i, label in enumerate(s.labels) if not label.startswith("monitor:")]
     problem = Problem(
         s.pencil, s.found.values[:keep], vectors[:, :keep], zero, s.B[np.array(exact, dtype=int)],
@@ -240,21 +240,22 @@ def _divergence(settings: BodySettings, speed: float, count: int, model: BodyMod
     if settings.rotation.prestress == "none" and speed:
         remedy += ', or use rotation.prestress = "nonlinear": without the stiffening by stress frequencies fall to zero'
     elif not speed:
-        remedy = "reduce the loads or the temperature change, or check the material"
+        remedy = "it buckles under what loads it at rest: reduce that, or check the material"
     return (
-        f"rotation.speeds_rpm: at {speed * 30 / np.pi:.6g} rpm{where and ', ' + where + ','} {count} "
+        f"{what_loads(model, speed)}: at {speed * 30 / np.pi:.6g} rpm{where and ', ' + where + ','} {count} "
         f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}"
     )
 
 
-def _band(values: Array, settings: BodySettings, zero: int) -> int:
+def _band(values: Array, settings: BodySettings) -> int:
+    """How many modes are kept; of a free body its rigid motions alone, if the band ends below the first elastic one."""
     if settings.modes.max_frequency is None:
         return len(values)
     keep = int(np.searchsorted(values, (2 * np.pi * settings.modes.max_frequency) ** 2, side="right"))
-    if keep <= zero:
+    if not keep:
         raise UserError(
-            f"modes.max_frequency: no elastic mode lies below {settings.modes.max_frequency:g} Hz "
-            f"(the first is at {np.sqrt(values[min(zero, len(values) - 1)]) / 2 / np.pi:.6g} Hz); raise it"
+            f"modes.max_frequency: no mode lies below {settings.modes.max_frequency:g} Hz "
+            f"(the first is at {np.sqrt(values[0]) / 2 / np.pi:.6g} Hz); raise it"
         )
     if keep == len(values):
         raise UserError(
