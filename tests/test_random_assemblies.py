@@ -5,20 +5,13 @@ It is compared in table, response file, summary and page, see `answers.differenc
 
 from __future__ import annotations
 
-<<<<<<< HEAD
-=======
 import copy
 from collections.abc import Callable
->>>>>>> random-assemblies
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-<<<<<<< HEAD
-from answers import Answer
-from assemblies import Drawn, draw
-from attack import Case, opened, responded
-=======
 import rings
 from answers import Answer, Change, apart, changed_bits, differences, known, of_rows
 from assemblies import Beams, Drawn, Y, draw, places, ring, turned
@@ -31,7 +24,6 @@ from microslip.basis import write_basis
 from microslip.data import Array
 from microslip.frames import rotation
 from microslip.modes import modal_basis
->>>>>>> random-assemblies
 
 pytest.importorskip("matplotlib")
 
