@@ -275,7 +275,8 @@ def attack(
         points = sum(len(s.key) for s in plain.response.series)
         at = case.copied(folder / "interrupted")
         code = interrupted(at, int(rng.integers(1, points)), float(rng.uniform(0, 0.2)))
-        yield f"interrupted with exit code {code} and resumed", far(plain, responded(at))
+        left = f"interrupted with exit code {code} and resumed" if code > 1 else "ended before it was interrupted"
+        yield left, far(plain, responded(at))
         for name in case.inputs:
             file = folder / "plain" / name
             held = spoilt(file)

@@ -193,6 +193,10 @@ def test_a_pressure_field_in_a_case(tmp_path) -> None:
     gas = small.basis().groups[0, 0].excitations["gas"].rows[0]
     np.testing.assert_allclose(part.load, 2 * (3 - 4j) * gas, rtol=1e-9)
     assert any("on face 'contact_left'" in s for s in made.remarks)
+    path.write_text(BEAM.replace("amplitude", "harmonic = 0\namplitude"))
+    made = build(load_case(path)[0], {"small": small.basis()}, path)  # Re(p exp(0)) of a steady one
+    part = made.assembly.part(made.assembly.members[0], 0)
+    np.testing.assert_allclose(part.load, 2 * 3 * gas, rtol=1e-9)
     path.write_text(BEAM.replace('"mm"', '"m"'))
     with pytest.raises(UserError, match=r"case.toml: excitations.contact_left.field: .*length_unit mm instead of m"):
         build(load_case(path)[0], {"small": small.basis()}, path)
@@ -205,6 +209,7 @@ def test_a_pressure_field_in_a_case(tmp_path) -> None:
     (GAS + "stimulus = 0.1", "", "stimulus and steady come together"),
     (GAS + "stimulus = 0.1\nsteady = 2.0\namplitude = 3.0", "", "stimulus and steady come together"),
     (GAS + "engine_order = 0", "", "0 is steady"),
+    (GAS + "harmonic = 0\nphase = 30.0", "", "phase"),
     (GAS + "engine_order = 2\nharmonic = 2", "", "give one of them"),
     (GAS + "magnets = { angles = [0], width = 10 }\nengine_order = 3", "", "magnets and engine_order"),
     (GAS + "magnets = { angles = [0, 120], force = [1.0], width = 10 }", "", "one force or as many as angles"),

@@ -25,7 +25,7 @@ from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checks import forces_on
-from microslip.harmonic_balance.jenkins import overhanging
+from microslip.harmonic_balance.jenkins import hidden, overhanging
 from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
@@ -106,6 +106,13 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     assert len([t for t in told if "peak near" in t]) == 1
     alone = response.harmonic_response(problem, frequency, np.ones(0))
     assert rising({1.0: found}, {1.0: peaks}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
+
+
+def test_modes_that_are_one_but_for_rounding_get_one_point_and_those_of_the_sweep_none() -> None:
+    """Pairs of a ring's waves differ in the last digits, and so may a mode and the frequency that was asked for."""
+    modes = np.array([3.0, 3.5, 3.5 * (1 + 1e-14), 4.0 * (1 - 1e-14), 4.6, 9.0])
+    assert hidden(np.arange(2.0, 7.0), modes, np.full(6, 0.01)) == pytest.approx([3.5, 4.6], rel=1e-12)
+    assert hidden(np.arange(2.0, 7.0), np.zeros(0), np.zeros(0)) == []
 
 
 def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:

@@ -15,7 +15,7 @@ import pytest
 import rings
 from answers import Answer, Change, apart, changed_bits, differences, known, of_rows
 from assemblies import Beams, Drawn, Y, draw, places, ring, turned
-from attack import SAME, Case, exchangeable, exchanged, later, opened, responded, shuffled, spoilt, toml
+from attack import SAME, Case, attack, exchangeable, exchanged, later, opened, responded, shuffled, spoilt, toml
 from meshes import body
 from test_assembly_cyclic import FACES
 
@@ -374,3 +374,22 @@ def test_what_was_interrupted_leaves_no_trace(place: Path) -> None:
 
 
 # all of it -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_an_attack_on_an_assembly(place: Path) -> None:
+    """`attack`, with a process that is really ended; everything that it tries is tried."""
+    found = dict(attack(draw(35, **MILD).written(place / "attacked"), root=place / "attacked"))
+    files = [f"{name} changed and restored" for name in ("case.toml", "build/a/basis.h5", "build/b/basis.h5")]
+    resumed = "interrupted with exit code 143 and resumed"
+    assert [*found] == ["in another order", "sides of contacts exchanged: 1", resumed, *files]
+    assert max(found.values()) <= EQUAL
+
+
+@pytest.mark.slow
+def test_a_whole_attack_on_a_shipped_case(tmp_path: Path) -> None:
+    """With pictures and pages, as a person runs it."""
+    path = Path(running.__file__).parent / "templates" / "three-masses" / "case.toml"
+    found = dict(attack(path, assignments=["sweep.points=60"], root=tmp_path))
+    assert {"case.toml changed and restored", "basis.h5 changed and restored"} < {*found}
+    assert max(found.values()) <= EQUAL
