@@ -249,4 +249,3 @@ def response(m: Matrices, force: Array, Omega: float, eta: float, coriolis: bool
     if coriolis:
         A = A + 1j * Omega * m.G
     return sp.linalg.spsolve(A.tocsc(), force)
-

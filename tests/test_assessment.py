@@ -111,9 +111,7 @@ def test_a_response_without_resonances(response: Response, tmp_path: Path) -> No
 def along(found: Assessment, places: dict[float, dict[float, tuple[float, float]]]) -> Assessment:
     """Resonances by normal force: frequency -> the ends of its range."""
     one = found.resonances[0]
-    many = [
-        replace(one, normal_force=n, frequency=f, range=ends) for n, at in places.items() for f, ends in at.items()
-    ]
+    many = [replace(one, normal_force=n, frequency=f, range=ends) for n, at in places.items() for f, ends in at.items()]
     return replace(found, resonances=tuple(many))
 
 
@@ -163,9 +161,10 @@ def test_the_stress_of_a_resonance_is_the_largest_of_its_range(response: Respons
     stress = stress_peaks(motion).amplitude
     (r,) = found.resonances
     assert r.frequency == 100.5 and r.stressed_at == 107.0 == series.frequency[stress.argmax()]
-    assert r.worst.amplitude == pytest.approx(stress.max(), rel=1e-6) and stress.max() > 1.5 * stress[
-        list(series.frequency).index(100.5)
-    ]
+    assert (
+        r.worst.amplitude == pytest.approx(stress.max(), rel=1e-6)
+        and stress.max() > 1.5 * stress[list(series.frequency).index(100.5)]
+    )
     assert found.table()[0]["frequency_of_stress_Hz"] == 107.0
     assert found.at(r)[1].amplitude.max() == pytest.approx(stress.max(), rel=1e-6)
 

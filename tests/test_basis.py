@@ -91,9 +91,7 @@ def test_round_trip_is_exact_and_writes_the_same_bytes(tmp_path: Path, which: st
 def test_without_shapes_and_stresses(tmp_path: Path) -> None:
     basis = small.basis()
     m = basis.groups[0, 0].n_modes
-    faces = {
-        n: dataclasses.replace(i, shapes=np.zeros((0, 3, m))) for n, i in basis.groups[0, 0].interfaces.items()
-    }
+    faces = {n: dataclasses.replace(i, shapes=np.zeros((0, 3, m))) for n, i in basis.groups[0, 0].interfaces.items()}
     group = dataclasses.replace(basis.groups[0, 0], phi=np.zeros((0, 3, m)), stresses={}, interfaces=faces)
     write_basis(tmp_path / "a.h5", dataclasses.replace(basis, groups={(0, 0): group}))
     again = read_basis(tmp_path / "a.h5")

@@ -52,8 +52,9 @@ def test_constraints_of_the_chosen_set_are_supports(tmp_path):
     lines = [line for line in lines if line != "ENDDATA"] + cards + ["ENDDATA"]
     (tmp_path / "a.bdf").write_text("\n".join(lines))
     read = read_mesh(tmp_path / "a.bdf", "m")
-    named = {name: (directions, read.node_id[read.point_sets[name]].tolist()) for name, directions in
-             read.supports.items()}
+    named = {
+        name: (directions, read.node_id[read.point_sets[name]].tolist()) for name, directions in read.supports.items()
+    }
     assert named == {"SPC 7": ("xyz", [1, 2, 3]), "held x": ("x", [4])}
     assert read.not_held == ("SPC 8 displaces node 5",)
     (tmp_path / "a.bdf").write_text("\n".join(lines).replace("SPC = 20", "SUBCASE 1"))

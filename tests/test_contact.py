@@ -326,6 +326,7 @@ def test_stiffness_of_flat_blocks():
 
 # through body.toml -------------------------------------------------------------------------------------------------
 
+
 def closure(**more) -> dict:
     return {"name": "shroud", "face": "right", "against": "left", "sector_shift": 1, **more}
 

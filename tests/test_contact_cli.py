@@ -215,7 +215,8 @@ def test_init_brings_the_example_and_the_figures(tmp_path: Path, capsys: pytest.
 ALTERNATIVES = {
     "given": ('[stiffness]\nkind = "given"\nnormal = 8.4e8\ntangential = [3.2e8, 2e8]\n', ""),
     "hertz": (
-        '[stiffness]\nkind = "hertz"\nyoung = 2.1e11\npoisson = 0.3\nradii = [5e4, inf]\nradii_2 = [inf, 2e4]\n', "",
+        '[stiffness]\nkind = "hertz"\nyoung = 2.1e11\npoisson = 0.3\nradii = [5e4, inf]\nradii_2 = [inf, 2e4]\n',
+        "",
     ),
     "curve": ('[stiffness]\nkind = "curve"\nfile = "curve.csv"\ntangential = 3e8\n', ""),
     "profile": ("", '[roughness]\nkind = "profile"\nfile = "profile.txt"\nunit = "um"\nway_unit = "mm"\n'),

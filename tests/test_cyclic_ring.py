@@ -98,9 +98,7 @@ CASES = [("hexahedron20", 6, 0.0), ("hexahedron20", 6, RPM), ("tetra10", 5, RPM)
 # ---------------------------------------------------------------- spectra
 
 
-@pytest.mark.parametrize(
-    ("cell_type", "sectors", "rpm"), [pytest.param(*CASES[0], marks=pytest.mark.slow), *CASES[1:]]
-)
+@pytest.mark.parametrize(("cell_type", "sectors", "rpm"), [pytest.param(*CASES[0], marks=pytest.mark.slow), *CASES[1:]])
 def test_frequencies_of_every_nodal_diameter(cell_type, sectors, rpm):
     """Even and odd numbers of sectors, at rest and about the nonlinear equilibrium (measured: 6e-12)."""
     full = whole(cell_type, sectors, rpm * np.pi / 30)

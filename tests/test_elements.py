@@ -53,9 +53,7 @@ def test_gradients_are_the_differences_of_the_shape_functions(cell_type):
     _, dN = shape_functions(cell_type, at)
     for i in range(at.shape[1]):
         step = h * np.eye(at.shape[1])[i]
-        difference = (shape_functions(cell_type, at + step)[0] - shape_functions(cell_type, at - step)[0]) / (
-            2 * h
-        )
+        difference = (shape_functions(cell_type, at + step)[0] - shape_functions(cell_type, at - step)[0]) / (2 * h)
         np.testing.assert_allclose(dN[:, i], difference, atol=1e-9)  # eps / h = 2e-10
 
 
@@ -67,9 +65,7 @@ def test_quadrature_integrates_its_degree(cell_type):
 
     at, w = quadrature(cell_type)
     simplex = cell_type.startswith(("tet", "tri"))
-    degree = {"tetra": 2, "tetra10": 2, "hexahedron": 3, "hexahedron20": 5, "hexahedron27": 5}.get(
-        cell_type, 3
-    )
+    degree = {"tetra": 2, "tetra10": 2, "hexahedron": 3, "hexahedron20": 5, "hexahedron27": 5}.get(cell_type, 3)
     d = at.shape[1]
     for powers in product(range(degree + 1), repeat=d):
         if simplex and sum(powers) > degree:
@@ -118,9 +114,7 @@ def test_volume_and_moments_by_gauss_theorem(cell_type):
     d = discretise(mesh, {cell_type: 8})
     blocks = [b for name in mesh.faces for b in face_blocks(mesh, name)]
     surface = sum(np.einsum("fqi,fqi->", b.points, b.area) for b in blocks) / 3
-    assert d.volume == pytest.approx(
-        surface, rel=2e-6
-    )  # the facet rule has degree 4 or 5, x.n dA more when bent
+    assert d.volume == pytest.approx(surface, rel=2e-6)  # the facet rule has degree 4 or 5, x.n dA more when bent
     total = sum(len(f) for f in boundary_facets(mesh).values())
     assert total == sum(len(b.facets) for b in blocks)
 
@@ -141,9 +135,7 @@ def test_volume_and_areas_of_a_box(cell_type):
 def test_curved_sides_converge_with_fourth_order(cell_type):
     """Volume of a pipe whose mid-side nodes lie on the circle: error O(h^4)."""
     exact = np.pi * (0.1**2 - 0.06**2) * 0.05
-    errors = [
-        abs(discretise(pipe(cell_type, (1, n, 1), 0.06, 0.1, 0.05)).volume - exact) / exact for n in (8, 16)
-    ]
+    errors = [abs(discretise(pipe(cell_type, (1, n, 1), 0.06, 0.1, 0.05)).volume - exact) / exact for n in (8, 16)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.15)
 
 
@@ -188,13 +180,8 @@ def test_a_gmsh_file_comes_back_in_our_order(cell_type, tmp_path):
     lines += ["$EndPhysicalNames", "$Nodes", str(mesh.n_points)]
     lines += [f"{i + 1} {x!r} {y!r} {z!r}" for i, (x, y, z) in enumerate(mesh.points.tolist())]
     lines += ["$EndNodes", "$Elements", str(len(facets) + mesh.n_cells)]
-    rows = [(number, 1, f) for f in facets] + [
-        (_GMSH_NUMBER[cell_type], 2, c[order]) for c in mesh.cells[cell_type]
-    ]
-    lines += [
-        f"{i + 1} {t} 2 {g} {g} " + " ".join(str(k + 1) for k in nodes)
-        for i, (t, g, nodes) in enumerate(rows)
-    ]
+    rows = [(number, 1, f) for f in facets] + [(_GMSH_NUMBER[cell_type], 2, c[order]) for c in mesh.cells[cell_type]]
+    lines += [f"{i + 1} {t} 2 {g} {g} " + " ".join(str(k + 1) for k in nodes) for i, (t, g, nodes) in enumerate(rows)]
     path = tmp_path / "bent.msh"
     path.write_text("\n".join([*lines, "$EndElements", ""]))
     read = read_mesh(path, "mm")
@@ -203,9 +190,7 @@ def test_a_gmsh_file_comes_back_in_our_order(cell_type, tmp_path):
     np.testing.assert_array_equal(np.sort(read.faces["tip"][facet_type], axis=0), np.sort(facets, axis=0))
 
 
-@pytest.mark.parametrize(
-    ("cell_type", "abaqus"), [("tetra10", "C3D10"), ("hexahedron20", "C3D20"), ("tetra", "C3D4")]
-)
+@pytest.mark.parametrize(("cell_type", "abaqus"), [("tetra10", "C3D10"), ("hexahedron20", "C3D20"), ("tetra", "C3D4")])
 def test_an_abaqus_file_comes_back_in_our_order(cell_type, abaqus, tmp_path):
     mesh = brick(cell_type, (2, 1, 1), (1.0, 0.7, 0.5), to=shaken(0.05))
     held = mesh.face_points("x0")
@@ -213,9 +198,7 @@ def test_an_abaqus_file_comes_back_in_our_order(cell_type, abaqus, tmp_path):
     lines += [f"*ELEMENT, TYPE={abaqus}, ELSET=body"]
     for e, cell in enumerate(mesh.cells[cell_type]):
         text = [str(e + 1), *(str(k + 1) for k in cell)]
-        lines += [
-            ", ".join(text[i : i + 12]) + ("," if i + 12 < len(text) else "") for i in range(0, len(text), 12)
-        ]
+        lines += [", ".join(text[i : i + 12]) + ("," if i + 12 < len(text) else "") for i in range(0, len(text), 12)]
     lines += ["*NSET, NSET=root", *(f"{k + 1}," for k in held), ""]
     path = tmp_path / "bent.inp"
     path.write_text("\n".join(lines))

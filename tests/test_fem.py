@@ -66,9 +66,7 @@ def oracle(mesh: Mesh, cell_type: str) -> tuple[skfem.Basis, np.ndarray]:
         theirs = kind(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(cells[:, order].T))
     else:
         used, t = np.unique(cells[:, order[:corners]], return_inverse=True)
-        theirs = kind(
-            np.ascontiguousarray(mesh.points[used].T), np.ascontiguousarray(t.reshape(-1, corners).T)
-        )
+        theirs = kind(np.ascontiguousarray(mesh.points[used].T), np.ascontiguousarray(t.reshape(-1, corners).T))
     basis = skfem.Basis(theirs, skfem.ElementVector(element()), intorder=DEGREE[cell_type])
     distance, node = cKDTree(mesh.points).query(basis.doflocs.T)
     assert distance.max() < 1e-12
@@ -296,9 +294,7 @@ def test_tangent_is_the_derivative_of_the_internal_force(cell_type):
     h = 1e-4
     plus, minus = (force_of(d, u + s * v, WOOD_C, factor)[0] for s in (h, -h))
     difference = ((plus - minus) / (2 * h)).reshape(-1)
-    assert (
-        np.abs(Kv - difference).max() < 1e-8 * np.abs(Kv).max()
-    )  # h^2 |v|^2 grad^2 ~ 1e-8 times the cubic term
+    assert np.abs(Kv - difference).max() < 1e-8 * np.abs(Kv).max()  # h^2 |v|^2 grad^2 ~ 1e-8 times the cubic term
 
 
 def test_internal_force_is_the_derivative_of_the_strain_energy():
@@ -309,9 +305,7 @@ def test_internal_force_is_the_derivative_of_the_strain_energy():
 
     def energy(w):
         e = [green_strain(displacement_gradient(b, w)) for b in d.blocks]
-        return sum(
-            0.5 * np.einsum("eq,eqi,ij,eqj->", b.dx, x, WOOD_C, x) for b, x in zip(d.blocks, e, strict=True)
-        )
+        return sum(0.5 * np.einsum("eq,eqi,ij,eqj->", b.dx, x, WOOD_C, x) for b, x in zip(d.blocks, e, strict=True))
 
     h = 1e-4
     slope = (energy(u + h * v) - energy(u - h * v)) / (2 * h)
@@ -389,9 +383,7 @@ def test_constants_that_cannot_be_are_refused():
 def test_modulus_over_temperature_is_interpolated():
     table = {"temperature": [300.0, 500.0, 900.0], "modulus_factor": [1.0, 0.9, 0.5]}
     material = body({**STEEL, **table}).material.material()
-    np.testing.assert_allclose(
-        material.modulus_factor(np.array([200, 400, 700, 1000.0])), [1, 0.95, 0.7, 0.5]
-    )
+    np.testing.assert_allclose(material.modulus_factor(np.array([200, 400, 700, 1000.0])), [1, 0.95, 0.7, 0.5])
 
 
 def test_thermal_strain_of_an_orthotropic_material_is_turned():
@@ -432,9 +424,7 @@ def test_loads_have_the_resultants_of_statics(cell_type):
     # a pressure on x1 pushes along -x at the middle of the face
     f = pressure(face_blocks(mesh, "x1"), mesh.n_points, 2e5)
     push = np.array([-2e5 * 0.3 * 0.2, 0, 0])
-    np.testing.assert_allclose(
-        resultant(f), np.concatenate([push, np.cross([0.5, -0.05, 0.6], push)]), atol=1e-8
-    )
+    np.testing.assert_allclose(resultant(f), np.concatenate([push, np.cross([0.5, -0.05, 0.6], push)]), atol=1e-8)
     f = traction(face_blocks(mesh, "y0"), mesh.n_points, np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(f.sum(axis=0), np.array([1.0, 2.0, 3.0]) * 0.4 * 0.2, rtol=1e-12)
     # centrifugal force: m times the arm of the mass centre from the axis
@@ -472,9 +462,7 @@ def test_mass_centre_and_inertia_of_a_box(cell_type):
     m, centre, inertia = inertia_of(discretise(mesh), RHO)
     assert m == pytest.approx(RHO * a * b * c, rel=1e-13)
     np.testing.assert_allclose(centre, [0.3, -0.05, 0.6], rtol=1e-12)
-    np.testing.assert_allclose(
-        inertia, m / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b]), atol=1e-12 * m
-    )
+    np.testing.assert_allclose(inertia, m / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b]), atol=1e-12 * m)
 
 
 @pytest.mark.parametrize("cell_type", QUADRATIC)
@@ -591,9 +579,7 @@ def test_order_of_the_mass_quadrature():
     steps = (3, 4, 6)
     meshes = [brick("tetra10", (n, n, n), BOX) for n in steps]
     change = [abs(lowest(m, 1) / lowest(m, 1, {"tetra10": 4}) - 1)[0] for m in meshes]
-    assert slope([1 / n for n in steps], change) == pytest.approx(
-        4, abs=0.45
-    )  # 3.6 here, 3.8 between 6 and 8
+    assert slope([1 / n for n in steps], change) == pytest.approx(4, abs=0.45)  # 3.6 here, 3.8 between 6 and 8
 
 
 @pytest.mark.parametrize("cell_type", flat_slow(QUADRATIC))
@@ -627,9 +613,7 @@ def source(points):
     u, g = wave(points)
     s, c = np.sin(points * k), np.cos(points * k)
     a = np.array([0.7, -1.1, 0.4])
-    gradient = np.stack(
-        [-k[i] * s[..., i] * np.prod(np.delete(c, i, axis=-1), axis=-1) for i in range(3)], axis=-1
-    )
+    gradient = np.stack([-k[i] * s[..., i] * np.prod(np.delete(c, i, axis=-1), axis=-1) for i in range(3)], axis=-1)
     return SHEAR * (k @ k) * u - (LAME + SHEAR) * (a @ k) * gradient
 
 
@@ -645,9 +629,7 @@ def test_order_of_displacements_and_stresses(cell_type):
         free = np.setdiff1d(np.arange(3 * mesh.n_points), rollers(mesh))
         u = np.zeros(3 * mesh.n_points)
         K = d.pattern.full(stiffness(d, STEEL_C))[free][:, free].tocsc()
-        u[free] = spla.splu(K, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
-            f.reshape(-1)[free]
-        )
+        u[free] = spla.splu(K, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(f.reshape(-1)[free])
         u = u.reshape(-1, 3)
         exact, gradient = wave(x)
         there = np.einsum("qk,eki->eqi", b.N, u[b.cells])

@@ -163,9 +163,7 @@ def test_a_free_body_keeps_its_momenta_and_its_energy():
     found = [(energy(b, *s), *momentum(b, *s)) for s in state]
     E = np.array([e for e, _, _ in found])
     p = np.array([A @ p for A, (_, p, _) in zip(f.attitude, found, strict=True)])
-    L = np.array(
-        [A @ h + np.cross(r, A @ p) for A, r, (_, p, h) in zip(f.attitude, f.position, found, strict=True)]
-    )
+    L = np.array([A @ h + np.cross(r, A @ p) for A, r, (_, p, h) in zip(f.attitude, f.position, found, strict=True)])
     np.testing.assert_allclose(E, E[0], rtol=1e-8)
     np.testing.assert_allclose(p, np.tile(p[0], (len(p), 1)), atol=1e-8 * np.abs(p[0]).max())
     np.testing.assert_allclose(L, np.tile(L[0], (len(L), 1)), atol=1e-8 * np.abs(L[0]).max())

@@ -87,6 +87,7 @@ def test_mass_on_two_springs(second):
 
 def test_divergence_between_the_critical_speeds_and_flutter_of_none():
     """100 < Omega < 130 rad/s: K has one negative direction and the mass leaves; above both it is held by G."""
+
     def at(speed):
         K = np.diag([100.0**2, 130.0**2]) - speed**2 * np.eye(2)
         return gyroscopic_modes(np.eye(2), 2 * speed * QUARTER, K, QUARTER)

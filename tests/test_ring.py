@@ -134,9 +134,7 @@ def test_expanded_modes_are_orthonormal_on_the_ring_and_solve_its_eigenproblem(r
 def test_neighbours_agree_on_their_common_face(ring: tuple) -> None:
     """The right face of sector j is the left face of sector j + 1, for every sector and nodal diameter."""
     basis = ring[0]
-    left, right = tied_points(
-        basis.mesh, basis.rotation_axis, basis.rotation_point, basis.sectors, basis.cyclic_faces
-    )
+    left, right = tied_points(basis.mesh, basis.rotation_axis, basis.rotation_point, basis.sectors, basis.cyclic_faces)
     for g in basis.groups.values():
         for j in range(basis.sectors):
             here, there = expand(g, basis, j)[right], expand(g, basis, j + 1)[left]

@@ -85,9 +85,7 @@ def test_forces_balance_and_the_tangent_is_their_derivative(hot):
     assert state.iterations <= 9
     v, h = np.zeros((BLADE.n_points, 3)), 1e-7
     v.reshape(-1)[model.free.free] = rng.normal(size=len(model.free.free))
-    difference = (unbalance(model, speed, state.u + h * v) - unbalance(model, speed, state.u - h * v)) / (
-        2 * h
-    )
+    difference = (unbalance(model, speed, state.u + h * v) - unbalance(model, speed, state.u - h * v)) / (2 * h)
     Kv = (model.d.pattern.full(state.K) @ v.reshape(-1))[model.free.free]
     assert np.abs(Kv - difference).max() < 1e-6 * np.abs(Kv).max()
     _, dK = stiffness_slope(model, speed, state, solver)
@@ -165,9 +163,7 @@ def test_rotor_axis_and_point_are_used():
     assert further[0] > base.omega[0] * 1.005
     back = the_group(away, **ROOT, rotation=at_rpm(9000, point=[0.0, 0.0, 0.1]))
     np.testing.assert_allclose(back.omega, base.omega, rtol=1e-8)
-    long_axis = the_group(
-        BLADE, **ROOT, rotation=at_rpm(9000, axis=[0.0, 2.0, 0.0])
-    )  # its length does not count
+    long_axis = the_group(BLADE, **ROOT, rotation=at_rpm(9000, axis=[0.0, 2.0, 0.0]))  # its length does not count
     np.testing.assert_allclose(long_axis.omega, base.omega, rtol=1e-12)
 
 
@@ -375,16 +371,12 @@ def test_a_bar_under_its_own_weight():
     u = RHO * 9.81 * (2 * x - x**2 / 2) / E
     np.testing.assert_allclose(group.u_static[:, 0], u, atol=1e-9 * u.max())
     for s in group.stresses.values():
-        np.testing.assert_allclose(
-            s.static_stress[:, 0], RHO * 9.81 * (2 - s.points[:, 0]), atol=1e-7 * RHO * 9.81
-        )
+        np.testing.assert_allclose(s.static_stress[:, 0], RHO * 9.81 * (2 - s.points[:, 0]), atol=1e-7 * RHO * 9.81)
 
 
 def test_pressure_all_round_squeezes_evenly():
     """-p in all directions, volume change -p / K, on bent cells."""
-    mesh, supports = three_points(
-        brick("tetra10", (2, 2, 2), (0.3, 0.2, 0.1), to=shaken(0.01), straight=True)
-    )
+    mesh, supports = three_points(brick("tetra10", (2, 2, 2), (0.3, 0.2, 0.1), to=shaken(0.01), straight=True))
     loads = [{"kind": "pressure", "face": f, "value": 1e7} for f in mesh.faces]
     group = the_group(mesh, supports=supports, loads=loads, output={}, rotation={"prestress": "linear"})
     stress = group.stresses["gauss"].static_stress
@@ -397,9 +389,7 @@ def test_point_force_and_face_force_have_their_resultants():
         load = {"kind": "force", "vector": [0.0, 0.0, 5e4], **place}
         group = the_group(mesh, **ROOT, loads=[load], rotation={"prestress": "linear"})
         mean = group.u_static[mesh.face_points("z1"), 2].mean()
-        assert mean == pytest.approx(
-            5e4 * 0.4 / (E * 0.01), rel=0.1
-        )  # the clamp holds the width, the point dents
+        assert mean == pytest.approx(5e4 * 0.4 / (E * 0.01), rel=0.1)  # the clamp holds the width, the point dents
 
 
 def test_temperature_and_speed_together():

@@ -66,9 +66,7 @@ def test_forces_through_a_patch_do_the_work_of_the_rows(cell_type):
     for i in range(6):
         nodal = (p.B.T @ np.eye(6)[i]).reshape(-1, 3)
         force, moment = nodal.sum(axis=0), np.cross(mesh.points - p.origin, nodal).sum(axis=0)
-        np.testing.assert_allclose(
-            np.concatenate([p.rotation @ force, p.rotation @ moment]), np.eye(6)[i], atol=1e-10
-        )
+        np.testing.assert_allclose(np.concatenate([p.rotation @ force, p.rotation @ moment]), np.eye(6)[i], atol=1e-10)
         assert not nodal[np.setdiff1d(np.arange(mesh.n_points), mesh.face_points("x1"))].any()
     rng = np.random.default_rng(0)
     u, f = rng.normal(size=3 * mesh.n_points), rng.normal(size=6)
@@ -84,9 +82,7 @@ def test_the_fit_is_the_least_squares_one():
     A = rigid_fields(p.points, p.origin).reshape(-1, 6) * np.sqrt(np.repeat(p.areas, 3))[:, None]
     best, left, *_ = np.linalg.lstsq(A, (there * np.sqrt(p.areas)[:, None]).ravel(), rcond=None)
     read = p.B @ u.ravel()
-    np.testing.assert_allclose(
-        np.concatenate([p.rotation.T @ read[:3], p.rotation.T @ read[3:]]), best, rtol=1e-9
-    )
+    np.testing.assert_allclose(np.concatenate([p.rotation.T @ read[:3], p.rotation.T @ read[3:]]), best, rtol=1e-9)
     share = np.sqrt(left[0] / (p.areas @ (there**2).sum(axis=1)))
     assert p.fit_residual(u[:, :, None])[0] == pytest.approx(share, rel=1e-9)
 
@@ -175,8 +171,7 @@ def quadratic(x):
 
 
 STRAIGHT = {
-    t: brick(t, (2, 3, 2), (1.0, 0.8, 0.5), to=shaken(0.06), straight=True)
-    for t in ("tetra10", "hexahedron27")
+    t: brick(t, (2, 3, 2), (1.0, 0.8, 0.5), to=shaken(0.06), straight=True) for t in ("tetra10", "hexahedron27")
 }
 
 
@@ -211,9 +206,7 @@ def test_every_node_and_quadrature_point_is_found(cell_type):
     mesh = BENT[cell_type]
     locator = Locator(mesh)
     d = discretise(mesh)
-    inner = np.concatenate(
-        [np.einsum("qk,eki->eqi", b.N, mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks]
-    )
+    inner = np.concatenate([np.einsum("qk,eki->eqi", b.N, mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks])
     surface = np.concatenate([b.points.reshape(-1, 3) for b in face_blocks(mesh, "y1")])
     for x in np.concatenate([mesh.points[::3], inner[::17], surface[::5]]):
         place = locator.find(x, "monitor")
@@ -262,9 +255,7 @@ def test_nearest_place_of_a_skew_body(direction, at):
 def _skin():
     blocks = [b for name in BENT["tetra10"].faces for b in face_blocks(BENT["tetra10"], name)]
     normals = np.concatenate([b.area.reshape(-1, 3) for b in blocks])
-    return np.concatenate([b.points.reshape(-1, 3) for b in blocks]), normals / np.linalg.norm(
-        normals, axis=1
-    )[:, None]
+    return np.concatenate([b.points.reshape(-1, 3) for b in blocks]), normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def _dense_skin():
@@ -473,9 +464,7 @@ def test_modal_rows_are_the_rows_times_the_shapes():
         np.testing.assert_allclose(i.shapes, np.einsum("pn,nim->pim", p.N.toarray(), group.phi), atol=1e-12)
         np.testing.assert_allclose(i.areas.sum(), p.areas.sum())
     foil = rows.gauges["foil"]
-    np.testing.assert_allclose(
-        group.gauges["foil"].rows, np.array([[1.0, 0, 0]]) @ (foil.B @ phi), rtol=1e-12
-    )
+    np.testing.assert_allclose(group.gauges["foil"].rows, np.array([[1.0, 0, 0]]) @ (foil.B @ phi), rtol=1e-12)
     for kind in ("excitations", "monitors"):
         for name, r in getattr(rows, kind).items():
             np.testing.assert_allclose(getattr(group, kind)[name].rows, r.B @ phi, rtol=1e-12, atol=1e-12)
@@ -507,9 +496,7 @@ def test_gauge_in_a_static_state_reads_strain_not_rotation():
 def test_gauge_modes_are_strain_modes():
     """The row of a gauge equals the strain mode at its place, along the fibre it is glued to (F d at speed)."""
     mesh = brick("tetra10", (1, 2, 6), (0.01, 0.04, 0.2), (0, 0, 0.1))
-    mesh = Mesh(
-        mesh.points @ rotation_matrix((0, 0, 0.5)).T, mesh.cells, mesh.faces, mesh.point_sets, mesh.node_id
-    )
+    mesh = Mesh(mesh.points @ rotation_matrix((0, 0, 0.5)).T, mesh.cells, mesh.faces, mesh.point_sets, mesh.node_id)
     (block,) = discretise(mesh).blocks
     centre = np.einsum("qk,eki->eqi", block.N, mesh.points[block.cells])
     e, q = 30, 2

@@ -32,9 +32,7 @@ BLOCK = brick("tetra10", (3, 2, 2), (0.1, 0.07, 0.06), to=shaken(0.004))
 
 
 def the_group(mesh, count=6, temperature=None, **what):
-    return modal_basis(mesh, body(**{"modes": {"count": count}, "output": {}, **what}), temperature).groups[
-        0, 0
-    ]
+    return modal_basis(mesh, body(**{"modes": {"count": count}, "output": {}, **what}), temperature).groups[0, 0]
 
 
 def boundary_nodes(mesh):
@@ -130,16 +128,12 @@ def test_stress_of_a_static_solution_in_modes():
     c = np.random.default_rng(0).normal(size=group.n_modes) * group.omega**2
     M = d.pattern.full(mass(d, RHO))
     load = M @ np.einsum("nim,m->ni", group.phi, c)
-    free = np.setdiff1d(
-        np.arange(3 * BLOCK.n_points), (3 * BLOCK.face_points("x0")[:, None] + np.arange(3)).ravel()
-    )
+    free = np.setdiff1d(np.arange(3 * BLOCK.n_points), (3 * BLOCK.face_points("x0")[:, None] + np.arange(3)).ravel())
     K = d.pattern.full(stiffness(d, STEEL_C))
     u = np.zeros(3 * BLOCK.n_points)
     u[free] = spla.spsolve(K[free][:, free].tocsc(), load.reshape(-1)[free])
     (b,) = d.blocks
-    direct = (green_strain(displacement_gradient(b, u.reshape(-1, 3)), nonlinear=False) @ STEEL_C.T).reshape(
-        -1, 6
-    )
+    direct = (green_strain(displacement_gradient(b, u.reshape(-1, 3)), nonlinear=False) @ STEEL_C.T).reshape(-1, 6)
     q = c / group.omega**2
     scale = np.abs(direct).max()
     np.testing.assert_allclose(group.stresses["gauss"].stress @ q, direct, atol=1e-8 * scale)
@@ -231,9 +225,7 @@ def test_von_mises():
     s = np.random.default_rng(0).normal(size=(10, 6))
     t = to_symmetric(s)
     deviator = t - np.trace(t, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-    np.testing.assert_allclose(
-        von_mises(s), np.sqrt(1.5 * np.einsum("pij,pij->p", deviator, deviator)), rtol=1e-12
-    )
+    np.testing.assert_allclose(von_mises(s), np.sqrt(1.5 * np.einsum("pij,pij->p", deviator, deviator)), rtol=1e-12)
 
 
 # ---------------------------------------------------------------- Lame's pipe
@@ -258,9 +250,7 @@ def test_thick_pipe_under_pressure(cell_type):
         t = np.column_stack([-n[:, 1], n[:, 0], 0 * r])
         T = to_symmetric(s.static_stress)
         radially, hoop = (np.einsum("pi,pij,pj->p", v, T, v) for v in (n, t))
-        wrong = np.sqrt(
-            s.weights @ ((radially - A + B / r**2) ** 2 + (hoop - A - B / r**2) ** 2) / s.weights.sum()
-        )
+        wrong = np.sqrt(s.weights @ ((radially - A + B / r**2) ** 2 + (hoop - A - B / r**2) ** 2) / s.weights.sum())
         R = np.linalg.norm(mesh.points[:, :2], axis=1)
         u = (1 + NU) / E * ((1 - 2 * NU) * A * R + B / R)
         moved = np.einsum("ni,ni->n", group.u_static[:, :2], mesh.points[:, :2]) / R

@@ -78,7 +78,10 @@ SLOW = pytest.mark.slow
         pytest.param("body.toml", "count = 6", "count = 5", {BASIS, RESPONSE}, marks=SLOW),
         pytest.param("body.toml", "size = 20.0", "size = 10.0", {MESH, BASIS, RESPONSE}, marks=SLOW),
         pytest.param(
-            "body.toml", "size = [20.0, 30.0, 120.0]", "size = [20.0, 32.0, 120.0]", {MESH, BASIS, RESPONSE},
+            "body.toml",
+            "size = [20.0, 30.0, 120.0]",
+            "size = [20.0, 32.0, 120.0]",
+            {MESH, BASIS, RESPONSE},
             marks=SLOW,
         ),
         ("build.py", 'name_face("tip"', '# the same mesh\n    name_face("tip"', {MESH}),

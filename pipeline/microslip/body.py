@@ -73,6 +73,7 @@ def has_length(value: tuple[float, ...]) -> tuple[float, ...]:
     """
     if not any(value):
         raise ValueError("a direction must not be [0, 0, 0]")
+    of_sensible_size(max(map(abs, value)))
     return value
 
 
@@ -85,6 +86,15 @@ def of_sensible_size(value: float) -> float:
     if value and math.isfinite(value) and not 1 / BEYOND <= abs(value) <= BEYOND:
         raise ValueError(f"{value:g} is beyond all bounds; write 0, or a number between {1 / BEYOND:g} and {BEYOND:g}")
     return value
+
+
+def not_too_large(value: float) -> float:
+    """A component of a vector as it is, if it is small enough; what is left of zero by rounding is none too small.
+
+    Raises:
+        ValueError: it is larger than any quantity.
+    """
+    return of_sensible_size(value) if abs(value) > 1 else value
 
 
 BEYOND = 1e30
@@ -117,16 +127,21 @@ def _friction(value: float) -> float:
 
 NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_nodal_diameters)]
 Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(of_sensible_size)]
+Component = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(not_too_large)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Ratio = Annotated[NotNegative, AfterValidator(damping_ratio), Field(lt=1)]
 Coefficient = Annotated[NotNegative, AfterValidator(_friction), Field(le=MOST_FRICTION)]
 Length = Annotated[Number, _LENGTH]
 PositiveLength = Annotated[Positive, _LENGTH]
-Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector)]
-Direction = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), AfterValidator(has_length)]
-Point = Annotated[tuple[Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
-Box = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_finite_vector), _LENGTH]
+Vector = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector)]
+Direction = Annotated[
+    tuple[Component, Component, Component], BeforeValidator(_finite_vector), AfterValidator(has_length)
+]
+Point = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH]
+Box = Annotated[
+    tuple[Component, Component, Component, Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH
+]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
 Positives = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector)]
 Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_finite_vector)]
@@ -378,7 +393,7 @@ class Cyclic(Model):
         if self.nodal_diameters != "all":
             wanted = self.nodal_diameters
             if not wanted or len(set(wanted)) < len(wanted):
-                raise ValueError("nodal_diameters must name each of them once, or be \"all\"")
+                raise ValueError('nodal_diameters must name each of them once, or be "all"')
             if max(wanted) > self.sectors // 2:
                 raise ValueError(
                     f"nodal_diameters: {max(wanted)} is more than {self.sectors} sectors can have "
@@ -622,9 +637,9 @@ class BodySettings(Model):
     name: Name
     description: str = ""
     length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
-    reduction: Literal[
-        "eigenmodes", "macneal", "rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"
-    ] = "eigenmodes"
+    reduction: Literal["eigenmodes", "macneal", "rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"] = (
+        "eigenmodes"
+    )
     free: bool = False
     geometry: Geometry
     mesh: Meshing = Field(default_factory=Meshing)
@@ -673,7 +688,6 @@ class BodySettings(Model):
         if self.cyclic and self.free:
             raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self
-
 
     def _only_what_matrices_can(self) -> None:
         """Refuse what needs finite elements of ours."""
@@ -822,7 +836,7 @@ def implausible(settings: BodySettings, size: float) -> list[str]:
             found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
     if not 1e-3 <= size <= 50:
         found.append(
-            f"the body is {size:g} m long; is length_unit = \"{settings.length_unit}\" right? "
+            f'the body is {size:g} m long; is length_unit = "{settings.length_unit}" right? '
             "(material.unusual = true silences warnings of this kind)"
         )
     if settings.mesh.size is not None and settings.mesh.size > size:

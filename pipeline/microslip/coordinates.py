@@ -109,9 +109,7 @@ def of_density(g: ModalGroup, share: float) -> ModalGroup:
     """
     if g.speed:
         raise UserError("the body rotates, and its prestress would change with its mass; make it of another material")
-    heavy = {
-        name: replace(r, rows=share * r.rows) if r.unit == CENTRIFUGAL else r for name, r in g.excitations.items()
-    }
+    heavy = {name: replace(r, rows=share * r.rows) if r.unit == CENTRIFUGAL else r for name, r in g.excitations.items()}
     dense = replace(
         g, M_r=share * g.M_r, C_r=np.sqrt(share) * g.C_r, omega=g.omega / np.sqrt(share), excitations=heavy,
         run_up=None, invariants=None, gyroscopic=None,
@@ -161,9 +159,7 @@ def _solved(A: Array, b: Array) -> Array:
         return np.full_like(b, np.nan)
 
 
-def held(
-    T: Array, labels: Sequence[str], kind: Sequence[str], K_r: Array, omega: Array, V: Array | None
-) -> Array:
+def held(T: Array, labels: Sequence[str], kind: Sequence[str], K_r: Array, omega: Array, V: Array | None) -> Array:
     """(r, r) static compliance that the coordinates hold over rows T (r, m); a free body's elastic part.
 
     The sum of (T V)_j (T V)_j^H / omega_j^2 over the elastic modes, and what coordinates without mass or interface

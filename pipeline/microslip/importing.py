@@ -175,7 +175,7 @@ def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     lines += ["#[[geometry.faces]]", '#name = "clamp"', "#surfaces = [1]"]
     lines += ["#[[geometry.faces]]", '#name = "contact"', "#surfaces = [2]", ""]
     lines += ["[mesh]", "#size = 5.0               # a fifteenth of the diagonal if not given", ""]
-    lines += ['[material]', 'name = "steel"', "density = 7850.0          # kg/m3", "young = 2.1e11            # Pa"]
+    lines += ["[material]", 'name = "steel"', "density = 7850.0          # kg/m3", "young = 2.1e11            # Pa"]
     lines += ["poisson = 0.3", "", "#[[supports]]             # then remove free = true at the top", '#face = "clamp"']
     lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', '#face = "contact"']
     lines += ["#[[excitations]]          # a force of 1 N", '#name = "shaker"', "#point = [0.0, 0.0, 0.0]"]

@@ -43,9 +43,7 @@ def relative_rows(basis: ModalBasis, group: ModalGroup, name: str) -> Array:
     return frame_change(basis, right, left) @ left.rows * phase(group, basis.sectors, 1) - right.rows
 
 
-def stuck(
-    basis: ModalBasis, group: ModalGroup, name: str, stiffness: Array | None = None
-) -> tuple[Array, Array]:
+def stuck(basis: ModalBasis, group: ModalGroup, name: str, stiffness: Array | None = None) -> tuple[Array, Array]:
     """The sector's modes with neighbours that stick to each other, coupled through disc and contact.
 
     Args:
@@ -59,7 +57,7 @@ def stuck(
     """
     if "interface-force" in group.kind:
         raise UserError(
-            f'{basis.name}: springs between neighbours need displacements or modes as coordinates, but '
+            f"{basis.name}: springs between neighbours need displacements or modes as coordinates, but "
             f'"{basis.reduction}" keeps forces; use "rubin", "craig-bampton" or "massless-boundary"'
         )
     G = relative_rows(basis, group, name)

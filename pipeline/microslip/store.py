@@ -369,6 +369,7 @@ def note_product(product: Path | str, inputs: Mapping[str, Any], files: Iterable
 def git_state(folder: Path) -> dict[str, Any]:
     """Commit and whether the tree is dirty, or nothing outside a checkout."""
     try:
+
         def ask(*words: str) -> str:
             return subprocess.run(
                 ["git", "-C", str(folder), *words], capture_output=True, text=True, check=True, timeout=10

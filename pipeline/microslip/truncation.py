@@ -84,8 +84,7 @@ def coordinates(group: ModalGroup, sectors: int = 1) -> tuple[Coordinate, ...]:
     static = group.compliance.static
     T = np.array([compliance_row(group, label) for label in labels]).reshape(len(labels), group.n_modes)
     found = [
-        _coordinate(group, *describe(group, label), np.eye(len(labels))[i], static, T)
-        for i, label in enumerate(labels)
+        _coordinate(group, *describe(group, label), np.eye(len(labels))[i], static, T) for i, label in enumerate(labels)
     ]
     for a, b in ring_pairs(group):
         pick, words = closing(group, a, b, sectors), "squeezed" if sectors == 1 else "across the gap"

@@ -304,8 +304,7 @@ def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
     system = material.units or usual
     if system is None:
         raise UserError(
-            f'{job.path}: material.units: with length_unit = "{unit}" it must be said; choose '
-            + ", ".join(SYSTEMS)
+            f'{job.path}: material.units: with length_unit = "{unit}" it must be said; choose ' + ", ".join(SYSTEMS)
         )
     mesh = read_mesh(path, unit, system, zero)
     if not mesh.materials:
@@ -560,7 +559,7 @@ def with_temperature(job: Job, mesh: Mesh) -> tuple[BodySettings, Array | None]:
     if setting.source is None:
         return job.settings, nodal_temperature(job, mesh)
     if mesh.temperature is None:
-        raise UserError('temperature.from: the mesh file brings no temperatures; use uniform or file')
+        raise UserError("temperature.from: the mesh file brings no temperatures; use uniform or file")
     free, actual = mesh.temperature.T
     if np.isnan(free).any() or np.ptp(free) > 1e-9 * max(np.abs(free).max(), 1.0):
         raise UserError(

@@ -48,8 +48,9 @@ start = np.zeros(body.nModes)
 start[0] = 1e-6
 mbs.SetNodeParameter(items["nGenericODE2"], "initialCoordinates", list(start))
 node = items["nGenericODE2"]
-sensor = mbs.AddSensor(SensorNode(
-    nodeNumber=node, storeInternal=True, outputVariableType=exu.OutputVariableType.Coordinates))
+sensor = mbs.AddSensor(
+    SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=exu.OutputVariableType.Coordinates)
+)
 mbs.Assemble()
 values = mbs.ComputeODE2Eigenvalues(convert2Frequencies=True)[0]
 found["frequencies"] = np.sort(np.asarray(values))
@@ -57,10 +58,14 @@ found["vibration"] = run(mbs, sensor, 10 / job["frequency"], 2000)
 
 # swinging
 mbs, items = system(True, [0, 0, 9.81])
-sensor = mbs.AddSensor(SensorNode(
-    nodeNumber=items["nRigidBody"], storeInternal=True, outputVariableType=exu.OutputVariableType.Rotation))
-modal = mbs.AddSensor(SensorNode(
-    nodeNumber=items["nGenericODE2"], storeInternal=True, outputVariableType=exu.OutputVariableType.Coordinates))
+sensor = mbs.AddSensor(
+    SensorNode(nodeNumber=items["nRigidBody"], storeInternal=True, outputVariableType=exu.OutputVariableType.Rotation)
+)
+modal = mbs.AddSensor(
+    SensorNode(
+        nodeNumber=items["nGenericODE2"], storeInternal=True, outputVariableType=exu.OutputVariableType.Coordinates
+    )
+)
 mbs.Assemble()
 found["swing"] = run(mbs, sensor, job["time"], job["steps"])
 found["swing_modal"] = mbs.GetSensorStoredData(modal)

@@ -32,12 +32,14 @@ analysis = {
     "sign_ds": 1, "verbose": False, "solver": "NewtonRaphson",
     "solver_options": {"tol_residual": 1e-10 * job["force"], "tol_delta_x": 1e-8},
 }  # fmt: skip
-maestro = Maestro({
-    "analysis": {"frf": analysis},
-    "system": {"type": "Base", "nh": 1, "nti": job["samples"], "adim": {"status": False}},
-    "substructures": {"body": body},
-    "connectors": connectors,
-})
+maestro = Maestro(
+    {
+        "analysis": {"frf": analysis},
+        "system": {"type": "Base", "nh": 1, "nti": job["samples"], "adim": {"status": False}},
+        "substructures": {"body": body},
+        "connectors": connectors,
+    }
+)
 maestro.operate()
 found = [s for s in maestro.nls["frf"].SolList if s.flag_accepted]
 dofs = maestro.system.expl_dofs

@@ -43,8 +43,7 @@ def deck(mesh, elastic=ISOTROPIC, density=STEEL["density"], held="z0", orientati
     for e, cell in enumerate(cells):
         numbers = [str(k) for k in (e + 1, *(cell + 1))]
         lines += [
-            ", ".join(numbers[i : i + 12]) + ("," if i + 12 < len(numbers) else "")
-            for i in range(0, len(numbers), 12)
+            ", ".join(numbers[i : i + 12]) + ("," if i + 12 < len(numbers) else "") for i in range(0, len(numbers), 12)
         ]
     lines += [f"*MATERIAL, NAME=M\n{elastic}*DENSITY\n{density:.12e}"]
     section = "*SOLID SECTION, ELSET=EALL, MATERIAL=M"
@@ -66,9 +65,7 @@ def static(load: str, kind: str = "") -> str:
 def run(folder, text: str) -> str:
     """The .dat file of a CalculiX run."""
     (folder / "job.inp").write_text(text)
-    done = subprocess.run(
-        ["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=170, check=False
-    )
+    done = subprocess.run(["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=170, check=False)
     assert "Job finished" in done.stdout, done.stdout[-2000:]
     return (folder / "job.dat").read_text()
 
@@ -135,16 +132,10 @@ def test_frequencies_of_an_orthotropic_body(tmp_path):
     axes = rotation_matrix((0.4, -0.7, 1.1))
     mesh = brick("tetra10", (3, 3, 4), (0.1, 0.08, 0.15), to=shaken(0.004))
     constants = [120e9, 9e9, 14e9, 0.28, 0.31, 0.35, 5e9, 6e9]
-    elastic = (
-        "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n"
-        + ", ".join(f"{v:.6e}" for v in constants)
-        + "\n3.4e9, 293.\n"
-    )
+    elastic = "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n" + ", ".join(f"{v:.6e}" for v in constants) + "\n3.4e9, 293.\n"
     a = ", ".join(f"{v:.12e}" for v in [*axes[0], *axes[1]])
     orientation = f"*ORIENTATION, NAME=AXES, SYSTEM=RECTANGULAR\n{a}\n"
-    theirs = frequencies(
-        run(tmp_path, deck(mesh, elastic, 500.0, orientation=orientation) + FREQUENCY.format(kind=""))
-    )
+    theirs = frequencies(run(tmp_path, deck(mesh, elastic, 500.0, orientation=orientation) + FREQUENCY.format(kind="")))
     material = {
         "density": 500.0, "young": [120e9, 9e9, 14e9], "poisson": [0.28, 0.35, 0.31], "shear": [5e9, 3.4e9, 6e9],
         "axes": axes.tolist(),
@@ -245,9 +236,7 @@ def test_heat_and_rotation(tmp_path):
 # ---------------------------------------------------------------- at speed
 
 
-@pytest.mark.parametrize(
-    ("prestress", "kind", "rtol"), [("linear", "", PRINTED), ("nonlinear", ", NLGEOM", PRINTED)]
-)
+@pytest.mark.parametrize(("prestress", "kind", "rtol"), [("linear", "", PRINTED), ("nonlinear", ", NLGEOM", PRINTED)])
 def test_frequencies_at_speed(prestress, kind, rtol, tmp_path):
     """The staggered, twisted blade at 900 rad/s."""
     text = deck(BLADE) + static(CENTRIFUGAL, kind) + FREQUENCY.format(kind=", PERTURBATION")

@@ -23,8 +23,10 @@ def name_picked(rules: Sequence[dict[str, Any]], marks: Marks) -> None:
         picked = pick(rule, marks)
         if not picked:
             way = {k: v for k, v in rule.items() if k != "name" and v is not None}
-            raise UserError(f"geometry.faces: no surface answers to {way} of face {rule.get('name')!r}; the file "
-                            f"has {len(marks)} surfaces, list them with: microslip info FILE")
+            raise UserError(
+                f"geometry.faces: no surface answers to {way} of face {rule.get('name')!r}; the file "
+                f"has {len(marks)} surfaces, list them with: microslip info FILE"
+            )
         named.setdefault(str(rule.get("name")), []).extend(picked)
     owner: dict[int, str] = {}
     for name, tags in named.items():

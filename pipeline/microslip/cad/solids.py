@@ -43,8 +43,10 @@ def load(path: Path, unit: str) -> Marks:
     solids = gmsh.model.getEntities(3)
     if not solids:
         count = len(gmsh.model.getEntities(2))
-        raise UserError(f"geometry.cad: {path.name} holds no solid ({count} surfaces of open or loose shells); "
-                        "close the body in the CAD program and export it as a solid")
+        raise UserError(
+            f"geometry.cad: {path.name} holds no solid ({count} surfaces of open or loose shells); "
+            "close the body in the CAD program and export it as a solid"
+        )
     for solid in solids:
         refuse_damaged(path, solid)
     marks = marks_of(path)
@@ -126,8 +128,9 @@ def refuse_damaged(path: Path, solid: tuple[int, int]) -> None:
     for wrong, what in ((lambda n: n < 2, "is open"), (lambda n: n > 2, "is not manifold")):
         count = sum(map(wrong, real.values()))
         if count:
-            raise UserError(f"geometry.cad: a solid in {path.name} {what} along {count} edges; repair it "
-                            "in the CAD program")
+            raise UserError(
+                f"geometry.cad: a solid in {path.name} {what} along {count} edges; repair it in the CAD program"
+            )
 
 
 def join(path: Path, solids: list[tuple[int, int]], marks: Marks) -> Marks:
@@ -144,8 +147,10 @@ def join(path: Path, solids: list[tuple[int, int]], marks: Marks) -> Marks:
     occ.synchronize()
     parts = count_parts(made)
     if parts > 1:
-        raise UserError(f"geometry.cad: the solids of {path.name} fall into {parts} parts that share no face; "
-                        "join them in the CAD program or mesh each as a body of its own")
+        raise UserError(
+            f"geometry.cad: the solids of {path.name} fall into {parts} parts that share no face; "
+            "join them in the CAD program or mesh each as a body of its own"
+        )
     if sum(occ.getMass(*solid) for solid in made) < (1 - 1e-6) * before:
         warn(f"{path.name}: solids overlap; the common part is counted once")
     return heirs

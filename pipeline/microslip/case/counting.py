@@ -120,5 +120,3 @@ def brought(group: ModalGroup, reduction: str, beside: bool, faces: Mapping[str,
 def _leaves(group: ModalGroup, interface: str, reduction: str) -> bool:
     """Whether a basis leaves static compliance at a contact, beyond rounding."""
     return any(contact_share(group, reduction, row, interface).left for row in INTERFACE_ROWS)
-
-

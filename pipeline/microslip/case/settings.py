@@ -356,9 +356,7 @@ class CaseSettings(Model):
         if self.mode == "book" and not self.has_laws:
             raise ValueError('mode: "book" needs point contacts; write law = "smooth" or "rough" in every contact')
         if self.strips and self.mode != "book":
-            raise ValueError(
-                'strips: belong to mode = "book"; a marched law brings its own microslip (contacts.file)'
-            )
+            raise ValueError('strips: belong to mode = "book"; a marched law brings its own microslip (contacts.file)')
         return self
 
     def _pressed(self) -> CaseSettings:

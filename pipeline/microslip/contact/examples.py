@@ -75,9 +75,7 @@ EXAMPLES: dict[str, Example] = {
     "rough point, two stiffnesses": Example(
         PointContact(_ROUGH, _COULOMB, _C, _value(0.4e8)), 1.2e-5, 8e-6, isotropic=False
     ),
-    "portion of a rough contact": Example(
-        Portion(PointContact(_ROUGH, _COULOMB, _C), _value(0.125)), 1.2e-5, 8e-6
-    ),
+    "portion of a rough contact": Example(Portion(PointContact(_ROUGH, _COULOMB, _C), _value(0.125)), 1.2e-5, 8e-6),
     "linear heights": _rough(Linear()),
     "exponential heights, cut": _rough(Cut(Exponential(_value(4.0)))),
     "Gaussian heights, cut": _rough(Cut(Gaussian(_value(0.5), _value(0.22)))),

@@ -114,9 +114,7 @@ class BasisSource(Model):
     facing: Name | None = None
 
 
-Stiffness = Annotated[
-    Given | LayerSource | HertzSource | CurveSource | BasisSource, Field(discriminator="kind")
-]
+Stiffness = Annotated[Given | LayerSource | HertzSource | CurveSource | BasisSource, Field(discriminator="kind")]
 
 # [roughness] -------------------------------------------------------------------------------------------------------
 
@@ -308,9 +306,7 @@ class MindlinElement(Model):
     count: Annotated[int, Field(ge=2, le=500)] = 32
 
 
-Element = Annotated[
-    Massless | WithMass | StripsElement | IwanElement | MindlinElement, Field(discriminator="kind")
-]
+Element = Annotated[Massless | WithMass | StripsElement | IwanElement | MindlinElement, Field(discriminator="kind")]
 
 # the rest ----------------------------------------------------------------------------------------------------------
 

@@ -125,8 +125,10 @@ def _local_sizes(n: int, faces: Facets, areas: list[Array]) -> Array:
 
 def _refuse_misplaced(pair: ContactPair, face: str, against: str | Plane) -> None:
     key = f"closures.{pair.name}"
-    other = "the plane" if isinstance(against, Plane) else f"'{against}'" + (
-        " of the neighbouring sector" if pair.between_sectors else ""
+    other = (
+        "the plane"
+        if isinstance(against, Plane)
+        else f"'{against}'" + (" of the neighbouring sector" if pair.between_sectors else "")
     )
     cuts = cut_pair(pair, pair.points)
     if not cuts.points:

@@ -217,9 +217,7 @@ class Discretisation:
         return float(sum(b.dx.sum() for b in self.blocks))
 
 
-def discretise(
-    mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Sequence[Indices] = ()
-) -> Discretisation:
+def discretise(mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Sequence[Indices] = ()) -> Discretisation:
     """Shape-function gradients at every quadrature point and the sparsity pattern.
 
     Args:

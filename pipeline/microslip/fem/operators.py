@@ -63,9 +63,7 @@ def mass(d: Discretisation, density: float | Sequence[float]) -> Array:
     return out[:-1, 0]
 
 
-def stiffness(
-    d: Discretisation, elasticity: Array | Sequence[Array], factor: list[Array] | None = None
-) -> Array:
+def stiffness(d: Discretisation, elasticity: Array | Sequence[Array], factor: list[Array] | None = None) -> Array:
     """(p, 3, 3) stiffness of the stress-free body, N/m: K_N of Sextro Eq. (2.3-17).
 
     Args:

@@ -419,9 +419,7 @@ def prominent(height: Array, candidates: Indices) -> Indices:
     return np.array(kept, dtype=int)
 
 
-def resonances(
-    response: FrequencyResponse, found: Sequence[tuple[float, float]]
-) -> list[tuple[float, float]]:
+def resonances(response: FrequencyResponse, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Of peaks (Hz, m) found between the points of a sweep those that are one resonance each, see `prominent`."""
     grid, ok = response.frequency, response.converged
     f = np.concatenate([grid[ok], [f for f, _ in found]])

@@ -131,12 +131,8 @@ class _Body:
             speed = settled.speed
             if speed not in self.solutions:
                 common = (self.motions, self.rows, self.solver, self.sector, self.report)
-                every = self.searched.get(speed) or searched_state(
-                    self.model, more, self.states[speed], speed, *common
-                )
-                self.solutions[speed] = {
-                    n: reduced_solution(self.model, more, s, self.rows) for n, s in every.items()
-                }
+                every = self.searched.get(speed) or searched_state(self.model, more, self.states[speed], speed, *common)
+                self.solutions[speed] = {n: reduced_solution(self.model, more, s, self.rows) for n, s in every.items()}
             found = self.solutions[speed][k]
             shapes = [found.found.vectors]
             if self.settings.reduction not in ("eigenmodes", "macneal"):

@@ -55,7 +55,7 @@ def with_characteristic(
         if 8.0 * len(dofs) * pencil.n > _MEMORY:
             raise UserError(
                 f"interfaces.{item.name}.coordinates: the patch has {len(dofs)} displacements, too many to condense "
-                "(2 GB of static answers); mesh the patch coarser or keep coordinates = \"rigid\""
+                '(2 GB of static answers); mesh the patch coarser or keep coordinates = "rigid"'
             )
         select = _selection(dofs, model.free.free)
         answers = static_answers(pencil, few, select, R, shift)

@@ -119,4 +119,3 @@ class Closing:
         chosen = [g for g in self.grips if g.pair.stays_closed or not kept]
         chosen = [g for g in chosen if neighbours or not g.pair.between_sectors]
         return sum((contact_stiffness(g, pattern, self.bent) for g in chosen), start=K)
-

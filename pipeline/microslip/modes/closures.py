@@ -130,9 +130,7 @@ def _seat(mesh: Mesh, face: str, key: str) -> tuple[Array, Array, float]:
     return areas @ points / areas.sum(), mean / np.linalg.norm(mean), float(areas.sum())
 
 
-def contact_states(
-    mesh: Mesh, settings: BodySettings, grips: tuple[Grip, ...]
-) -> dict[str, ContactState]:
+def contact_states(mesh: Mesh, settings: BodySettings, grips: tuple[Grip, ...]) -> dict[str, ContactState]:
     """What the modal file keeps of every closure, by name."""
     by_name = {c.name: c for c in settings.closures}
     of_face = {i.face: i.name for i in reversed(settings.interfaces) if i.role != "load"}

@@ -64,9 +64,7 @@ def foreign_basis(
             check_held(body.mesh, settings, centre, spread)
         shift = _shift(body, motions, free, pencil) if R.shape[1] else 0.0
         s = _search(settings, pencil, unknowns, R, shift, rows, report)
-        place = np.concatenate(
-            [canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)]
-        )
+        place = np.concatenate([canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)])
         solved = reduced_on(place, layout.width // 3, settings, s, rows)
     finally:
         solver.close()

@@ -39,9 +39,7 @@ def null_space(rows: Array) -> Array:
     return vt[rank:].T
 
 
-def free_motions_of_ring(
-    points: Array, point: Array, fixed: Indices, turn: Array, sectors: int
-) -> Array:
+def free_motions_of_ring(points: Array, point: Array, fixed: Indices, turn: Array, sectors: int) -> Array:
     """(3n, r) rigid motions of a ring, on its first sector, that the supports of no sector hold.
 
     Args:

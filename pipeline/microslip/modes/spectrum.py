@@ -121,9 +121,7 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     return within + u
 
 
-def leading_rows(
-    rows: BodyRows, settings: BodySettings, phi: Array, place: Indices
-) -> Callable[[Array], Array]:
+def leading_rows(rows: BodyRows, settings: BodySettings, phi: Array, place: Indices) -> Callable[[Array], Array]:
     """Rows that decide signs and the basis of pairs: the first interface's, else the strongest nodes' motion."""
     first = next((i.name for i in settings.interfaces), None)
     chosen = _strong(phi, place)

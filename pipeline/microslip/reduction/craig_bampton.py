@@ -64,7 +64,7 @@ def static_shapes(R: Array, B: sp.csr_matrix, answers: Array, what: str) -> tupl
     b, r = held.shape
     if r and np.linalg.matrix_rank(held, 1e-9 * np.abs(held).max(initial=1e-300)) < r:
         raise UserError(
-            f'reduction: {what} needs interfaces that hold the body against its rigid motions; add an interface or '
+            f"reduction: {what} needs interfaces that hold the body against its rigid motions; add an interface or "
             'use "rubin"'
         )
     F = hermitian(np.asarray(B @ answers))

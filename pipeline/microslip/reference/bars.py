@@ -9,9 +9,7 @@ import numpy as np
 from ..data import Array
 
 
-def rod_frequencies(
-    young: float, density: float, length: float, count: int, ends: str = "clamped-free"
-) -> Array:
+def rod_frequencies(young: float, density: float, length: float, count: int, ends: str = "clamped-free") -> Array:
     """(count,) angular frequencies of axial vibration of a uniform rod, rad/s (elastic ones only).
 
     Args:

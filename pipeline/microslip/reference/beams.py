@@ -39,14 +39,10 @@ class Section:
         return float(np.sqrt(self.young * self.inertia / (self.density * self.area * self.length**4)))
 
 
-def rectangle(
-    length: float, width: float, height: float, young: float, poisson: float, density: float
-) -> Section:
+def rectangle(length: float, width: float, height: float, young: float, poisson: float, density: float) -> Section:
     """The beam of rectangular section that bends in the direction of `height` (m)."""
     shear = young / (2 * (1 + poisson))
-    return Section(
-        length, young, shear, density, width * height, width * height**3 / 12, rectangle_kappa(poisson)
-    )
+    return Section(length, young, shear, density, width * height, width * height**3 / 12, rectangle_kappa(poisson))
 
 
 def rectangle_kappa(poisson: float) -> float:

@@ -11,9 +11,7 @@ def ring_at_rest(wave: int, radius: float, young: float, density: float, thickne
     omega^2 = n^2 (n^2 - 1)^2 / (n^2 + 1) E h^2 / (12 rho R^4)
     """
     n = wave
-    return float(
-        n * (n**2 - 1) / np.sqrt(n**2 + 1) * thickness / radius**2 * np.sqrt(young / (12 * density))
-    )
+    return float(n * (n**2 - 1) / np.sqrt(n**2 + 1) * thickness / radius**2 * np.sqrt(young / (12 * density)))
 
 
 def spinning_ring(wave: int, at_rest: float, speed: float) -> tuple[float, float]:

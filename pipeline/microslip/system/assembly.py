@@ -454,7 +454,9 @@ class Assembly:
             _all_round(self.members, N),
             tuple(met(c, j) for j in range(N) for c in self.contacts),
             tuple(load(x, j) for j in range(N) for x in self.loads),
-            tuple(watch(w, j) for j in range(N) for w in self.watches), None, self.stuck_damping,
+            tuple(watch(w, j) for j in range(N) for w in self.watches),
+            None,
+            self.stuck_damping,
         )
 
     def joined(self, harmonic: int) -> Linear:

@@ -108,9 +108,7 @@ def _compliance(first: ModalGroup, waves: list[InWave], N: int) -> Compliance:
         for j in range(N)
         for kind, name, row in (label.split(":", 2) for label in c.labels)
     )
-    static, modal = (
-        _circulant([getattr(w.group.compliance, key) for w in waves], N) for key in ("static", "modal")
-    )
+    static, modal = (_circulant([getattr(w.group.compliance, key) for w in waves], N) for key in ("static", "modal"))
     return Compliance(labels, static, modal, c.inertia_relief)
 
 

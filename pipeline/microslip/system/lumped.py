@@ -36,7 +36,7 @@ from ..body import (
     has_length,
     load_toml,
     named_once,
-    of_sensible_size,
+    not_too_large,
     override,
     validate,
 )
@@ -169,7 +169,7 @@ def _unit(direction: Sequence[float], what: str) -> Array:
     """
     bounded(what, direction)
     try:
-        v = np.array([of_sensible_size(float(x)) for x in has_length(tuple(direction))])
+        v = np.array([not_too_large(float(x)) for x in has_length(tuple(direction))])
     except ValueError as error:
         raise UserError(f"{what}: {error}") from error
     return v / np.linalg.norm(v)

@@ -116,9 +116,7 @@ def _yield(wave: InWave, T: Array) -> Array:
 def _interface(member: Member, name: str) -> Interface:
     group = member.groups[min(member.groups)]
     if name not in group.interfaces:
-        raise UserError(
-            f"{member.name}: has no interface '{name}'; it has {', '.join(group.interfaces) or 'none'}"
-        )
+        raise UserError(f"{member.name}: has no interface '{name}'; it has {', '.join(group.interfaces) or 'none'}")
     found = group.interfaces[name]
     if not len(found.shapes):
         raise UserError(
