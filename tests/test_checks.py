@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_harmonic_balance_time import cantilever, group, held
+from test_nonlinear_modes import sliding
 from test_response_stage import CASE, SAMPLES, respond
 
 from microslip import running
@@ -19,11 +20,12 @@ from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact
+from microslip.harmonic_balance import peak, reduced, response, solver
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance import reduced, response, solver
+from microslip.harmonic_balance.nonlinear_modes import backbone
 from microslip.harmonic_balance.solver import solve
 from microslip.results import Response, read_response, write_response
-from microslip.results.checks import COUNTED, cause, check_response, sentence
+from microslip.results.checks import COUNTED, cause, check_response, largest, sentence
 
 CLOSED = CASE.replace('law = "smooth"\npoints = [2, 2]', 'law = "jenkins"').replace("harmonics = 1\nsamples = 24\n", "")
 
@@ -124,6 +126,20 @@ def test_too_few_samples_are_no_convergence() -> None:
         counted.append(float(np.abs(found.counted).max()))
         assert found.converged.all() == (counted[-1] <= COUNTED)
     assert counted[0] > COUNTED and counted[1] < 0.005
+
+
+def test_peaks_and_modes_are_checked_as_points_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is climbed to or followed over the amplitude: eight samples of a cycle are too few, 1024 leave nothing."""
+    for samples, few in ((8, True), (1024, False)):
+        mode = backbone(sliding(samples=samples), 5e-5, 6e-5)
+        assert mode.status.startswith("energy") == few != mode.complete
+        assert (abs(largest(mode.checks).counted) > COUNTED) == few
+    problem, band = sliding(force=2.0), np.linspace(80.0, 200.0, 25)
+    assert peak.highest(problem, band)[0].converged
+    work = reduced.work
+    monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.001, 1.0, 1.0]))
+    found, _ = peak.highest(problem, band)
+    assert not found.converged and found.status.startswith("energy")
 
 
 def test_why_a_point_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,7 @@ from .data import ModalBasis, UserError
 from .harmonic_balance.readout import measured
 from .mistakes import validate
 from .results import read_response
+from .results.checks import checked, largest
 from .units import METRES, Quantity
 from .workflow import Report
 
@@ -133,6 +134,7 @@ def backbones(
                 f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} {of.said}; damping at most "
                 f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} {of.said}"
             )
+            said += f"; {checked(largest(one.checks))}"
         report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
     return found
 

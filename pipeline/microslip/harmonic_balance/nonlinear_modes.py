@@ -22,11 +22,14 @@ import numpy as np
 
 from ..continuation import Point, Settings, follow, start
 from ..data import Array, UserError
+from ..results.checks import Checks
 from ..system import assembly
 from ..system.assembly import Linear
 from .problem import AtFrequency, Problem
 from .readout import amplitude
-from .solver import Report
+from .response import operating
+from .solver import CONVERGED, Report
+from .solver import Point as Solved
 
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
@@ -39,7 +42,8 @@ class Backbone:
 
     Attributes:
         amplitude: (k,) of the read-out's first harmonic, m. Omega: (k,) rad/s. damping: (k,) ratio.
-        x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended.
+        x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended. checks: of its points
+            (`results.checks`), the force that feeds the losses among the bodies' own.
     """
 
     amplitude: Array
@@ -48,10 +52,11 @@ class Backbone:
     x: Array
     stuck: float
     status: str
+    checks: tuple[Checks, ...]
 
     @property
     def complete(self) -> bool:
-        """All amplitudes asked for were reached."""
+        """All amplitudes asked for were reached, by motions that pass their checks."""
         return self.status.startswith("bound")
 
 
@@ -99,7 +104,9 @@ def backbone(
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), -1)
-    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, state.status)
+    found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
+    status = next((one.failure for one in found if one.failure), state.status)
+    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)
 
 
 def strongest(problem: Problem, low: float, high: float, watch: int = 0) -> int:
@@ -175,9 +182,16 @@ class _Curve:
     def _given(self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]) -> tuple[Array, complex]:
         return at.residual_of(x, force), amplitude(at, x, force, slopes, self.watch).value
 
-    def _at(self, Omega: float, xi: float) -> AtFrequency:
+    def checks(self, x: Array, Omega: float, xi: float) -> Checks:
+        """Of a point of the mode."""
+        return operating(self._fed(xi), Solved(Omega, x, CONVERGED, 0.0, 0)).checks
+
+    def _fed(self, xi: float) -> Problem:
         parts = tuple(tuple(replace(p, C=p.C - xi * p.M) for p in one) for one in self.problem.parts)
-        problem = replace(self.problem, parts=parts)
+        return replace(self.problem, parts=parts)
+
+    def _at(self, Omega: float, xi: float) -> AtFrequency:
+        problem = self._fed(xi)
         return AtFrequency(problem, Omega, tuple(one.directly(Omega) for one in problem.eliminated))
 
 

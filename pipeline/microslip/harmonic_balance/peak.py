@@ -17,7 +17,8 @@ from ..data import Array
 from .jenkins import prominent
 from .problem import Problem
 from .readout import Watched
-from .solver import Report, sweep
+from .response import operating
+from .solver import CONVERGED, Point, Report, sweep
 
 SEEN = 0.5
 """Share of the highest peak that a top of the sweep has to have to be climbed: half a step of the sweep beside a
@@ -84,9 +85,17 @@ def highest(
             break
         found = climbed(watched, points[i].x, points[i].Omega, within)
         if found.converged and within.low < found.lam < within.high and found.value > best.value:
-            best = found
+            best = checked(problem, found)
     end = max((0, -1), key=lambda k: height[k])
     return best, points[end].Omega if height[end] > best.value else None
+
+
+def checked(problem: Problem, peak: Peak) -> Peak:
+    """A peak that is not called converged if its solution fails its checks (`results.checks`)."""
+    if not peak.converged:
+        return peak
+    failure = operating(problem, Point(peak.lam, peak.x, CONVERGED, 0.0, 0)).checks.failure
+    return replace(peak, status=failure or peak.status)
 
 
 def resonance(peak: Peak) -> Resonance:

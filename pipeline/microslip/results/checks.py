@@ -4,7 +4,7 @@ verified from its own content."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,13 +99,25 @@ def sentence(response: Response, estimated: float | None) -> str:
     """
     guess = "not estimated" if estimated is None else f"estimated as {percent(estimated)}"
     guess = guess if estimated is None or np.isfinite(estimated) else "unknown, no finer solution was found"
+    worst = Checks(*(_worst(response.series, name) for name in ("balance", "counted", "motion")))
+    return f"{checked(worst)}, error of harmonics and samples: {guess}; {_of_points(response.series)}"
+
+
+def checked(worst: Checks) -> str:
+    """The largest errors of some solutions in words."""
     words = [
-        _to("energy in balance", _worst(response.series, "balance")),
-        _to("contacts take what their laws count", _worst(response.series, "counted")),
-        _to("bodies move as their contacts", _worst(response.series, "motion")),
-        f"error of harmonics and samples: {guess}",
+        _to("energy in balance", worst.balance),
+        _to("contacts take what their laws count", worst.counted),
+        _to("bodies move as their contacts", worst.motion),
     ]
-    return f"checked: {', '.join(words)}; {_of_points(response.series)}"
+    return f"checked: {', '.join(words)}"
+
+
+def largest(each: Sequence[Checks]) -> Checks:
+    """The largest errors of some solutions, NaN where nothing can be said."""
+    rows = np.abs([[c.balance, c.counted, c.motion] for c in each]).reshape(-1, 3)
+    known = np.where(np.isnan(rows), -1.0, rows).max(axis=0, initial=-1.0)
+    return Checks(*(float(v) if v >= 0 else np.nan for v in known))
 
 
 def _to(what: str, worst: float) -> str:
