@@ -72,11 +72,9 @@ def unbalanced(at: AtFrequency, before: Places, after: Places) -> tuple[float, s
     return most, whom
 
 
-def held_by_contacts(problem: Problem) -> bool:
-    """Whether nothing but the contacts holds some motion of a body, or next to nothing (`hold` of a case file), and
-    their laws are marched: those of the book's mode do not know the mean place."""
-    marched = any(isinstance(g.model, Marched) for g in problem.groups)
-    return marched and any(len(shares) for shares in _shares(problem))
+def serves(problem: Problem) -> bool:
+    """Whether laws are marched: those of the book's mode do not know the mean place."""
+    return any(isinstance(g.model, Marched) for g in problem.groups)
 
 
 def unheld(problem: Problem) -> bool:

@@ -115,9 +115,8 @@ def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) ->
 
 
 def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
-    """Newton's method from one start after the other, then from the sticking contact, then along the load.
-
-    Where nothing but contacts holds a body, it comes from rest in slow time before it follows the load.
+    """Newton's method from one start after the other, then from the sticking contact, then from rest in slow time, then
+    along the load.
 
     Raises:
         UserError: a frequency that is not positive.
@@ -152,7 +151,7 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
     yield from (partial(newton, at, x, slope=slope) for x in starts)
-    if slow.held_by_contacts(problem):
+    if slow.serves(problem):
         yield partial(from_rest, problem, at.Omega)
     yield partial(_raised, problem, at.Omega)
 
