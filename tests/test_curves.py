@@ -30,7 +30,7 @@ amplitude = 0.25
 monitor = "middle"
 direction = "z"
 harmonics = 1
-samples = 32
+samples = 64
 [[contacts]]
 interface = "sole"
 law = "smooth"

@@ -289,9 +289,10 @@ def test_forced_vibration_with_a_patch_that_deforms() -> None:
         assert point.converged
         found = response.operating(problem, point)
         cycle = found.cycles["joint"]
-        errors.append(abs(cycle.dissipated.sum() / (found.supplied - found.damped) - 1))
+        errors.append(abs(cycle.by_slip.sum() / (found.supplied - found.damped) - 1))
+        assert abs(cycle.lost.sum() / (found.supplied - found.damped) - 1) < 2e-3
     assert cycle.slipping.max() > 0.9 and cycle.slipping.min() < 0.3
-    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1) and errors[1] < 2e-3
+    assert errors[0] > 3.5 * errors[1] and errors[1] < 6e-3
 
 
 def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
