@@ -53,7 +53,7 @@ def of_points(built: Built) -> str:
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
-    from ..contact.settings import files_of as of_contact
+    from ..contact.kinds import files_of as of_contact
 
     found = {name: path.parent / name for name in settings.files}
     for name in [c.file for c in settings.contacts if c.file is not None]:

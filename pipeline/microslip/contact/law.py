@@ -61,6 +61,11 @@ def static(**options: Any) -> Any:
     return field(metadata={"static": True}, **options)
 
 
+def value(x: float) -> Array:
+    """A number of a law."""
+    return jnp.asarray(x, dtype=float)
+
+
 def number(gt: float | None = None, ge: float | None = None, le: float | None = None, **options: Any) -> Any:
     """A field of numbers that are finite and within bounds wherever a person gives them (`mistakes.bounded`)."""
     return field(metadata={"bounds": (gt, ge, le)}, **options)
