@@ -10,6 +10,7 @@ and its place is the only entry it needs: in `OWN`, or, in a package of one's ow
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 
@@ -51,8 +52,18 @@ OWN = {
 def kinds(section: str) -> Any:
     """The annotation of a section: any of its kinds, told apart by `kind`; those of other packages last."""
     own = (EntryPoint(place, f"{__package__}.{place}", section) for place in OWN[section])
-    given = sorted(entry_points(group=f"microslip.{section}"), key=lambda entry: entry.name)
-    return Annotated[Union[tuple(entry.load() for entry in (*own, *given))], Field(discriminator="kind")]  # noqa: UP007
+    known = tuple(entry.load() for entry in (*own, *_of_others(section)))
+    return Annotated[Union[known], Field(discriminator="kind")]  # noqa: UP007
+
+
+def _of_others(section: str) -> list[EntryPoint]:
+    return sorted(entry_points(group=f"microslip.{section}"), key=lambda entry: entry.name)
+
+
+def sources_of_others() -> dict[str, Path]:
+    """Module -> file of the kinds of other packages: what is computed with them depends on it."""
+    modules = {entry.module for section in OWN for entry in _of_others(section)}
+    return {name: Path(found.origin) for name in sorted(modules) if (found := find_spec(name)) and found.origin}
 
 
 class _Kind(Model):

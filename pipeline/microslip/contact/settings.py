@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from ..body import (
     Coefficient,
@@ -112,6 +112,12 @@ class Limits(Model):
     boundary: Boundary = "stress-free"
 
 
+def _coulomb(value: Any) -> Any:
+    """A number as Coulomb's friction."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"kind": "coulomb", "mu": float(value)} if number else value
+
+
 class ContactLaw(Model):
     """What a contact is, wherever it stands.
 
@@ -120,7 +126,7 @@ class ContactLaw(Model):
 
     stiffness: kinds("stiffness")  # type: ignore[valid-type]
     roughness: kinds("roughness") | None = None  # type: ignore[valid-type]
-    friction: kinds("friction") | None = None  # type: ignore[valid-type]
+    friction: Annotated[kinds("friction") | None, BeforeValidator(_coulomb)] = None  # type: ignore[valid-type]
     element: kinds("element") = Massless()  # type: ignore[valid-type]
     temperature: Temperature | None = None
 
