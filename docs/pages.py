@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from microslip.body import BodySettings, _is_length
-from microslip.case.settings import CaseSettings
+from microslip.case.settings import CaseSettings, ContactSettings
 from microslip.contact.settings import ContactFile
 
 HERE = Path(__file__).parent
@@ -402,16 +402,19 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.normal_force": ("N", "where the sweep's forces are not this contact's"),
     "contacts.interference": ("m", "or how far the faces overlap at rest; negative: a gap"),
     "contacts.file": ("", "a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"),
-    "contacts.normal_stiffness": ("N/m", "c_N0 of the whole patch; **required** without file or young"),
+    "contacts.stiffness": ("", "as in a [contact.toml](contact_toml.md), lengths in m, instead of the two below"),
+    "contacts.element": ("", "likewise: what sticks and slips, of any [kind](contact_toml.md), also of another package"),
+    "contacts.temperature": ("", "likewise: heat of sliding"),
+    "contacts.normal_stiffness": ("N/m", "c_N0 of the whole patch; **required** without stiffness, file or young"),
     "contacts.tangential_stiffness": ("N/m", "c_R0, likewise"),
     "contacts.width": ("m", "b_0 along t1; the patch's own if not given"),
     "contacts.height": ("m", "h_0 along t2, likewise"),
-    "contacts.friction": ("", "coefficient; **required** without file"),
+    "contacts.friction": ("", "coefficient, or a table as in a contact.toml; **required** without file"),
     "contacts.slides_along": ("", "law jenkins: where its slider is"),
     "contacts.includes": ("", "which [compliance](contact.md) the stiffnesses count"),
     "contacts.law": ("", "closed form of one harmonic, or points with a law; if not given, `jenkins` for one body on "
                      "the ground, else `smooth`"),
-    "contacts.roughness": ("m", "R_Z, of law rough"),
+    "contacts.roughness": ("m", "R_Z, of law rough, or a table as in a contact.toml"),
     "contacts.points": ("", "how many along t1 and t2"),
     "contacts.patch": ("", "six coordinates, or points that move as the shapes of the bodies say"),
     "contacts.curvature": ("m", "relative radii along t1 and t2, inf where it is flat"),
@@ -490,11 +493,11 @@ def _reference(model: Any, meanings: dict[str, tuple[str, str]], file: str) -> s
 def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, str, Any]]:
     yield prefix, title, "" if not prefix else " ".join((model.__doc__ or "").split("\n\n")[0].split()), model
     for key, field in _fields(model).items():
-        for number, (inner, many) in enumerate(_inner(field.annotation)):
+        for number, (inner, many) in enumerate(_told(model, field)):
             name = f"{prefix}{key}"
             head = f"[[{name}]]" if many else f"[{name}]"
             kinds = getattr(_fields(inner).get("kind"), "annotation", None)
-            if len(_inner(field.annotation)) > 1 and kinds is not None:
+            if len(_told(model, field)) > 1 and kinds is not None:
                 head += " kind = " + " or ".join(f'"{kind}"' for kind in kinds.__args__)
             elif number:
                 head += ", or instead"
@@ -514,8 +517,14 @@ def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:
     return [found for argument in getattr(annotation, "__args__", ()) for found in _inner(argument, many)]
 
 
+def _told(model: Any, field: Any) -> list[tuple[Any, bool]]:
+    """`_inner`, without the tables of a contact file in a contact of a case, which have a page of their own."""
+    found = _inner(field.annotation)
+    return [] if model is ContactSettings else found
+
+
 def _plain_keys(model: Any) -> list[str]:
-    return [k for k, f in _fields(model).items() if not _inner(f.annotation)]
+    return [k for k, f in _fields(model).items() if not _told(model, f)]
 
 
 def _section(prefix: str, title: str, text: str, model: Any, meanings: dict[str, tuple[str, str]]) -> str:
@@ -555,6 +564,8 @@ SIGNS = {"exclusiveMinimum": ">", "gt": ">", "minimum": ">=", "exclusiveMaximum"
 
 def _type(schema: dict[str, Any]) -> str:
     """What may be written, in words, from a field's JSON schema."""
+    if "oneOf" in schema or "$ref" in schema:
+        return "table"
     if "anyOf" in schema:
         return " or ".join(dict.fromkeys(_type(s) for s in schema["anyOf"] if s.get("type") != "null"))
     if "enum" in schema or "const" in schema:

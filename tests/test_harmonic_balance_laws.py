@@ -324,8 +324,8 @@ def test_work_of_the_excitation_is_the_friction_along_the_slip_path() -> None:
 def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     from microslip.harmonic_balance import solver
 
-    def stubborn(at: Any, x: np.ndarray, **more: Any) -> Any:
-        found = newton(at, x, **more)
+    def stubborn(at: Any, x: np.ndarray, *given: Any, **more: Any) -> Any:
+        found = newton(at, x, *given, **more)
         bad = abs(at.Omega - 2 * np.pi * 20.0) < 1e-9
         return replace(found, status="no convergence") if bad else found
 

@@ -6,17 +6,25 @@ import contextlib
 import inspect
 import io
 import itertools
+import os
 import re
+import shutil
+import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("jax")
 import test_contact_laws as contract
+
+from microslip.contact import composed
+from microslip.results import read_response
 
 PAGE = (Path(__file__).parents[1] / "docs" / "own_law.md").read_text(encoding="utf-8")
 
@@ -50,6 +58,59 @@ def cases() -> Iterator[Any]:
 @pytest.mark.parametrize("test, given", list(cases()))
 def test_the_pages_law_satisfies_the_contract(test: Callable[..., None], given: dict[str, Any]) -> None:
     test(example=NAMES["pad"], **given)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> dict[str, str]:
+    """Environment in which the page's package is installed, beside the case that the page names it in."""
+    site = tmp_path / "site"
+    found = site / "pads-0.1.dist-info"
+    found.mkdir(parents=True)
+    settings = tomllib.loads(re.search(r"```toml\n(\[project\]\n.*?)```", PAGE, flags=re.S)[1])["project"]
+    head = f"Name: {settings['name']}\nVersion: {settings['version']}\n"
+    (found / "METADATA").write_text(f"Metadata-Version: 2.1\n{head}")
+    groups = settings["entry-points"].items()
+    lines = [f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in own.items()) for group, own in groups]
+    (found / "entry_points.txt").write_text("\n".join(lines))
+    (site / "pads.py").write_text(re.search(r"```python\n(.*?)```", PAGE, flags=re.S)[1])
+    masses = Path(composed.__file__).parents[1] / "templates" / "three-masses"
+    shutil.copy(masses / "system.toml", tmp_path)
+    contact = re.search(r"```toml\n(\[\[contacts\]\]\n.*?)```", PAGE, flags=re.S)[1]
+    case = (masses / "case.toml").read_text().replace("points = 600", "points = 9")
+    whole = re.sub(r"\[\[contacts\]\].*?(?=\[sweep\])", contact, case, flags=re.S)
+    (tmp_path / "case.toml").write_text(re.sub(r"normal_forces = .*", "normal_forces = [10.0, 1000.0]", whole))
+    return {**os.environ, "PYTHONPATH": str(site)}
+
+
+def microslip(where: Path, environment: dict[str, str], *words: str) -> subprocess.CompletedProcess[str]:
+    call = [sys.executable, "-m", "microslip", *words]
+    return subprocess.run(call, cwd=where, env=environment, capture_output=True, text=True)
+
+
+def test_a_law_of_another_package_is_named_in_a_case(tmp_path: Path, package: dict[str, str]) -> None:
+    """It is solved, it is the pad (which holds less than Coulomb under 1000 N), and it is no other one's."""
+    done = microslip(tmp_path, package, "run", ".")
+    assert done.returncode == 0, done.stderr
+    found = read_response(tmp_path / "build/three-masses/response.h5")
+    for series, normal in zip(found.series, (10.0, 1000.0), strict=True):
+        swing = np.abs(series.arrays["contacts/rub/force"][:, 1, 1:3]).max()
+        assert swing <= 4 / np.pi * float(NAMES["Pad"](1e4, 5e3, 0.3, 40.0).hold(normal))
+    assert "up to date" in microslip(tmp_path, package, "respond", "case.toml").stderr
+    law = tmp_path / "site" / "pads.py"
+    law.write_text(law.read_text() + "\n# another arithmetic\n")
+    assert "up to date" not in microslip(tmp_path, package, "respond", "case.toml").stderr
+    typed = microslip(tmp_path, package, "respond", "case.toml", "--set", "contacts.rub.element.kind=mad")
+    assert typed.returncode == 2 and '"pad"' in typed.stderr
+    alone = microslip(tmp_path, {k: v for k, v in package.items() if k != "PYTHONPATH"}, "respond", "case.toml")
+    assert alone.returncode == 2 and 'element.kind: "pad" is unknown; choose one of' in alone.stderr
+
+
+@pytest.mark.slow
+def test_the_contract_runs_on_a_law_of_another_package(package: dict[str, str]) -> None:
+    path = Path(__file__).with_name("test_contact_laws.py")
+    call = [sys.executable, "-m", "pytest", str(path), "-k", "pad and not without", "-p", "no:cacheprovider"]
+    done = subprocess.run(call, env=package, capture_output=True, text=True)
+    assert done.returncode == 0 and int(re.search(r"(\d+) passed", done.stdout)[1]) >= 10, done.stdout
 
 
 def test_the_contract_is_there() -> None:

@@ -324,8 +324,8 @@ def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: p
 
     newton = solver.newton
 
-    def stubborn(at: Any, x: np.ndarray, **more: Any) -> Any:
-        found = newton(at, x, **more)
+    def stubborn(at: Any, x: np.ndarray, *given: Any, **more: Any) -> Any:
+        found = newton(at, x, *given, **more)
         return replace(found, status="no convergence") if abs(at.Omega - 2 * np.pi * 360.0) < 1e-6 else found
 
     monkeypatch.setattr(solver, "newton", stubborn)

@@ -277,15 +277,15 @@ def _stiffness(
 ) -> tuple[ContactSettings, Springs, list[str]]:
     """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and remarks."""
     loaded, faces = _sides(settings, bodies, c, path)
-    c = c if c.file is None else _of_file(c, path)[0]
+    c = _described(c, path)[0] if c.described else c
     own = sized(c, faces[0], path)
     if c.young is not None:
         springs, remark = _told(path, c, lambda: curved_springs(own, load))
     else:
         springs, remark = counted_once(c, _faces(settings, c, loaded), path)
-    if c.file is not None and springs[0] != c.normal_stiffness:
+    if c.described and springs[0] != c.normal_stiffness:
         raise UserError(
-            f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of the law of a file; give there the "
+            f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of a law in tables; give there the "
             'stiffness of the surface alone, and includes = "surface" here'
         )
     return own, springs, [remark] if remark else []
@@ -317,7 +317,7 @@ def _contact(
     if len(ends) == 2:
         met = _told(path, c, lambda: _met(settings, c, loaded, faces))
         second = Side(*ends[1], met.frame, c.against_sector)
-    whole = _of_file(c, path)[1] if c.file is not None else None
+    whole = _described(c, path)[1] if c.described else None
     said, found, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None, None
     if c.patch == "nodal":
         found, first, second, compliance = _told(path, c, lambda: _nodal(settings, members, c, (first, second), met))
@@ -434,24 +434,28 @@ def _place(b: Loaded) -> Place:
     return Place(R, centre - R @ centre + np.asarray(b.settings.shift))
 
 
-def _of_file(c: ContactSettings, path: Path | str) -> tuple[ContactSettings, Law]:
-    """A contact whose stiffnesses are those of its file, and the law in it.
+def _described(c: ContactSettings, path: Path | str) -> tuple[ContactSettings, Law]:
+    """A contact whose stiffnesses are those of its tables, here or in its file, and the law that they make.
 
     Raises:
-        UserError: no such file, or one that makes no law for point contacts.
+        UserError: no such file, or tables that make no law for point contacts.
     """
     from ..contact.composed import compose
     from ..contact.settings import load_contact
 
-    file = Path(path).parent / str(c.file)
-    if not ordinary(file).is_file():
-        raise UserError(f"{path}: contacts.{c.interface}.file: there is no file {file}; correct the path")
-    found = compose(load_contact(file), file)
+    where, file = f"contacts.{c.interface}", Path(path).parent / str(c.file)
+    if c.file is None:
+        try:
+            found = compose(c.tables, Path(path))
+        except UserError as error:
+            raise UserError(str(error).replace(f"{path}: ", f"{path}: {where}.", 1)) from error
+    elif not ordinary(file).is_file():
+        raise UserError(f"{path}: {where}.file: there is no file {file}; correct the path")
+    else:
+        found = compose(load_contact(file), file)
     if found.law is None or found.stiffness is None:
-        raise UserError(
-            f"{path}: contacts.{c.interface}.file: {file} needs friction and a tangential stiffness to make a law; "
-            "add them"
-        )
+        told = f"file: {file} needs" if c.file is not None else "stiffness: it needs"
+        raise UserError(f"{path}: {where}.{told} friction and a tangential stiffness to make a law; add them")
     includes = c.includes or ("surface" if found.stiffness.includes == "surface" else None)
     first, _ = found.stiffness.tangential
     own = {"normal_stiffness": found.normal_0, "tangential_stiffness": first, "includes": includes}

@@ -96,4 +96,4 @@ def jenkins_contact(c: ContactSettings, normal: float, springs: Springs | None =
     if normal == 0:
         six = np.zeros(6)
     slider = 1 if c.slides_along == "t1" else 2
-    return JenkinsContact(c.interface, six, slider, six[slider], c.friction * normal)
+    return JenkinsContact(c.interface, six, slider, six[slider], c.coefficient * normal)

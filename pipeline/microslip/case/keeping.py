@@ -53,9 +53,11 @@ def of_points(built: Built) -> str:
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
-    from ..contact.settings import files_of as of_contact
+    from ..contact.kinds import files_of as of_contact
+    from ..contact.kinds import sources_of_others
 
     found = {name: path.parent / name for name in settings.files}
+    found |= sources_of_others() if any(c.described for c in settings.contacts) else {}
     for name in [c.file for c in settings.contacts if c.file is not None]:
         found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
     return found

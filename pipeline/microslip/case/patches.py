@@ -122,7 +122,7 @@ def _law(c: ContactSettings, springs: Springs, law: str, areas: Array, whole: La
     normal: Normal = Penalty(n)
     if law == "rough":
         normal = Rough(n, jnp.asarray(c.roughness), Polynomial())
-    friction, second = Coulomb(jnp.asarray(c.friction)), None if springs[1] == springs[2] else t2
+    friction, second = Coulomb(jnp.asarray(c.coefficient)), None if springs[1] == springs[2] else t2
     return PointContact(normal, friction, t1, second, includes=c.includes or BULK_AND_SURFACE)
 
 
@@ -183,7 +183,7 @@ def _resultants(c: ContactSettings, load: float | None) -> Patch:
     from ..contact.patch import Patch, grid
     from ..contact.point_laws import curve_point
 
-    friction, most = Coulomb(jnp.asarray(c.friction, dtype=float)), 4 * _fitted(c, load)
+    friction, most = Coulomb(jnp.asarray(c.coefficient, dtype=float)), 4 * _fitted(c, load)
     width, height = c.width or 0.0, c.height or 0.0
     line = _line(c)
     if line is None:

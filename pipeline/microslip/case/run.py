@@ -203,7 +203,7 @@ def _by_laws(
         problem = problem_of(built, normal)
         key = pressed_by(built, problem) if normal is None else normal
         report(f"friction response at a normal force of {key:g} N")
-        limits = np.array([c.friction * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
+        limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
         responses[key] = found
         remarks += _not_periodic(key, found.unsteady, built.settings)

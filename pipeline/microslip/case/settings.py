@@ -27,6 +27,8 @@ from ..body import (
     validate,
 )
 from ..compliance import BULK_AND_SURFACE
+from ..contact.kinds import kinds
+from ..contact.settings import ContactFile, Temperature
 from ..operating.fatigue import MaterialLimits
 from .driving import ROTATION, ExcitationOfCase, base_of
 from .keys import GROUND as GROUND
@@ -117,8 +119,10 @@ class ContactSettings(Model):
     `roughness` R_Z in m). Not given: ``jenkins`` for one body on the ground, else ``smooth``. points: how many along
     t1 and t2.
 
-    file: a contact.toml (`docs/contact_toml.md`) beside the case instead of stiffnesses, friction, law and roughness:
-    any law of the contact room, of which every point carries its share.
+    stiffness, roughness, friction, element, temperature: the tables of a contact.toml (`docs/contact_toml.md`), for any
+    law of the contact room or of another package; every point carries its share of it. normal_stiffness and
+    tangential_stiffness are short for a stiffness of kind ``given``, a number as friction for Coulomb's, one as
+    roughness for the R_Z of polynomial heights. file: a contact.toml beside the case instead of all of these.
 
     patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
     relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
@@ -134,15 +138,18 @@ class ContactSettings(Model):
     normal_force: NotNegative | None = None
     interference: Number | None = None
     file: str | None = None
-    normal_stiffness: Positive = 0.0  # of the file, if there is one
+    stiffness: kinds("stiffness") | None = None  # type: ignore[valid-type]
+    element: kinds("element") | None = None  # type: ignore[valid-type]
+    temperature: Temperature | None = None
+    normal_stiffness: Positive = 0.0  # of the tables or the file, if there are some
     tangential_stiffness: Positive = 0.0
     width: Positive | None = None
     height: Positive | None = None
-    friction: Coefficient = 0.0
+    friction: Coefficient | kinds("friction") = 0.0  # type: ignore[valid-type]
     slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
     law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
-    roughness: Positive | None = None
+    roughness: Positive | kinds("roughness") | None = None  # type: ignore[valid-type]
     points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
     patch: Literal["rigid", "nodal"] = "rigid"
     curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None
@@ -155,18 +162,67 @@ class ContactSettings(Model):
     @model_validator(mode="after")
     def _says_what_it_is(self) -> ContactSettings:
         own = ("normal_stiffness", "tangential_stiffness", "friction")
-        given = [key for key in (*own, "law", "roughness") if key in self.model_fields_set]
+        tables = ("stiffness", "element", "temperature")
+        given = [key for key in (*own, "law", "roughness", *tables) if key in self.model_fields_set]
         if self.file is not None and given:
             raise ValueError(f"{given[0]}: stands in the contact file already; give file or {given[0]}")
+        short = [key for key in ("normal_stiffness", "tangential_stiffness") if key in self.model_fields_set]
+        if self.stiffness is not None and short:
+            raise ValueError(f"{short[0]}: is short for a table of stiffness; give one of the two")
+        if self.in_tables and (self.law is not None or self.young is not None):
+            key = "law" if self.law is not None else "young"
+            raise ValueError(f"{key}: cannot stand beside tables of stiffness, roughness, friction or element; write "
+                             "all of it in tables")  # fmt: skip
         needed = own if self.young is None else ("friction",)
+        needed = ("friction",) if self.stiffness is not None else needed
         missing = [key for key in needed if key not in self.model_fields_set]
         if self.file is None and missing:
             raise ValueError(f"{missing[0]}: is missing; give it, or a contact file (file)")
+        if self.in_tables:
+            _ = self.tables
         return self
+
+    @property
+    def in_tables(self) -> bool:
+        """Whether tables of a contact.toml say what it is."""
+        some = (self.stiffness, self.element, self.temperature, self.friction, self.roughness)
+        return any(isinstance(one, Model) for one in some)
+
+    @property
+    def described(self) -> bool:
+        """Whether tables say what it is, here or in a file."""
+        return self.file is not None or self.in_tables
+
+    @property
+    def tables(self) -> ContactFile:
+        """The tables, short keys written out.
+
+        Raises:
+            ValueError: some that do not go together.
+        """
+        given = {"kind": "given", "normal": self.normal_stiffness, "tangential": self.tangential_stiffness}
+        rough = {"kind": "polynomial", "R_Z": self.roughness}
+        return ContactFile.model_validate({
+            "name": "contact", "stiffness": given if self.stiffness is None else self.stiffness,
+            "roughness": rough if isinstance(self.roughness, float) else self.roughness,
+            "friction": self.friction, "temperature": self.temperature,
+            **({} if self.element is None else {"element": self.element}),
+        })  # fmt: skip
+
+    @property
+    def coefficient(self) -> float:
+        """Coulomb's, 0 where that is no single number."""
+        return self.friction if isinstance(self.friction, float) else getattr(self.friction, "mu", 0.0)
+
+    @property
+    def files(self) -> list[str]:
+        """Files that it names."""
+        some = (self, self.stiffness, self.roughness, self.friction)
+        return [file for one in some if isinstance(file := getattr(one, "file", None), str)]
 
     @model_validator(mode="after")
     def _belongs_to_the_law(self) -> ContactSettings:
-        if (self.law == "rough") != (self.roughness is not None):
+        if (self.law == "rough") != (self.roughness is not None) and not self.in_tables:
             raise ValueError('roughness (R_Z in m) belongs to law = "rough": give both or neither')
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
@@ -416,7 +472,11 @@ class CaseSettings(Model):
     @property
     def files(self) -> tuple[str, ...]:
         """Files beside the case that it names, modal files left out."""
-        named = [c.file for c in self.contacts] + [x.field for x in self.loads] + [b.aerodynamics for b in self.members]
+        named = (
+            [f for c in self.contacts for f in c.files]
+            + [x.field for x in self.loads]
+            + [b.aerodynamics for b in self.members]
+        )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 
     @property
@@ -443,9 +503,9 @@ class CaseSettings(Model):
         )
 
     def law_of(self, contact: ContactSettings) -> str:
-        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``file``."""
-        if contact.file is not None:
-            return "file"
+        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``tables``."""
+        if contact.described:
+            return "tables"
         plain = self.one_on_the_ground and contact.patch == "rigid" and contact.curvature is None
         return contact.law or ("jenkins" if plain else "smooth")
 

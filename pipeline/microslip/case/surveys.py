@@ -287,15 +287,16 @@ def over_ranges(
     """The envelope of a case. keep: is given what there is after every combination.
 
     Raises:
-        UserError: friction of a contact whose law stands in a file.
+        UserError: friction of a contact whose tables say it.
     """
     from ..harmonic_balance import envelope
     from .assemble import build
     from .run import problem_of
 
     asked = _asked(settings, "ranges", path)
-    if asked.friction and (files := [c.interface for c in settings.contacts if c.file is not None]):
-        raise UserError(f"{path}: ranges.friction: the friction of contact '{files[0]}' stands in its file")
+    told = [c.interface for c in settings.contacts if c.file is not None or not isinstance(c.friction, float)]
+    if asked.friction and told:
+        raise UserError(f"{path}: ranges.friction: the friction of contact '{told[0]}' is no number, or in its file")
 
     @cache
     def at(damping_ratio: float | None, friction: float | None) -> Built:

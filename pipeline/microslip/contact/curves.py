@@ -283,6 +283,19 @@ _DECIMALS = re.compile(r"[^\s,]+(,[^\s,]+)?(\s+[^\s,]+(,[^\s,]+)?)+")
 """A line of columns parted by blanks, each with one comma inside at most."""
 
 
+def read_table(path: Path, columns: tuple[int | str, ...], names: tuple[str, ...]) -> Array:
+    """`read_columns`, all numbers of which are finite.
+
+    Args:
+        names: of the columns, for the complaint.
+    """
+    table, lines = read_columns(path, columns)
+    if (bad := np.argwhere(~np.isfinite(table))).size:
+        row, column = bad[0]
+        raise UserError(f"{path}: line {lines[row]}: the {names[column]} is no finite number; correct it")
+    return table
+
+
 def _text(path: Path) -> str:
     try:
         raw = ordinary(path).read_bytes()

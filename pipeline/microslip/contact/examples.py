@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from importlib.metadata import entry_points
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +12,8 @@ from .friction import Coulomb, Falling, Friction, Heated, Scattered, StaticSlidi
 from .friction import Exponential as Rising
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, tabulated
 from .hertz import Hertz
-from .law import Array, Law
+from .law import Array
+from .law import Example as Example
 from .normal import Gapped, Hyperbolic, Penalty, Potential, Rough, measured
 from .point import PointContact
 from .point_laws import hertz_point, round_point
@@ -22,28 +23,6 @@ from .regularised import MassContact
 from .sliders import Iwan, mindlin, rough_strips, segalman
 from .solids import Solid
 from .wear import course
-
-
-@dataclass(frozen=True)
-class Example:
-    """A law with scales for trying it.
-
-    Attributes:
-        law: for any number of points. normal, tangential: displacements in m at which it shows what it does.
-        period: of a cycle, s. isotropic: whether turning the tangents turns the force. gap: m, beyond u_n = 0, at
-            which the contact is open for certain. inertia: share of the largest force by which a mass may carry the
-            tangential force beyond what friction holds. jumps: whether friction falls with the speed, so that the force
-            jumps in time and depends on rounding where two roots meet.
-    """
-
-    law: Law
-    normal: float
-    tangential: float
-    period: float = 0.01
-    isotropic: bool = True
-    gap: float = 0.0
-    inertia: float = 0.0
-    jumps: bool = False
 
 
 def _value(number: float) -> jnp.ndarray:
@@ -107,4 +86,5 @@ EXAMPLES: dict[str, Example] = {
         mindlin(Hertz(_STEEL, _STEEL, 5.0, 20.0), 0.3, 3e-5, 4), 1.2e-5, 8e-6, isotropic=False
     ),
     "Iwan": Example(Iwan(_ROUGH, _value(0.3), _C, *segalman(5, -0.5, 0.1, 0.05)), 1.2e-5, 8e-6),
-}
+} | {entry.name: entry.load() for entry in entry_points(group="microslip.example")}
+"""Name -> law, those of other packages last."""

@@ -6,18 +6,28 @@ jump (stick-slip in one step); the return map then takes one of the roots, the r
 
 from __future__ import annotations
 
-from typing import ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
+from ..body import Coefficient, NotNegative, Number, Positive
 from ..errors import UserError
 from ..mistakes import bounded
+from . import kinds
+from .curves import read_table
 from .heights import Heights
-from .law import Array, number, settings
+from .keys import Columns, FileName
+from .kinds import beside
+from .law import Array, number, settings, value
+
+if TYPE_CHECKING:
+    from .settings import Temperature
 
 
 class Friction:
@@ -356,3 +366,106 @@ def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float
     values = friction.coefficient(speeds, jnp.ones_like(speeds)) * smoothed(speeds, slope)
     top = int(jnp.argmax(values))
     return float(values[top]), float(speeds[top])
+
+
+# the kinds of [friction] ---------------------------------------------------------------------------------------------
+
+
+class _Scattering(kinds.FrictionKind):
+    """Scatter in time, for every characteristic: mean times 1 + deviation xi(t)."""
+
+    deviation: NotNegative = 0.0
+    memory: Positive = 1e-3
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+
+    def friction(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        mean = self.mean(path, heat, area)
+        return scattered(mean, self.deviation, self.memory, self.seed) if self.deviation else mean
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        """The characteristic without its scatter."""
+        raise NotImplementedError
+
+
+class OfCoulomb(_Scattering):
+    """The same coefficient at every speed."""
+
+    kind: Literal["coulomb"]
+    mu: Coefficient
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        return Coulomb(value(self.mu))
+
+
+class OfStaticSliding(_Scattering):
+    """One coefficient for sticking, a lower one for sliding."""
+
+    kind: Literal["static-sliding"]
+    static: Coefficient
+    sliding: Coefficient
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        return StaticSliding(value(self.static), value(self.sliding))
+
+
+class OfFalling(_Scattering):
+    """mu_0/(1 + p_v v) (3.6-15)."""
+
+    kind: Literal["falling"]
+    mu_0: Coefficient
+    p_v: NotNegative
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        return Falling(value(self.mu_0), value(self.p_v))
+
+
+class OfExponential(_Scattering):
+    """(mu_0 - mu_inf) exp(-rate v) + mu_inf (4.1-22)."""
+
+    kind: Literal["exponential"]
+    mu_0: Coefficient
+    mu_inf: Coefficient
+    rate: NotNegative
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        return Exponential(value(self.mu_0), value(self.mu_inf), value(self.rate))
+
+
+class OfHeated(_Scattering):
+    """Linear loss with the temperature that sliding makes (3.6-3, 3.6-5); needs [temperature] and an area."""
+
+    kind: Literal["heated"]
+    mu_0: Coefficient
+
+    heated: ClassVar[bool] = True
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        assert heat is not None and area is not None
+        return Heated(*map(value, (self.mu_0, heat.resistance, heat.limit, area)))
+
+
+class OfTable(_Scattering):
+    """A measured table of the coefficient over the speed, shifted by the temperature as rubber is (WLF)."""
+
+    kind: Literal["table"]
+    file: FileName
+    columns: Columns = (1, 2)
+    temperature: Positive = 293.15
+    reference: Positive = 293.15
+    c_1: Number = 8.86
+    c_2: Positive = 101.6
+
+    def mean(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        file = beside(path, self.file, "friction.file")
+        table = read_table(file, self.columns, ("speed", "coefficient"))
+        shift = {key: getattr(self, key) for key in ("temperature", "reference", "c_1", "c_2")}
+        return characteristic(table[:, 0], table[:, 1], str(file), **shift)
+
+
+class OfLubricated(OfHeated):
+    """Dry and fluid part of a lubricated rough surface (3.6-21): drawn; laws take the dry part (heated)."""
+
+    kind: Literal["lubricated"]  # type: ignore[assignment]
+    mu_0: Annotated[Coefficient, Field(gt=0)]
+    viscosity: NotNegative
+    film: Annotated[Number, Field(gt=0, lt=1)] = 0.01

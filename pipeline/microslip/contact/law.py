@@ -61,6 +61,11 @@ def static(**options: Any) -> Any:
     return field(metadata={"static": True}, **options)
 
 
+def value(x: float) -> Array:
+    """A number of a law."""
+    return jnp.asarray(x, dtype=float)
+
+
 def number(gt: float | None = None, ge: float | None = None, le: float | None = None, **options: Any) -> Any:
     """A field of numbers that are finite and within bounds wherever a person gives them (`mistakes.bounded`)."""
     return field(metadata={"bounds": (gt, ge, le)}, **options)
@@ -285,3 +290,25 @@ def ratio(above: Array, below: Array, otherwise: float = 0.0) -> Array:
     """above / below, and ``otherwise`` where ``below`` is not positive, without a division there."""
     positive = below > 0
     return jnp.where(positive, above / jnp.where(positive, below, 1.0), otherwise)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A law with scales for trying it.
+
+    Attributes:
+        law: for any number of points. normal, tangential: displacements in m at which it shows what it does.
+        period: of a cycle, s. isotropic: whether turning the tangents turns the force. gap: m, beyond u_n = 0, at
+            which the contact is open for certain. inertia: share of the largest force by which a mass may carry the
+            tangential force beyond what friction holds. jumps: whether friction falls with the speed, so that the force
+            jumps in time and depends on rounding where two roots meet.
+    """
+
+    law: Law
+    normal: float
+    tangential: float
+    period: float = 0.01
+    isotropic: bool = True
+    gap: float = 0.0
+    inertia: float = 0.0
+    jumps: bool = False

@@ -7,15 +7,21 @@ normal law and two tangential springs (with dampers, if wanted); P sticks to the
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from ..body import NotNegative, Positive, PositiveLength
 from ..compliance import BULK_AND_SURFACE
+from . import kinds
 from .friction import Friction
-from .law import Array, Law, Step, norm, number, ratio, root, settings, static
+from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
 from .normal import Normal
+
+if TYPE_CHECKING:
+    from .composed import Contact
+    from .settings import ContactLaw
 
 
 class PointState(NamedTuple):
@@ -327,3 +333,26 @@ def _halved(excess: Callable[[Array], Array], count: int) -> Array:
 
     low, high = jax.lax.fori_loop(0, _STEPS, halve, (jnp.zeros(count), jnp.ones(count)))
     return 0.5 * (low + high)
+
+
+# the element of a contact file ---------------------------------------------------------------------------------------
+
+
+class Massless(kinds.Element):
+    """The point contact element without mass (3.7): a return map with exact stick."""
+
+    kind: Literal["massless"] = "massless"
+    damping: NotNegative = 0.0
+    length: PositiveLength | None = None
+    preload: Positive | None = None
+
+    def fits(self, contact: ContactLaw) -> None:
+        kinds.own_normal_law(self.length, self.preload, contact)
+
+    def normal(self, contact: Contact) -> Normal | None:
+        return kinds.own_normal(self.length, self.preload, contact)
+
+    def law(self, contact: Contact) -> Law:
+        damping = value(self.damping) if self.damping else None
+        first, second = contact.springs
+        return PointContact(contact.normal, contact.sliding, first, second, damping)

@@ -10,19 +10,25 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ..body import NotNegative, Positive, PositiveLength
 from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
+from . import kinds
 from .friction import Friction, creep
-from .law import Array, Law, Step, norm, number, ratio, settings, static
+from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
 from .point import met, touching
+
+if TYPE_CHECKING:
+    from .composed import Contact
+    from .settings import ContactLaw
 
 
 class MassState(NamedTuple):
@@ -341,3 +347,27 @@ def _told(law: MassContact, motion: Callable[[Array], Array], times: Array, ys: 
         return u[0], force[0], state.slipped[:, 0], state.velocity[:, 0], friction
 
     return jax.vmap(one)(times, ys)
+
+
+# the element of a contact file ---------------------------------------------------------------------------------------
+
+
+class WithMass(kinds.Element):
+    """The point contact element with a mass and smoothed friction (3.7-19 to 3.7-44): a differential equation."""
+
+    kind: Literal["with-mass"]
+    mass: Positive
+    slope: Positive
+    damping: NotNegative = 0.0
+    length: PositiveLength | None = None
+    printed: bool = False
+
+    def fits(self, contact: ContactLaw) -> None:
+        kinds.own_normal_law(self.length, None, contact)
+
+    def normal(self, contact: Contact) -> Normal | None:
+        return kinds.own_normal(self.length, None, contact)
+
+    def law(self, contact: Contact) -> Law:
+        mass, damping, slope = map(value, (self.mass, self.damping, self.slope))
+        return MassContact(contact.normal, contact.sliding, *contact.springs, mass, damping, slope, self.printed)

@@ -8,21 +8,29 @@ the other; `Iwan` sliders share one normal force and differ in strength.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
+from ..body import NotNegative, Number
 from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
-from .friction import Coulomb
+from . import kinds
+from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
-from .law import Array, Law, Step, norm, number, ratio, settings, static
+from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, dragged, let_go, met, slide, touching, weight
 from .series import BULK
+from .stiffness import OfHertz
+
+if TYPE_CHECKING:
+    from .composed import Contact
+    from .settings import ContactLaw
 
 
 class SliderState(NamedTuple):
@@ -401,6 +409,72 @@ def _edges(x: np.ndarray, area: np.ndarray, count: int) -> np.ndarray:
 
 
 def _positive(**settings: float) -> None:
-    for name, value in settings.items():
-        if not 0 < value < np.inf:
-            raise UserError(f"{name}: {value:g}; it must be greater than 0")
+    for name, given in settings.items():
+        if not 0 < given < np.inf:
+            raise UserError(f"{name}: {given:g}; it must be greater than 0")
+
+
+# the elements of a contact file --------------------------------------------------------------------------------------
+
+
+class _Parallel(kinds.Element):
+    """Sliders in parallel, under Coulomb's friction."""
+
+    partly: ClassVar[bool] = True
+
+    def fits(self, contact: ContactLaw) -> None:
+        if not isinstance(contact.friction, OfCoulomb):
+            raise ValueError(f'element: kind = "{self.kind}" slides by Coulomb; write [friction] kind = "coulomb"')
+        if contact.friction.deviation:
+            raise ValueError(f'element: "{self.kind}" takes no friction that scatters; remove friction.deviation')
+
+
+class OfStrips(_Parallel):
+    """Microslip by the strips of the rough surface (5.2-33), Coulomb friction in each."""
+
+    kind: Literal["strips"]
+    count: Annotated[int, Field(ge=2, le=500)] = 32
+
+    def fits(self, contact: ContactLaw) -> None:
+        super().fits(contact)
+        if contact.roughness is None:
+            raise ValueError("element: strips are those of a rough surface; add [roughness]")
+
+    def law(self, contact: Contact) -> Law:
+        assert contact.heights is not None and contact.roughness is not None and contact.stiffness is not None
+        first, mu = contact.stiffness.tangential[0], contact.mu
+        strips = rough_strips(contact.normal_0, contact.roughness, contact.heights, first, mu, self.count)
+        return replace(strips, stiffness_ratio=contact.ratio)
+
+
+class OfIwan(_Parallel):
+    """Microslip by Iwan's sliders in parallel; with an exponent by Segalman's four parameters."""
+
+    kind: Literal["iwan"]
+    count: Annotated[int, Field(ge=2, le=500)] = 32
+    weakest: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    exponent: Annotated[Number, Field(gt=-1, le=0)] | None = None
+    ratio: NotNegative = 0.0
+
+    def law(self, contact: Contact) -> Law:
+        shares = uniform(self.count, self.weakest)
+        if self.exponent is not None:
+            shares = segalman(self.count, self.exponent, self.ratio)
+        return Iwan(contact.normal, value(contact.mu), contact.springs[0], *shares, contact.ratio)
+
+
+class OfMindlin(_Parallel):
+    """Microslip of a Hertzian contact (Cattaneo, Mindlin) under a varying load; needs stiffness.kind = "hertz"."""
+
+    kind: Literal["mindlin"]
+    count: Annotated[int, Field(ge=2, le=500)] = 32
+
+    def fits(self, contact: ContactLaw) -> None:
+        super().fits(contact)
+        if not isinstance(contact.stiffness, OfHertz):
+            raise ValueError('element: "mindlin" is the partial slip of curved bodies; write stiffness.kind = "hertz"')
+
+    def law(self, contact: Contact) -> Law:
+        given = contact.settings.stiffness
+        assert contact.hertz is not None and isinstance(given, OfHertz)
+        return mindlin(contact.hertz, contact.mu, contact.deepest, self.count, given.axis)

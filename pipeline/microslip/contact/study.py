@@ -18,14 +18,16 @@ from . import microslip
 from . import settings as S
 from .composed import Contact, compose
 from .friction import Exponential as ExponentialFriction
-from .friction import Falling, Friction, Heated, Scattered, lubricated, smoothed
+from .friction import Falling, Friction, Heated, OfLubricated, Scattered, lubricated, smoothed
 from .friction import Measured as MeasuredFriction
 from .law import history
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
+from .point import PointContact
 from .regularised import MassContact, integrate
 from .sliders import Strips
 from .solids import Solid
+from .stiffness import OfCurve
 from .wear import course, dimensionless_time, from_archard, from_energy_density
 
 Columns = dict[str, np.ndarray]
@@ -162,7 +164,7 @@ def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, floa
     top = 0.0 if c.roughness is None else 1.4 * c.roughness
     if motion is not None and working is not None:
         top = max(top, 1.1 * (working[0] + sum(map(abs, motion.normal[1:]))))
-    if isinstance(c.settings.stiffness, S.CurveSource):
+    if isinstance(c.settings.stiffness, OfCurve):
         knots = np.asarray(c.normal.u)  # type: ignore[attr-defined]
         return float(knots[0] - 0.05 * np.ptp(knots)), float(max(top, knots[-1]))
     top = top if top > 0 else 1e-5
@@ -174,7 +176,7 @@ def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, floa
 
 def _characteristic(c: Contact, working: tuple[float, float] | None, found: _Findings) -> None:
     assert c.friction is not None
-    if isinstance(c.settings.friction, S.LubricatedFriction):
+    if isinstance(c.settings.friction, OfLubricated):
         return _lubricated(c, c.settings.friction, found)
     mean = c.friction.mean if isinstance(c.friction, Scattered) else c.friction
     pressed = working[1] if working is not None and working[1] > 0 else 1.0
@@ -206,7 +208,7 @@ def _speeds(c: Contact, mean: Friction, pressed: float) -> np.ndarray:
     return np.linspace(0.0, min(5 / scale, FASTEST) if scale > 0 else 1.0, 301)
 
 
-def _lubricated(c: Contact, given: S.LubricatedFriction, found: _Findings) -> None:
+def _lubricated(c: Contact, given: OfLubricated, found: _Findings) -> None:
     """Dry and fluid part over the speed at four approaches (Fig. 3.6-5)."""
     heat = c.settings.temperature
     assert heat is not None and c.heights is not None and c.roughness is not None and c.area is not None
@@ -336,7 +338,7 @@ def _work(u: np.ndarray, force: np.ndarray) -> float:
 def _slips(c: Contact, force: np.ndarray, slip: np.ndarray, time: np.ndarray) -> np.ndarray:
     """(s,) whether P slides: of sliders in parallel, whether all of them do."""
     assert c.friction is not None
-    if c.settings.element.kind == "massless":
+    if isinstance(c.law, PointContact):
         moved = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1)
         return moved > 1e-9 * max(float(np.ptp(slip, axis=0).max()), 1e-300)
     held = np.asarray(c.friction.coefficient(jnp.zeros(len(force)), jnp.asarray(force[:, 0]))) * force[:, 0]
@@ -354,14 +356,10 @@ def _of_a_cycle(
     what = "energy dissipated in the last cycle" if not motion.drift else "work of friction in the last period"
     found.told.append((what, _engineering(_work(u[last], force[last]), "J")))
     shares = [100 * float(np.mean(state[last][1:] == s)) for s in (STICK, SLIP, OPEN)]
-    words = "stick or partly slip / slip / open" if c.settings.element.kind in PARTLY else "stick / slip / open"
+    words = "stick or partly slip / slip / open" if c.settings.element.partly else "stick / slip / open"
     found.told.append((f"{words}, of the last cycle", " / ".join(f"{s:.3g} %" for s in shares)))
     if shares[2] == 100:
         found.sentences.append("The contact never closes in the last cycle: raise the mean of motion.normal.")
-
-
-PARTLY = ("strips", "iwan", "mindlin")
-"""Elements of sliders in parallel, which stick while some of them slip."""
 
 
 # microslip ---------------------------------------------------------------------------------------------------------

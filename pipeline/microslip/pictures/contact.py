@@ -153,8 +153,6 @@ _NAMES, _TINTS = ("n", "t1", "t2"), (COLOURS[2], COLOURS[0], COLOURS[1])
 
 def motion_figure(study: Study) -> Any:
     """As the book's Fig. 3.7-7: orbits of M and P, displacements, forces, and the force over each displacement."""
-    from ..contact.study import PARTLY
-
     t, motion = study.tables["motion"], study.contact.settings.motion
     assert motion is not None
     last = slice(None) if motion.drift else slice(len(t["time_s"]) - motion.samples - 1, None)
@@ -176,7 +174,7 @@ def motion_figure(study: Study) -> Any:
         if np.ptp(forces[i]) > 0 or i == 0:
             panels[1].plot(time, forces[i], color=_TINTS[i], linewidth=1.5, label=f"$F_{{{_NAMES[i]}}}$")
     panels[1].set(xlabel=f"time in {second}", ylabel=f"force in {newton}")
-    partly = study.contact.settings.element.kind in PARTLY
+    partly = study.contact.settings.element.partly
     _shade(panels[1], time, t["state"], "stick, partly slip" if partly else "stick")
     for axes in panels[:2]:
         _legend_above(axes)

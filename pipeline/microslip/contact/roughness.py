@@ -1,0 +1,122 @@
+"""Where the heights of a rough surface come from: the kinds of [roughness]."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..body import Numbers, Positive, PositiveLength
+from ..data import UserError
+from . import kinds, topography
+from .curves import read_table
+from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, combined, tabulated
+from .keys import Columns, FileName, Lengths, NotNegativeLength
+from .kinds import beside
+from .law import value
+from .topography import UNITS
+
+
+class _Rough(kinds.Roughness):
+    """Of the first surface, and of the other one if that is rough too."""
+
+    R_Z_other: NotNegativeLength = 0.0
+
+    def heights(self, path: Path, unit: float) -> tuple[Heights, float]:
+        own, roughness = self.own(path, unit)
+        if self.R_Z_other:
+            return combined(own, roughness, Polynomial(), self.R_Z_other)
+        return own, roughness
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        """Of the first surface alone."""
+        raise NotImplementedError
+
+
+class Shape(_Rough):
+    """A cumulative height distribution by its formula: polynomial (3.3-4) or linear (3.3-29)."""
+
+    kind: Literal["polynomial", "linear"]
+    R_Z: PositiveLength
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        return (Polynomial() if self.kind == "polynomial" else Linear()), self.R_Z
+
+
+class ExponentialHeights(_Rough):
+    """Exponential heights (3.3-34), whose peaks beyond u = 0 are cut off."""
+
+    kind: Literal["exponential"]
+    R_Z: PositiveLength
+    rate: Positive = 4.0
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        return Cut(Exponential(value(self.rate))), self.R_Z
+
+
+class GaussianHeights(_Rough):
+    """Gaussian heights (3.3-7), whose peaks beyond u = 0 are cut off."""
+
+    kind: Literal["gaussian"]
+    R_Z: PositiveLength
+    mean: Positive = 0.5
+    deviation: Positive = 20**-0.5
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        return Cut(Gaussian(value(self.mean), value(self.deviation))), self.R_Z
+
+
+class TableHeights(_Rough):
+    """A table: depths below the highest peak, and the share of the area that is higher, from 0 to 1."""
+
+    kind: Literal["table"]
+    R_Z: PositiveLength | None = None
+    depth: Lengths = ()
+    share: Numbers = ()
+    file: str | None = None
+    columns: Columns = (1, 2)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TableHeights:
+        if (self.file is None) == (not self.depth):
+            raise ValueError("heights of a table need either file, or depth and share; keep one of the two ways")
+        if len(self.depth) != len(self.share):
+            raise ValueError(f"{len(self.depth)} depths and {len(self.share)} shares; give one share a depth")
+        return self
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        depth, share, name = np.array(self.depth), np.array(self.share), f"{path}: roughness"
+        if self.file is not None:
+            file = beside(path, self.file, "roughness.file")
+            table = read_table(file, self.columns, ("depth", "share"))
+            depth, share, name = table[:, 0] * unit, table[:, 1], str(file)
+        if len(depth) < 2:
+            raise UserError(f"{name}: {len(depth)} depths; a height distribution needs two or more")
+        if depth[0] < 0:
+            raise UserError(
+                f"{name}: the first depth is {depth[0]:g} m; depths are counted from the highest peak, from 0"
+            )
+        roughness = self.R_Z or float(depth[-1])
+        if not roughness > 0:
+            raise UserError(f"{name}: the deepest height is {depth[-1]:g} m; give depths that rise from 0")
+        return tabulated(depth / roughness, share, name), roughness
+
+
+class ProfileHeights(_Rough):
+    """A measured surface profile: columns of way and height, or the file of an instrument."""
+
+    kind: Literal["profile"]
+    file: FileName
+    unit: Literal[tuple(UNITS)] = "um"  # type: ignore[valid-type]
+    way_unit: Literal[tuple(UNITS)] | None = None  # type: ignore[valid-type]
+    columns: Columns = (1, 2)
+    level: Annotated[int, Field(ge=0, le=10)] | Literal["none"] = 1
+
+    def own(self, path: Path, unit: float) -> tuple[Heights, float]:
+        file = beside(path, self.file, "roughness.file")
+        level = None if self.level == "none" else self.level
+        profile = topography.read_profile(file, (self.way_unit or self.unit, self.unit), level, self.columns)
+        roughness = topography.roughness(profile).Rz
+        return topography.heights(profile, roughness), roughness

@@ -1,0 +1,155 @@
+"""Where the stiffness of a contact comes from: the kinds of [stiffness]."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..basis import read_basis
+from ..body import Name, NotNegative, Number, Positive, PositiveLength
+from ..data import UserError
+from . import kinds
+from .curves import FORCES, LENGTHS, read_curve
+from .hertz import Hertz, half_curvatures
+from .keys import Boundary, Columns, FileName, OneOrTwo, Poisson, Radii
+from .kinds import beside
+from .law import value
+from .layer import Layer
+from .normal import Normal, Penalty, Potential, measured
+from .series import BULK, ContactStiffness, of_layer, of_patch
+from .solids import Solid
+
+HERTZ_DEPTH = 1e-6
+"""m, approach at which the numbers of a Hertzian contact as a power law are taken; the law is the same for any."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a kind of stiffness says.
+
+    Attributes:
+        normal: c_N0, N/m. stiffness: of the full area; None without a tangential one. area: nominal, m2, or None. law:
+            the normal law of smooth surfaces. layer, hertz: where the numbers come from one.
+    """
+
+    normal: float
+    stiffness: ContactStiffness | None
+    area: float | None
+    law: Normal
+    layer: Layer | None = None
+    hertz: Hertz | None = None
+
+
+class Given(kinds.Stiffness):
+    """Stiffnesses of the full area, from wherever they come: a rig, a handbook, another program."""
+
+    kind: Literal["given"]
+    normal: Positive
+    tangential: OneOrTwo | None = None
+    area: Positive | None = None
+    includes: Literal["surface", "bulk", "bulk+surface"] = "bulk"
+
+    def source(self, path: Path) -> Source:
+        law = Penalty(value(self.normal))
+        return Source(self.normal, _both(self.normal, self.tangential, self.includes), self.area, law)
+
+
+class OfLayer(kinds.Stiffness):
+    """An elastic layer under the contact (3.1): c_N0 = E~ A/l_0, c_R0 = G A/l_0."""
+
+    kind: Literal["layer"]
+    young: Positive
+    poisson: Poisson
+    shear: Positive | None = None
+    thickness: PositiveLength
+    area: Positive
+    boundary: Boundary = "stress-free"
+    density: Positive | None = None
+
+    def source(self, path: Path) -> Source:
+        layer = Layer(Solid(self.young, self.poisson, self.shear), self.thickness, self.boundary, self.density)
+        found = of_layer(layer, self.area)
+        return Source(found.normal, found, self.area, Penalty(value(found.normal)), layer)
+
+
+class OfHertz(kinds.Stiffness):
+    """Two curved bodies (Hertz, Mindlin): F = C u^(3/2), tangential stiffness in proportion to the normal one."""
+
+    kind: Literal["hertz"]
+    young: Positive
+    poisson: Poisson
+    radii: Radii
+    young_2: Positive | None = None
+    poisson_2: Poisson | None = None
+    radii_2: Radii = (math.inf, math.inf)
+    angle: Number = 0.0
+    axis: Literal[0, 1] = 0
+
+    is_law: ClassVar[bool] = True
+
+    def source(self, path: Path) -> Source:
+        first = Solid(self.young, self.poisson)
+        second = Solid(self.young_2 or self.young, self.poisson if self.poisson_2 is None else self.poisson_2)
+        A, B, _ = half_curvatures(self.radii, self.radii_2, self.angle)
+        hertz = Hertz(first, second, A, B)
+        force = float(hertz.force(HERTZ_DEPTH))
+        normal = 1.5 * force / HERTZ_DEPTH
+        x, y = hertz.tangential_ratio
+        t1, t2 = (y, x) if self.axis else (x, y)
+        both = ContactStiffness(normal, (t1 * normal, t2 * normal), BULK, f"Hertz at {1e6 * HERTZ_DEPTH:g} um")
+        return Source(normal, both, None, Potential(value(force), value(HERTZ_DEPTH), value(1.5)), hertz=hertz)
+
+
+class OfCurve(kinds.Stiffness):
+    """A measured curve of force over displacement, or one of `microslip closure`, in a file of columns."""
+
+    kind: Literal["curve"]
+    file: FileName
+    tangential: OneOrTwo | None = None
+    columns: Columns = (1, 2)
+    displacement_unit: Literal[tuple(LENGTHS)] = "um"  # type: ignore[valid-type]
+    force_unit: Literal[tuple(FORCES)] = "N"  # type: ignore[valid-type]
+    gap: bool = False
+    noise: NotNegative = 0.0
+    area: Positive | None = None
+    includes: Literal["surface", "bulk", "bulk+surface"] = "bulk+surface"
+
+    is_law: ClassVar[bool] = True
+
+    def source(self, path: Path) -> Source:
+        file = beside(path, self.file, "stiffness.file")
+        units = self.displacement_unit, self.force_unit
+        law = measured(read_curve(file, *self.columns, *units, self.gap, self.noise, self.includes))
+        normal = float(law.nominal)
+        return Source(normal, _both(normal, self.tangential, self.includes), self.area, law)
+
+
+class OfBasis(kinds.Stiffness):
+    """A local static finite-element model: what a patch of a modal file yields beyond its eigenmodes."""
+
+    kind: Literal["basis"]
+    file: FileName
+    interface: Name
+    facing: Name | None = None
+
+    def source(self, path: Path) -> Source:
+        basis = read_basis(beside(path, self.file, "stiffness.file"))
+        group = basis.groups[0, 0]
+        for key, name in (("interface", self.interface), ("facing", self.facing)):
+            if name is not None and name not in group.interfaces:
+                known = ", ".join(group.interfaces) or "none"
+                raise UserError(f"{key}: the modal file of '{basis.name}' has no interface '{name}'; it has {known}")
+        found = of_patch(group, basis.reduction, self.interface, self.facing or "", basis.sectors)
+        area = float(np.sum(group.interfaces[self.interface].areas))
+        return Source(found.normal, found, area, Penalty(value(found.normal)))
+
+
+def _both(normal: float, tangential: float | tuple[float, float] | None, includes: str) -> ContactStiffness | None:
+    if tangential is None:
+        return None
+    pair = tangential if isinstance(tangential, tuple) else (tangential, tangential)
+    return ContactStiffness(normal, pair, includes)
