@@ -403,7 +403,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.interference": ("m", "or how far the faces overlap at rest; negative: a gap"),
     "contacts.file": ("", "a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"),
     "contacts.stiffness": ("", "as in a [contact.toml](contact_toml.md), lengths in m, instead of the two below"),
-    "contacts.element": ("", "likewise: what sticks and slips, of any [kind](contact_toml.md), also of another package"),
+    "contacts.element": ("", "likewise: what sticks and slips, of any kind, also of [another package](own_law.md)"),
     "contacts.temperature": ("", "likewise: heat of sliding"),
     "contacts.normal_stiffness": ("N/m", "c_N0 of the whole patch; **required** without stiffness, file or young"),
     "contacts.tangential_stiffness": ("N/m", "c_R0, likewise"),

@@ -10,9 +10,11 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 import small
+from attack import toml
 
 from microslip import running, store
 from microslip.basis import write_basis
@@ -169,6 +171,41 @@ def test_points_depend_on_every_file_that_a_file_names(tmp_path: Path) -> None:
     assert found[0][0] != found[1][0] and found[0][1] != found[1][1]
 
 
+IWAN = {"kind": "iwan", "count": 5, "exponent": -0.5}
+ROUGH = {"kind": "polynomial", "R_Z": 1e-5}
+TABLES: dict[str, dict[str, Any]] = {
+    "short stiffness": {**STIFF, "element": IWAN},
+    "a coefficient": {"stiffness": {"kind": "given", "normal": 1e9, "tangential": [8e8, 7e8]}, "roughness": ROUGH},
+    "heated": {
+        "stiffness": {"kind": "layer", "young": 2e11, "poisson": 0.3, "thickness": 1e-3, "area": 1e-4},
+        "friction": {"kind": "heated", "mu_0": 0.3}, "temperature": {"resistance": 1e-6, "limit": 900.0},
+    },
+    "a file of a table": {
+        "stiffness": {"kind": "curve", "file": "curve.txt", "tangential": 1e7}, "element": {"kind": "massless"},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("tables", TABLES.values(), ids=list(TABLES))
+def test_tables_in_a_case_are_those_of_a_file(tables: dict[str, Any], tmp_path: Path) -> None:
+    """The same law to the last bit, and the files that it depends on are known."""
+    (tmp_path / "curve.txt").write_text(CURVE)
+    tables, path = {"friction": 0.3, **tables}, tmp_path / "case.toml"
+    own = {k: v for k, v in tables.items() if k not in STIFF}
+    stiffness = {"kind": "given", "normal": 1e9, "tangential": 8e8}
+    (tmp_path / "contact.toml").write_text(toml({"name": "c", "stiffness": stiffness, **own}))
+    laws, files = [], []
+    for contact in (tables, {"file": "contact.toml"}):
+        raw = table(points=[2, 2])
+        only = {k: v for k, v in raw["contacts"][0].items() if k not in ("friction", "law", *STIFF)}
+        settings = made({**raw, "contacts": [{**only, **contact}]})
+        laws.append(build(settings, {"small": small.basis()}, path).assembly.contacts[0].patch.law)
+        files.append({name.split(": ")[-1] for name in files_of(settings, path)} - {"contact.toml"})
+    first, second = (jax.tree.flatten(law) for law in laws)
+    assert first[1] == second[1] and all(np.array_equal(a, b) for a, b in zip(first[0], second[0], strict=True))
+    assert files[0] == files[1]
+
+
 def rubbing(**contact: Any) -> dict[str, Any]:
     return {"contacts": table(**{**STIFF, "law": "smooth", **contact})["contacts"]}
 
@@ -235,6 +272,17 @@ def test_a_curved_face_that_converges_in_a_case(law: str, points: list[int]) -> 
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "no table": (table(**STIFF, element="iwan"), 'element: must be a table (it is "iwan"); write [contacts.element]'),
+    "neither": (table(**STIFF, friction="0.3"), 'friction: must be a number or a table (it is "0.3")'),
+    "unknown kind": (table(**STIFF, element={"kind": "iwam"}), 'right.element.kind: "iwam" is unknown; choose one of'),
+    "part of it": (table(**STIFF, friction={"kind": "coulomb"}), "contacts.right.friction.mu: is missing; add it"),
+    "both": (table(**STIFF, element={"kind": "iwan"}, law="smooth"), "law: cannot stand beside tables"),
+    "smooth strips": (table(**STIFF, element={"kind": "strips"}), "element: strips are those of a rough surface"),
+    "cold": (table(**STIFF, friction={"kind": "heated", "mu_0": 0.3}), "the heat of sliding; add [temperature]"),
+    "no such table": (
+        table(**STIFF, friction={"kind": "table", "file": "no.csv"}), "right.friction.file: there is no file no.csv"
+    ),
+
     "no stiffness": (table(), "normal_stiffness: is missing"),
     "twice": (table(**STIFF, **PIN), "young stands for both stiffnesses"),
     "young alone": (table(young=2e11), "young stands for both stiffnesses where a curvature is given"),

@@ -32,6 +32,7 @@ _WORDS = {
     "list_type": "must be a list in [brackets]",
 }
 _SCALAR = {"float_type", "int_type", "bool_type", "string_type"}
+_NO_TABLE = {"model_type", "model_attributes_type", "dict_type"}
 
 
 def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
@@ -80,6 +81,9 @@ def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -
         while key and isinstance(key[-1], int) and not isinstance(_at(raw, key), dict):
             key = key[:-1]
         by_key.setdefault(key, []).append((place, error))
+    for key in [k for k in by_key if isinstance(_at(raw, k), dict)]:  # a number or a table: the table is meant
+        if any(k != key and k[: len(key)] == key for k in by_key) and by_key[key][0][1]["type"] in _SCALAR:
+            del by_key[key]
     known = {key: _known_keys(model, key[:-1], raw) for key in by_key}
     meant = set()
     other_way: dict[tuple[Any, ...], list[str]] = {}
@@ -206,8 +210,10 @@ def _kind_mistake(where: str, value: Any, error: Any) -> str:
 
 def _table_mistake(key: tuple[Any, ...], place: tuple[Any, ...], value: Any, kinds: set[str]) -> str:
     """A table given where a list of tables belongs, or the other way round."""
-    name = ".".join(map(str, key))
-    if kinds & {"model_type", "model_attributes_type", "dict_type"}:
+    name = ".".join(step for step in key if isinstance(step, str))
+    if kinds & _SCALAR and kinds & _NO_TABLE:
+        return f"must be a number or a table (it is {_shown(value)}); correct it"
+    if kinds & _NO_TABLE:
         if len(place) > len(key):
             return f"entry {place[-1] + 1} of the list must be a table; write [[{name}]] and its keys below"
         if isinstance(value, list):
