@@ -141,6 +141,7 @@ def test_orbits_that_stick_circles_at_the_limit_and_lines() -> None:
     assert np.allclose(found[:, 0], found[:, 1], rtol=1e-9, atol=0)
 
 
+@pytest.mark.slow
 def test_the_error_of_the_table_is_the_one_it_promises(computed: tuple) -> None:
     """At the places chosen at random."""
     A, B, K = (x[..., 2 * len(SIZES) :] for x in computed)

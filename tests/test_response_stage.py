@@ -192,6 +192,12 @@ def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
     assert found.keys() == points.keys() and all(np.array_equal(found[n], points[n]) for n in points)
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_what_was_run_before_changes_nothing(folder: Path) -> None:
     """A sweep, another one, and the first again: the same table and points, to the last bit."""
     build, found = folder / "build" / "vane", []
@@ -319,6 +325,7 @@ def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pyte
     assert any(t.startswith("warning") and "map" in t for t in told)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sweep goes on, the table and the summary tell, and the case counts as not converged."""
     from microslip.harmonic_balance import solver
