@@ -96,9 +96,11 @@ def test_a_law_of_another_package_is_named_in_a_case(tmp_path: Path, package: di
         swing = np.abs(series.arrays["contacts/rub/force"][:, 1, 1:3]).max()
         assert swing <= 4 / np.pi * float(NAMES["Pad"](1e4, 5e3, 0.3, 40.0).hold(normal))
     assert "up to date" in microslip(tmp_path, package, "respond", "case.toml").stderr
-    law = tmp_path / "site" / "pads.py"
-    law.write_text(law.read_text() + "\n# another arithmetic\n")
+    law, table = tmp_path / "site" / "pads.py", tmp_path / "build/three-masses/response.csv"
+    before = table.read_text()
+    law.write_text(law.read_text().replace("return self.mu * pressed", "return 0.5 * self.mu * pressed"))
     assert "up to date" not in microslip(tmp_path, package, "respond", "case.toml").stderr
+    assert table.read_text() != before
     typed = microslip(tmp_path, package, "respond", "case.toml", "--set", "contacts.rub.element.kind=mad")
     assert typed.returncode == 2 and '"pad"' in typed.stderr
     alone = microslip(tmp_path, {k: v for k, v in package.items() if k != "PYTHONPATH"}, "respond", "case.toml")

@@ -24,6 +24,7 @@ from .case import CaseResult, CaseSettings, keeping, load_case, run_case
 from .case.assemble import Built, build
 from .case.comparison import Pair, comparison_table, paired
 from .case.settings import FIRST_HARMONICS
+from .contact.kinds import sources_of_others
 from .data import Array, ModalBasis, UserError
 from .report import response_page
 from .results import Journal, Response, open_journal, read_journal, read_response, response_of, write_response
@@ -122,7 +123,8 @@ def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
 
 def inputs_of_points(built: Built, hashes: Mapping[str, str]) -> str:
     """Hash of all that the points of an assembly depend on. hashes: body of the case -> SHA-256 of its modal file."""
-    return store.fingerprint(keeping.of_points(built), hashes, code_hash(CASE_CODE))
+    others = hashes_of(sources_of_others())
+    return store.fingerprint(keeping.of_points(built), hashes, code_hash(CASE_CODE), others)
 
 
 @dataclass
