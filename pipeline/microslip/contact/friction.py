@@ -51,6 +51,27 @@ class Friction:
         """(n,) largest coefficient at any speed: of a characteristic that falls from the start, that at rest."""
         return self.coefficient(jnp.zeros_like(pressed), pressed, time)
 
+    def without_scatter(self) -> Friction:
+        """What is left of it without what is random."""
+        return self
+
+    def scale(self, pressed: float) -> float:
+        """Inverse of the speed over which it changes, s/m, under a normal force (N); 0: it does not."""
+        return 0.0
+
+    def speeds_shown(self, pressed: float) -> np.ndarray:
+        """(301,) speeds in m/s that show it, under a normal force (N)."""
+        scale = self.scale(pressed)
+        return np.linspace(0.0, min(5 / scale, FASTEST) if scale > 0 else 1.0, 301)
+
+    def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
+        """Name -> values at speeds (m/s) under a normal force (N), for a table."""
+        return {"coefficient": np.array(self.coefficient(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))}
+
+
+FASTEST = 50.0
+"""m/s, up to which a characteristic is drawn."""
+
 
 @settings
 class Coulomb(Friction):
@@ -87,6 +108,9 @@ class Falling(Friction):
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         return self.mu_0 / (1 + self.p_v * speed)
 
+    def scale(self, pressed: float) -> float:
+        return float(self.p_v)
+
 
 @settings
 class Exponential(Friction):
@@ -104,6 +128,9 @@ class Exponential(Friction):
 
     def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
         return jnp.broadcast_to(jnp.maximum(self.mu_0, self.mu_inf), pressed.shape)
+
+    def scale(self, pressed: float) -> float:
+        return float(self.rate)
 
 
 EXPONENTIAL_44 = Exponential(
@@ -128,8 +155,17 @@ class Heated(Friction):
     area: Array = number(gt=0)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
-        p_v = self.resistance * self.mu_0 * pressed / (self.area * self.limit)
-        return self.mu_0 / (1 + p_v * speed)
+        return self.mu_0 / (1 + self._p_v(pressed) * speed)
+
+    def _p_v(self, pressed: Array) -> Array:
+        return self.resistance * self.mu_0 * pressed / (self.area * self.limit)
+
+    def scale(self, pressed: float) -> float:
+        return float(self._p_v(jnp.asarray(pressed)))
+
+    def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
+        warm = np.array(self.temperature(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))
+        return super().columns(speeds, pressed) | {"temperature_rise_K": warm}
 
     def temperature(self, speed: Array, pressed: Array) -> Array:
         """(n,) rise of temperature in K at a speed of sliding (m/s) and a normal force (N)."""
@@ -163,6 +199,10 @@ class Measured(Friction):
         """a_T: factor on the speed."""
         away = jnp.asarray(self.temperature) - self.reference
         return 10.0 ** (-self.c_1 * away / (self.c_2 + away))
+
+    def speeds_shown(self, pressed: float) -> np.ndarray:
+        low, high = (float(self.speeds[i, 0] / self.shift()) for i in (0, -1))
+        return np.geomspace(low / 3, 3 * high, 301)
 
     def coefficient(self, speed: Array, pressed: Array, time: Array | float = 0.0) -> Array:
         x, y, d = jnp.log(self.speeds[:, 0]), self.values[:, 0], self.slopes[:, 0]
@@ -252,6 +292,18 @@ class Scattered(Friction):
     def highest(self, pressed: Array, time: Array | float = 0.0) -> Array:
         share = self.deviation.highest(pressed, time) if isinstance(self.deviation, Friction) else self.deviation
         return self.mean.highest(pressed, time) * self._factor(share, pressed, time)
+
+    def without_scatter(self) -> Friction:
+        return self.mean
+
+    def speeds_shown(self, pressed: float) -> np.ndarray:
+        return self.mean.speeds_shown(pressed)
+
+    def columns(self, speeds: np.ndarray, pressed: float) -> dict[str, np.ndarray]:
+        """Of the mean, and one standard deviation below and above it."""
+        found = self.mean.columns(speeds, pressed)
+        share, mean = float(np.asarray(self.deviation)), found["coefficient"]
+        return found | {"mean_less_deviation": (1 - share) * mean, "mean_plus_deviation": (1 + share) * mean}
 
     def _factor(self, share: Array, like: Array, time: Array | float) -> Array:
         return jnp.maximum(1 + share * self.noise(jnp.broadcast_to(time, like.shape)), 0.0)

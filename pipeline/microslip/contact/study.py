@@ -17,9 +17,7 @@ from ..errors import UserError
 from . import microslip
 from . import settings as S
 from .composed import Contact, compose
-from .friction import Exponential as ExponentialFriction
-from .friction import Falling, Friction, Heated, OfLubricated, Scattered, lubricated, smoothed
-from .friction import Measured as MeasuredFriction
+from .friction import FASTEST, OfLubricated, lubricated, smoothed
 from .law import history
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
@@ -32,8 +30,6 @@ from .wear import course, dimensionless_time, from_archard, from_energy_density
 
 Columns = dict[str, np.ndarray]
 OPEN, STICK, SLIP = 0, 1, 2
-FASTEST = 50.0
-"""m/s, up to which a characteristic is drawn."""
 CREEP = 10.0
 """A smoothed contact counts as slipping where slope times speed is more: friction has 94 % of its value there."""
 
@@ -178,34 +174,12 @@ def _characteristic(c: Contact, working: tuple[float, float] | None, found: _Fin
     assert c.friction is not None
     if isinstance(c.settings.friction, OfLubricated):
         return _lubricated(c, c.settings.friction, found)
-    mean = c.friction.mean if isinstance(c.friction, Scattered) else c.friction
     pressed = working[1] if working is not None and working[1] > 0 else 1.0
-    speeds = _speeds(c, mean, pressed)
-    values = np.array(mean.coefficient(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))
-    table = {"speed_m/s": speeds, "coefficient": values}
-    if isinstance(c.friction, Scattered):
-        deviation = float(c.friction.deviation)  # type: ignore[arg-type]  # a number here
-        table |= {"mean_less_deviation": (1 - deviation) * values, "mean_plus_deviation": (1 + deviation) * values}
+    speeds = c.friction.speeds_shown(pressed)
+    table = {"speed_m/s": speeds, **c.friction.columns(speeds, pressed)}
     if isinstance(c.law, MassContact):
-        table["smoothed"] = values * np.array(smoothed(jnp.asarray(speeds), c.law.slope))
-    if isinstance(mean, Heated):
-        table["temperature_rise_K"] = np.array(mean.temperature(jnp.asarray(speeds), jnp.full(len(speeds), pressed)))
+        table["smoothed"] = table["coefficient"] * np.array(smoothed(jnp.asarray(speeds), c.law.slope))
     found.tables["friction"] = table
-
-
-def _speeds(c: Contact, mean: Friction, pressed: float) -> np.ndarray:
-    """Speeds that show a characteristic, m/s."""
-    if isinstance(mean, MeasuredFriction):
-        low, high = (float(mean.speeds[i, 0] / mean.shift()) for i in (0, -1))
-        return np.geomspace(low / 3, 3 * high, 301)
-    scale = 0.0
-    if isinstance(mean, Falling):
-        scale = float(mean.p_v)
-    if isinstance(mean, ExponentialFriction):
-        scale = float(mean.rate)
-    if isinstance(mean, Heated):
-        scale = float(mean.resistance * mean.mu_0 * pressed / (mean.area * mean.limit))
-    return np.linspace(0.0, min(5 / scale, FASTEST) if scale > 0 else 1.0, 301)
 
 
 def _lubricated(c: Contact, given: OfLubricated, found: _Findings) -> None:
@@ -434,7 +408,7 @@ def _wear(c: Contact, found: _Findings) -> None:
 
 def _sliding_friction(c: Contact, given: S.Wear) -> float:
     assert c.friction is not None
-    mean = c.friction.mean if isinstance(c.friction, Scattered) else c.friction
+    mean = c.friction.without_scatter()
     return float(mean.coefficient(jnp.array([given.speed]), jnp.array([given.normal_force]))[0])
 
 
