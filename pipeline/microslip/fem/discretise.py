@@ -109,10 +109,6 @@ class Block:
     dx: Array
     region: int = 0
 
-    @property
-    def points_shape(self) -> tuple[int, int]:
-        return self.dx.shape  # type: ignore[return-value]
-
 
 @dataclass(frozen=True)
 class Pattern:

@@ -275,8 +275,3 @@ def stuck_damping(part: Linear, stiffness: Array) -> Array:
 def _of_each(A: Array, shapes: Array) -> Array:
     """(m,) real phi^H A phi of every column."""
     return np.einsum("im,ij,jm->m", shapes.conj(), A, shapes, optimize=True).real
-
-
-def real_block(D: ComplexArray) -> Array:
-    """(2c, 2c) acting on (cos, sin) parts of a vector what D does on its amplitude, cos part - i sin part."""
-    return np.block([[D.real, D.imag], [-D.imag, D.real]])
