@@ -13,7 +13,7 @@ from ring_study import Highest, frf, highest
 from microslip.case.run import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance import response
-from microslip.harmonic_balance.jenkins import brackets
+from microslip.harmonic_balance.sweeps import brackets
 
 BAND = np.linspace(70.0, 125.0, 56)
 WIDE = np.linspace(90.0, 300.0, 43)

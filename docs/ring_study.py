@@ -16,9 +16,9 @@ from microslip.case.run import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.frames import rotation
 from microslip.harmonic_balance import response
-from microslip.harmonic_balance.jenkins import brackets
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import sweep
+from microslip.harmonic_balance.sweeps import brackets
 from microslip.operating.motion import motion_of
 from microslip.operating.stress import places, stress_peaks
 from microslip.system.assembly import Side

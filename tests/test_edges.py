@@ -7,7 +7,7 @@ import pytest
 
 from microslip.case.edges import remarks, rising
 from microslip.harmonic_balance import FrequencyResponse, refined_peaks
-from microslip.harmonic_balance.jenkins import overhanging
+from microslip.harmonic_balance.sweeps import overhanging
 
 
 def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyResponse:

@@ -16,7 +16,7 @@ from microslip.harmonic_balance import (
     peaks,
     stuck_frequencies,
 )
-from microslip.harmonic_balance.jenkins import resonances
+from microslip.harmonic_balance.sweeps import resonances
 
 
 def oscillator(mass: float = 1.0, stiffness: float = 1e4, ratio: float = 0.0) -> ModalGroup:

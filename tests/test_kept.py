@@ -25,9 +25,9 @@ from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checks import forces_on
-from microslip.harmonic_balance.jenkins import hidden, overhanging
 from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
+from microslip.harmonic_balance.sweeps import hidden, overhanging
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .data import Array, Indices, ModalBasis, UserError
-from .harmonic_balance.jenkins import prominent
+from .harmonic_balance.sweeps import prominent
 from .operating.fatigue import Endurance, MaterialLimits, endurance
 from .operating.motion import Motion, amplitude, read_out
 from .operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
@@ -201,7 +201,7 @@ def _searched(series: Series) -> Indices:
 
 def tops(series: Series, size: Array) -> Indices:
     """Points of a series that are resonances: those that were searched for between the others, and of those of one
-    plateau the highest, see `jenkins.prominent`. size: (f,) m, of the read-out."""
+    plateau the highest, see `sweeps.prominent`. size: (f,) m, of the read-out."""
     points = np.flatnonzero(series.converged)
     at = np.flatnonzero(np.isin(points, _searched(series)))
     return points[prominent(np.asarray(size)[points], at)]

@@ -258,7 +258,7 @@ def _rising(found: Optimum, unit: str) -> str:
 
 HARDLY = 0.01
 """Share by which a setting changes the highest resonance over its whole range, below which it is said to hardly matter:
-what two tops have to be apart to be two, `harmonic_balance.jenkins.DIP`."""
+what two tops have to be apart to be two, `harmonic_balance.sweeps.DIP`."""
 
 
 def _hardly(found: Optimum) -> str:

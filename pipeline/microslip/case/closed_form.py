@@ -16,8 +16,8 @@ from ..harmonic_balance import (
     refined_peaks,
     stuck_resonances,
 )
-from ..harmonic_balance.jenkins import hidden
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.sweeps import hidden
 from .assemble import Built
 from .counting import Springs
 from .settings import ContactSettings

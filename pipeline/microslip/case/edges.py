@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
-from ..harmonic_balance.jenkins import DIP
+from ..harmonic_balance.sweeps import DIP
 
 OF_THE_HIGHEST = 0.1
 """Share of the highest resonance of a curve (20 dB below it) from which an end that rises is told."""
@@ -36,7 +36,7 @@ def rising(
 ) -> list[Rising]:
     """The ends at which curves rise outwards, by normal force (N).
 
-    An end counts where the response falls by more than `jenkins.DIP` on the way in before it is as high again (half the
+    An end counts where the response falls by more than `sweeps.DIP` on the way in before it is as high again (half the
     prominence of a resonance that the end cuts off), to no less than `OF_THE_HIGHEST` of the curve's resonances.
 
     Args:

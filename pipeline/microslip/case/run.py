@@ -13,8 +13,8 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
 from ..harmonic_balance import FrequencyResponse
-from ..harmonic_balance.jenkins import overhanging
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.sweeps import overhanging
 from ..results import Journal
 from ..results.checks import cause
 from ..units import Quantity, counted, percent

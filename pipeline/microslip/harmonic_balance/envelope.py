@@ -17,13 +17,13 @@ from ..data import Array, ComplexArray, Indices, UserError
 from ..system.assembly import Assembly, Ring
 from ..units import METRES, Quantity
 from . import response
-from .jenkins import tops
 from .peak import checked, resonance
 from .problem import Problem
 from .readout import Watched, measured
 from .reduced import stuck
 from .response import HarmonicResponse
 from .solver import Report
+from .sweeps import tops
 
 # --- resonance over engine order -------------------------------------------------------------------------------------
 

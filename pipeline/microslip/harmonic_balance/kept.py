@@ -18,11 +18,11 @@ from ..results.journal import Journal
 from ..system.assembly import Assembly, Member, Watch
 from .checks import forces_on, judged
 from .families import Family, followed
-from .jenkins import brackets, resonances
 from .patch import Cycle
 from .problem import Problem
 from .response import HarmonicResponse, Operating, between, hidden, highest, of_points, operating
 from .solver import CONVERGED, Point, Report, sweep
+from .sweeps import brackets, resonances
 
 
 def kept_response(

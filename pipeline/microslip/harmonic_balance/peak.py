@@ -14,11 +14,11 @@ import numpy as np
 from ..continuation import SEARCH, Lowest, Peak, lowest, rated
 from ..continuation import peak as climbed
 from ..data import Array
-from .jenkins import prominent
 from .problem import Problem
 from .readout import Watched
 from .response import operating
 from .solver import CONVERGED, Point, Report, sweep
+from .sweeps import prominent
 
 SEEN = 0.5
 """Share of the highest peak that a top of the sweep has to have to be climbed: half a step of the sweep beside a

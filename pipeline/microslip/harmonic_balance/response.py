@@ -15,10 +15,9 @@ from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
-from . import jenkins, reduced
 from . import problem as balance
+from . import reduced, sweeps
 from .checks import checks, judged
-from .jenkins import FrequencyResponse, brackets, inside, resonances
 from .patch import Cycle, Traced
 from .problem import Problem
 from .readout import Watched, measured
@@ -26,6 +25,7 @@ from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
 from .solver import newton as newton
+from .sweeps import FrequencyResponse, brackets, inside, resonances
 
 
 @dataclass(frozen=True)
@@ -163,14 +163,14 @@ def filled_response(
 
 
 def hidden(problem: Problem, frequency: Array) -> list[float]:
-    """Hz of resonances that a sweep may step over, see `jenkins.hidden`: of sticking contacts, and of none."""
+    """Hz of resonances that a sweep may step over, see `sweeps.hidden`: of sticking contacts, and of none."""
     a = problem.assembly
     if not a.loads:
         return []
     part = a.joined(1)
     pairs = [(part, a.stiffness), (reduced.untouched(part), np.zeros((0, 0)))]
     modes, damping = (np.concatenate([of(one, k) for one, k in pairs]) for of in (reduced.stuck, reduced.stuck_damping))
-    return jenkins.hidden(np.asarray(frequency, dtype=float), modes, damping)
+    return sweeps.hidden(np.asarray(frequency, dtype=float), modes, damping)
 
 
 def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
@@ -266,7 +266,7 @@ def of_body(
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
     """(Hz, m) of the peaks of the first read-out beside the tops of a sweep; of those of one plateau the highest, see
-    `jenkins.prominent`."""
+    `sweeps.prominent`."""
     found = [highest(problem, response, bracket) for bracket in brackets(response)]
     return resonances(response, [(one[0].Omega / (2 * np.pi), one[1]) for one in found if one])
 

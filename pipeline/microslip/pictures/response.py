@@ -10,7 +10,7 @@ import numpy as np
 from ..case import CaseResult, CaseSettings
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
-from ..harmonic_balance.jenkins import overhanging
+from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 

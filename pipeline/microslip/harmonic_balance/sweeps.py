@@ -1,0 +1,185 @@
+"""A sweep over frequency: what it holds, its table, and where its resonances are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data import Array, ComplexArray, Indices
+from ..results.names import apart as told_apart
+from ..units import METRES, Quantity
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Response over frequency.
+
+    Attributes:
+        frequency: (f,) Hz. monitor: (f,) complex 0-peak displacement of the monitored row, m.
+        slip: (f, c) complex 0-peak displacement of each slider, m. dissipated: (f,) energy per cycle, J.
+        converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
+            amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
+        quantity: what the monitored row measures; m stands for its unit.
+        supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
+        balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
+        added: (f,) bool, points between those asked for, see `hidden`; empty: none.
+        modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
+            0-peak; of the closed form alone.
+    """
+
+    frequency: Array
+    monitor: Array
+    slip: Array
+    dissipated: Array
+    converged: Array
+    limit: Array
+    normal_swing: Array
+    quantity: Quantity = field(kw_only=True, default=METRES)
+    supplied: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    damped: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    balance: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
+    added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
+    modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
+
+    @property
+    def asked(self) -> Array:
+        """(f,) bool, points of the sweep itself."""
+        return ~self.added if len(self.added) else np.ones(len(self.frequency), dtype=bool)
+
+    def columns(self) -> dict[str, Array]:
+        """What stands in a table beside the frequency, by name and unit."""
+        return {
+            self.quantity.column("amplitude"): np.abs(self.monitor),
+            "phase_rad": np.angle(self.monitor),
+            "dissipated_J": self.dissipated,
+            **({"supplied_J": self.supplied, "damped_J": self.damped} if len(self.supplied) else {}),
+            "converged": self.converged.astype(float),
+        }
+
+
+def peaks(response: FrequencyResponse) -> list[tuple[float, float]]:
+    """(frequency in Hz, amplitude in m) of every local maximum of the monitored amplitude among converged points."""
+    a = np.abs(response.monitor)
+    return [(float(response.frequency[i]), float(a[i])) for i in tops(response)]
+
+
+def tops(response: FrequencyResponse) -> Indices:
+    """Points of the local maxima that `peaks` lists."""
+    good = np.flatnonzero(response.converged)
+    a = np.abs(response.monitor[good])
+    return good[1:-1][(a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])]
+
+
+def brackets(response: FrequencyResponse) -> list[tuple[int, int, int]]:
+    """Points (low, top, high) between which a sweep may have a peak: about its tops, and from an end at which it is
+    higher than beside it inwards, for the peak may lie just inside. Points that did not converge are passed over."""
+    good = np.flatnonzero(response.converged)
+    where = np.searchsorted(good, tops(response))
+    found = [(int(good[i - 1]), int(good[i]), int(good[i + 1])) for i in where]
+    a, last = np.where(response.converged, np.abs(response.monitor), 0.0), len(response.frequency) - 1
+    ends = [(0, 0, 1), (last - 1, last, last)] if last > 0 else []
+    inside = ((end, high if end == low else low) for low, end, high in ends)
+    rise = [0 < a[beside] < a[end] for end, beside in inside]
+    return found + [end for end, rises in zip(ends, rise, strict=True) if rises]
+
+
+def hidden(frequency: Array, modes: Array, damping: Array) -> list[float]:
+    """Hz of resonances that a sweep may step over: of modes inside the band whose half-power width is less than a step.
+
+    Args:
+        frequency: (f,) Hz, rising. modes: (m,) Hz, with sticking contacts or without contacts: where these dissipate
+            most, between both, no resonance is as narrow. damping: (m,) their ratios.
+    """
+    inside = (modes > frequency[0]) & (modes < frequency[-1])
+    modes, damping = modes[inside], damping[inside]
+    below, above = (frequency[np.searchsorted(frequency, modes) + i] for i in (-1, 0))
+    apart = np.minimum(modes - below, above - modes) > ONE * modes
+    found = np.sort(modes[apart & (2 * damping * modes < above - below)])
+    return found[np.diff(found, prepend=0.0) > ONE * found].tolist()
+
+
+ONE = 1e-9
+"""Relative distance of two modes up to which they are one frequency, as those of a ring's waves that run both ways."""
+
+
+def inside(
+    response: FrequencyResponse, bracket: tuple[int, int, int], peak: float, amplitude: Callable[[float], float]
+) -> bool:
+    """Whether what was found between three points is a peak, and no flank or ripple of an end of the band: the response
+    is lower by `DIP` at that end, or as far beyond it as the points are apart.
+
+    Args:
+        amplitude: m, at another frequency (Hz).
+    """
+    low, top, high = bracket
+    if low < top < high:
+        return True
+    f, end = response.frequency, float(abs(response.monitor[top]))
+    beyond = max(2 * f[top] - f[low if top == high else high], 0.5 * f[top])
+    return end < (1 - 1e-9) * peak and min(end, amplitude(float(beyond))) < (1 - DIP) * peak
+
+
+def overhanging(response: FrequencyResponse, peaks: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Peaks (Hz, m) that do not lie beside a top of the sweep that led to them: the curve turns back between, and has
+    other motions at the same frequency, on which the sweep came along."""
+    f, a = response.frequency, np.where(response.converged, np.abs(response.monitor), 0.0)
+    highest = {top for _, top, _ in brackets(response)}
+    found = []
+    for at, height in peaks:
+        j = int(np.clip(np.searchsorted(f, at), 1, len(f) - 1))
+        if not {j - 1, j} & highest and max(a[j - 1], a[j]) < (1 - DIP) * height:
+            found.append((at, height))
+    return found
+
+
+DIP = 0.01
+"""Share of the lower one of two tops by which the response has to fall between them for them to be two resonances: the
+1 % of amplitude (2 % of its square) that also ends the climb to a followed peak, `continuation.extremum.DIP`. Contacts
+that switch point by point and sample by sample ripple a plateau by less."""
+
+
+def prominent(height: Array, candidates: Indices) -> Indices:
+    """Those of some tops of a curve that stand for one resonance each: of tops with less than `DIP` between them the
+    highest, the topographic prominence of the others being less than that.
+
+    Args:
+        height: (f,) along the curve, all known. candidates: numbers of tops, rising.
+    """
+    kept: list[int] = []
+    for i in map(int, candidates):
+        while kept and height[kept[-1] : i + 1].min() > (1 - DIP) * min(height[kept[-1]], height[i]):
+            if height[kept[-1]] >= height[i]:
+                break
+            kept.pop()
+        else:
+            kept.append(i)
+    return np.array(kept, dtype=int)
+
+
+def resonances(response: FrequencyResponse, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Of peaks (Hz, m) found between the points of a sweep those that are one resonance each, see `prominent`."""
+    grid, ok = response.frequency, response.converged
+    f = np.concatenate([grid[ok], [f for f, _ in found]])
+    height = np.concatenate([np.abs(response.monitor)[ok], [a for _, a in found]])
+    order = np.argsort(f, kind="stable")
+    at = np.flatnonzero(order >= np.count_nonzero(ok))
+    kept = prominent(height[order], at)
+    return [(float(f[i]), float(height[i])) for i in order[kept]]
+
+
+def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
+    """CSV text: the frequencies asked for and, per normal force, amplitude, phase, energies and what else a response
+    has."""
+    head, columns = ["frequency_Hz"], []
+    for force, r in zip(told_apart(list(responses)), responses.values(), strict=True):
+        head += [f"{name}_FN_{force}_N" for name in r.columns()]
+        columns += [column[r.asked] for column in r.columns().values()]
+    first = next(iter(responses.values()))
+    table = np.column_stack([first.frequency[first.asked], *columns])
+    lines = [",".join(head)] + [",".join(f"{v:.9g}" for v in row) for row in table]
+    return "\n".join(lines) + "\n"
