@@ -27,8 +27,7 @@ from ..body import (
     validate,
 )
 from ..compliance import BULK_AND_SURFACE
-from ..contact.kinds import kinds
-from ..contact.settings import ContactFile, Temperature
+from ..contact.settings import AnyElement, AnyFriction, AnyRoughness, AnyStiffness, ContactFile, Temperature
 from ..operating.fatigue import MaterialLimits
 from .driving import ROTATION, ExcitationOfCase, base_of
 from .keys import GROUND as GROUND
@@ -138,18 +137,18 @@ class ContactSettings(Model):
     normal_force: NotNegative | None = None
     interference: Number | None = None
     file: str | None = None
-    stiffness: kinds("stiffness") | None = None  # type: ignore[valid-type]
-    element: kinds("element") | None = None  # type: ignore[valid-type]
+    stiffness: AnyStiffness | None = None
+    element: AnyElement | None = None
     temperature: Temperature | None = None
     normal_stiffness: Positive = 0.0  # of the tables or the file, if there are some
     tangential_stiffness: Positive = 0.0
     width: Positive | None = None
     height: Positive | None = None
-    friction: Coefficient | kinds("friction") = 0.0  # type: ignore[valid-type]
+    friction: Coefficient | AnyFriction = 0.0
     slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
     law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
-    roughness: Positive | kinds("roughness") | None = None  # type: ignore[valid-type]
+    roughness: Positive | AnyRoughness | None = None
     points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
     patch: Literal["rigid", "nodal"] = "rigid"
     curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None

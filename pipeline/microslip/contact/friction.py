@@ -19,11 +19,10 @@ from scipy.interpolate import PchipInterpolator
 from ..body import Coefficient, NotNegative, Number, Positive
 from ..errors import UserError
 from ..mistakes import bounded
-from . import kinds
 from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName
-from .kinds import beside
+from .kinds import Kind, beside
 from .law import Array, number, settings, value
 
 if TYPE_CHECKING:
@@ -423,14 +422,24 @@ def peak(friction: Friction, slope: float, fastest: float = 10.0) -> tuple[float
 # the kinds of [friction] ---------------------------------------------------------------------------------------------
 
 
-class _Scattering(kinds.FrictionKind):
-    """Scatter in time, for every characteristic: mean times 1 + deviation xi(t)."""
+class FrictionKind(Kind):
+    """A characteristic, which may scatter in time: mean times 1 + deviation xi(t).
 
+    Attributes:
+        heated: whether it needs the heat of sliding, [temperature], and an area.
+    """
+
+    heated: ClassVar[bool] = False
     deviation: NotNegative = 0.0
     memory: Positive = 1e-3
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
 
     def friction(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
+        """The characteristic.
+
+        Args:
+            path: of the contact file. heat: [temperature]. area: nominal, m2.
+        """
         mean = self.mean(path, heat, area)
         return scattered(mean, self.deviation, self.memory, self.seed) if self.deviation else mean
 
@@ -439,7 +448,7 @@ class _Scattering(kinds.FrictionKind):
         raise NotImplementedError
 
 
-class OfCoulomb(_Scattering):
+class OfCoulomb(FrictionKind):
     """The same coefficient at every speed."""
 
     kind: Literal["coulomb"]
@@ -449,7 +458,7 @@ class OfCoulomb(_Scattering):
         return Coulomb(value(self.mu))
 
 
-class OfStaticSliding(_Scattering):
+class OfStaticSliding(FrictionKind):
     """One coefficient for sticking, a lower one for sliding."""
 
     kind: Literal["static-sliding"]
@@ -460,7 +469,7 @@ class OfStaticSliding(_Scattering):
         return StaticSliding(value(self.static), value(self.sliding))
 
 
-class OfFalling(_Scattering):
+class OfFalling(FrictionKind):
     """mu_0/(1 + p_v v) (3.6-15)."""
 
     kind: Literal["falling"]
@@ -471,7 +480,7 @@ class OfFalling(_Scattering):
         return Falling(value(self.mu_0), value(self.p_v))
 
 
-class OfExponential(_Scattering):
+class OfExponential(FrictionKind):
     """(mu_0 - mu_inf) exp(-rate v) + mu_inf (4.1-22)."""
 
     kind: Literal["exponential"]
@@ -483,7 +492,7 @@ class OfExponential(_Scattering):
         return Exponential(value(self.mu_0), value(self.mu_inf), value(self.rate))
 
 
-class OfHeated(_Scattering):
+class OfHeated(FrictionKind):
     """Linear loss with the temperature that sliding makes (3.6-3, 3.6-5); needs [temperature] and an area."""
 
     kind: Literal["heated"]
@@ -496,7 +505,7 @@ class OfHeated(_Scattering):
         return Heated(*map(value, (self.mu_0, heat.resistance, heat.limit, area)))
 
 
-class OfTable(_Scattering):
+class OfTable(FrictionKind):
     """A measured table of the coefficient over the speed, shifted by the temperature as rubber is (WLF)."""
 
     kind: Literal["table"]

@@ -1,7 +1,8 @@
 """The sections of a contact's settings that come in kinds: stiffness, roughness, friction and element.
 
-A kind is a class of settings with ``kind: Literal["its name"]`` that makes its own arithmetic. It stands beside that,
-and its place is the only entry it needs: in `OWN`, or, in a package of one's own, as an entry point:
+A kind is a class of settings with ``kind: Literal["its name"]`` that makes its own arithmetic, beside which it stands:
+`stiffness.Stiffness`, `roughness.Roughness`, `friction.FrictionKind` and `Element` say what. It is named where
+`settings` lists the kinds, or, in a package of one's own, by an entry point:
 
     [project.entry-points."microslip.element"]
     pad = "pads:Pad"
@@ -22,37 +23,22 @@ from ..store import ordinary
 
 if TYPE_CHECKING:
     from .composed import Contact
-    from .friction import Friction
-    from .heights import Heights
     from .law import Law
     from .normal import Normal
-    from .settings import ContactLaw, Temperature
-    from .stiffness import Source
+    from .settings import ContactLaw
 
-OWN = {
-    "stiffness": (
-        "stiffness:Given", "stiffness:OfLayer", "stiffness:OfHertz", "stiffness:OfCurve", "stiffness:OfBasis",
-    ),
-    "roughness": (
-        "roughness:Shape", "roughness:ExponentialHeights", "roughness:GaussianHeights", "roughness:TableHeights",
-        "roughness:ProfileHeights",
-    ),
-    "friction": (
-        "friction:OfCoulomb", "friction:OfStaticSliding", "friction:OfFalling",
-        "friction:OfExponential", "friction:OfHeated", "friction:OfTable",
-        "friction:OfLubricated",
-    ),
-    "element": (
-        "point:Massless", "regularised:WithMass", "sliders:OfStrips", "sliders:OfIwan", "sliders:OfMindlin",
-    ),
-}  # fmt: skip
-"""Section -> module and class of each kind, in the order in which they are told."""
+SECTIONS = ("stiffness", "roughness", "friction", "element")
 
 
-def kinds(section: str) -> Any:
+class Kind(Model):
+    """Base of all kinds."""
+
+    kind: str
+
+
+def kinds(section: str, *own: type[Kind]) -> Any:
     """The annotation of a section: any of its kinds, told apart by `kind`; those of other packages last."""
-    own = (EntryPoint(place, f"{__package__}.{place}", section) for place in OWN[section])
-    known = tuple(entry.load() for entry in (*own, *_of_others(section)))
+    known = (*own, *(entry.load() for entry in _of_others(section)))
     return Annotated[Union[known], Field(discriminator="kind")]  # noqa: UP007
 
 
@@ -62,63 +48,11 @@ def _of_others(section: str) -> list[EntryPoint]:
 
 def sources_of_others() -> dict[str, Path]:
     """Module -> file of the kinds of other packages: what is computed with them depends on it."""
-    modules = {entry.module for section in OWN for entry in _of_others(section)}
+    modules = {entry.module for section in SECTIONS for entry in _of_others(section)}
     return {name: Path(found.origin) for name in sorted(modules) if (found := find_spec(name)) and found.origin}
 
 
-class _Kind(Model):
-    kind: str
-
-
-class Stiffness(_Kind):
-    """Where the stiffness of the full area comes from.
-
-    Attributes:
-        is_law: whether it is a normal law by itself, to which no roughness belongs.
-    """
-
-    is_law: ClassVar[bool] = False
-
-    def source(self, path: Path) -> Source:
-        """What the contact file at a path makes of it.
-
-        Raises:
-            UserError: with its key, the section's name left out.
-        """
-        raise NotImplementedError
-
-
-class Roughness(_Kind):
-    """A distribution of heights."""
-
-    def heights(self, path: Path, unit: float) -> tuple[Heights, float]:
-        """The distribution and R_Z in m.
-
-        Args:
-            path: of the contact file. unit: of lengths in files without one of their own, m.
-        """
-        raise NotImplementedError
-
-
-class FrictionKind(_Kind):
-    """A characteristic; each may scatter in time.
-
-    Attributes:
-        heated: whether it needs the heat of sliding, [temperature], and an area.
-    """
-
-    heated: ClassVar[bool] = False
-
-    def friction(self, path: Path, heat: Temperature | None, area: float | None) -> Friction:
-        """The characteristic.
-
-        Args:
-            path: of the contact file. heat: [temperature]. area: nominal, m2.
-        """
-        raise NotImplementedError
-
-
-class Element(_Kind):
+class Element(Kind):
     """What sticks and slips.
 
     Attributes:
@@ -145,33 +79,6 @@ class Element(_Kind):
             UserError: numbers that make none.
         """
         raise NotImplementedError
-
-
-def own_normal_law(length: float | None, preload: float | None, contact: ContactLaw) -> None:
-    """Refuse a normal law of the element's (hyperbolic with a length, constant with a preload) that has no place.
-
-    Raises:
-        ValueError: see `Element.fits`.
-    """
-    if length is not None and contact.roughness is None:
-        raise ValueError("element.length: the hyperbolic law needs a rough surface; add [roughness]")
-    if preload is not None and (contact.roughness is not None or contact.is_pressed):
-        raise ValueError(
-            "element.preload: a constant force has neither roughness nor another force beside it; remove [roughness] "
-            "and motion.normal_force"
-        )
-
-
-def own_normal(length: float | None, preload: float | None, contact: Contact) -> Normal | None:
-    """The hyperbolic law (with a length), or a constant force (with a preload)."""
-    from .law import value
-    from .normal import Hyperbolic, Preload
-
-    if preload is not None:
-        return Preload(value(preload))
-    if length is None or contact.heights is None or contact.roughness is None:
-        return None
-    return Hyperbolic(value(contact.normal_0), value(contact.roughness), contact.heights, value(length))
 
 
 def beside(path: Path, name: str, key: str) -> Path:

@@ -14,10 +14,10 @@ import jax.numpy as jnp
 
 from ..body import NotNegative, Positive, PositiveLength
 from ..compliance import BULK_AND_SURFACE
-from . import kinds
 from .friction import Friction
+from .kinds import Element
 from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
-from .normal import Normal
+from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:
     from .composed import Contact
@@ -338,21 +338,39 @@ def _halved(excess: Callable[[Array], Array], count: int) -> Array:
 # the element of a contact file ---------------------------------------------------------------------------------------
 
 
-class Massless(kinds.Element):
+class OwnNormal(Element):
+    """An element with a normal law of its own."""
+
+    length: PositiveLength | None = None
+
+    def fits(self, contact: ContactLaw) -> None:
+        if self.length is not None and contact.roughness is None:
+            raise ValueError("element.length: the hyperbolic law needs a rough surface; add [roughness]")
+
+    def normal(self, contact: Contact) -> Normal | None:
+        if self.length is None or contact.heights is None or contact.roughness is None:
+            return None
+        return Hyperbolic(value(contact.normal_0), value(contact.roughness), contact.heights, value(self.length))
+
+
+class Massless(OwnNormal):
     """The point contact element without mass (3.7): a return map with exact stick."""
 
     kind: Literal["massless"] = "massless"
     damping: NotNegative = 0.0
-    length: PositiveLength | None = None
     preload: Positive | None = None
 
     def fits(self, contact: ContactLaw) -> None:
-        kinds.own_normal_law(self.length, self.preload, contact)
+        super().fits(contact)
+        if self.preload is not None and (contact.roughness is not None or contact.is_pressed):
+            raise ValueError(
+                "element.preload: a constant force has neither roughness nor another force beside it; remove "
+                "[roughness] and motion.normal_force"
+            )
 
     def normal(self, contact: Contact) -> Normal | None:
-        return kinds.own_normal(self.length, self.preload, contact)
+        return super().normal(contact) if self.preload is None else Preload(value(self.preload))
 
     def law(self, contact: Contact) -> Law:
         damping = value(self.damping) if self.damping else None
-        first, second = contact.springs
-        return PointContact(contact.normal, contact.sliding, first, second, damping)
+        return PointContact(contact.normal, contact.sliding, *contact.springs, damping)

@@ -17,18 +17,16 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..body import NotNegative, Positive, PositiveLength
+from ..body import NotNegative, Positive
 from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
-from . import kinds
 from .friction import Friction, creep
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal
-from .point import met, touching
+from .point import OwnNormal, met, touching
 
 if TYPE_CHECKING:
     from .composed import Contact
-    from .settings import ContactLaw
 
 
 class MassState(NamedTuple):
@@ -352,21 +350,14 @@ def _told(law: MassContact, motion: Callable[[Array], Array], times: Array, ys: 
 # the element of a contact file ---------------------------------------------------------------------------------------
 
 
-class WithMass(kinds.Element):
+class WithMass(OwnNormal):
     """The point contact element with a mass and smoothed friction (3.7-19 to 3.7-44): a differential equation."""
 
     kind: Literal["with-mass"]
     mass: Positive
     slope: Positive
     damping: NotNegative = 0.0
-    length: PositiveLength | None = None
     printed: bool = False
-
-    def fits(self, contact: ContactLaw) -> None:
-        kinds.own_normal_law(self.length, None, contact)
-
-    def normal(self, contact: Contact) -> Normal | None:
-        return kinds.own_normal(self.length, None, contact)
 
     def law(self, contact: Contact) -> Law:
         mass, damping, slope = map(value, (self.mass, self.damping, self.slope))

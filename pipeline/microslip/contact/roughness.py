@@ -10,21 +10,26 @@ from pydantic import Field, model_validator
 
 from ..body import Numbers, Positive, PositiveLength
 from ..data import UserError
-from . import kinds, topography
+from . import topography
 from .curves import read_table
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, combined, tabulated
 from .keys import Columns, FileName, Lengths, NotNegativeLength
-from .kinds import beside
+from .kinds import Kind, beside
 from .law import value
 from .topography import UNITS
 
 
-class _Rough(kinds.Roughness):
-    """Of the first surface, and of the other one if that is rough too."""
+class Roughness(Kind):
+    """A distribution of heights, of the first surface and of the other one if that is rough too."""
 
     R_Z_other: NotNegativeLength = 0.0
 
     def heights(self, path: Path, unit: float) -> tuple[Heights, float]:
+        """The distribution and R_Z in m.
+
+        Args:
+            path: of the contact file. unit: of lengths in files without one of their own, m.
+        """
         own, roughness = self.own(path, unit)
         if self.R_Z_other:
             return combined(own, roughness, Polynomial(), self.R_Z_other)
@@ -35,7 +40,7 @@ class _Rough(kinds.Roughness):
         raise NotImplementedError
 
 
-class Shape(_Rough):
+class Shape(Roughness):
     """A cumulative height distribution by its formula: polynomial (3.3-4) or linear (3.3-29)."""
 
     kind: Literal["polynomial", "linear"]
@@ -45,7 +50,7 @@ class Shape(_Rough):
         return (Polynomial() if self.kind == "polynomial" else Linear()), self.R_Z
 
 
-class ExponentialHeights(_Rough):
+class ExponentialHeights(Roughness):
     """Exponential heights (3.3-34), whose peaks beyond u = 0 are cut off."""
 
     kind: Literal["exponential"]
@@ -56,7 +61,7 @@ class ExponentialHeights(_Rough):
         return Cut(Exponential(value(self.rate))), self.R_Z
 
 
-class GaussianHeights(_Rough):
+class GaussianHeights(Roughness):
     """Gaussian heights (3.3-7), whose peaks beyond u = 0 are cut off."""
 
     kind: Literal["gaussian"]
@@ -68,7 +73,7 @@ class GaussianHeights(_Rough):
         return Cut(Gaussian(value(self.mean), value(self.deviation))), self.R_Z
 
 
-class TableHeights(_Rough):
+class TableHeights(Roughness):
     """A table: depths below the highest peak, and the share of the area that is higher, from 0 to 1."""
 
     kind: Literal["table"]
@@ -104,7 +109,7 @@ class TableHeights(_Rough):
         return tabulated(depth / roughness, share, name), roughness
 
 
-class ProfileHeights(_Rough):
+class ProfileHeights(Roughness):
     """A measured surface profile: columns of way and height, or the file of an instrument."""
 
     kind: Literal["profile"]

@@ -7,7 +7,7 @@ area square metres. `study` makes laws and curves of them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
@@ -28,11 +28,36 @@ from ..body import (
     validate,
 )
 from ..mesh import UNITS
-from .friction import OfCoulomb, OfLubricated
+from .friction import (
+    FrictionKind,
+    OfCoulomb,
+    OfExponential,
+    OfFalling,
+    OfHeated,
+    OfLubricated,
+    OfStaticSliding,
+    OfTable,
+)
 from .keys import Boundary, Lengths, PositiveLengths
-from .kinds import kinds
+from .kinds import Element, kinds
 from .point import Massless
-from .stiffness import OfBasis
+from .regularised import WithMass
+from .roughness import ExponentialHeights, GaussianHeights, ProfileHeights, Roughness, Shape, TableHeights
+from .sliders import OfIwan, OfMindlin, OfStrips
+from .stiffness import Given, OfBasis, OfCurve, OfHertz, OfLayer, Stiffness
+
+if TYPE_CHECKING:  # what all kinds of a section are
+    AnyStiffness = Stiffness
+    AnyRoughness = Roughness
+    AnyFriction = FrictionKind
+    AnyElement = Element
+else:
+    AnyStiffness = kinds("stiffness", Given, OfLayer, OfHertz, OfCurve, OfBasis)
+    AnyRoughness = kinds("roughness", Shape, ExponentialHeights, GaussianHeights, TableHeights, ProfileHeights)
+    AnyFriction = kinds(
+        "friction", OfCoulomb, OfStaticSliding, OfFalling, OfExponential, OfHeated, OfTable, OfLubricated
+    )  # fmt: skip
+    AnyElement = kinds("element", Massless, WithMass, OfStrips, OfIwan, OfMindlin)
 
 
 class Motion(Model):
@@ -124,10 +149,10 @@ class ContactLaw(Model):
     friction: a table of one of its kinds, or a number, Coulomb's coefficient.
     """
 
-    stiffness: kinds("stiffness")  # type: ignore[valid-type]
-    roughness: kinds("roughness") | None = None  # type: ignore[valid-type]
-    friction: Annotated[kinds("friction") | None, BeforeValidator(_coulomb)] = None  # type: ignore[valid-type]
-    element: kinds("element") = Massless()  # type: ignore[valid-type]
+    stiffness: AnyStiffness
+    roughness: AnyRoughness | None = None
+    friction: Annotated[AnyFriction | None, BeforeValidator(_coulomb)] = None
+    element: AnyElement = Massless()
     temperature: Temperature | None = None
 
     @property

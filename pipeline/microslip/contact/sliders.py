@@ -18,9 +18,9 @@ from pydantic import Field
 from ..body import NotNegative, Number
 from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
-from . import kinds
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
+from .kinds import Element
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
@@ -417,7 +417,7 @@ def _positive(**settings: float) -> None:
 # the elements of a contact file --------------------------------------------------------------------------------------
 
 
-class _Parallel(kinds.Element):
+class _Parallel(Element):
     """Sliders in parallel, under Coulomb's friction."""
 
     partly: ClassVar[bool] = True

@@ -12,11 +12,10 @@ import numpy as np
 from ..basis import read_basis
 from ..body import Name, NotNegative, Number, Positive, PositiveLength
 from ..data import UserError
-from . import kinds
 from .curves import FORCES, LENGTHS, read_curve
 from .hertz import Hertz, half_curvatures
 from .keys import Boundary, Columns, FileName, OneOrTwo, Poisson, Radii
-from .kinds import beside
+from .kinds import Kind, beside
 from .law import value
 from .layer import Layer
 from .normal import Normal, Penalty, Potential, measured
@@ -44,7 +43,25 @@ class Source:
     hertz: Hertz | None = None
 
 
-class Given(kinds.Stiffness):
+class Stiffness(Kind):
+    """Where the stiffness of the full area comes from.
+
+    Attributes:
+        is_law: whether it is a normal law by itself, to which no roughness belongs.
+    """
+
+    is_law: ClassVar[bool] = False
+
+    def source(self, path: Path) -> Source:
+        """What the contact file at a path makes of it.
+
+        Raises:
+            UserError: with its key, the section's name left out.
+        """
+        raise NotImplementedError
+
+
+class Given(Stiffness):
     """Stiffnesses of the full area, from wherever they come: a rig, a handbook, another program."""
 
     kind: Literal["given"]
@@ -58,7 +75,7 @@ class Given(kinds.Stiffness):
         return Source(self.normal, _both(self.normal, self.tangential, self.includes), self.area, law)
 
 
-class OfLayer(kinds.Stiffness):
+class OfLayer(Stiffness):
     """An elastic layer under the contact (3.1): c_N0 = E~ A/l_0, c_R0 = G A/l_0."""
 
     kind: Literal["layer"]
@@ -76,7 +93,7 @@ class OfLayer(kinds.Stiffness):
         return Source(found.normal, found, self.area, Penalty(value(found.normal)), layer)
 
 
-class OfHertz(kinds.Stiffness):
+class OfHertz(Stiffness):
     """Two curved bodies (Hertz, Mindlin): F = C u^(3/2), tangential stiffness in proportion to the normal one."""
 
     kind: Literal["hertz"]
@@ -104,7 +121,7 @@ class OfHertz(kinds.Stiffness):
         return Source(normal, both, None, Potential(value(force), value(HERTZ_DEPTH), value(1.5)), hertz=hertz)
 
 
-class OfCurve(kinds.Stiffness):
+class OfCurve(Stiffness):
     """A measured curve of force over displacement, or one of `microslip closure`, in a file of columns."""
 
     kind: Literal["curve"]
@@ -128,7 +145,7 @@ class OfCurve(kinds.Stiffness):
         return Source(normal, _both(normal, self.tangential, self.includes), self.area, law)
 
 
-class OfBasis(kinds.Stiffness):
+class OfBasis(Stiffness):
     """A local static finite-element model: what a patch of a modal file yields beyond its eigenmodes."""
 
     kind: Literal["basis"]
