@@ -15,7 +15,7 @@ import scipy.linalg
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.cli import main
-from microslip.data import UserError
+from microslip.data import NotConverged, UserError
 from microslip.harmonic_balance import JenkinsContact, frequency_response, refined_peaks, stuck_frequencies
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
@@ -451,6 +451,9 @@ def test_an_undamped_mode_that_is_met_exactly_is_answered() -> None:
     sticks = [JenkinsContact("rub", np.zeros(6), 1, k, 1e9)]
     found = frequency_response(g, sticks, g.excitations["f"].rows[0], g.monitors["m"].rows[0], np.array([f]))
     assert abs(found.monitor[0]) == pytest.approx(1 / k, rel=1e-6)
+    nothing = replace(g, K_r=0 * g.K_r, M_r=0 * g.M_r, C_r=0 * g.C_r)
+    with pytest.raises(NotConverged, match="singular"):
+        frequency_response(nothing, sticks, g.excitations["f"].rows[0], g.monitors["m"].rows[0], np.array([f]))
 
 
 def test_a_sweep_without_points_has_no_peaks() -> None:
