@@ -22,12 +22,12 @@ from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.coordinates import in_modes
-from microslip.harmonic_balance import kept, response
+from microslip.harmonic_balance import kept, refinement, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checks import forces_on
 from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import solve
-from microslip.harmonic_balance.sweeps import hidden, overhanging
+from microslip.harmonic_balance.sweeps import overhanging
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
@@ -74,7 +74,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
                 found, peaks = kept_response(problem, FREQUENCY, np.ones(1), journal, SERIES, impatient)
             except Stop:
                 continue
-    whole = response.filled_response(problem, FREQUENCY, np.ones(1))
+    whole = refinement.filled_response(problem, FREQUENCY, np.ones(1))
     computed = [t for t in told if "of 16 frequencies" in t]
     assert len(computed) == len(FREQUENCY) + 3  # the three that were under way are begun once more, no other
     assert list(dict.fromkeys(computed)) == [f"{i + 1} of 16 frequencies: {f:.6g} Hz" for i, f in enumerate(FREQUENCY)]
@@ -106,13 +106,6 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     assert len([t for t in told if "peak near" in t]) == 1
     alone = response.harmonic_response(problem, frequency, np.ones(0))
     assert rising({1.0: found}, {1.0: peaks}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
-
-
-def test_modes_that_are_one_but_for_rounding_get_one_point_and_those_of_the_sweep_none() -> None:
-    """Pairs of a ring's waves differ in the last digits, and so may a mode and the frequency that was asked for."""
-    modes = np.array([3.0, 3.5, 3.5 * (1 + 1e-14), 4.0 * (1 - 1e-14), 4.6, 9.0])
-    assert hidden(np.arange(2.0, 7.0), modes, np.full(6, 0.01)) == pytest.approx([3.5, 4.6], rel=1e-12)
-    assert hidden(np.arange(2.0, 7.0), np.zeros(0), np.zeros(0)) == []
 
 
 def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:

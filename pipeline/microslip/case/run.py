@@ -238,10 +238,10 @@ def _swept(
     normal: float,
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
     """One sweep and its peaks, from what a journal holds of it and what is computed now."""
-    from ..harmonic_balance import kept, response
+    from ..harmonic_balance import kept, refinement, response
 
     if journal is None:
-        found = response.filled_response(problem, frequency, limits, report)
+        found = refinement.filled_response(problem, frequency, limits, report)
         return found, response.refined_peaks(problem, found)
     name = series_name(normal)
     parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}

@@ -3,7 +3,6 @@ was."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
@@ -20,15 +19,16 @@ from .checks import forces_on, judged
 from .families import Family, followed
 from .patch import Cycle
 from .problem import Problem
-from .response import HarmonicResponse, Operating, between, hidden, highest, of_points, operating
-from .solver import CONVERGED, Point, Report, sweep
+from .refinement import Solved, filled_response
+from .response import HarmonicResponse, Operating, highest, operating
+from .solver import CONVERGED, Point, Report
 from .sweeps import brackets, resonances
 
 
 def kept_response(
     problem: Problem, frequency: Array, limit: Array, journal: Journal, series: str, report: Report = lambda _: None
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:
-    """`response.harmonic_response` and its refined peaks; what a series of the journal holds already is not computed.
+    """`refinement.filled_response` and its refined peaks; what a series of the journal holds already is not computed.
 
     Points of another `frequency` have no place in the series: each one was begun at its neighbours.
 
@@ -37,29 +37,14 @@ def kept_response(
             ``peak`` = the frequency, Hz, of the point that they were searched from.
 
     Returns:
-        The response at `frequency` and at points that are added, see `response.hidden`, and (Hz, m) of its resonances:
-        of the maxima of one plateau the highest.
+        The response and (Hz, m) of its resonances: of the maxima of one plateau the highest.
     """
-    held = {key: restored(problem, row) for key, row in journal.of(series).items()}
-    more = hidden(problem, frequency)
-    known = {f: held[f][0] for f in [*map(float, frequency), *more] if f in held}
-    found = {f: held[f][1] for f in known}
+    held = {key: restored(problem, row) for key, row in journal.of(series).items() if not row["peak"]}
 
-    def keep(point: Point, among: Iterable[float] = frequency) -> None:
-        f = point.Omega / (2 * np.pi)
-        at = float(min(among, key=lambda x: abs(x - f)))  # the number asked for, not the one divided back
-        found[at] = operating(problem, point)
-        added = {"frequency": at, "added": int(among is more)}
-        journal.keep(series, at, record(problem, point, found[at]) | added)
+    def keep(f: float, solved: Solved, added: bool) -> None:
+        journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
 
-    points = sweep(problem, frequency, report, known=known, keep=keep)
-    for f in more:
-        if f not in known:
-            report(f"{series}: a mode at {f:.6g} Hz between two frequencies")
-            known[f] = between(problem, points, f)
-            keep(known[f], more)
-    points += [known[f] for f in more]
-    response = of_points(problem, points, limit, [found[f] for f in [*map(float, frequency), *more]], frequency)
+    response = filled_response(problem, frequency, limit, report, held, keep)
     peaks = [_peak(problem, response, bracket, journal, series, report) for bracket in brackets(response)]
     return response, resonances(response, [peak for peak in peaks if peak])
 

@@ -16,7 +16,7 @@ from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
 from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
 from . import problem as balance
-from . import reduced, sweeps
+from . import reduced
 from .checks import checks, judged
 from .patch import Cycle, Traced
 from .problem import Problem
@@ -151,33 +151,6 @@ def harmonic_response(
 ) -> HarmonicResponse:  # fmt: skip
     """`sweep`, and what a reader asks of its points. limit: (patches,) friction limits, N, for reports."""
     return of_points(problem, sweep(problem, frequency, report, start), limit)
-
-
-def filled_response(
-    problem: Problem, frequency: Array, limit: Array, report: Report = lambda _: None
-) -> HarmonicResponse:  # fmt: skip
-    """`harmonic_response`, with points added where the sweep may step over a resonance, see `hidden`."""
-    points = sweep(problem, frequency, report)
-    points += [between(problem, points, f) for f in hidden(problem, frequency)]
-    return of_points(problem, points, limit, asked=frequency)
-
-
-def hidden(problem: Problem, frequency: Array) -> list[float]:
-    """Hz of resonances that a sweep may step over, see `sweeps.hidden`: of sticking contacts, and of none."""
-    a = problem.assembly
-    if not a.loads:
-        return []
-    part = a.joined(1)
-    pairs = [(part, a.stiffness), (reduced.untouched(part), np.zeros((0, 0)))]
-    modes, damping = (np.concatenate([of(one, k) for one, k in pairs]) for of in (reduced.stuck, reduced.stuck_damping))
-    return sweeps.hidden(np.asarray(frequency, dtype=float), modes, damping)
-
-
-def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
-    """The solution at a frequency (Hz), begun at the nearest of others."""
-    Omega = 2 * np.pi * frequency
-    good = sorted((p for p in points if p.converged), key=lambda p: abs(p.Omega - Omega))
-    return solve(problem, Omega, [p.x for p in good[:1]])
 
 
 def of_points(

@@ -135,7 +135,7 @@ def _worst(series: tuple[Series, ...], name: str) -> float:
 def _of_points(series: tuple[Series, ...]) -> str:
     whole = sum(len(s.status) for s in series)
     added = int(sum(s.arrays["added"].sum() for s in series if "added" in s.arrays))
-    more = f"; {added} were added for resonances narrower than a step" if added else ""
+    more = f"; {added} were added at narrow resonances, folds and failures" if added else ""
     causes = Counter(cause(status) for s in series for status in s.status if status != CONVERGED)
     if not causes:
         return f"all {counted(whole, 'point')} converged{more}"

@@ -1,0 +1,111 @@
+"""Points that a sweep over frequency is not asked for and needs: at modes narrower than a step, on both sides of
+folds, and beside points without a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ..data import Array
+from . import reduced, sweeps
+from .problem import Problem
+from .response import HarmonicResponse, Operating, of_points, operating
+from .solver import Point, Report, newton, solve, sweep
+
+Solved = tuple[Point, Operating]
+
+
+def filled_response(
+    problem: Problem, frequency: Array, limit: Array, report: Report = lambda _: None,
+    known: Mapping[float, Solved] | None = None, keep: Callable[[float, Solved, bool], None] = lambda *_: None,
+) -> HarmonicResponse:  # fmt: skip
+    """`response.harmonic_response`, with points added where the sweep may step over a resonance (`hidden`), past a fold
+    or past the last solution beside none (`last_solutions`).
+
+    Args:
+        limit: (patches,) friction limits, N, for reports. known: Hz -> what was found before. keep: told of every other
+            point as soon as it is found: Hz, what was found, and whether it is added.
+    """
+    asked, solved = [float(f) for f in frequency], dict(known or {})
+
+    def take(f: float, point: Point, added: bool) -> None:
+        solved[f] = point, operating(problem, point)
+        keep(f, solved[f], added)
+
+    def swept(point: Point) -> None:
+        take(min(asked, key=lambda f: abs(2 * np.pi * f - point.Omega)), point, False)
+
+    sweep(problem, frequency, report, known={f: solved[f][0] for f in asked if f in solved}, keep=swept)
+    more = hidden(problem, frequency)
+    for f in more:
+        if f not in solved:
+            report(f"a mode at {f:.6g} Hz between two frequencies")
+            take(f, between(problem, [solved[g][0] for g in asked], f), True)
+    for low, high in pairwise(sorted([*asked, *more])):
+        one, other = solved[low][0], solved[high][0]
+        before = [f for f in solved if low < f < high]
+        if len(before) < one.converged + other.converged:
+            for point in last_solutions(problem, one, other):
+                report(f"the curve ends near {point.Omega / (2 * np.pi):.6g} Hz between two frequencies")
+                take(point.Omega / (2 * np.pi), point, True)
+    chosen = asked + [f for f in solved if f not in asked]
+    points, found = zip(*(solved[f] for f in chosen), strict=True)
+    return of_points(problem, points, limit, found, frequency)
+
+
+def hidden(problem: Problem, frequency: Array) -> list[float]:
+    """Hz of resonances that a sweep may step over, see `sweeps.hidden`: of sticking contacts, and of none."""
+    a = problem.assembly
+    if not a.loads:
+        return []
+    part = a.joined(1)
+    pairs = [(part, a.stiffness), (reduced.untouched(part), np.zeros((0, 0)))]
+    modes, damping = (np.concatenate([of(one, k) for one, k in pairs]) for of in (reduced.stuck, reduced.stuck_damping))
+    return sweeps.hidden(np.asarray(frequency, dtype=float), modes, damping)
+
+
+def between(problem: Problem, points: Sequence[Point], frequency: float) -> Point:
+    """The solution at a frequency (Hz), begun at the nearest of others."""
+    Omega = 2 * np.pi * frequency
+    good = sorted((p for p in points if p.converged), key=lambda p: abs(p.Omega - Omega))
+    return solve(problem, Omega, [p.x for p in good[:1]])
+
+
+HALVINGS = 12
+"""Times that the distance of two points is halved to find where the curve of solutions ends between them; a resonance
+that is narrower than what is left cannot be told from a fold."""
+
+JUMP = 0.2
+"""Share of the vibration by which two points may differ and be of one curve, without a look at what is between."""
+
+
+def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
+    """Where the curve of solutions through a point ends before the next one: the last solutions on either side.
+
+    It ends at a fold, beyond which the vibration is another one, or where no solution is found. None are told if both
+    points are of one curve.
+    """
+    given = (low, high)
+    for _ in range(HALVINGS):
+        good = [p for p in (low, high) if p.converged]
+        if not good or (len(good) == 2 and _apart(problem, low, high) <= JUMP):
+            return []
+        at = problem.at(0.5 * (low.Omega + high.Omega))
+        found = newton(at, good[0].x, most=20)
+        if not found.converged and len(good) == 2:
+            found = newton(at, high.x, most=20)
+            if not found.converged:
+                break
+        of_low = _apart(problem, low, found) < _apart(problem, high, found) if len(good) == 2 else low.converged
+        low, high = (found, high) if of_low == found.converged else (low, found)
+    if low.converged and high.converged and _apart(problem, low, high) <= JUMP:
+        return []
+    return [p for p in (low, high) if p.converged and p not in given]
+
+
+def _apart(problem: Problem, a: Point, b: Point) -> float:
+    """Difference of two vibrations over the larger one; where their means are may be undetermined."""
+    x, y = a.x[problem.count :], b.x[problem.count :]
+    return float(np.abs(x - y).max(initial=0.0) / max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0), 1e-300))
