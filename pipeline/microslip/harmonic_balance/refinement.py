@@ -4,6 +4,7 @@ folds, and beside points without a solution."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -78,7 +79,7 @@ HALVINGS = 12
 that is narrower than what is left cannot be told from a fold."""
 
 JUMP = 0.2
-"""Share of the vibration by which two points may differ and be of one curve, without a look at what is between."""
+"""Share of the vibration by which two points may differ and be of one curve."""
 
 
 def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
@@ -87,25 +88,48 @@ def last_solutions(problem: Problem, low: Point, high: Point) -> list[Point]:
     It ends at a fold, beyond which the vibration is another one, or where no solution is found. None are told if both
     points are of one curve.
     """
-    given = (low, high)
+    given = (low.Omega, high.Omega)
     for _ in range(HALVINGS):
+        both = low.converged and high.converged
+        if both and _apart(problem, low.x, high.x) <= JUMP:
+            return []
+        low, high = (_with_slope(problem, p) for p in (low, high))
         good = [p for p in (low, high) if p.converged]
-        if not good or (len(good) == 2 and _apart(problem, low, high) <= JUMP):
+        if not good or (both and _lead_to_each_other(problem, low, high)):
             return []
         at = problem.at(0.5 * (low.Omega + high.Omega))
-        found = newton(at, good[0].x, most=20)
-        if not found.converged and len(good) == 2:
-            found = newton(at, high.x, most=20)
-            if not found.converged:
-                break
-        of_low = _apart(problem, low, found) < _apart(problem, high, found) if len(good) == 2 else low.converged
-        low, high = (found, high) if of_low == found.converged else (low, found)
-    if low.converged and high.converged and _apart(problem, low, high) <= JUMP:
-        return []
-    return [p for p in (low, high) if p.converged and p not in given]
+        found = next((p for g in good if (p := newton(at, g.x, most=20, slope=g.slope)).converged), None)
+        if found is None and both:
+            break
+        if found is None:  # the end lies on this side of the middle
+            nothing = Point(at.Omega, good[0].x, "", np.inf, 0)
+            low, high = (low, nothing) if low.converged else (nothing, high)
+        elif _apart(problem, low.x, found.x) < _apart(problem, found.x, high.x) if both else low.converged:
+            low = found
+        else:
+            high = found
+    return [p for p in (low, high) if p.converged and p.Omega not in given]
 
 
-def _apart(problem: Problem, a: Point, b: Point) -> float:
+def _with_slope(problem: Problem, point: Point) -> Point:
+    """A solution with the derivative of its contact forces."""
+    if not point.converged or point.slope is not None:
+        return point
+    return replace(point, slope=problem.at(point.Omega).forces(point.x)[1])
+
+
+def _lead_to_each_other(problem: Problem, low: Point, high: Point) -> bool:
+    """Whether the contacts of each point, linear as they are there, lead to the other one: between them is a resonance
+    that is narrow because damping is low."""
+    for a, b in ((low, high), (high, low)):
+        at = problem.at(b.Omega)
+        reached = a.x + at.jacobian(a.slope).solve(-at.residual(a.x))
+        if not _apart(problem, reached, b.x) <= JUMP:
+            return False
+    return True
+
+
+def _apart(problem: Problem, x: Array, y: Array) -> float:
     """Difference of two vibrations over the larger one; where their means are may be undetermined."""
-    x, y = a.x[problem.count :], b.x[problem.count :]
+    x, y = x[problem.count :], y[problem.count :]
     return float(np.abs(x - y).max(initial=0.0) / max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0), 1e-300))
