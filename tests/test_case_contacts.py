@@ -293,8 +293,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "hertz bare": (table(**STIFF, law="hertz"), 'law = "hertz" needs curvature and young'),
     "hertz nodal": (table(**PIN, law="hertz", patch="nodal"), 'law = "hertz" needs curvature and young, and a rigid'),
     "points of a mesh": (table(**STIFF, patch="nodal", points=[3, 3]), "has those of the mesh"),
-    "closed form": (table(**STIFF, patch="nodal", law="jenkins"), 'write law = "smooth" or "rough"'),
-    "closed curve": (table(**STIFF, curvature=[1.0, 2.0], law="jenkins"), 'write law = "smooth" or "rough"'),
+    "jenkins nodal": (table(**STIFF, patch="nodal", law="jenkins"), 'patch: law = "jenkins" has four elements'),
+    "jenkins curved": (table(**STIFF, curvature=[1.0, 2.0], law="jenkins"), 'curvature: law = "jenkins" has four'),
+    "jenkins overlapping": (table(**STIFF, interference=1e-6, law="jenkins"), "interference: law"),
+    "one way only": (table(**STIFF, slides_along="t2"), 'slides_along: belongs to law = "jenkins"'),
     "statics in six rows": (table(**STIFF, includes="surface", patch="nodal"), "stands in the six rows of right alone"),
     "one of both": (table(**STIFF, isotropic=True), "isotropic belongs to young"),
     "bulk": (table(**PIN, includes="bulk+surface"), "beyond what the face yields"),
@@ -367,13 +369,13 @@ friction = 0.3
 
 
 def sample_case(folder: Path, monkeypatch: pytest.MonkeyPatch, **keys: Any) -> list[str]:
-    """The vane that travels with the package, its contacts smooth; what to type after `respond`."""
+    """The vane that travels with the package, 24 x 5 points a contact; what to type after `respond`."""
     import microslip
 
     monkeypatch.chdir(folder)
     for file in ("case.toml", "basis.h5"):
         shutil.copy(Path(microslip.__file__).parent / "samples" / file, folder)
-    more = {"contacts.right.law": '"smooth"', "contacts.left.law": '"smooth"', "sweep.normal_forces": [20.0]}
+    more = {"contacts.right.points": [24, 5], "contacts.left.points": [24, 5], "sweep.normal_forces": [20.0]}
     more |= {"sweep.points": 2, "sweep.start": 300, "sweep.stop": 310} | keys
     return ["case.toml", "basis.h5", *(f"--set={key}={value}" for key, value in more.items())]
 

@@ -186,15 +186,15 @@ def test_mistakes_are_one_sentence(
     assert words in said and "Traceback" not in said
 
 
-def test_nothing_to_press_and_closed_forms(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_to_press_and_laws_of_one_force(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = CASE.replace("points = [1, 1]", "points = [1, 1]\nnormal_force = 10.0")
     own = own.replace("normal_forces = [10.0]\n", "")
     case.write_text(own)
     assert main(["respond", "case.toml", "--over", "normal-force"]) == 2
     assert "press no contact" in "".join(capsys.readouterr())
-    case.write_text(CASE.replace('law = "smooth"\n', "").replace("points = [1, 1]\n", ""))
-    assert main(["respond", "case.toml", "--over", "load"]) == 2
-    assert "needs point contacts" in "".join(capsys.readouterr())
+    case.write_text(CASE.replace('law = "smooth"', 'law = "jenkins"').replace("points = [1, 1]\n", ""))
+    assert main(["respond", "case.toml", "--over", "normal-force"]) == 2
+    assert "contacts.sole.law" in "".join(capsys.readouterr())
     case.write_text(CASE.replace("start = 100.0", "start = 131.0"))
     assert main(["respond", "case.toml", "--over", "load"]) == 2
     assert "holds no resonance; give a frequency" in "".join(capsys.readouterr())

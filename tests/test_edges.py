@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from microslip.case.edges import remarks, rising
-from microslip.harmonic_balance import FrequencyResponse, refined_peaks
-from microslip.harmonic_balance.sweeps import overhanging
+from microslip.harmonic_balance import FrequencyResponse
+from microslip.harmonic_balance.sweeps import brackets, inside, overhanging, resonances
 
 
 def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyResponse:
@@ -15,6 +17,23 @@ def modes(f: np.ndarray, *resonances: tuple[float, float, float]) -> FrequencyRe
     a = sum(share / (f0**2 - f**2 + 2j * d * f0 * f) for f0, d, share in resonances) * 100.0**2
     zero, none = np.zeros(len(f)), np.zeros((len(f), 0))
     return FrequencyResponse(f, np.asarray(a), none, zero, np.ones(len(f), bool), np.zeros(0), none)
+
+
+def refined_peaks(
+    response: FrequencyResponse, respond: Callable[[np.ndarray], FrequencyResponse]
+) -> list[tuple[float, float]]:
+    """(Hz, height) of the peaks beside the tops of a sweep, searched for by nine points a round."""
+    found = []
+    for bracket in brackets(response):
+        low, high = (float(response.frequency[j]) for j in (bracket[0], bracket[-1]))
+        for _ in range(6):
+            f = np.linspace(low, high, 9)
+            a = np.abs(respond(f).monitor)
+            top = int(np.clip(a.argmax(), 1, 7))
+            low, high = float(f[top - 1]), float(f[top + 1])
+        if inside(response, bracket, float(a.max()), lambda f: float(abs(respond(np.array([f])).monitor[0]))):
+            found.append((float(f[a.argmax()]), float(a.max())))
+    return resonances(response, found)
 
 
 @pytest.mark.parametrize("damping", [1e-4, 0.01, 0.1])

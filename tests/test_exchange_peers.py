@@ -26,8 +26,8 @@ from microslip.data import Array, ModalBasis
 from microslip.exchange import WRITERS, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
-from microslip.harmonic_balance import jenkins_harmonic
 from microslip.modes import modal_basis
+from microslip.reference.one_harmonic import jenkins_harmonic
 
 PEERS = Path(__file__).parent / "peers"
 

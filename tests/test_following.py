@@ -166,7 +166,6 @@ def test_respond_with_stability(capsys: pytest.CaptureFixture[str]) -> None:
         (["optimum", "case.toml", "--over", "friction"], "give --low and --high, two positive numbers"),
         (["optimum", "case.toml", "--over", "bodies.sled.turn", "--low", "5", "--high", "-5"], "the first one smaller"),
         (["optimum", "case.toml", "--over", "contacts.sole.mu", "--low", "0.1", "--high", "0.5"], "mu"),
-        (["backbone", "case.toml", "--set", 'contacts.sole.law="jenkins"'], "contacts"),
     ],
 )
 def test_mistakes_are_one_sentence(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

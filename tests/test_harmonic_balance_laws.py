@@ -23,10 +23,11 @@ from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
 from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, NotConverged, UserError
-from microslip.harmonic_balance import JenkinsContact, frequency_response, response_table
+from microslip.harmonic_balance import response_table
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response, newton, of_body
+from microslip.reference.one_harmonic import JenkinsContact, frequency_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 
@@ -170,7 +171,7 @@ def test_the_reference_stiffness_does_not_matter(scale: float) -> None:
 
 @pytest.mark.slow
 def test_one_harmonic_and_a_constant_force_are_the_closed_form() -> None:
-    """Against `jenkins`: the sampled force converges to the closed form with the square of the step."""
+    """The sampled force converges to the closed form with the square of the step."""
     g, limit, kt = oscillator(), 0.6, 2e4
     frequency = np.linspace(12, 40, 15)
     one = np.array([1.0])
@@ -453,16 +454,16 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> CaseResult:
     return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled(), "case.toml")
 
 
-def test_a_case_with_a_law_that_sticks_is_the_closed_form_that_sticks(answered: CaseResult, tmp_path: Path) -> None:
-    """Pressed by 1e5 N both are the same springs, if the closed form is given the width and height whose rotational
+def test_a_case_with_a_law_that_sticks_is_springs(answered: CaseResult, tmp_path: Path) -> None:
+    """Pressed by 1e5 N both are the same springs, if the Jenkins elements are given the width and height whose rotational
     stiffness is that of four by two points: (1 - 1/n^2) of a uniform patch (errata to 5.2-40/41)."""
     result = answered
     narrow = f"width = {0.06 * np.sqrt(1 - 1 / 16)}\nheight = {0.03 * np.sqrt(1 - 1 / 4)}"
-    linear = ('law = "smooth"\n', ""), ("points = [4, 2]\n", ""), ("width = 0.06\nheight = 0.03", narrow)
-    closed = run_case(asked(tmp_path, FEW, *linear), sled(), "case.toml")
+    linear = ('law = "smooth"\n', 'law = "jenkins"\n'), ("points = [4, 2]\n", ""), ("width = 0.06\nheight = 0.03", narrow)
+    springs = run_case(asked(tmp_path, FEW, *linear), sled(), "case.toml")
     assert all(r.converged.all() for r in result.responses.values())
-    np.testing.assert_allclose(result.responses[1e5].monitor, closed.responses[1e5].monitor, rtol=1e-8)
-    np.testing.assert_allclose(result.stuck, closed.stuck, rtol=1e-8)
+    np.testing.assert_allclose(result.responses[1e5].monitor, springs.responses[1e5].monitor, rtol=1e-8)
+    np.testing.assert_allclose(result.stuck, springs.stuck, rtol=1e-8)
 
 
 def test_a_case_with_a_law_slides_and_its_table_says_how(answered: CaseResult) -> None:

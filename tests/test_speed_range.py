@@ -505,7 +505,6 @@ interface = "tip"
 normal_stiffness = 2e7
 tangential_stiffness = 1e7
 friction = 0.2
-slides_along = "t2"
 [sweep]
 start = {start}
 stop = {stop}

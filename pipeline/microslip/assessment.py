@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from .operating.patches import ContactMap
     from .progress import Report
 
-LIFTS = "contacts would lift off: not valid"
-"""Note on a resonance of the closed form."""
-
 ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
 """Limits of a case that gives none: the worst place is then that of the largest amplitude."""
 
@@ -39,8 +36,7 @@ class Resonance:
     Attributes:
         normal_force: N. frequency: Hz. amplitude: m, of the read-out that is drawn. range: Hz. stressed: number, in its
             series, of the point of that range at which the body's stress amplitude is largest, stressed_at: Hz there.
-            worst: place of the body whose vibration may grow least there (largest amplitude without limits). lifts:
-            contacts would lift off, which the closed form that gave it does not follow.
+            worst: place of the body whose vibration may grow least there (largest amplitude without limits).
     """
 
     normal_force: float
@@ -50,7 +46,6 @@ class Resonance:
     stressed: int
     stressed_at: float
     worst: Endurance
-    lifts: bool = False
 
     def holds(self, frequency: float) -> bool:
         """Whether a frequency (Hz) lies in its range."""
@@ -75,10 +70,9 @@ class Assessment:
 
     @property
     def highest(self) -> Resonance | None:
-        """The resonance with the least margin (without limits, the most stressed one), of the valid ones if any."""
-        valid = [r for r in self.resonances if not r.lifts]
+        """The resonance with the least margin (without limits, the most stressed one)."""
         key = (lambda r: r.worst.vibration) if self.limits else (lambda r: -r.worst.amplitude)
-        return min(valid or self.resonances, key=key, default=None)
+        return min(self.resonances, key=key, default=None)
 
     def at(self, r: Resonance) -> tuple[Motion, CycleStress]:
         """Motion and stress where a resonance stresses the body most."""
@@ -99,21 +93,19 @@ class Assessment:
         row |= {"mean_stress_Pa": r.worst.mean}
         if self.limits is not None:
             row["vibration_may_grow"] = r.worst.vibration
-        row |= {"at_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
-        return row | ({"note": LIFTS if r.lifts else ""} if any(one.lifts for one in self.resonances) else {})
+        return row | {"at_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
 
 
 def assess(
     response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
-    only: Array | None = None, report: Report = lambda _: None, lifted: Mapping[float, Array] | None = None,
+    only: Array | None = None, report: Report = lambda _: None,
 ) -> Assessment:  # fmt: skip
     """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
     where the read-out is largest: another mode may stress the body on its flank.
 
     Args:
         monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
-            where there is one body. only: numbers of the stress places that count, all if None. lifted: normal force
-            (N) -> points (Hz) that are not valid because contacts would lift off.
+            where there is one body. only: numbers of the stress places that count, all if None.
 
     Raises:
         UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
@@ -127,13 +119,10 @@ def assess(
         motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
         size = abs(series.monitor(monitor)[:, 0, 1])
-        invalid = (lifted or {}).get(normal, np.zeros(0))
-        lifts = np.asarray(np.isclose(series.frequency[:, None], invalid, rtol=1e-9).any(axis=1))
         chosen, at = drawn_points(series), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
         ranges = _ranges(peaks.amplitude, chosen, series.converged, at)
-        most = [_most_stressed(motion, r[lifts[r] == lifts[i]], chosen, peaks, only)
-                for i, r in zip(at, ranges, strict=True)]  # fmt: skip
+        most = [_most_stressed(motion, r, chosen, peaks, only) for r in ranges]
         if not np.isin(most, chosen).all():
             chosen = np.union1d(chosen, most)
             peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
@@ -141,7 +130,7 @@ def assess(
         for i, r, j in zip(at, ranges, most, strict=True):
             worst = endurance(cycle_stress(motion, j), limits or ENDLESS, only)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
-            found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst, bool(lifts[i])))
+            found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst))
     return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
 
 
@@ -269,11 +258,9 @@ def draw(
         drawn["stress over frequency"] = operating.over_frequency_plot(
             curves, label, title, folder / "stress_over_frequency.png"
         )
-    out = ", ".join(f"{r.normal_force:g} N" for r in found.resonances if r.lifts)
-    out = f"\n(left out: {out}, where contacts would lift off)" if out else ""
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
-            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force{out}",
+            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force",
             folder / "stress_over_normal_force.png",
         )  # fmt: skip
     top = found.highest
@@ -315,12 +302,12 @@ def families(found: Assessment) -> dict[str, list[Resonance]]:
 
 
 def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
-    """Normal force, N, and stress amplitude, MPa, of families of resonances that are valid, none left out; nothing
-    where there are fewer than three normal forces to look over."""
-    valid = {name: [r for r in line if not r.lifts] for name, line in families(found).items()}
-    if len({r.normal_force for line in valid.values() for r in line}) < 3:
+    """Normal force, N, and stress amplitude, MPa, of families of resonances, none left out; nothing where there are
+    fewer than three normal forces to look over."""
+    lines = families(found)
+    if len({r.normal_force for line in lines.values() for r in line}) < 3:
         return {}
-    return {name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line] for name, line in valid.items() if line}
+    return {name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line] for name, line in lines.items()}
 
 
 def _at_worst(

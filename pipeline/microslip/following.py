@@ -71,11 +71,7 @@ class Case:
 
 
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
-    """A case and its modal files.
-
-    Raises:
-        UserError: contacts in closed form, which has no solutions to follow.
-    """
+    """A case and its modal files."""
     raw = override(load_toml(path), list(assignments), path)
     asked = validate(CaseSettings, raw, path)
     settings = keeping.as_found(asked, folder, path)
@@ -83,11 +79,6 @@ def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: 
         raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
         raw |= {"harmonics": settings.harmonics, "samples": settings.samples}
     case = Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
-    if settings.contacts and not settings.has_laws:
-        raise UserError(
-            f'{path}: contacts: law = "jenkins" is one harmonic in closed form; write law = "smooth" or "rough" to '
-            "follow backbones, optima and stability"
-        )
     return case
 
 

@@ -210,18 +210,11 @@ def _finished(keeper: Keeper, result: CaseResult, report: Report) -> dict[str, A
 
 
 def _response(keeper: Keeper, result: CaseResult, summary: Mapping[str, Any]) -> Response:
-    """What goes into ``response.h5``: the journal's points of this case's sweep, or those of the closed form."""
+    """What goes into ``response.h5``: the journal's points of this case's sweep."""
     names = {keeping.series_name(n): n for n in result.responses}
-    if result.at_peaks:
-        head = keeping.head_of(result.built, keeper.raw, keeper.hashes, keeper.files)
-        found = {
-            name: keeping.closed_points(result.built, result.responses[n], result.at_peaks[n])
-            for name, n in names.items()
-        }
-    else:
-        head, held = read_journal(keeper.points)
-        low, high = result.settings.sweep.start, result.settings.sweep.stop
-        found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
+    head, held = read_journal(keeper.points)
+    low, high = result.settings.sweep.start, result.settings.sweep.stop
+    found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
     told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
     told["estimated"] = result.truncation
     told |= {key: summary[key] for key in ("resonances", "stuck_modes", "remarks")}
@@ -243,20 +236,13 @@ def _assessed(result: CaseResult, response: Response, folder: Path, report: Repo
     if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
     member, monitor = first
-    lifted = {n: _lifting_at(result, n) for n in result.resonances}
     limits = result.settings.material_limits
-    found = assessment.assess(response, basis, monitor, member, limits, report=report, lifted=lifted)
-    maps, remarks = ({}, []) if found.highest is None or result.at_peaks else _maps(result, found, report)
+    found = assessment.assess(response, basis, monitor, member, limits, report=report)
+    maps, remarks = ({}, []) if found.highest is None else _maps(result, found, report)
     report("pictures of stresses")
     scenes = _can_draw() is None
     drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
-
-
-def _lifting_at(result: CaseResult, normal: float) -> Array:
-    """Hz of the points of a sweep and of its resonances at which contacts would lift off."""
-    at = result.responses[normal].frequency, np.array([f for f, _ in result.resonances[normal]])
-    return np.concatenate([f[lifts] for f, lifts in zip(at, result.lifted(normal), strict=True)])
 
 
 def _maps(
@@ -311,9 +297,6 @@ def _is_there(package: str) -> bool:
 
 def _write_log(response: Response, folder: Path, report: Report) -> None:
     """``convergence.csv``: what Newton's method did at every point."""
-    if response.mode == "jenkins":
-        report('warning: --log: law = "jenkins" is solved in closed form; there is nothing to log')
-        return
     store.write_text(folder / "convergence.csv", convergence_table(response))
 
 
@@ -333,26 +316,23 @@ def convergence_table(response: Response) -> str:
 def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
     rows = []
-    lifted = {normal: result.lifted(normal)[1] for normal in result.resonances}
     name = result.quantity.column("amplitude")
     for normal, peaks in result.resonances.items():
-        for (frequency, amplitude), lifts in zip(peaks, lifted[normal], strict=True):
-            row = {"normal_force_N": normal, "frequency_Hz": frequency, name: amplitude}
-            rows.append(row | ({"note": assessment.LIFTS if lifts else ""} if any(map(any, lifted.values())) else {}))
+        rows += [{"normal_force_N": normal, "frequency_Hz": f, name: a} for f, a in peaks]
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
-    balanced: dict[str, float] = {"harmonics": result.settings.balanced} if result.settings.has_laws else {}
+    balanced: dict[str, float] = {"harmonics": result.settings.balanced}
     if result.truncation is not None:
         balanced["estimated_error_of_harmonics"] = result.truncation
     return {
         "case": result.settings.name,
-        "mode": result.settings.mode if result.settings.has_laws else "jenkins",
+        "mode": result.settings.mode,
         **balanced,
         "description": result.settings.description,
         "rotation_speed_rpm": result.speed * 30 / np.pi,
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
         "damping": result.settings.damping_as,
         "stuck_modes": _stuck_modes(result),
-        **({"stuck_under_N": max(result.responses)} if result.settings.has_laws and result.responses else {}),
+        **({"stuck_under_N": max(result.responses)} if result.responses else {}),
         "resonances": rows,
         "rising_at_the_edge": [
             {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}

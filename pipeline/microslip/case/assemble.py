@@ -223,15 +223,14 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         own, k, said = _stiffness(settings, bodies, c, pressed[-1], path)
         contacts.append(own)
         springs.append(k)
-        if settings.law_of(c) != "jenkins":  # which has a closed form, and needs no assembly of point contacts
-            at, more = _contact(settings, bodies, members, own, k, path)
+        at, more = _contact(settings, bodies, members, own, k, path)
+        said += more
+        for force in pressed:
+            contact, more = at(force)
             said += more
-            for force in pressed:
-                contact, more = at(force)
-                said += more
-            made.append(contact)
-            if follows_the_force(c):
-                fitted[i] = partial(_of_force, at)
+        made.append(contact)
+        if follows_the_force(c):
+            fitted[i] = partial(_of_force, at)
         remarks += said
     flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in members.values())
     flowing, loads, said = _loads(settings, bodies, flowing, path)
@@ -311,7 +310,7 @@ def _contact(
     """A contact for any load, and remarks. springs: of one that is not curved."""
     from ..system.assembly import Side, touching
 
-    ends, law = _ends(settings, c), settings.law_of(c)
+    ends, law = _ends(settings, c), c.law_name
     loaded, faces = _sides(settings, bodies, c, path)
     first, second, met = Side(*ends[0]), None, None
     if len(ends) == 2:

@@ -16,7 +16,7 @@ from ..results.names import exact
 from ..units import METRES, Quantity
 from .assemble import Built, build, swept
 from .run import normal_forces, problem_of
-from .surveys import CurveOfCase, pointwise
+from .surveys import CurveOfCase
 
 if TYPE_CHECKING:
     from ..harmonic_balance.families import Family
@@ -148,7 +148,6 @@ def curves(
     from ..harmonic_balance.kept import kept_curve, labels, points_of_curve
     from ..harmonic_balance.readout import measured
 
-    pointwise(settings, "curve", path)
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
     of = measured(built.assembly)
     ends, how = _ends(built, asked, over, path), _settings(asked)
@@ -187,10 +186,13 @@ def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tupl
         return asked.band or (built.settings.sweep.start, built.settings.sweep.stop)
     if not any(swept(c) for c in built.contacts):
         raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
-    for i in built.fitted:
+    for c in (built.contacts[i] for i in built.fitted):
+        if c.law == "jenkins":
+            raise UserError(f'{path}: contacts.{c.interface}.law: "jenkins" holds a force given beforehand; write "smooth" '
+                            "for a curve over the force")  # fmt: skip
         raise UserError(
-            f"{path}: contacts.{built.contacts[i].interface}.fitted_at: is missing; along a curve over its force "
-            "a curved contact has one law, so give the force (N) at which it is fitted"
+            f"{path}: contacts.{c.interface}.fitted_at: is missing; along a curve over its force a curved contact has "
+            "one law, so give the force (N) at which it is fitted"
         )
     forces = normal_forces(built, path)
     if asked.normal_force is None and len(set(forces)) < 2:

@@ -1,4 +1,4 @@
-"""What a case puts into its response file: the head that says what points are of, and points of the closed form."""
+"""What a case puts into its response file: the head that says what points are of"""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
-from ..harmonic_balance import FrequencyResponse
-from ..harmonic_balance.readout import measured
+from ..data import UserError
 from ..results import Body
-from ..results.files import CONVERGED
 from ..results.names import exact
 from ..store import fingerprint
 from .assemble import Built, Loaded
@@ -82,17 +79,8 @@ def head_of(
         for name in built.bodies
         for member in _standing(built, name)
     }
-    mode = s.mode if s.has_laws else "jenkins"
-    told = {"case": s.name, "description": s.description, "mode": mode, "settings": dict(raw), "bodies": bodies}
-    if mode == "jenkins":
-        return told | {"labels": {_read_out(built): [built.assembly.watches[0].label]}}
+    told = {"case": s.name, "description": s.description, "mode": s.mode, "settings": dict(raw), "bodies": bodies}
     return told | {"harmonics": s.balanced}
-
-
-def _read_out(built: Built) -> str:
-    """Name of the array of the first read-out in the response file."""
-    kind = "gauges" if measured(built.assembly).unit == "1" else "monitors"
-    return f"{kind}/{built.assembly.watches[0].monitor}"
 
 
 def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSettings:
@@ -127,8 +115,7 @@ def _joined(built: Built, name: str) -> bool:
 
 def _body(built: Built, name: str, sha256: str, file: str) -> Body:
     b = built.bodies[name]
-    count = built.settings.balanced if built.settings.has_laws or not built.settings.contacts else 1
-    harmonics = tuple(_wave(built, b, h) for h in range(count + 1))
+    harmonics = tuple(_wave(built, b, h) for h in range(built.settings.balanced + 1))
     speed = b.settings.speed if b.settings.speed_rpm is None else -1
     return Body(b.basis.name, sha256, file, speed, b.group.speed * 30 / np.pi, harmonics, b.beside)
 
@@ -149,49 +136,6 @@ def drawn_monitor(built: Built) -> tuple[str, str] | None:
     member = _standing(built, watch.member)[0]
     several = len(built.bodies) > 1 or member != watch.member
     return member, f"{member}:{watch.monitor}" if several else watch.monitor
-
-
-# the closed form ---------------------------------------------------------------------------------------------------
-
-
-def closed_points(
-    built: Built, response: FrequencyResponse, at_peaks: FrequencyResponse
-) -> dict[float, dict[str, Any]]:  # fmt: skip
-    """Points of one normal force, as a journal would keep them: those of the sweep, and of its refined peaks."""
-    return _closed(built, response, 0) | _closed(built, at_peaks, 1)
-
-
-def _closed(built: Built, r: FrequencyResponse, peak: int) -> dict[float, dict[str, Any]]:
-    (member,) = built.assembly.members
-    group = member.groups[0]
-    points: dict[float, dict[str, Any]] = {}
-    for i, f in enumerate(map(float, r.frequency)):
-        row: dict[str, Any] = {
-            "frequency": f, "status": CONVERGED if r.converged[i] else "iteration limit: no solution was found",
-            "peak": float(peak * f), "added": int(not peak and not r.asked[i]),
-            _read_out(built): np.array([[0.0, r.monitor[i]]]), "dissipated": float(r.dissipated[i]),
-            "supplied": float(r.supplied[i]), "damped": float(r.damped[i]), "checks/balance": float(r.balance[i]),
-            "checks/counted": float(r.counted[i]), "checks/motion": float(r.motion[i]),
-            f"bodies/{member.name}/q": np.stack([0.0 * r.modal[i], r.modal[i]]),
-        }  # fmt: skip
-        for c, six in zip(built.contacts, r.force[i].reshape(-1, 6), strict=True):
-            row[f"contacts/{c.interface}/force"] = np.column_stack([0.0 * six.real, six.real, -six.imag])
-        if group.residual is not None:
-            row[f"bodies/{member.name}/forces"] = _beside(built, group, r.force[i])
-        points[f] = row
-    return points
-
-
-def _beside(built: Built, group: ModalGroup, force: Array) -> Array:
-    """(2, r) amplitudes of the forces on the rows of the residual shapes."""
-    assert group.residual is not None
-    labels, load = group.residual.labels, built.assembly.loads[0]
-    out = np.zeros((2, len(labels)), dtype=complex)
-    for c, six in zip(built.contacts, force.reshape(-1, 6), strict=True):
-        for row, value in zip(INTERFACE_ROWS, six, strict=True):
-            out[1, labels.index(f"interface:{c.interface}:{row}")] -= value
-    out[1, next(i for i, x in enumerate(labels) if x.startswith(f"excitation:{load.row}:"))] += load.amplitude
-    return out
 
 
 # contacts ----------------------------------------------------------------------------------------------------------

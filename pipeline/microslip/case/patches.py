@@ -33,6 +33,8 @@ def patch_of(
 
     if law == "hertz":
         return _resultants(c, load)
+    if law == "jenkins":
+        return _jenkins(c, springs, load)
     points, areas = _points(c, face, _counts(c, load))
     return Patch(c.interface, points, areas, _curved(c, _law(c, springs, law, areas, whole), points))
 
@@ -43,6 +45,15 @@ def nodal_patch(c: ContactSettings, springs: Springs, law: str, found: Nodal, wh
 
     law_of_points = _curved(c, _law(c, springs, law, found.areas, whole), found.points)
     return Patch(c.interface, found.points, found.areas, law_of_points, found.shapes)
+
+
+def _jenkins(c: ContactSettings, springs: Springs, load: float | None) -> Patch:
+    """Jenkins elements; a contact that nothing presses has no stiffness."""
+    from ..contact.jenkins import four
+
+    size, slider = (c.width or 0.0, c.height or 0.0), 1 if c.slides_along == "t1" else 2
+    stiff = springs if load is None or load > 0 else (0.0, 0.0, 0.0)
+    return four(c.interface, stiff, size, c.coefficient * (load or 0.0), slider)
 
 
 FEWEST, ENOUGH = 3, 6
@@ -130,8 +141,10 @@ def _law(c: ContactSettings, springs: Springs, law: str, areas: Array, whole: La
 
 
 def follows_the_force(c: ContactSettings) -> bool:
-    """Whether a curved contact is fitted at the very force of the sweep that presses it."""
-    return c.young is not None and c.fitted_at is None and c.normal_force is None and c.interference is None
+    """Whether the law of a contact depends on the very force of the sweep that presses it: a curved one is fitted at
+    it, of a Jenkins element it is the friction limit."""
+    made_for_it = c.law == "jenkins" or (c.young is not None and c.fitted_at is None)
+    return made_for_it and c.normal_force is None and c.interference is None
 
 
 def fitting_forces(settings: CaseSettings, c: ContactSettings) -> tuple[float | None, ...]:

@@ -20,7 +20,6 @@ from ..results.checks import cause
 from ..units import Quantity, counted, percent
 from . import edges
 from .assemble import Built, build, memory_of, swept
-from .closed_form import Answer, in_closed_form
 from .edges import Rising
 from .keeping import series_name
 from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from ..system.assembly import Assembly, Linear
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
+Answer = tuple[dict[float, "HarmonicResponse"], dict[float, list[tuple[float, float]]], tuple[Array, Array], list[str]]
 
 
 @dataclass(frozen=True)
@@ -43,20 +43,19 @@ class CaseResult:
     stuck_damping: ratio D of each of them, so that its half-power width is 2 D f.
 
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
-    sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. at_peaks: the closed form at those
-    peaks. rising: ends of the band at which responses still rise. truncation: largest estimated error of an amplitude
-    for want of harmonics and samples, over it; None where it is not estimated.
+    sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. rising: ends of the band at which
+    responses still rise. truncation: largest estimated error of an amplitude for want of harmonics and samples, over
+    it; None where it is not estimated.
     """
 
     settings: CaseSettings
-    responses: dict[float, FrequencyResponse]
+    responses: dict[float, HarmonicResponse]
     free: FrequencyResponse
     stuck: Array
     resonances: dict[float, list[tuple[float, float]]]
     speed: float
     remarks: tuple[str, ...]
     built: Built
-    at_peaks: dict[float, FrequencyResponse] = field(default_factory=dict)
     rising: tuple[Rising, ...] = ()
     truncation: float | None = None
     stuck_damping: Array = field(default_factory=lambda: np.zeros(0))
@@ -65,17 +64,6 @@ class CaseResult:
     def quantity(self) -> Quantity:
         """What the first read-out measures."""
         return measured(self.built.assembly)
-
-    def lifted(self, normal: float) -> tuple[Array, Array]:
-        """Whether contacts would lift off, which the closed form does not follow: (f,) of the sweep, (p,) of its peaks.
-
-        All False for contacts with a law, which do lift off.
-        """
-        if not self.at_peaks or not normal:
-            return np.zeros(len(self.responses[normal].frequency), bool), np.zeros(len(self.resonances[normal]), bool)
-        at = (self.responses[normal], self.at_peaks[normal])
-        swing, at_peaks = (r.normal_swing.max(axis=1, initial=0.0) > normal for r in at)
-        return swing, at_peaks
 
 
 class _TooFew(Exception):
@@ -124,15 +112,11 @@ def _run(
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
     forces = normal_forces(built, path)
-    at_peaks: dict[float, FrequencyResponse] = {}
     left = _Left(built, tolerance)
     _book_can(built, path)
-    if settings.has_laws or not settings.contacts:
-        _can_be_pressed(built, forces, path)
-        with keep(built) if keep else nullcontext() as journal:
-            responses, resonances, stuck, remarks = _by_laws(built, forces, frequency, report, journal, left)
-    else:
-        responses, resonances, stuck, remarks = in_closed_form(built, forces, frequency, report, at_peaks)
+    _can_be_pressed(built, forces, path)
+    with keep(built) if keep else nullcontext() as journal:
+        responses, resonances, stuck, remarks = _by_laws(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
     idle = [normal for normal, r in responses.items() if _still(r)]
     resonances |= {normal: [] for normal in idle}
@@ -150,7 +134,7 @@ def _run(
         *edges.remarks(at_the_ends),
     ]
     return CaseResult(
-        settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built, at_peaks,
+        settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built,
         tuple(at_the_ends), left.most, stuck[1],
     )  # fmt: skip
 
@@ -196,7 +180,7 @@ def _by_laws(
     left: _Left,
 ) -> Answer:  # fmt: skip
     """With the laws of the contact room and as many harmonics as the case asks for."""
-    responses: dict[float, FrequencyResponse] = {}
+    responses: dict[float, HarmonicResponse] = {}
     resonances, stiff, remarks = {}, (np.zeros(0), np.zeros(0)), []
     _say_what_it_takes(built, report)
     for normal in forces or (None,):
@@ -207,7 +191,7 @@ def _by_laws(
         found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
         responses[key] = found
         remarks += _not_periodic(key, found.unsteady, built.settings)
-        remarks += _lifting(built, problem, found, key)
+        remarks += _lifting(built, problem, found, key) + _pulling(built, found, key)
         remarks += [] if _still(found) else left.out(problem, found, resonances[key], key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
@@ -457,6 +441,20 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
     ]
 
 
+def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
+    """A remark where contacts that do not open would."""
+    count = found.open.shape[1] // max(len(built.contacts), 1)
+    jenkins = np.repeat(np.array([c.law == "jenkins" for c in built.contacts], dtype=bool), count)
+    pulls = ((found.open > 0) & found.converged[:, None])[:, jenkins].any(axis=1)
+    if not normal or not pulls.any():
+        return []
+    low, high = found.frequency[pulls][[0, -1]]
+    return [
+        f"At F_N = {normal:g} N the contacts would lift off between {low:.4g} and {high:.4g} Hz, which law = "
+        '"jenkins" does not follow; write law = "smooth" in the contacts.'
+    ]
+
+
 def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> list[str]:
     worst = float(unsteady.max(initial=0.0))
     if worst < 1e-3:
@@ -569,12 +567,11 @@ REMEDIES = {
 """What to do about a cause, where the status of the point does not say it."""
 
 
-def _not_converged(responses: dict[float, FrequencyResponse]) -> list[str]:
+def _not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
     """A remark for each normal force and cause."""
     found = []
     for normal, r in responses.items():
-        texts = getattr(r, "status", ("iteration limit: Newton's method found no solution",) * len(r.frequency))
-        failed = {f: text for f, text, ok in zip(r.frequency, texts, r.converged, strict=True) if not ok}
+        failed = {f: text for f, text, ok in zip(r.frequency, r.status, r.converged, strict=True) if not ok}
         for why in dict.fromkeys(map(cause, failed.values())):
             at = [f for f, text in failed.items() if cause(text) == why]
             remedy = REMEDIES.get(why, REMEDIES["iteration limit"])

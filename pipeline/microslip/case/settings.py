@@ -113,10 +113,10 @@ class ContactSettings(Model):
     width (along t1) and height (along t2) in m are the patch's own if not given. includes: which compliance the
     stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
 
-    law: ``jenkins``, linear springs and one Jenkins element along `slides_along` in closed form, one harmonic; or point
-    contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough`` (3.3, with
-    `roughness` R_Z in m). Not given: ``jenkins`` for one body on the ground, else ``smooth``. points: how many along
-    t1 and t2.
+    law: point contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough``
+    (3.3, with `roughness` R_Z in m), points of them along t1 and t2; or ``jenkins``, four Jenkins elements: linear
+    springs that do not open and slide along `slides_along`, where friction holds its share of the normal force that
+    presses the contact, however that one swings. Not given: ``smooth``.
 
     stiffness, roughness, friction, element, temperature: the tables of a contact.toml (`docs/contact_toml.md`), for any
     law of the contact room or of another package; every point carries its share of it. normal_stiffness and
@@ -219,12 +219,24 @@ class ContactSettings(Model):
         some = (self, self.stiffness, self.roughness, self.friction)
         return [file for one in some if isinstance(file := getattr(one, "file", None), str)]
 
+    @property
+    def law_name(self) -> str:
+        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``tables``."""
+        return "tables" if self.described else self.law or "smooth"
+
     @model_validator(mode="after")
     def _belongs_to_the_law(self) -> ContactSettings:
         if (self.law == "rough") != (self.roughness is not None) and not self.in_tables:
             raise ValueError('roughness (R_Z in m) belongs to law = "rough": give both or neither')
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
+        if self.law == "jenkins" and self.interference is not None:
+            raise ValueError('interference: law = "jenkins" holds mu F_N of a given force; give a normal_force')
+        if self.law == "jenkins" and (self.points is not None or self.patch == "nodal" or self.curvature is not None):
+            key = "points" if self.points is not None else "curvature" if self.curvature is not None else "patch"
+            raise ValueError(f'{key}: law = "jenkins" has four elements on a flat, rigid patch; write law = "smooth"')
+        if self.law != "jenkins" and "slides_along" in self.model_fields_set:
+            raise ValueError('slides_along: belongs to law = "jenkins"; points of the others slide in any direction')
         return self._curved()
 
     def _curved(self) -> ContactSettings:
@@ -334,17 +346,6 @@ class CaseSettings(Model):
         if all(x.is_zero for x in self.loads):
             key = "excitations" if self.excitations else "amplitude"
             raise ValueError(f"{key}: a force of 0 moves nothing; give its size in N (Pa of a pressure)")
-        laws = {self.law_of(c) == "jenkins" for c in self.contacts}
-        if len(laws) > 1:
-            raise ValueError('contacts: law = "jenkins" is one harmonic in closed form and cannot stand beside others')
-        if True in laws and not self.one_on_the_ground:
-            raise ValueError(
-                'contacts: law = "jenkins" is a closed form for one body on the ground; write "smooth" or "rough"'
-            )
-        if any(self.law_of(c) == "jenkins" and c.points is not None for c in self.contacts):
-            raise ValueError('contacts: points belong to law = "smooth" or "rough"; the closed form needs none')
-        if any(self.law_of(c) == "jenkins" and (c.patch == "nodal" or c.curvature) for c in self.contacts):
-            raise ValueError('contacts: patch = "nodal" and curvature need points; write law = "smooth" or "rough"')
         if said := self._met_twice():
             raise ValueError(said)
         count = self.number_of_harmonics
@@ -360,8 +361,6 @@ class CaseSettings(Model):
             raise ValueError('damping_ratio: damping = "stuck" needs that of the stuck modes; give one, or one a mode')
         if self.damping == "stuck" and any(b.damping_ratio is not None for b in self.bodies):
             raise ValueError('bodies: damping = "stuck" leaves no damping_ratio of a body; give one of the two')
-        if self.damping in ("structural", "stuck") and self.contacts and not self.has_laws:
-            raise ValueError('damping: the closed form of law = "jenkins" knows "modal" alone; write law = "smooth"')
         return self
 
     @property
@@ -408,7 +407,7 @@ class CaseSettings(Model):
         return ""
 
     def _book(self) -> CaseSettings:
-        if self.mode == "book" and not self.has_laws:
+        if self.mode == "book" and (not self.contacts or any(c.law == "jenkins" for c in self.contacts)):
             raise ValueError('mode: "book" needs point contacts; write law = "smooth" or "rough" in every contact')
         if self.strips and self.mode != "book":
             raise ValueError('strips: belong to mode = "book"; a marched law brings its own microslip (contacts.file)')
@@ -444,7 +443,7 @@ class CaseSettings(Model):
     @property
     def looks_for_harmonics(self) -> bool:
         """Whether their number follows from an estimated error."""
-        return self.harmonics == "auto" and self.mode == "marched" and (self.has_laws or not self.contacts)
+        return self.harmonics == "auto" and self.mode == "marched"
 
     def with_harmonics(self, count: int) -> CaseSettings:
         """The case with a number of harmonics, and of samples that grow with them: both errors fall."""
@@ -492,26 +491,6 @@ class CaseSettings(Model):
     def watches(self) -> tuple[MonitorOfCase, ...]:
         """The monitors; one that the short form names."""
         return self.monitors or (MonitorOfCase(monitor=self.monitor or "", direction=self.direction),)
-
-    @property
-    def one_on_the_ground(self) -> bool:
-        """One body whose contacts all meet the ground, pressed by the forces of the sweep."""
-        alone = len(self.members) == 1 and self.ring is None and not (self.excitations or self.monitors)
-        return alone and all(
-            c.against == GROUND and c.normal_force is None and c.interference is None for c in self.contacts
-        )
-
-    def law_of(self, contact: ContactSettings) -> str:
-        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``tables``."""
-        if contact.described:
-            return "tables"
-        plain = self.one_on_the_ground and contact.patch == "rigid" and contact.curvature is None
-        return contact.law or ("jenkins" if plain else "smooth")
-
-    @property
-    def has_laws(self) -> bool:
-        """Whether the contacts are points with a law, and not the closed form."""
-        return any(self.law_of(c) != "jenkins" for c in self.contacts)
 
     def address(self, text: str) -> tuple[str, str]:
         """Body and row of ``body:row``; the only body of the case where none is named."""

@@ -151,18 +151,7 @@ def _asked(settings: CaseSettings, key: str, path: Path | str) -> Any:
     found = getattr(settings, key)
     if found is None:
         raise UserError(f"{path}: {key}: is not asked for in this case; add [{key}]")
-    pointwise(settings, key, path)
     return found
-
-
-def pointwise(settings: CaseSettings, key: str, path: Path | str) -> None:
-    """Refuse contacts in closed form.
-
-    Raises:
-        UserError: law = "jenkins".
-    """
-    if settings.contacts and not settings.has_laws:
-        raise UserError(f'{path}: {key}: needs point contacts; write law = "smooth" or "rough" in the contacts')
 
 
 def _one_force(built: Built, path: Path | str, key: str) -> float | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..data import Array, ComplexArray, Indices
+from ..data import Array, Indices
 from ..results.names import apart as told_apart
 from ..units import METRES, Quantity
 
@@ -25,8 +25,6 @@ class FrequencyResponse:
         supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
         balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
         added: (f,) bool, points between those asked for, see `hidden`; empty: none.
-        modal: (f, m) coordinates of the body, and force: (f, 6 c) what acts on the contacts, N and N m, both complex
-            0-peak; of the closed form alone.
     """
 
     frequency: Array
@@ -43,8 +41,6 @@ class FrequencyResponse:
     counted: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
     motion: Array = field(kw_only=True, default_factory=lambda: np.zeros(0))
     added: Array = field(kw_only=True, default_factory=lambda: np.zeros(0, dtype=bool))
-    modal: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    force: ComplexArray = field(kw_only=True, default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     @property
     def asked(self) -> Array:

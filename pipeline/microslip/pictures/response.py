@@ -22,21 +22,14 @@ def response_picture(result: CaseResult, path: Path) -> None:
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
     axes.plot(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
-    colours, lifted = _colours(len(result.responses)), list[float]()
-    forces = sorted(result.responses, reverse=True)
+    forces, colours = sorted(result.responses, reverse=True), _colours(len(result.responses))
     for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
         r = result.responses[normal]
         apart_from_it = overhanging(r, result.resonances[normal])
-        f, amplitude, lifts = _with_peaks(r, result.resonances[normal], result.lifted(normal))
+        f, amplitude = _with_peaks(r, result.resonances[normal])
         on = ~np.isin(f, [at for at, _ in apart_from_it])
-        f, amplitude, lifts = f[on], amplitude[on], lifts[on]
         axes.plot([at for at, _ in apart_from_it], [1e6 * a for _, a in apart_from_it], "o", color=colour, ms=4)
-        sure = np.where(lifts, np.nan, amplitude)
-        axes.plot(f, sure, color=colour, lw=1.6, label=f"$F_N$ = {said} N")
-        if lifts.any():
-            beside = lifts | np.append(lifts[1:], False) | np.append(False, lifts[:-1])  # up to the line that is sure
-            axes.plot(f, np.where(beside, amplitude, np.nan), color=colour, lw=1.6, ls=":")
-            lifted.append(normal)
+        axes.plot(f[on], amplitude[on], color=colour, lw=1.6, label=f"$F_N$ = {said} N")
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
     low, high = result.free.frequency[[0, -1]]
@@ -54,9 +47,8 @@ def response_picture(result: CaseResult, path: Path) -> None:
     axes.set_xlim(low, high)
     axes.grid(True, which="both", alpha=0.25)
     told = "dashed: sticking contacts"
-    if s.has_laws and len(result.responses) > 1:
+    if len(result.responses) > 1:
         told += f" at $F_N$ = {max(result.responses):g} N"
-    told += "; dotted: contacts would lift off, not valid" if lifted else ""
     figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told, title_fontsize=8)
     figure.savefig(path, format="png")
 
@@ -98,15 +90,13 @@ def comparison_picture(
     figure.savefig(path, format="png")
 
 
-def _with_peaks(
-    r: FrequencyResponse, peaks: list[tuple[float, float]], lifted: tuple[Array, Array]
-) -> tuple[Array, Array, Array]:
-    """Frequency, Hz, amplitude, millionths of its unit, and lift-off at the points of a sweep and at the peaks found
-    between them."""
+def _with_peaks(r: FrequencyResponse, peaks: list[tuple[float, float]]) -> tuple[Array, Array]:
+    """Frequency, Hz, and amplitude, millionths of its unit, at the points of a sweep and at the peaks found between
+    them."""
     f = np.concatenate([r.frequency, [f for f, _ in peaks]])
     amplitude = np.concatenate([np.where(r.converged, np.abs(r.monitor), np.nan), [a for _, a in peaks]])
     order = np.argsort(f, kind="stable")
-    return f[order], 1e6 * amplitude[order], np.concatenate(lifted)[order]
+    return f[order], 1e6 * amplitude[order]
 
 
 def _colours(count: int) -> list[tuple[float, ...]]:

@@ -99,7 +99,7 @@ class Response:
     """A case's response.
 
     Attributes:
-        case: its name. description. mode: how the contacts were treated (``marched``, ``book``, ``jenkins``).
+        case: its name. description. mode: how the contacts were treated (``marched`` or ``book``).
             settings: the case file. inputs: hash of all that a point depends on. bodies: member -> `Body`. labels: name
             of an array -> its rows. series: in the order they were computed. resonances: rows of a table.
             estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not
