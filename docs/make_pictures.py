@@ -23,10 +23,9 @@ from microslip.basis import read_basis
 from microslip.campbell import track_basis
 from microslip.case import CaseSettings, load_case, run_case
 from microslip.case.assemble import sized
-from microslip.case.closed_form import jenkins_contact
+from microslip.case.settings import ContactSettings
 from microslip.compliance import contact_share, without_bulk
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
-from microslip.harmonic_balance import peaks, stuck_frequencies
 from microslip.modes import modal_basis
 from microslip.modes.patches import patch_bounds
 from microslip.pictures import lettering, plots, views
@@ -34,6 +33,7 @@ from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
 from microslip.reduction import METHODS
+from microslip.reference.one_harmonic import JenkinsContact, stuck_frequencies
 from microslip.running import compare_book
 from microslip.speed_range import frequencies_over
 from microslip.workflow import closure_stage, load_mesh, mesh_stage, modes_stage, open_job
@@ -523,8 +523,15 @@ def blade_case(basis: ModalBasis, **changes: Any) -> CaseSettings:
     return settings.model_copy(update={"contacts": own, **changes})
 
 
-def stuck(group: ModalGroup, settings: CaseSettings, normal: float = 780.0) -> np.ndarray:
-    return stuck_frequencies(group, [jenkins_contact(c, normal) for c in settings.contacts])[:4]
+def stuck(group: ModalGroup, settings: CaseSettings) -> np.ndarray:
+    contacts = [JenkinsContact(c.interface, six := springs_of(c), 1, six[1], np.inf) for c in settings.contacts]
+    return stuck_frequencies(group, contacts)[:4]
+
+
+def springs_of(c: ContactSettings) -> np.ndarray:
+    """(6,) springs of a patch along u_n, u_t1, u_t2, phi_n, phi_t1, phi_t2 (Sextro Eqs. (5.2-39) to (5.2-41))."""
+    n, t, b2, h2 = c.normal_stiffness, c.tangential_stiffness, (c.width or 0.0) ** 2 / 12, (c.height or 0.0) ** 2 / 12
+    return np.array([n, t, t, t * (b2 + h2), n * h2, n * b2])
 
 
 def contact() -> None:
@@ -537,14 +544,12 @@ def contact() -> None:
     ]
     fill("blade.md", "stuck", table(["resonance", "printed, Hz", "sticking contacts, Hz", "deviation"], rows))
     rows = []
-    near = {"start": 90.0, "stop": 130.0, "points": 8001}  # fine enough for the sharpest peak
-    settings = blade_case(basis)
-    fine = run_case(settings.model_copy(update={"sweep": settings.sweep.model_copy(update=near)}), basis, "blade.toml")
-    for normal, response in sorted(fine.responses.items(), reverse=True):
-        f, a = max((p for p in peaks(response) if p[0] < 200), key=lambda p: p[1])
-        i = int(np.argmin(np.abs(response.frequency - f)))
-        rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{1e6 * response.dissipated[i]:.0f}"])
-    fill("blade.md", "peaks", table(["F_N, N", "resonance, Hz", "amplitude, um", "friction loss a cycle, uJ"], rows))
+    for normal, found in sorted(result.resonances.items(), reverse=True):
+        f, a = max(found, key=lambda p: p[1])
+        open_ = result.responses[normal].open.max()
+        rows.append([f"{normal:g}", f"{f:.1f}", f"{1e6 * a:.1f}", f"{100 * open_:.2g}"])
+    head = ["F_N, N", "resonance, Hz", "amplitude, um", "points times cycle that are open at most, %"]
+    fill("blade.md", "peaks", table(head, rows))
     PICTURES.mkdir(exist_ok=True)
     response_picture(result, BUILD / "response.png")
     save(from_file(BUILD / "response.png"), "blade_response")
@@ -597,7 +602,7 @@ def with_contacts(settings: CaseSettings, change: Any) -> CaseSettings:
 
 def amplitudes(basis: ModalBasis, settings: CaseSettings) -> None:
     """First resonance at 780 N and 100 N for other excitation heights and dampings."""
-    band = {"start": 105.0, "stop": 125.0, "points": 2001, "normal_forces": (100.0, 780.0)}
+    band = {"start": 105.0, "stop": 125.0, "points": 41, "normal_forces": (100.0, 780.0)}
     near = settings.sweep.model_copy(update=band)
     rows = []
 
@@ -622,7 +627,7 @@ def arrangement2() -> None:
     change = ("geometry.parameters.arrangement=2", "interfaces.right.t2=[0,0,1]", "interfaces.left.t2=[0,0,1]")
     basis = made("blade-arrangement-2", "blade", *LIGHT, *change)
     settings = blade_case(basis)
-    stiff = dict(zip(SPRINGS, (7.6e9, 2.9e9), strict=True)) | {"width": 0.020, "friction": 0.4, "slides_along": "t1"}
+    stiff = dict(zip(SPRINGS, (7.6e9, 2.9e9), strict=True)) | {"width": 0.020, "friction": 0.4}
     values = stuck(basis.groups[0, 0], with_contacts(settings, lambda _: stiff))
     text = ", ".join(f"{v:.1f}" for v in values[:3])
     fill("blade.md", "arrangement2", f"With sticking contacts: {text} and {values[3]:.1f} Hz.")
@@ -631,19 +636,17 @@ def arrangement2() -> None:
 def first() -> None:
     """README's first screen: three modes of the free blade, and the friction response between its neighbours."""
     basis = made("blade", "blade", *LIGHT)
-    forces = (10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0, 780.0)
-    settings = blade_case(basis)
-    sweep = settings.sweep.model_copy(update={"start": 90.0, "stop": 130.0, "points": 1601, "normal_forces": forces})
-    result = run_case(settings.model_copy(update={"sweep": sweep}), basis, "blade.toml")
+    result = run_case(blade_case(basis), basis, "blade.toml")
     left = with_studio(basis, three_modes)
     fig = figure(7.2, left.height / 110)
     axes = fig.subplots()
     plain(axes)
     free = result.free
     axes.semilogy(free.frequency, 1e6 * np.abs(free.monitor), color="0.55", lw=1.2, ls="--", label="free blade")
-    colours = plots_colours(len(forces))
-    for colour, (normal, r) in zip(colours, result.responses.items(), strict=True):
-        axes.semilogy(r.frequency, 1e6 * np.abs(r.monitor), color=colour, lw=2.0, label=f"{normal:g} N")
+    for colour, (normal, r) in zip(plots_colours(len(result.responses)), result.responses.items(), strict=True):
+        points = np.vstack([np.column_stack([r.frequency, np.abs(r.monitor)]), result.resonances[normal]])
+        f, a = points[points[:, 0].argsort()].T
+        axes.semilogy(f, 1e6 * a, color=colour, lw=2.0, label=f"{normal:g} N")
     axes.set_xlim(90, 130)
     axes.set_ylim(2, 2500)
     axes.set_xlabel("excitation frequency in Hz", fontsize=12)
@@ -1000,7 +1003,7 @@ def sticking_force(study: Any) -> None:
         groups[label] = study.modal_basis(mesh, settings.model_copy(update=own)).groups[0, 0]
     case, _ = load_case(ROOT / "pipeline" / "cases" / "blade.toml")
     own = [sized(c, groups["reference"].interfaces[c.interface], "blade.toml") for c in case.contacts]
-    springs = np.concatenate([jenkins_contact(c, 780.0).stiffness for c in own])
+    springs = np.concatenate([springs_of(c) for c in own])
     frequency = np.linspace(60, 1200, 2281)
     found = {label: np.abs(study.reduced_force(g, springs, frequency)) for label, g in groups.items()}
     places = np.linspace(0, len(frequency) - 1, 25).astype(int)

@@ -410,10 +410,10 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.width": ("m", "b_0 along t1; the patch's own if not given"),
     "contacts.height": ("m", "h_0 along t2, likewise"),
     "contacts.friction": ("", "coefficient, or a table as in a contact.toml; **required** without file"),
-    "contacts.slides_along": ("", "law jenkins: where its slider is"),
+    "contacts.slides_along": ("", "law jenkins: the tangent along which it slides"),
     "contacts.includes": ("", "which [compliance](contact.md) the stiffnesses count"),
-    "contacts.law": ("", "closed form of one harmonic, or points with a law; if not given, `jenkins` for one body on "
-                     "the ground, else `smooth`"),
+    "contacts.law": ("", "points that stick, slide and open (`smooth` if not given), Hertz' own law, or Jenkins "
+                     "elements that never open"),
     "contacts.roughness": ("m", "R_Z, of law rough, or a table as in a contact.toml"),
     "contacts.points": ("", "how many along t1 and t2"),
     "contacts.patch": ("", "six coordinates, or points that move as the shapes of the bodies say"),

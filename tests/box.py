@@ -70,9 +70,12 @@ body = "box"
 excitation = "shaker"
 monitor = "tip"
 direction = "x"
+harmonics = 1
+samples = 32
 
 [[contacts]]
 interface = "tip"
+law = "jenkins"
 normal_stiffness = 1e7
 tangential_stiffness = 1e6
 friction = 0.3
@@ -80,7 +83,7 @@ friction = 0.3
 [sweep]
 start = 500.0
 stop = 3000.0
-points = 60
+points = 12
 normal_forces = [1.0, 100.0]
 """
 

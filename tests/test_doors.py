@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 import pytest
 from box import edit, write_box
-from test_response_stage import CLOSED, SAMPLES
+from test_response_stage import QUICK, SAMPLES
 
 from microslip import running, store
 from microslip.cli import main
@@ -50,9 +50,9 @@ def soon() -> Iterator[None]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A modal file with a case in closed form, whose response takes no time."""
+    """A modal file with a case that sticks, whose response takes little time."""
     shutil.copy(SAMPLES / "basis.h5", tmp_path)
-    (tmp_path / "case.toml").write_text(CLOSED)
+    (tmp_path / "case.toml").write_text(QUICK)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(running, "_assessed", lambda *_: None)
     monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"picture"))
@@ -178,8 +178,8 @@ def test_a_file_that_a_file_names_is_a_file(key: str, folder: Path, capsys: pyte
         words = ["contact", "contact.toml"]
     else:
         field = 'excitations = [{field = "odd.inp", face = "right", length_unit = "m"}]'
-        text = CLOSED.replace('excitation = "magnet"\namplitude = 2.0', field)
-        (folder / "case.toml").write_text(text.replace("[[contacts]]", '[[contacts]]\nlaw = "smooth"'))
+        text = QUICK.replace('excitation = "magnet"\namplitude = 2.0', field)
+        (folder / "case.toml").write_text(text)
         words = ["respond", "."]
     assert "odd.inp" in refused(words, capsys)
 
@@ -390,7 +390,7 @@ def test_no_verb_makes_the_folder_of_an_output(
 
 @pytest.mark.parametrize("given", ['body = "../part"', 'bodies = [{name = "vane", body = "../part"}]'])
 def test_a_body_is_no_path(given: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "case.toml").write_text(CLOSED.replace('body = "vane-eigenmodes"', given))
+    (folder / "case.toml").write_text(QUICK.replace('body = "vane-eigenmodes"', given))
     line = refused(["run", "case.toml"], capsys)
     assert "body: " in line and "name" in line and "geometry/" in line
 

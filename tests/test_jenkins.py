@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_contact_laws import COUNTED, FORCES, TANGENT, path, work
 
-from microslip.contact.jenkins import Jenkins, four
+from microslip.contact.jenkins import Jenkins, four_places, shared
 from microslip.contact.law import Example, march, value
-from microslip.contact.patch import stuck_stiffness
+from microslip.contact.patch import Patch, stuck_stiffness
 from microslip.errors import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import harmonic_response
@@ -20,11 +20,15 @@ SPRINGS, SIZE = (3e6, 2e6, 5e6), (0.08, 0.03)
 LAW = Example(Jenkins(value(3e6), value(2e6), value(5e6), value(4.0), 2), 1e-5, 1e-5)
 
 
+def four(held: float, slider: int) -> Patch:
+    return Patch("rub", *four_places(*SIZE), shared(SPRINGS, held, slider, 4))
+
+
 @pytest.mark.parametrize("slider", [1, 2])
 def test_six_springs_are_those_of_an_even_patch(slider: int) -> None:
     """c_n, c_1, c_2, c_2 b^2/12 + c_1 h^2/12, c_n h^2/12, c_n b^2/12 (Sextro Eqs. (5.2-39) to (5.2-41))."""
     (n, t1, t2), (b2, h2) = SPRINGS, np.square(SIZE) / 12
-    patch = four("rub", SPRINGS, SIZE, 3.0, slider)
+    patch = four(3.0, slider)
     six = np.diag([n, t1, t2, t2 * b2 + t1 * h2, n * h2, n * b2])
     np.testing.assert_allclose(stuck_stiffness(patch, np.zeros(6)), six, rtol=1e-12, atol=1e-6)
 
@@ -44,14 +48,14 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     assert abs(abs(along @ group.excitations["push"].rows[0]) - 1.0) < 1e-9
     read, f = group.monitors["tip"].rows[1 if slider == 1 else 0], np.linspace(200.0, 420.0, 23)
     k, held = SPRINGS[slider], 0.4
-    six = np.diag(stuck_stiffness(four("rub", SPRINGS, SIZE, held, slider), np.zeros(6)))
+    six = np.diag(stuck_stiffness(four(held, slider), np.zeros(6)))
     closed = frequency_response(
         group, [JenkinsContact("rub", six, slider, k, held)], group.excitations["push"].rows[0], read, f
     )
     assert closed.converged.all() and (np.abs(closed.contact[:, slider]) > 2 * held / k).any()
     errors = []
     for samples in (64, 256):
-        contact = touching("rub", four("rub", SPRINGS, SIZE, held, slider), Side("block", "rub"), None, normal=2.0)
+        contact = touching("rub", four(held, slider), Side("block", "rub"), None, normal=2.0)
         loads, watches = (Load("block", "push"),), (Watch("block", "tip", "u_y" if slider == 1 else "u_x"),)
         problem = balance.of(Assembly((Member("block", {0: group}),), (contact,), loads, watches), 1, samples)
         found = harmonic_response(problem, f, np.array([held]))
@@ -87,4 +91,4 @@ def test_tangents_are_differences() -> None:
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
 def test_nonsense_is_refused(bad: float) -> None:
     with pytest.raises(UserError, match=r"Jenkins.held"):
-        four("rub", SPRINGS, SIZE, bad, 1)
+        four(bad, 1)

@@ -107,11 +107,11 @@ def test_interrupted_and_resumed(folder: Path) -> None:
     assert computed(respond(folder)[0]) == []  # up to date
 
 
-CLOSED = (
-    CASE.replace('law = "smooth"\npoints = [2, 2]\n', "").replace("points = 9", "points = 4")
-    .replace("[50.0]\n", "[50.0]\n#")
+QUICK = (
+    CASE.replace('law = "smooth"\npoints = [2, 2]\n', 'law = "jenkins"\n').replace("points = 9", "points = 4")
+    .replace("samples = 24", "samples = 8").replace("[50.0]\n", "[1e4]\n#")
 )  # fmt: skip
-"""In closed form, without margins: it costs nothing."""
+"""Linear, as it sticks, and without margins: it costs little."""
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_what_was_spoiled_is_made_again(folder: Path) -> None:
 @pytest.mark.slow
 def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`respond`, `respond --set amplitude=4` killed at its first, second, ... write, `respond`: the first answer."""
-    (folder / "case.toml").write_text(CLOSED)
+    (folder / "case.toml").write_text(QUICK)
     monkeypatch.setattr(running, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
     monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"picture"))
     respond(folder)
@@ -174,7 +174,7 @@ def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.M
 @pytest.mark.slow
 def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
     """SIGKILL at the response file of another case, whose table is written already: `respond` gives its own again."""
-    (folder / "case.toml").write_text(CLOSED)
+    (folder / "case.toml").write_text(QUICK)
     respond(folder)
     build = folder / "build" / "vane"
     table, points = (build / "response.csv").read_bytes(), read_response(build / "response.h5").series[0].arrays

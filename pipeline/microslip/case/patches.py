@@ -34,7 +34,7 @@ def patch_of(
     if law == "hertz":
         return _resultants(c, load)
     if law == "jenkins":
-        return _jenkins(c, springs, load)
+        return _jenkins(c, springs, face, load)
     points, areas = _points(c, face, _counts(c, load))
     return Patch(c.interface, points, areas, _curved(c, _law(c, springs, law, areas, whole), points))
 
@@ -47,13 +47,15 @@ def nodal_patch(c: ContactSettings, springs: Springs, law: str, found: Nodal, wh
     return Patch(c.interface, found.points, found.areas, law_of_points, found.shapes)
 
 
-def _jenkins(c: ContactSettings, springs: Springs, load: float | None) -> Patch:
+def _jenkins(c: ContactSettings, springs: Springs, face: Interface, load: float | None) -> Patch:
     """Jenkins elements; a contact that nothing presses has no stiffness."""
-    from ..contact.jenkins import four
+    from ..contact.jenkins import four_places, shared
+    from ..contact.patch import Patch
 
-    size, slider = (c.width or 0.0, c.height or 0.0), 1 if c.slides_along == "t1" else 2
+    places, areas = _points(c, face, c.points) if c.points else four_places(c.width or 0.0, c.height or 0.0)
     stiff = springs if load is None or load > 0 else (0.0, 0.0, 0.0)
-    return four(c.interface, stiff, size, c.coefficient * (load or 0.0), slider)
+    law = shared(stiff, c.coefficient * (load or 0.0), 1 if c.slides_along == "t1" else 2, len(places))
+    return Patch(c.interface, places, areas, law)
 
 
 FEWEST, ENOUGH = 3, 6

@@ -114,9 +114,9 @@ class ContactSettings(Model):
     stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
 
     law: point contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough``
-    (3.3, with `roughness` R_Z in m), points of them along t1 and t2; or ``jenkins``, four Jenkins elements: linear
-    springs that do not open and slide along `slides_along`, where friction holds its share of the normal force that
-    presses the contact, however that one swings. Not given: ``smooth``.
+    (3.3, with `roughness` R_Z in m), points of them along t1 and t2; or ``jenkins``, Jenkins elements (four if
+    `points` are not given): linear springs that do not open and slide along `slides_along`, where friction holds its
+    share of the normal force that presses the contact, however that one swings. Not given: ``smooth``.
 
     stiffness, roughness, friction, element, temperature: the tables of a contact.toml (`docs/contact_toml.md`), for any
     law of the contact room or of another package; every point carries its share of it. normal_stiffness and
@@ -232,9 +232,9 @@ class ContactSettings(Model):
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
         if self.law == "jenkins" and self.interference is not None:
             raise ValueError('interference: law = "jenkins" holds mu F_N of a given force; give a normal_force')
-        if self.law == "jenkins" and (self.points is not None or self.patch == "nodal" or self.curvature is not None):
-            key = "points" if self.points is not None else "curvature" if self.curvature is not None else "patch"
-            raise ValueError(f'{key}: law = "jenkins" has four elements on a flat, rigid patch; write law = "smooth"')
+        if self.law == "jenkins" and (self.patch == "nodal" or self.curvature is not None):
+            key = "curvature" if self.curvature is not None else "patch"
+            raise ValueError(f'{key}: law = "jenkins" belongs to flat, rigid patches; write law = "smooth"')
         if self.law != "jenkins" and "slides_along" in self.model_fields_set:
             raise ValueError('slides_along: belongs to law = "jenkins"; points of the others slide in any direction')
         return self._curved()

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from .law import Array, Law, Step, number, ratio, settings, static, value
-from .patch import Patch
 
 
 class JenkinsState(NamedTuple):
@@ -75,17 +74,19 @@ class Jenkins(Law):
         return self.held * jnp.abs(step.after.slipped - step.before.slipped)
 
 
-def four(
-    interface: str, springs: tuple[float, float, float], size: tuple[float, float], held: float, slider: int
-) -> Patch:
-    """A patch of four elements where they are as stiff against rotations as one of evenly spread springs is (Sextro
-    Eqs. (5.2-39) to (5.2-41)).
+def shared(springs: tuple[float, float, float], held: float, slider: int, count: int) -> Jenkins:
+    """The law of one of `count` elements of a contact.
 
     Args:
-        springs: of the whole patch along n, t1, t2, N/m. size: b0 x h0 along t1 and t2, m. held: by friction, mu F_N of
-            the whole patch, N. slider: see `Jenkins`.
+        springs: of the whole contact along n, t1, t2, N/m. held: by friction, mu F_N of the whole contact, N.
+            slider: see `Jenkins`.
     """
-    n, along, across = (0.25 * springs[i] for i in (0, slider, 3 - slider))
-    places = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * np.array(size) / np.sqrt(12)
-    law = Jenkins(value(n), value(along), value(across), value(0.25 * held), slider)
-    return Patch(interface, places, np.full(4, 0.25 * size[0] * size[1]), law)
+    n, along, across, limit = (value(v / count) for v in (springs[0], springs[slider], springs[3 - slider], held))
+    return Jenkins(n, along, across, limit, slider)
+
+
+def four_places(width: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """(4, 2) places and (4,) areas of elements that are as stiff against rotations as springs spread evenly over
+    b0 x h0 (m; Sextro Eqs. (5.2-39) to (5.2-41))."""
+    corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+    return corners * np.array([width, height]) / np.sqrt(12), np.full(4, 0.25 * width * height)

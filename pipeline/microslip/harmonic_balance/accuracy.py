@@ -163,7 +163,8 @@ def judged(problem: Problem, response: HarmonicResponse, peaks: Sequence[float])
         return []
     size = np.abs(response.monitor)
     top = int(good[np.argmax(size[good])])
-    some = good[np.unique(np.linspace(0, len(good) - 1, LOOKED_AT).round().astype(int))]
+    asked = np.flatnonzero(response.converged & response.asked)  # at a fold the least error is a jump
+    some = asked[np.unique(np.linspace(0, len(asked) - 1, min(LOOKED_AT, len(asked))).round().astype(int))]
     left = [left_out(problem, response.x[i], 2 * np.pi * float(response.frequency[i])) for i in some]
     worst = some[np.argsort(left)[-2:]]
     places = {float(response.frequency[i]) for i in (top, *worst)} | {float(f) for f in peaks}
