@@ -468,8 +468,8 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
 
 
 def test_a_strain_gauge_is_strain_everywhere(folder: Path) -> None:
-    """The strain that its row reads from the coordinates in the response file (2e-3: the bulk beside them); one name and one unit in table,
-    CSV, terminal, page and HDF5, and metres nowhere."""
+    """The strain that its row reads from the coordinates in the response file (2e-3: the bulk beside them); one name
+    and one unit in table, CSV, terminal, page and HDF5, and metres nowhere."""
     (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', 'monitor = "root"'))
     told, converged = respond(folder)
     build = folder / "build" / "vane"
