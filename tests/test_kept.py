@@ -26,7 +26,7 @@ from microslip.harmonic_balance import kept, refinement, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checks import forces_on
 from microslip.harmonic_balance.kept import kept_response, labels, record, restored
-from microslip.harmonic_balance.solver import solve
+from microslip.harmonic_balance.solver import Point, solve
 from microslip.harmonic_balance.sweeps import overhanging
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
@@ -93,6 +93,22 @@ def test_nothing_is_computed_twice(tmp_path: Path) -> None:
     computed = [t.split(": ")[1] for t in told if " of 3 frequencies" in t]
     assert computed == 2 * ["0.5 Hz", "0.65 Hz", "0.8 Hz"]
     assert len([t for t in told if "a mode at" in t]) == 2
+
+
+def test_a_peak_on_a_point_of_the_sweep_is_a_point_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a climb fails the highest point stands for the peak, under the same key: asked again, all is known."""
+    problem, told = balance.of(free(2.2), 1, 16, length=0.01), list[str]()
+
+    def top(problem: balance.Problem, found: response.HarmonicResponse, bracket: tuple[int, int, int]) -> object:
+        f, x = found.frequency[bracket[1]], found.x[bracket[1]]
+        return Point(2 * np.pi * f, x, "converged", 0.0, 0), float(abs(found.monitor[bracket[1]]))
+
+    monkeypatch.setattr(kept, "highest", top)
+    for frequency in 2 * [np.array([2.0, 2.125, 2.25, 2.375])]:
+        with open_journal(tmp_path / "points", "abc", HEAD) as journal:
+            found, peaks = kept_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+    assert peaks[0][0] in found.frequency and found.converged.all()
+    assert len([t for t in told if " of 4 frequencies" in t]) == 4 and len([t for t in told if "peak near" in t]) == 1
 
 
 @pytest.mark.parametrize("frequency", [np.linspace(2.0, 6.0, 9), np.linspace(0.45, 2.25, 6)])

@@ -78,8 +78,7 @@ def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: 
     if asked.looks_for_harmonics:
         raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
         raw |= {"harmonics": settings.harmonics, "samples": settings.samples}
-    case = Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
-    return case
+    return Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
 
 
 def normal_forces(built: Built) -> tuple[float | None, ...]:

@@ -84,7 +84,7 @@ def _response_stage(
     inputs = {"case": case, "basis": hashes, "files": beside, "code": code_hash(CASE_CODE + _ASSESSMENT_CODE)}
     if store.nothing_to_do(summary_file, inputs, force, report):
         if log:
-            _write_log(read_response(folder / "response.h5"), folder, report)
+            _write_log(read_response(folder / "response.h5"), folder)
         summary = json.loads(summary_file.read_text())
         _tell(summary, report)
         return summary, summary["failed_points"] == 0
@@ -98,7 +98,7 @@ def _response_stage(
         raise
     summary = _finished(keeper, result, report)
     if log:
-        _write_log(read_response(folder / "response.h5"), folder, report)
+        _write_log(read_response(folder / "response.h5"), folder)
     _tell(summary, report)
     store.write_text(summary_file, json.dumps(summary, indent=1) + "\n")
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
@@ -295,7 +295,7 @@ def _is_there(package: str) -> bool:
         return False
 
 
-def _write_log(response: Response, folder: Path, report: Report) -> None:
+def _write_log(response: Response, folder: Path) -> None:
     """``convergence.csv``: what Newton's method did at every point."""
     store.write_text(folder / "convergence.csv", convergence_table(response))
 
@@ -320,13 +320,12 @@ def summarise(result: CaseResult) -> dict[str, Any]:
     for normal, peaks in result.resonances.items():
         rows += [{"normal_force_N": normal, "frequency_Hz": f, name: a} for f, a in peaks]
     failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
-    balanced: dict[str, float] = {"harmonics": result.settings.balanced}
-    if result.truncation is not None:
-        balanced["estimated_error_of_harmonics"] = result.truncation
+    truncation = {} if result.truncation is None else {"estimated_error_of_harmonics": result.truncation}
     return {
         "case": result.settings.name,
         "mode": result.settings.mode,
-        **balanced,
+        "harmonics": result.settings.balanced,
+        **truncation,
         "description": result.settings.description,
         "rotation_speed_rpm": result.speed * 30 / np.pi,
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],

@@ -1,4 +1,4 @@
-"""What a case puts into its response file: the head that says what points are of"""
+"""What a case puts into its response file: the head that says what its points are of."""
 
 from __future__ import annotations
 
@@ -79,8 +79,10 @@ def head_of(
         for name in built.bodies
         for member in _standing(built, name)
     }
-    told = {"case": s.name, "description": s.description, "mode": s.mode, "settings": dict(raw), "bodies": bodies}
-    return told | {"harmonics": s.balanced}
+    return {
+        "case": s.name, "description": s.description, "mode": s.mode, "settings": dict(raw), "bodies": bodies,
+        "harmonics": s.balanced,
+    }  # fmt: skip
 
 
 def as_found(settings: CaseSettings, folder: Path, path: Path | str) -> CaseSettings:

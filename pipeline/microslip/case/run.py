@@ -116,7 +116,7 @@ def _run(
     _book_can(built, path)
     _can_be_pressed(built, forces, path)
     with keep(built) if keep else nullcontext() as journal:
-        responses, resonances, stuck, remarks = _by_laws(built, forces, frequency, report, journal, left)
+        responses, resonances, stuck, remarks = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
     idle = [normal for normal, r in responses.items() if _still(r)]
     resonances |= {normal: [] for normal in idle}
@@ -175,11 +175,11 @@ def _idle(forces: Sequence[float]) -> list[str]:
     ]
 
 
-def _by_laws(
+def _answered(
     built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
     left: _Left,
 ) -> Answer:  # fmt: skip
-    """With the laws of the contact room and as many harmonics as the case asks for."""
+    """Responses and resonances by normal force, sticking frequencies and their damping, remarks."""
     responses: dict[float, HarmonicResponse] = {}
     resonances, stiff, remarks = {}, (np.zeros(0), np.zeros(0)), []
     _say_what_it_takes(built, report)
@@ -443,8 +443,8 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
 
 def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
     """A remark where contacts that do not open would."""
-    count = found.open.shape[1] // max(len(built.contacts), 1)
-    jenkins = np.repeat(np.array([c.law == "jenkins" for c in built.contacts], dtype=bool), count)
+    count = len(built.contacts)  # of a sector; the others of a ring follow
+    jenkins = [i for i in range(found.open.shape[1]) if built.contacts[i % count].law == "jenkins"]
     pulls = ((found.open > 0) & found.converged[:, None])[:, jenkins].any(axis=1)
     if not normal or not pulls.any():
         return []

@@ -39,7 +39,8 @@ def kept_response(
     Returns:
         The response and (Hz, m) of its resonances: of the maxima of one plateau the highest.
     """
-    held = {key: restored(problem, row) for key, row in journal.of(series).items() if not row["peak"]}
+    rows = journal.of(series)  # a peak on a point of the sweep stands in its place
+    held = {key: restored(problem, row) for key, row in rows.items() if row["peak"] in (0.0, key)}
 
     def keep(f: float, solved: Solved, added: bool) -> None:
         journal.keep(series, f, record(problem, *solved) | {"frequency": f, "added": int(added)})
