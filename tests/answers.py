@@ -22,7 +22,7 @@ Change = Callable[[str, Array], tuple[str, Array]]
 """Name and values (f, ...) of an array of a response -> those that another way of writing the case gives; no name: it
 says nothing of them."""
 
-OWN = ("seconds", "iterations", "history", "error", "x", "peak", "added", "checks/", "exchanged")
+OWN = ("iterations", "history", "error", "x", "peak", "added", "checks/", "exchanged")
 """Arrays of the solver's way, or of rounding."""
 
 
@@ -182,7 +182,7 @@ def changed_bits(a: Answer, b: Answer) -> list[str]:
     found += [f"h5 {n}" for n in ("labels", "settings", "inputs") if getattr(a.response, n) != getattr(b.response, n)]
     found += ["h5 series"] * (len(a.response.series) != len(b.response.series))
     for one, other in zip(a.response.series, b.response.series, strict=False):
-        names = {*one.arrays, *other.arrays} - {"seconds"}
+        names = {*one.arrays, *other.arrays}
         same = {n for n in names & {*one.arrays} & {*other.arrays}
                 if one.arrays[n].tobytes() == other.arrays[n].tobytes()}  # fmt: skip
         found += [f"h5 {n}" for n in sorted(names - same)] + ["h5 status"] * (one.status != other.status)

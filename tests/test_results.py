@@ -42,7 +42,7 @@ def point(frequency: float, status: str = "converged") -> dict:
     q = np.exp(1j * frequency * np.arange(12)).reshape(2, 6)
     monitors = {"monitors/tip-probe": small_basis().groups[0, 0].monitors["tip-probe"].rows @ q.T}
     return {
-        "frequency": frequency, "status": status, "error": 1e-12 * frequency, "iterations": 7, "seconds": 0.01,
+        "frequency": frequency, "status": status, "error": 1e-12 * frequency, "iterations": 7,
         "x": np.cos(frequency * np.arange(9)), "bodies/blade/q": q, **monitors,
     }  # fmt: skip
 

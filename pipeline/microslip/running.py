@@ -301,15 +301,15 @@ def _write_log(response: Response, folder: Path) -> None:
 
 
 def convergence_table(response: Response) -> str:
-    """CSV text: a row a point with its status, steps, time, and the error before every Newton step."""
-    rows = ["sweep,frequency_Hz,peak,status,iterations,seconds,error,errors before each step"]
+    """CSV text: a row a point with its status, steps, and the error before every Newton step."""
+    rows = ["sweep,frequency_Hz,peak,status,iterations,error,errors before each step"]
     for s in response.series:
-        columns = [s.arrays.get(n, np.full(len(s.key), np.nan)) for n in ("peak", "iterations", "seconds", "error")]
+        columns = [s.arrays.get(n, np.full(len(s.key), np.nan)) for n in ("peak", "iterations", "error")]
         history = s.arrays.get("history", np.zeros((len(s.key), 0)))
-        for f, status, peak, steps, spent, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
+        for f, status, peak, steps, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
             each = " ".join(f"{e:.1e}" for e in errors if e)
             said = status.replace(",", ";")
-            rows.append(f"{s.name},{f:.10g},{peak > 0:d},{said},{steps:.0f},{spent:.3g},{error:.1e},{each}")
+            rows.append(f"{s.name},{f:.10g},{peak > 0:d},{said},{steps:.0f},{error:.1e},{each}")
     return "\n".join(rows) + "\n"
 
 

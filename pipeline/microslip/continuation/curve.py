@@ -398,9 +398,10 @@ class Lost(Exception):
 
 
 def root(
-    scaled: Scaled, segment: Segment, settings: Settings, test: Callable[[Array, Array], float]
+    scaled: Scaled, segment: Segment, settings: Settings, test: Callable[[Array, Array], float], share: float = 1e-10
 ) -> tuple[Array, Array]:
-    """Point and tangent in a segment where a function of both, of different sign at its ends, changes its sign.
+    """Point and tangent in a segment where a function of both, of different sign at its ends, changes its sign, to a
+    share of the segment.
 
     Raises:
         Lost: the curve was not found again between the two points, or the signs at its ends are the same.
@@ -417,7 +418,7 @@ def root(
 
     if value(0.0) * value(1.0) > 0:
         raise Lost
-    place = float(scipy.optimize.brentq(value, 0.0, 1.0, xtol=1e-10, rtol=1e-12))
+    place = float(scipy.optimize.brentq(value, 0.0, 1.0, xtol=share, rtol=1e-12))
     value(place)
     return kept[place]
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -79,10 +79,10 @@ def peak(problem: Rated, x: Array, lam: float, settings: Settings | None = None)
 def _climbed(problem: Rated, state: State, settings: Settings) -> Peak:
     """Uphill, and the other way too where that peak is hardly higher than the beginning."""
     slope = _Slope(problem)
-    uphill = state if slope(state.y, state.tangent) >= 0 else _reversed(state)
-    begun = math.log(slope.output(state.y)[0])
+    begun = slope.at(state.y, state.tangent)
+    uphill = state if begun.slope >= 0 else _reversed(state)
     found = _ahead(slope, uphill, settings)
-    if not found.converged or math.log(found.value) - begun > DIP:
+    if not found.converged or math.log(found.value / begun.value) > DIP:
         return found
     other = _ahead(slope, _reversed(uphill), settings)
     return other if other.converged and other.value > found.value else found
@@ -95,26 +95,27 @@ def _ahead(slope: _Slope, state: State, settings: Settings) -> Peak:
     its slope is the peak. It also does if g is higher at the one that it leaves or reaches the wrong way: kinks lie
     between, as where the root is not found or lower than either end. The step is then halved, down to `NARROW`.
     """
-    best = _at(slope, state.y, state.tangent)
-    status, within = "", settings
+    there = slope.at(state.y, state.tangent)
+    best, status, within = _peak(slope, there), "", settings
     while not status:
         after = advance(slope.problem, state, within)
-        there, here = slope.output(state.y)[0], slope.output(after.y)[0]
-        leaves_up, comes_down = slope(state.y, state.tangent) > 0, slope(after.y, after.tangent) <= 0
-        if after.found and (leaves_up and (comes_down or here < there) or comes_down and here > there):
-            top = _pinned(slope, state, after, settings) if leaves_up and comes_down else None
+        here = slope.at(after.y, after.tangent)
+        leaves_up, comes_down = there.slope > 0, here.slope <= 0
+        higher = here.value > there.value
+        if after.found and (leaves_up and (comes_down or not higher) or comes_down and higher):
+            top = _pinned(slope, there, here, after.found[-1].kink, settings) if leaves_up and comes_down else None
             length = norm(after.y - state.y)
             if top is None and length > NARROW:
                 within = replace(settings, step_max=0.5 * length)
                 continue
-            top = top or max((_at(slope, p.y, p.tangent) for p in (state, after)), key=lambda peak: peak.value)
+            top = top or _peak(slope, max(there, here, key=lambda one: one.value))
             best = top if top.value >= best.value else best
         within = settings
-        if here > best.value:
-            best = _at(slope, after.y, after.tangent, "the peak is still ahead")
-        if here < best.value * math.exp(-DIP):
+        if here.value > best.value:
+            best = _peak(slope, here, "the peak is still ahead")
+        if here.value < best.value * math.exp(-DIP):
             return best
-        status, state = after.status, after
+        status, state, there = after.status, after, here
     return replace(best, status=best.status if best.converged else f"no peak before the end: {status}")
 
 
@@ -129,6 +130,15 @@ def _reversed(state: State) -> State:
     )  # fmt: skip
 
 
+class _Place(NamedTuple):
+    """A scaled point of the curve with its tangent, g, and d ln g / ds along the curve."""
+
+    y: Array
+    tangent: Array
+    value: float
+    slope: float
+
+
 class _Slope:
     """d ln g / ds along the curve, at a scaled point and its tangent."""
 
@@ -136,30 +146,30 @@ class _Slope:
         self.problem, self.scaled = problem, Scaled(problem)
 
     def __call__(self, y: Array, t: Array) -> float:
-        value, by_x, by_lam = self.output(y)
-        return float((by_x * self.scaled.x_scale) @ t[:-1] + by_lam * self.scaled.lam_scale * t[-1]) / value
+        return self.at(y, t).slope
 
-    def output(self, y: Array) -> tuple[float, Array, float]:
-        return self.problem.output(y[:-1] * self.scaled.x_scale, float(y[-1]) * self.scaled.lam_scale)
+    def at(self, y: Array, t: Array) -> _Place:
+        x_scale, lam_scale = self.scaled.x_scale, self.scaled.lam_scale
+        value, by_x, by_lam = self.problem.output(y[:-1] * x_scale, float(y[-1]) * lam_scale)
+        return _Place(y, t, value, float((by_x * x_scale) @ t[:-1] + by_lam * lam_scale * t[-1]) / value)
 
 
-def _pinned(slope: _Slope, state: State, after: State, settings: Settings) -> Peak | None:
-    """The root of the slope between two states, if it is found and no lower than both: one of several may be."""
-    bends = bool(after.found and after.found[-1].kink)
-    segment = Segment(state.y, after.y, state.tangent, after.tangent, bends)
+def _pinned(slope: _Slope, low: _Place, high: _Place, bends: bool, settings: Settings) -> Peak | None:
+    """The root of the slope between two places, if it is found and no lower than both: one of several may be."""
+    segment = Segment(low.y, high.y, low.tangent, high.tangent, bends)
     try:
-        y, t = root(slope.scaled, segment, settings, slope)
+        y, t = root(slope.scaled, segment, settings, slope, 1e-6)  # where g is level
     except Lost:
         return None
-    found = _at(slope, y, t)
-    return found if found.value >= max(slope.output(one.y)[0] for one in (state, after)) else None
+    found = _peak(slope, slope.at(y, t))
+    return found if found.value >= max(low.value, high.value) else None
 
 
-def _at(slope: _Slope, y: Array, t: Array, status: str = CONVERGED) -> Peak:
-    """The peak at a point; where the slope is not small there, its sign jumps."""
-    scaled, steep = slope.scaled, abs(slope(y, t))
+def _peak(slope: _Slope, at: _Place, status: str = CONVERGED) -> Peak:
+    """The peak at a place; where the slope is not small there, its sign jumps."""
+    scaled, y = slope.scaled, at.y
     x, lam = y[:-1] * scaled.x_scale, float(y[-1]) * scaled.lam_scale
-    return Peak(x, lam, slope.output(y)[0], steep > 1e-5 * max(1.0, norm(t)), status, t)
+    return Peak(x, lam, at.value, abs(at.slope) > 1e-5 * max(1.0, norm(at.tangent)), status, at.tangent)
 
 
 # over a parameter ----------------------------------------------------------------------------------------------------

@@ -149,7 +149,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     """A point as a journal keeps it, judged; the names are those of docs/response_file.md."""
     kept: dict[str, Any] = {
         "frequency": point.Omega / (2 * np.pi), "status": judged(point, found.checks).status, "error": point.error,
-        "iterations": point.iterations, "seconds": point.seconds, "peak": 0.0, "added": 0, "x": point.x,
+        "iterations": point.iterations, "peak": 0.0, "added": 0, "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
         "exchanged": found.exchanged,
@@ -178,7 +178,7 @@ def _of_contact(name: str, relative: Array, force: Array, cycle: Cycle) -> dict[
 def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     """A point and what belongs to it, from what a journal kept; of the cycles sums and means alone."""
     point = Point(
-        2 * np.pi * row["frequency"], row["x"], row["status"], row["error"], int(row["iterations"]), row["seconds"],
+        2 * np.pi * row["frequency"], row["x"], row["status"], row["error"], int(row["iterations"]),
         history=tuple(row["history"]),
     )  # fmt: skip
     names = [c.name for c in problem.assembly.contacts]

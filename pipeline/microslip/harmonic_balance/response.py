@@ -115,7 +115,7 @@ class HarmonicResponse(FrequencyResponse):
         dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J.
         slipping, open: (f, patches) share of points times cycle that slips, or is open; the rest sticks.
         unsteady: (f,) see `patch.Cycle`.
-        status: of every point. error, iterations, seconds: (f,), see `Point`.
+        status: of every point. error, iterations: (f,), see `Point`.
     """
 
     x: Array
@@ -129,7 +129,6 @@ class HarmonicResponse(FrequencyResponse):
     status: tuple[str, ...]
     error: Array
     iterations: Array
-    seconds: Array
 
     def columns(self) -> dict[str, Array]:
         of, name = range(2, self.harmonics.shape[1]), self.quantity.column
@@ -176,7 +175,6 @@ def of_points(
         status=tuple(p.status for p in points),
         error=np.array([p.error for p in points]),
         iterations=np.array([p.iterations for p in points]),
-        seconds=np.array([p.seconds for p in points]),
         quantity=measured(problem.assembly),
         added=np.zeros(len(points), bool) if asked is None else _not_in([p.Omega for p in points], asked),
         **parts,

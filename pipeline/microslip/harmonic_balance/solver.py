@@ -29,8 +29,8 @@ class Point:
     Attributes:
         Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong, the cause before a colon.
         error: largest entry of R over the largest of x. iterations: Newton steps, all attempts together.
-        seconds: spent. slope: the last derivative of the contact forces, if it is kept. history: `error` before every
-            Newton step, attempt after attempt.
+        slope: the last derivative of the contact forces, if it is kept. history: `error` before every Newton step, attempt
+            after attempt.
     """
 
     Omega: float
@@ -38,7 +38,6 @@ class Point:
     status: str
     error: float
     iterations: int
-    seconds: float = 0.0
     slope: Any = None
     history: tuple[float, ...] = ()
 
@@ -122,7 +121,7 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
         UserError: a frequency that is not positive.
     """
     bounded("frequency", Omega / (2 * np.pi), gt=0)
-    began, at, spent, status = time.perf_counter(), problem.at(Omega), 0, ""
+    at, spent, status = problem.at(Omega), 0, ""
     history: tuple[float, ...] = ()
     for way in _ways(problem, at, [*starts, at.reference], slope):
         point = way()
@@ -134,7 +133,7 @@ def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None
         point = replace(point, status=status or point.status)
     if not point.converged:
         point = replace(point, status=f"{_cause(at, point)}: {point.status}")
-    return replace(point, iterations=spent, seconds=time.perf_counter() - began, history=history)
+    return replace(point, iterations=spent, history=history)
 
 
 def _cause(at: AtFrequency, point: Point) -> str:
@@ -276,12 +275,13 @@ def sweep(
         starts = [] if start is None or done else [start]
         if good:
             starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) == 2 else [good[-1].x]
+        began = time.perf_counter()
         point = solve(problem, 2 * np.pi * float(f), starts, slope)
         slope = point.slope
         done.append(replace(point, slope=None))
         keep(done[-1])
         solved += 1
-        if solved == 2 and (said := _long(point.seconds, sum(float(f) not in known for f in frequency[i + 1 :]))):
+        if solved == 2 and (said := _long(time.perf_counter() - began, sum(float(f) not in known for f in frequency[i + 1 :]))):
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
@@ -307,7 +307,7 @@ def _long(each: float, left: int) -> str:
 
 def _walked(problem: Problem, known: Point, failed: Point) -> Point:
     """The failed point, reached from a known one in steps of frequency that are shortened where need be."""
-    began, last, step, spent = time.perf_counter(), known, 1.0, failed.iterations
+    last, step, spent = known, 1.0, failed.iterations
     while step > 1 / 64:
         Omega = last.Omega + step * (failed.Omega - known.Omega)
         Omega = failed.Omega if abs(Omega - known.Omega) >= abs(failed.Omega - known.Omega) else Omega
@@ -316,10 +316,10 @@ def _walked(problem: Problem, known: Point, failed: Point) -> Point:
         if not point.converged:
             step *= 0.5
         elif Omega == failed.Omega:
-            return replace(point, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
+            return replace(point, iterations=spent)
         else:
             last = point
-    return replace(failed, iterations=spent, seconds=failed.seconds + time.perf_counter() - began)
+    return replace(failed, iterations=spent)
 
 
 def _ahead(points: list[Point], Omega: float) -> Array:

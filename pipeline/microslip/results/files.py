@@ -24,7 +24,7 @@ FORMAT_VERSION = "0.1"
 CONVERGED = "converged"
 
 UNITS = {
-    "frequency": "Hz", "Omega": "rad/s", "seconds": "s", "supplied": "J", "damped": "J", "dissipated": "J",
+    "frequency": "Hz", "Omega": "rad/s", "supplied": "J", "damped": "J", "dissipated": "J",
     "by_slip": "J", "monitors": "m", "gauges": "1", "bodies": "m kg^1/2", "displacement": "m, rad",
     "force": "N, N m", "limit": "N", "normal_swing": "N", "normal_mean": "N",
 }  # fmt: skip
