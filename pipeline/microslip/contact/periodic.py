@@ -26,6 +26,7 @@ import jax
 import jax.numpy as jnp
 
 from .law import Array, Law, State
+from .linearised import linearised
 
 PLAIN = 2
 """Cycles that are marched before slow sliders are solved for."""
@@ -36,10 +37,6 @@ FEWEST = 4
 RECALL = 1e-5
 """Share of its memory that a slider regains in a cycle from the first one."""
 
-SLOPES = 1e-6
-"""Share of the largest tangent of a memory within which tangents are taken for periodic."""
-
-_LAPS = 6  # cycles of tangents at most
 # Anything from 0.2 and 0.5 to 0.9 and 0.99 does: of 4000 random paths, 1500 of them slow, none took above 20 cycles.
 _STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
 _GAIN = 0.9  # share of it above which the step was in vain
@@ -81,23 +78,6 @@ class _At(NamedTuple):
     wait: Array
     first: Array
     settled: Array
-
-
-class _Along(NamedTuple):
-    """Tangents on their way.
-
-    Attributes:
-        begun: state the next cycle with tangents begins with. tangents: of it, p along the first axis. first: (p, ...,
-            2, n) of the memory after the first cycle. slope: see `with_slopes`. laps: how many there were. smooth:
-            whether the tangents are periodic.
-    """
-
-    begun: State
-    tangents: State
-    first: Array
-    slope: Array
-    laps: Array
-    smooth: Array
 
 
 def periodic(
@@ -191,28 +171,17 @@ class _Laps:
         return at.found, slope
 
     def periodic_slopes(self, moves: Array, weights: Array) -> tuple[Periodic, Array]:
-        """Tangents follow once the state is periodic: linear in those it begins with, so that one cycle tells how."""
-        rest, size = self.rest(), moves.shape[1]
+        """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
+        rest = self.rest()
         at = self.solved(jax.lax.while_loop(self.unfinished, self.marching, rest))  # as `periodic` does
-        with_memory = jnp.pad(moves, ((0, 0), (0, 2), (0, 0)))
-
-        def lap(a: _Along) -> _Along:
-            along = jax.tree_util.tree_map(lambda x, y: jnp.concatenate([x, y]), a.tangents, self._units(at))
-            _, (slope, changed) = self._push(a.begun, along, with_memory)
-            own = jax.tree_util.tree_map(lambda leaf: leaf[:size], changed)
-            before, ended, rested = self._remembered(a.tangents), self._remembered(changed), a.laps == 0
-            first = jnp.where(rested, ended[:size], a.first)
-            turned = _Newton(ended[size:])(ended[:size] - before + RECALL * (first - before))
-            smooth = ~rested & (jnp.abs(turned).max() <= SLOPES * jnp.abs(ended[:size]).max())
-            next_ = jax.vmap(self.law.recalled)(own, jnp.where(rested, first, before + turned))
-            slope = jnp.einsum("ws,spnk->wpnk", weights, slope[:, :size])
-            return _Along(at.begun, next_, first, slope, a.laps + 1, smooth)
-
-        blank, none = _blank(rest.start, size), jnp.asarray(0)
-        slope = jnp.zeros((len(weights), size, *self.path.shape[1:]))
-        begin = _Along(rest.start, blank, self._remembered(blank), slope, none, none > 0)
-        found = jax.lax.while_loop(lambda a: ~a.smooth & (a.laps < _LAPS), lap, begin)
-        return at.found, found.slope
+        rates = self._rate(self.path)
+        cycles = [
+            linearised(self.law, self.path, rates, self.dt, start, follows, moves, weights)
+            for start, follows in ((rest.start, False), (at.begun, True))
+        ]
+        first, last = cycles[0].memory, cycles[1]
+        begin = _Newton(last.by_memory)(last.memory + RECALL * first)
+        return at.found, jnp.moveaxis(last.begun_with(begin), 2, 3)
 
     def _solving(self, at: _At) -> _At:
         """One cycle more, and the next begins where Newton's method expects the solution."""

@@ -63,8 +63,12 @@ press a contact a million times more than anything moves it leave no more of R t
 AT_MOST = 1e-5
 """Share of x that rounding may be."""
 
-CONTRACTION = 0.1
-"""Share of |R| that a step may leave for the derivative to be used again: it costs as much as a dozen residuals."""
+CONTRACTION = 0.03
+"""Share of |R| that a step may leave for the derivative to be used again: it costs as much as two or three residuals."""
+
+SHORTEST = 0.02
+"""Share of a step that is not halved any more: where contacts switch |R| rises at first however short it is, and from
+there the next derivative leads on."""
 
 
 def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None) -> Point:
@@ -105,9 +109,9 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
 
 
 def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) -> tuple[Array, Array]:
-    """x and R after the longest of 1, 1/2, ... 1/1024 of a step that lowers |R|, or the last of them."""
+    """x and R after the longest of 1, 1/2, ... of a step that lowers |R|, or the last of them."""
     share = 1.0
-    while not np.linalg.norm(left) < np.linalg.norm(R) and share > 1e-3:
+    while not np.linalg.norm(left) < np.linalg.norm(R) and share > SHORTEST:
         share *= 0.5
         left = at.residual(x + share * step)
     return x + share * step, left
