@@ -535,7 +535,7 @@ def test_respond_to_the_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     told = json.loads((tmp_path / "build/sample/response.json").read_text())
     peaks = {(r["normal_force_N"]): r["frequency_Hz"] for r in told["resonances"]}
     assert peaks[1000.0] == pytest.approx(told["stuck_frequencies_Hz"][0], rel=1e-4)  # sticking
-    assert 270.93 < peaks[5.0] < peaks[20.0] < peaks[1000.0]  # the first frequency of the free vane
+    assert 270.93 < peaks[20.0] < peaks[100.0] < peaks[1000.0]  # the first frequency of the free vane
     assert main(["init", "sample", "mine"]) == 0
     assert main(["respond", "mine", "--set", "name=mine", "-q"]) == 0
     first, second = (tmp_path / f"build/{n}/response.csv" for n in ("sample", "mine"))

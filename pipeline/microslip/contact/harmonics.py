@@ -110,8 +110,6 @@ def _with_derivative(
 ) -> tuple[Array, Array]:
     """Marched together with the tangents along every harmonic of every direction."""
     values, transform = waves(u.shape[2] // 2, samples)
-    unit = jnp.eye(u[0].size).reshape(-1, *u.shape[1:])
-    path, moves = jnp.einsum("sh,nkh->snk", values, u), jnp.einsum("sh,mkh->smk", values, unit)
-    found, slope = with_slopes(law, path, period, count, settled, moves, transform)
-    slopes = jnp.einsum("hmnk->nkhm", slope).reshape(*u.shape, *u.shape[1:])
-    return jnp.einsum("hs,snk->nkh", transform, found.force), slopes
+    path = jnp.einsum("sh,nkh->snk", values, u)
+    found, slope = with_slopes(law, path, period, count, settled, values, transform)
+    return jnp.einsum("hs,snk->nkh", transform, found.force), jnp.einsum("hzjnk->nkhjz", slope)

@@ -7,6 +7,7 @@ import tempfile
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
@@ -46,6 +47,11 @@ def keep_compiled() -> Path | None:
 
 
 keep_compiled()
+
+program = partial(
+    jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False} if (0, 6) <= jax.__version_info__ < (0, 11) else {}
+)
+"""`jax.jit` of what python calls: compiled in half the time and no slower. Other versions may not know the option."""
 
 Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""

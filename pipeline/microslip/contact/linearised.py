@@ -23,12 +23,13 @@ BLOCK = 2048
 
 
 class Linearised(NamedTuple):
-    """A cycle under p parameters, of m sliders at each of n points.
+    """A cycle under w signals along each of n, t1 and t2, of m sliders at each of n points.
 
     Attributes:
-        memory: (p, m, 2, n) tangents at the end, from a beginning without any. by_memory: (2, m, 2, n) those of a
-            memory of 1 N along either direction at the beginning. slope: (w, p, 3, n) weighted sums of the force's
-            tangents. slope_by_memory: (w, 3, 2, m, n) those of the memory at the beginning.
+        memory: (w, 3, m, 2, n) tangents at the end, from a beginning without any. by_memory: (2, m, 2, n) those of a
+            memory of 1 N along either direction at the beginning. slope: (h, w, 3, 3, n) weighted sums of the tangents
+            of the force, its directions last but one. slope_by_memory: (h, 2, 3, m, n) those of the memory at the
+            beginning.
     """
 
     memory: Array
@@ -37,15 +38,16 @@ class Linearised(NamedTuple):
     slope_by_memory: Array
 
     def begun_with(self, memory: Array) -> Array:
-        """`slope` of a cycle that begins with tangents (p, m, 2, n) of the memory."""
-        return self.slope + jnp.einsum("wikmn,pmkn->wpin", self.slope_by_memory, memory)
+        """`slope` of a cycle that begins with tangents (w, 3, m, 2, n) of the memory."""
+        return self.slope + jnp.einsum("hdimn,wkmdn->hwkin", self.slope_by_memory, memory)
 
 
 class _Steps(NamedTuple):
     """Derivatives of steps, samples along the first axis, as named above.
 
     Attributes:
-        A: (s, 2, m, 2, n). B, C: (s, 3, m, 2, n). D, E: (s, 3, n, 3). G: (s, 3, m, 2, n).
+        A: (s, 2, m, 2, n). B, C: (s, 3, m, 2, n). D, E: (s, 3, 3, n), of the force's directions last but one. G:
+            (s, 3, m, 2, n).
     """
 
     A: Array
@@ -57,39 +59,51 @@ class _Steps(NamedTuple):
 
 
 def linearised(
-    law: Law, path: Array, rate: Array, dt: Array | float, start: State, follows: bool, moves: Array, weights: Array
+    law: Law, path: Array, rate: Array, dt: Array | float, start: State, whole: Array, signals: Array, weights: Array
 ) -> Linearised:  # fmt: skip
     """The cycle that begins with a state, of a law whose sliders can be solved for (`Law.recalled`).
 
     Args:
-        path: (s, n, 3) m. rate: (s, n, 3) m/s over the steps. follows: the state is that after another such cycle, not
-            one of rest. moves: (s, p, 3) m of all points alike, periodic. weights: (w, s).
+        path: (s, n, 3) m. rate: (s, n, 3) m/s over the steps. start: of rest, or after such a cycle; then ``whole``
+            asks for the tangents of the force as well. signals: (s, w) by which all points move alike, periodic.
+            weights: (h, s).
     """
-    samples, p = moves.shape[:2]
+    (samples, w), h = signals.shape, len(weights)
     memory = sliders(law.memory(path[-1], start), 0)
     m, n = memory.shape[0], memory.shape[2]
     size = max(k for k in range(1, samples + 1) if samples % k == 0 and k * m * n <= max(BLOCK, m * n))
-    rows = (path, rate, moves, jnp.roll(moves, 1, axis=0), weights.T)
 
     def block(carried: tuple, rows: tuple[Array, ...]) -> tuple[tuple, None]:
-        state, held, x, by_memory, slope, slope_by_memory = carried
-        u, v, moved, before, weight = rows
-        after, states = jax.lax.scan(lambda one, row: (law.step(*row, dt, one)[1], one), state, (u, v))
+        state, held, x, by_memory, *sums = carried
+        u, v, signal, before, weight = rows
+        after, states = jax.lax.scan(lambda one, row: (stepped(law, *row, dt, one)[1], one), state, (u, v))
         steps, held = _steps(law, u, v, dt, states, held)
-        (x, by_memory), (along, by_start) = jax.lax.scan(_recursion, (x, by_memory), (steps, moved, before))
-        direct = [jnp.einsum("sw,spj,sjni->wpin", weight, m, D) for m, D in ((moved, steps.D), (before, steps.E))]
-        slope = slope + direct[0] + direct[1] + jnp.einsum("sw,spin->wpin", weight, along)
-        slope_by_memory = slope_by_memory + jnp.einsum("sw,sikmn->wikmn", weight, by_start)
-        return (after, held, x, by_memory, slope, slope_by_memory), None
+        (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, signal, before))
 
-    w = len(weights)
-    none = jnp.zeros((p, m, 2, n)), jnp.zeros((w, p, 3, n)), jnp.zeros((w, 3, 2, m, n))
+        def more() -> list[Array]:
+            G, (along, begun) = steps.G, each
+            force = jnp.sum(G[:, None, None] * along[:, :, :, None], axis=(4, 5))
+            force += signal[:, :, None, None, None] * steps.D[:, None]
+            force += before[:, :, None, None, None] * steps.E[:, None]
+            by_start = jnp.sum(G[:, None] * begun[:, :, None], axis=4)
+            return [a + jnp.einsum("sh,s...->h...", weight, b) for a, b in zip(sums, (force, by_start), strict=True)]
+
+        sums = jax.lax.cond(whole, more, lambda: sums)
+        return (after, held, x, by_memory, *sums), None
+
+    held = jax.tree_util.tree_map(lambda leaf: leaf * whole, _held(law, path[-1], rate[-1], dt, start))
     units = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
-    held = _held_at(law, path[-1], rate[-1], dt, start) if follows else _none(start, 3)
-    begin = (start, held, none[0], units, none[1], none[2])
+    sums = jnp.zeros((h, w, 3, 3, n)), jnp.zeros((h, 2, 3, m, n))
+    rows = (path, rate, signals, jnp.roll(signals, 1, axis=0), weights.T)
     blocks = tuple(row.reshape(samples // size, size, *row.shape[1:]) for row in rows)
-    _, _, *found = jax.lax.scan(block, begin, blocks)[0]
+    _, _, *found = jax.lax.scan(block, (start, held, jnp.zeros((w, 3, m, 2, n)), units, *sums), blocks)[0]
     return Linearised(*found)
+
+
+@jax.jit
+def stepped(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
+    """`Law.step`, which python reads once for all its uses."""
+    return law.step(u, v, dt, state)
 
 
 def sliders(memory: Array, lead: int) -> Array:
@@ -98,34 +112,35 @@ def sliders(memory: Array, lead: int) -> Array:
 
 
 def _steps(law: Law, u: Array, v: Array, dt: Array | float, states: State, held: State) -> tuple[_Steps, State]:
-    """Derivatives of steps to (s, n, 3) from states, and what goes on: tangents of the last state without its memory.
+    """Derivatives of steps to (s, n, 3) from states, and what goes on: `_held` of the last step.
 
     Args:
-        held: that of the state before.
+        held: of the step before.
     """
     ways = _ways(u.shape[1])
+    after = jax.vmap(lambda u, v, state: _held(law, u, v, dt, state))(u, v, states)
+    before = jax.tree_util.tree_map(lambda one, many: jnp.concatenate([one[None], many[:-1]]), held, after)
 
-    def ahead(u: Array, v: Array, state: State) -> tuple[Array, ...]:
-        """Of the end of a step and of the memory at its beginning."""
+    def step(u: Array, v: Array, state: State, held: State) -> _Steps:
         memory = law.memory(u, state)
         units = jnp.stack([jnp.zeros_like(memory).at[..., k, :].set(1.0) for k in range(2)])
-        of_end, after = _along(law, u, v, dt, state, ways, ways / dt, _none(state, 3))
-        _, turned = _along(law, u, v, dt, state, 0 * ways[:2], 0 * ways[:2], jax.vmap(law.recalled)(_none(state, 2), units))
-        _, pull = jax.vjp(lambda x: law.step(u, v, dt, law.recalled(state, x))[0], memory)
-        A, B = (jax.vmap(law.memory, (None, 0))(u, s) for s in (turned, after))
-        return A, B, of_end, jax.vmap(pull)(ways)[0], jax.vmap(law.recalled)(after, jnp.zeros_like(B))
+        along = (_none(state, 3), held, jax.vmap(law.recalled)(_none(state, 2), units))
+        tangents = jax.tree_util.tree_map(lambda *leaves: jnp.concatenate(leaves), *along)
+        still = jnp.zeros_like(ways[:2])
+        du, dv = jnp.concatenate([ways, 0 * ways, still]), jnp.concatenate([ways / dt, -ways / dt, still])
+        force, ended = _along(law, u, v, dt, state, du, dv, tangents)
+        remembered, force = sliders(jax.vmap(law.memory, (None, 0))(u, ended), 1), force.swapaxes(1, 2)
+        one = remembered.shape[1] == 1
+        G = force[6:].swapaxes(0, 1)[:, None] if one else _by_slider(law, u, v, dt, state, memory)
+        return _Steps(remembered[6:], remembered[:3], remembered[3:6], force[:3], force[3:6], G)
 
-    A, B, D, G, left = jax.vmap(ahead)(u, v, states)
-    before = jax.tree_util.tree_map(lambda one, many: jnp.concatenate([one[None], many[:-1]]), held, left)
+    return jax.vmap(step)(u, v, states, before), jax.tree_util.tree_map(lambda leaf: leaf[-1], after)
 
-    def behind(u: Array, v: Array, state: State, held: State) -> tuple[Array, Array]:
-        """Of the beginning of a step."""
-        of_start, after = _along(law, u, v, dt, state, 0 * ways, -ways / dt, held)
-        return of_start, jax.vmap(law.memory, (None, 0))(u, after)
 
-    E, C = jax.vmap(behind)(u, v, states, before)
-    last = jax.tree_util.tree_map(lambda leaf: leaf[-1], left)
-    return _Steps(*(sliders(x, 2) for x in (A, B, C)), D, E, sliders(G, 2)), last
+def _by_slider(law: Law, u: Array, v: Array, dt: Array | float, state: State, memory: Array) -> Array:
+    """(3, m, 2, n) derivatives of the force with respect to the memory of each slider."""
+    _, pull = jax.vjp(lambda x: stepped(law, u, v, dt, law.recalled(state, x))[0], memory)
+    return sliders(jax.vmap(pull)(_ways(u.shape[0]))[0], 1)
 
 
 def _along(
@@ -134,17 +149,16 @@ def _along(
     """Tangents of force and state at the end of a step along several changes."""
 
     def push(du: Array, dv: Array, along: State) -> tuple[Array, State]:
-        return jax.jvp(lambda u, v, s: law.step(u, v, dt, s), (u, v, state), (du, dv, along))[1]
+        return jax.jvp(lambda u, v, s: stepped(law, u, v, dt, s), (u, v, state), (du, dv, along))[1]
 
     return jax.vmap(push)(du, dv, along)
 
 
-def _held_at(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> State:
-    """Tangents of a state along where it is, without its memory: those at the end of a step that leads there."""
+def _held(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> State:
+    """Tangents of the state at the end of a step along where that is, but for the memory."""
     ways = _ways(len(u))
     _, after = _along(law, u, v, dt, state, ways, ways / dt, _none(state, 3))
-    memory = jnp.zeros_like(law.memory(u, state))
-    return jax.vmap(law.recalled, (0, None))(after, memory)
+    return jax.vmap(law.recalled, (0, None))(after, jnp.zeros_like(law.memory(u, state)))
 
 
 def _ways(n: int) -> Array:
@@ -160,11 +174,9 @@ def _none(state: State, count: int) -> State:
 def _recursion(
     carried: tuple[Array, Array], row: tuple[_Steps, Array, Array]
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """A sample on: (p, m, 2, n) tangents of the memory and (2, m, 2, n) those of the memory at the beginning; those of
-    the force (p, 3, n) and (3, 2, m, n)."""
-    (x, begun), (step, moved, before) = carried, row
-    force = jnp.sum(step.G * x[:, None], axis=(2, 3))
-    by_start = jnp.einsum("imdn,kmdn->ikmn", step.G, begun)
-    way = sum(moved[:, j, None, None, None] * step.B[j] + before[:, j, None, None, None] * step.C[j] for j in range(3))
-    turned = [step.A[0] * y[:, :, :1] + step.A[1] * y[:, :, 1:] for y in (x, begun)]
-    return (turned[0] + way, turned[1]), (force, by_start)
+    """Tangents (w, 3, m, 2, n) of the memory and (2, m, 2, n) those of the memory at the beginning, a sample on; and as
+    they were."""
+    (x, begun), (step, signal, before) = carried, row
+    turned = [step.A[0] * y[..., :1, :] + step.A[1] * y[..., 1:, :] for y in (x, begun)]
+    way = signal[:, None, None, None, None] * step.B + before[:, None, None, None, None] * step.C
+    return (turned[0] + way, turned[1]), carried

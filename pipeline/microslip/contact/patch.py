@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data import Array, Indices, NotConverged, UserError
-from .law import Law
+from .law import Law, program
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ def _known(patch: Patch, values: jax.Array) -> Array:
     return found
 
 
-@jax.jit
+@program
 def _normal(law: Law, approach: jax.Array) -> tuple[jax.Array, jax.Array]:
     def force(u: jax.Array) -> jax.Array:
         path = jnp.stack([u, jnp.zeros_like(u), jnp.zeros_like(u)], axis=1)
@@ -236,7 +236,7 @@ def stuck_stiffness(patch: Patch, u: Array) -> Array:
     return np.einsum("nia,nij,njb->ab", G, _known(patch, _tangent(patch.law, jnp.asarray(G @ u))), G)
 
 
-@jax.jit
+@program
 def _tangent(law: Law, u: jax.Array) -> jax.Array:
     """(n, 3, 3) derivative of the force for a small motion from a loaded state without tangential force."""
     at_rest = u.at[:, 1:].set(0.0)

@@ -26,7 +26,7 @@ import jax
 import jax.numpy as jnp
 
 from .law import Array, Law, State
-from .linearised import linearised
+from .linearised import Linearised, linearised, stepped
 
 PLAIN = 2
 """Cycles that are marched before slow sliders are solved for."""
@@ -100,7 +100,7 @@ def periodic(
 
 
 def with_slopes(
-    law: Law, path: Array, period: float | Array, count: int, settled: float | Array, moves: Array, weights: Array
+    law: Law, path: Array, period: float | Array, count: int, settled: float | Array, signals: Array, weights: Array
 ) -> tuple[Periodic, Array]:
     """`periodic` and the derivative of the force.
 
@@ -108,13 +108,13 @@ def with_slopes(
     the periodic one; otherwise tangents are marched along, and it is that of the cycles marched.
 
     Args:
-        moves: (s, p, 3) m, how each of p parameters moves all points alike. weights: (w, s) over the samples.
+        signals: (s, w) m, by which all points move alike along each of n, t1 and t2. weights: (h, s).
 
     Returns:
-        The cycle, and (w, p, n, 3) weighted sums of the derivatives over its samples.
+        The cycle, and (h, w, 3, n, 3) weighted sums of the derivatives over its samples.
     """
     laps = _Laps(law, path, period / len(path), settled, count)
-    return laps.periodic_slopes(moves, weights) if laps.solves else laps.marched_slopes(moves, weights)
+    return laps.periodic_slopes(signals, weights) if laps.solves else laps.marched_slopes(signals, weights)
 
 
 def cycles(
@@ -157,7 +157,7 @@ class _Laps:
             lambda at: (at.found.cycles >= PLAIN) & (at.found.cycles < self.count) & ~at.settled, self._solving, at
         )
 
-    def marched_slopes(self, moves: Array, weights: Array) -> tuple[Periodic, Array]:
+    def marched_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents are marched along with every cycle."""
 
         def lap(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
@@ -165,23 +165,25 @@ class _Laps:
             (force, after), (slope, changed) = self._push(at.start, tangents, moves)
             return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
 
+        moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
         size, rest = moves.shape[1], self.rest()
         begin = rest, _blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
         at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), lap, begin)
-        return at.found, slope
+        return at.found, slope.reshape(len(weights), -1, 3, *self.path.shape[1:])
 
-    def periodic_slopes(self, moves: Array, weights: Array) -> tuple[Periodic, Array]:
+    def periodic_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
         rest = self.rest()
         at = self.solved(jax.lax.while_loop(self.unfinished, self.marching, rest))  # as `periodic` does
-        rates = self._rate(self.path)
-        cycles = [
-            linearised(self.law, self.path, rates, self.dt, start, follows, moves, weights)
-            for start, follows in ((rest.start, False), (at.begun, True))
-        ]
-        first, last = cycles[0].memory, cycles[1]
-        begin = _Newton(last.by_memory)(last.memory + RECALL * first)
-        return at.found, jnp.moveaxis(last.begun_with(begin), 2, 3)
+        rate = self._rate(self.path)
+        starts = jax.tree_util.tree_map(lambda *both: jnp.stack(both), rest.start, at.begun)
+        found = jax.lax.map(
+            lambda one: linearised(self.law, self.path, rate, self.dt, one[0], one[1], signals, weights),
+            (starts, jnp.array([False, True])),
+        )  # fmt: skip
+        first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))
+        begin = _Newton(last.by_memory)(last.memory + RECALL * first.memory)
+        return at.found, jnp.einsum("hwkin->hwkni", last.begun_with(begin))
 
     def _solving(self, at: _At) -> _At:
         """One cycle more, and the next begins where Newton's method expects the solution."""
@@ -241,7 +243,7 @@ class _Laps:
         """One cycle."""
 
         def one(state: State, row: tuple[Array, Array]) -> tuple[State, Array]:
-            force, after = self.law.step(*row, self.dt, state)
+            force, after = stepped(self.law, *row, self.dt, state)
             return after, force
 
         after, force = jax.lax.scan(one, state, (self.path, self._rate(self.path)))
@@ -261,7 +263,7 @@ class _Laps:
 
             def push(along: State, *moved: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
                 whole = tuple(jnp.broadcast_to(m, u.shape) for m in moved)
-                return jax.jvp(lambda x, v, s: self.law.step(x, v, self.dt, s), (u, v, state), (*whole, along))
+                return jax.jvp(lambda x, v, s: stepped(self.law, x, v, self.dt, s), (u, v, state), (*whole, along))
 
             (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
             return (after, changed), (force, slope)

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import CHUNK, force_alone, force_harmonics
-from ..contact.law import Law, point_axes
+from ..contact.law import Law, point_axes, program
 from ..contact.patch import Patch
 from ..data import Array
 from .patch import Cycle, Traced, needs_rate, traced
@@ -111,7 +111,7 @@ def _points(G: jax.Array, u: jax.Array) -> jax.Array:
     return jnp.einsum("nia,caw->cniw", G, u).reshape(-1, 3, u.shape[2])
 
 
-@partial(jax.jit, static_argnames=("samples", "count"))
+@partial(program, static_argnames=("samples", "count"))
 def _both(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
     count: int,
@@ -122,8 +122,7 @@ def _both(
     return jnp.einsum("nia,cniw->caw", G, force.reshape(c, n, 3, W)), jnp.einsum("cnajkl,njb->cakbl", half, G)
 
 
-@partial(jax.jit, static_argnames=("samples", "count"))
-def _alone(
+def _force(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
     count: int,
 ) -> jax.Array:  # fmt: skip
@@ -131,9 +130,12 @@ def _alone(
     return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2]))
 
 
-@partial(jax.jit, static_argnames=("samples", "count"))
+_alone = partial(program, static_argnames=("samples", "count"))(_force)
+
+
+@partial(program, static_argnames=("samples", "count"))
 def _rate(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
     count: int,
 ) -> jax.Array:  # fmt: skip
-    return jax.jvp(lambda T: _alone(law, G, u, T, settled, samples, count), (period,), (jnp.ones(()),))[1]
+    return jax.jvp(lambda T: _force(law, G, u, T, settled, samples, count), (period,), (jnp.ones(()),))[1]

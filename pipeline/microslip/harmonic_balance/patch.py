@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import waves
-from ..contact.law import Law, State, Step
+from ..contact.law import Law, State, Step, program
 from ..contact.periodic import cycles
 from ..contact.point import PointContact
 from ..data import Array
@@ -79,7 +79,7 @@ def derivative(waves: int) -> Array:
     return out
 
 
-@partial(jax.jit, static_argnames=("samples", "count"))
+@partial(program, static_argnames=("samples", "count"))
 def _watched(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
     settled: jax.Array | float,

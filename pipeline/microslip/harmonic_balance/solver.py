@@ -29,8 +29,8 @@ class Point:
     Attributes:
         Omega: rad/s. x: see `Problem`. status: `CONVERGED`, or what went wrong, the cause before a colon.
         error: largest entry of R over the largest of x. iterations: Newton steps, all attempts together.
-        slope: the last derivative of the contact forces, if it is kept. history: `error` before every Newton step, attempt
-            after attempt.
+        slope: the last derivative of the contact forces, if it is kept. history: `error` before every Newton step,
+            attempt after attempt.
     """
 
     Omega: float
@@ -64,7 +64,7 @@ AT_MOST = 1e-5
 """Share of x that rounding may be."""
 
 CONTRACTION = 0.03
-"""Share of |R| that a step may leave for the derivative to be used again: it costs as much as two or three residuals."""
+"""Share of |R| that a step may leave for the derivative to be used again: it costs two or three residuals."""
 
 SHORTEST = 0.02
 """Share of a step that is not halved any more: where contacts switch |R| rises at first however short it is, and from
@@ -285,7 +285,8 @@ def sweep(
         done.append(replace(point, slope=None))
         keep(done[-1])
         solved += 1
-        if solved == 2 and (said := _long(time.perf_counter() - began, sum(float(f) not in known for f in frequency[i + 1 :]))):
+        left = sum(float(f) not in known for f in frequency[i + 1 :])
+        if solved == 2 and (said := _long(time.perf_counter() - began, left)):
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
