@@ -40,7 +40,7 @@ from microslip.data import Compliance, Interface, ModalGroup, Rows
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import newton, sweep
-from microslip.system.assembly import Assembly, Contact, Load, Member, Side, Watch
+from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Side
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
@@ -92,8 +92,8 @@ def cantilever(harmonics: int, samples: int) -> Problem:
     patch = Patch("tip", np.zeros((1, 2)), np.ones(1), law, along)
     side = Side("beam", "tip", rows={0: group.interfaces["tip"].rows[1:2]})
     contact = Contact("tip", patch, side, None, np.zeros(1), np.zeros(1))
-    member, push, watch = Member("beam", {0: group}), Load("beam", "push"), Watch("beam", "tip", "u")
-    assembly = Assembly((member,), (contact,), (push,), (watch,))
+    member, push, output = Member("beam", {0: group}), Load("beam", "push"), Output("beam", "tip", "u")
+    assembly = Assembly((member,), (contact,), (push,), (output,))
     return replace(balance.of(assembly, harmonics, samples, length=LIMIT / SPRING), lam_scale=2.0)
 
 

@@ -41,13 +41,13 @@ def told(seed: int) -> dict[tuple[int, int], tuple[float, float, float]]:
     """(harmonics, samples) -> true error, estimated error, energy that is not counted, all as shares."""
     fine, f = system(seed, **TRUE)
     exact = solve(fine, 2 * np.pi * f, [])
-    right, out = abs(operating(fine, exact).watched[0, 1]), {}
+    right, out = abs(operating(fine, exact).outputs[0, 1]), {}
     for H, n in [(3, n) for n in SAMPLES] + [(H, 64) for H in HARMONICS]:
         problem, _ = system(seed, harmonics=H, samples=n)
         point = solve(problem, 2 * np.pi * f, [exact.x[: problem.size]])
         if exact.converged and point.converged:
             found = operating(problem, point)
-            off = abs(abs(found.watched[0, 1]) / right - 1)
+            off = abs(abs(found.outputs[0, 1]) / right - 1)
             out[H, n] = float(off), error(problem, point.x, point.Omega).readout, abs(found.checks.counted)
     return out
 

@@ -32,7 +32,7 @@ class Curve:
 
     def largest(self, pick: Callable[[Array], Array]) -> tuple[float, float]:
         """Frequency (Hz) and value of the largest amplitude of a combination of the read-outs."""
-        size = np.where(self.converged, np.abs(pick(self.watched)), 0.0)
+        size = np.where(self.converged, np.abs(pick(self.outputs)), 0.0)
         top = int(size.argmax())
         return float(self.frequency[top]), float(size[top])
 
@@ -52,13 +52,13 @@ def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:
     points = sweep(problem, frequency)
     for _ in range(finer):
         points = _halved(problem, points)
-    first = np.array([operating(problem, p).watched[:, 1] for p in points])
+    first = np.array([operating(problem, p).outputs[:, 1] for p in points])
     return Curve(np.array([p.Omega for p in points]) / (2 * np.pi), first, np.array([p.converged for p in points]))
 
 
 def _halved(problem: Problem, points: list[Point]) -> list[Point]:
     """Two more points, half way to the neighbours of the highest."""
-    size = [abs(operating(problem, p).watched[0, 1]) if p.converged else 0.0 for p in points]
+    size = [abs(operating(problem, p).outputs[0, 1]) if p.converged else 0.0 for p in points]
     top = int(np.argmax(size))
     out = list(points)
     for a in sorted({max(top - 1, 0), min(top, len(points) - 2)}, reverse=True):

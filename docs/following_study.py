@@ -18,7 +18,7 @@ from microslip.data import ModalGroup
 from microslip.harmonic_balance.nonlinear_modes import backbone
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.problem import Problem
-from microslip.harmonic_balance.readout import Watched
+from microslip.harmonic_balance.readout import WithOutput
 from microslip.harmonic_balance.response import of_body
 from microslip.harmonic_balance.solver import sweep
 from microslip.harmonic_balance.stability import orbit, stability
@@ -71,7 +71,7 @@ def duffing(axes: Any) -> None:
     low = 2 * np.pi * 20.0
     bounds = continuation.Settings(low=low, high=2 * np.pi * 70.0, step_max=0.03)
     branch = continuation.trace(problem, problem.at(low).reference, low, bounds)
-    watched = Watched(problem)
+    watched = WithOutput(problem)
     f = branch.lam / (2 * np.pi)
     a = 1e3 * np.sqrt([watched.output(p.x, p.lam)[0] for p in branch.points])
     stable = np.array([stability(orbit(problem, p.x, p.lam)).stable for p in branch.points])
@@ -115,7 +115,7 @@ def valley(axes: Any) -> None:
     swept = []
     for normal in forces:
         problem = rubbing(float(normal))
-        watched = Watched(problem)
+        watched = WithOutput(problem)
         heights = [watched.output(p.x, p.Omega)[0] for p in sweep(problem, band / (2 * np.pi)) if p.converged]
         swept.append(1e6 * np.sqrt(max(heights)))
     axes.plot(forces, swept, color=GREY, lw=1.2, zorder=0, label="highest of 41 frequencies")

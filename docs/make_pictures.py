@@ -282,7 +282,7 @@ def damping_element() -> None:
         plain(axes)
         for force, colour in zip((30.0, 50.0, 80.0, 160.0, 1000.0), plots.COLOURS, strict=False):
             x = curves[force]
-            axes.semilogy(x.frequency, 1e3 * np.abs(pick(x.watched)), color=colour, label=f"{force:g} N")
+            axes.semilogy(x.frequency, 1e3 * np.abs(pick(x.outputs)), color=colour, label=f"{force:g} N")
         axes.set(xlabel="frequency in Hz", ylabel=what)
     a.legend(fontsize=8, title="normal force", title_fontsize=8)
     plain(c)
@@ -330,7 +330,7 @@ def damping_wire() -> None:
     plain(left)
     for force, colour in zip((10.0, 20.0, 50.0, 120.0, 1000.0), plots.COLOURS, strict=False):
         x = curves[force]
-        left.semilogy(x.frequency, 1e3 * np.abs(x.watched[:, 0]), color=colour, label=f"{force:g} N")
+        left.semilogy(x.frequency, 1e3 * np.abs(x.outputs[:, 0]), color=colour, label=f"{force:g} N")
     left.set(xlabel="frequency in Hz", ylabel="tip of blade 4 in mm")
     left.legend(fontsize=8, title="normal force", title_fontsize=8)
     plain(right)
@@ -357,7 +357,7 @@ def spin_pit() -> None:
     plain(left)
     for mass, colour in zip(damper_study.PRINTED, plots.COLOURS, strict=False):
         x = all_of["cottage-roof"][mass]
-        left.semilogy(x.frequency, 1e6 * np.abs(x.watched[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
+        left.semilogy(x.frequency, 1e6 * np.abs(x.outputs[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
     left.set(xlabel="frequency in Hz", ylabel="strain amplitude in µm/m", title="cottage roof")
     left.legend(fontsize=8)
     plain(right)

@@ -81,7 +81,7 @@ def highest(problem: Problem, basis: ModalBasis, frequency: Array) -> Highest:
     operating = at[top]
     share = max(float(c.open.mean()) for c in operating.cycles.values())
     return Highest(
-        operating.Omega / (2 * np.pi), float(abs(operating.watched[0, 1])), stress[top], share,
+        operating.Omega / (2 * np.pi), float(abs(operating.outputs[0, 1])), stress[top], share,
         int((~found.converged).sum()),
     )  # fmt: skip
 

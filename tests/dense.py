@@ -77,13 +77,13 @@ class Point:
 
 @dataclass(frozen=True)
 class System:
-    """M, C, K: (d, d). load: (d,) complex f. watch: (w, d). Omega: rad/s."""
+    """M, C, K: (d, d). load: (d,) complex f. output: (w, d). Omega: rad/s."""
 
     M: Array
     C: Array
     K: Array
     load: Array
-    watch: Array
+    output: Array
     points: Sequence[Point]
     Omega: float
 
@@ -108,7 +108,7 @@ def solution(system: System, start: Array | None = None) -> Solution:
         begin = np.zeros((2 * HARMONICS // level + 1, len(system.M)))
         begin[: len(x)] = x[: len(begin)]
         before, (x, missing) = begin, balanced(system, HARMONICS // level, SAMPLES // level, begin)
-    coarse, fine = (np.abs(system.watch @ (one[1] - 1j * one[2])) for one in (before, x))
+    coarse, fine = (np.abs(system.output @ (one[1] - 1j * one[2])) for one in (before, x))
     return Solution(x, fine, works(system, x), np.abs(fine - coarse), missing)
 
 
@@ -212,7 +212,7 @@ def forces(system: System, x: Array, samples: int) -> Array:
 
 
 def works(system: System, x: Array) -> Array:
-    """(p,) J a cycle that points take in a motion x (2 H + 1, d), by the trapezoidal rule."""
+    """(p,) J per cycle that points take in a motion x (2 H + 1, d), by the trapezoidal rule."""
     moved, each = touched(system, (waves(len(x) // 2, SAMPLES) @ x)[:, None])
     return np.array([np.sum(0.5 * (F + np.roll(F, 1, axis=0)) * (u - np.roll(u, 1, axis=0)))
                      for u, F in zip(moved, each, strict=True)])  # fmt: skip

@@ -90,7 +90,7 @@ def steady(
                 carried, out = _period(made, carried, driven, 2 * np.pi / Omega / steps)
                 outs.append(out)
         whole = jax.tree_util.tree_map(lambda *each: np.concatenate(each), *outs)
-        found.append(_looked_at(assembly, made, linear[1].watch, before, load, whole))
+        found.append(_looked_at(assembly, made, linear[1].output, before, load, whole))
     return found
 
 
@@ -206,7 +206,7 @@ def _cycled(law: Law, u: jax.Array, period: Any) -> tuple[jax.Array, Any]:
 
 
 def _looked_at(
-    assembly: Assembly, made: Made, watch: Array, before: Array, load: Array, out: Any
+    assembly: Assembly, made: Made, output: Array, before: Array, load: Array, out: Any
 ) -> Steady:  # fmt: skip
     q, d, F = (np.roll(np.asarray(x), 1, axis=0) for x in out[:3])  # the first sample at t = 0
     load = np.roll(load, 1, axis=0)
@@ -214,7 +214,7 @@ def _looked_at(
     relative, force = zip(*[(d[:, at] + np.asarray(made.offset)[at], F[:, at]) for at in made.slices], strict=True)
     change = float(np.abs(q[0] - before).max() / np.abs(q).max())
     work = [float(np.sum(0.5 * (f + np.roll(f, 1, axis=0))[..., 1:] * s)) for f, s in zip(points, slid, strict=True)]
-    return Steady(q, list(relative), list(force), load, q @ np.real(watch).T, work, change)
+    return Steady(q, list(relative), list(force), load, q @ np.real(output).T, work, change)
 
 
 def extrapolated(values: Sequence[Array], orders: Sequence[int] = (2, 3)) -> Array:

@@ -27,7 +27,7 @@ from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.results.checks import BALANCE, COUNTED, MOTION, Checks
-from microslip.system.assembly import Assembly, Contact, Load, Member, Side, Watch
+from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Side
 
 Array = np.ndarray
 
@@ -172,11 +172,11 @@ def plain(one: Drawn) -> dense.System:
     omega = np.concatenate([b[0] for b in one.bodies])
     points = [p for t in one.touches for p in points_of(one, t)]
     load = np.concatenate([f * b[1] for f, b in zip(one.forces, one.bodies, strict=True)])
-    watch = np.zeros((2 * len(one.bodies), len(omega)))
+    output = np.zeros((2 * len(one.bodies), len(omega)))
     for i, (at, b) in enumerate(zip(one.places, one.bodies, strict=True)):
-        watch[2 * i : 2 * i + 2, at] = b[2]
+        output[2 * i : 2 * i + 2, at] = b[2]
     C = np.diag(2 * one.ratio * omega)
-    return dense.System(np.eye(len(omega)), C, np.diag(omega**2), load, watch, points, one.Omega)
+    return dense.System(np.eye(len(omega)), C, np.diag(omega**2), load, output, points, one.Omega)
 
 
 def points_of(one: Drawn, t: Touch) -> list[dense.Point]:
@@ -231,8 +231,8 @@ def assembly(one: Drawn) -> Assembly:
     members = tuple(Member(name, {0: body(one, *b)}) for name, b in zip(names, one.bodies, strict=True))
     contacts = tuple(contact(one, f"contact {i}", t) for i, t in enumerate(one.touches))
     loads = tuple(Load(name, "push", f) for name, f in zip(names, one.forces, strict=True))
-    watches = tuple(Watch(name, "tip", label) for name in names for label in ("u", "v"))
-    return Assembly(members, contacts, loads, watches)
+    outputs = tuple(Output(name, "tip", label) for name in names for label in ("u", "v"))
+    return Assembly(members, contacts, loads, outputs)
 
 
 def body(one: Drawn, omega: Array, push: Array, watched: Array):
@@ -329,7 +329,7 @@ def verdict(one: Drawn, known: dense.Solution, **other: Any) -> Verdict:
     taken = [np.abs(c.dissipated - work.reshape(len(c.dissipated), -1).sum(axis=1)).max()
              for c, work in zip(found.cycles.values(), np.split(known.lost, ends[:-1]), strict=True)]  # fmt: skip
     return Verdict(
-        point.status, abs(abs(found.watched[0, 1]) - amplitude) / amplitude, e.readout * e.amplitude / amplitude,
+        point.status, abs(abs(found.outputs[0, 1]) - amplitude) / amplitude, e.readout * e.amplitude / amplitude,
         known.error[0] / amplitude, max(taken) / abs(found.supplied), found.checks, known.missing,
     )  # fmt: skip
 
@@ -351,9 +351,9 @@ def integrated(seed: int) -> tuple[float, float, float]:
     lasts = one.Omega / (2 * np.pi * one.ratio * min(omega.min() for omega, *_ in one.bodies))  # periods
     periods = int(np.ceil(3 * lasts))
     motions = steady(problem.assembly, one.Omega, ((periods, 256), (periods, 512)), begun(problem.assembly, found, 256))
-    coarse, fine = (abs(m.harmonics(m.watched, 1)[0, 1]) for m in motions)
+    coarse, fine = (abs(m.harmonics(m.outputs, 1)[0, 1]) for m in motions)
     own = abs(fine - coarse) / fine + lasts * motions[-1].change
-    return abs(abs(found.watched[0, 1]) - fine) / fine, e.readout * e.amplitude / fine, own
+    return abs(abs(found.outputs[0, 1]) - fine) / fine, e.readout * e.amplitude / fine, own
 
 
 def totalled(seed: int, total: bool) -> Checks:

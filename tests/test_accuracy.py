@@ -42,7 +42,7 @@ def sliding(harmonics):
 def readout(problem, f):
     found = solve(problem, 2 * np.pi * f, [])
     assert found.converged
-    return found, abs(operating(problem, found).watched[0, 1])
+    return found, abs(operating(problem, found).outputs[0, 1])
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def judge(spring, limit, body, Omega, grids):
     one = held(body, jenkins(spring, 1.0, limit), [1], np.zeros(1), np.zeros(1), 1.0)
     fine = balance.of(one, 40, 2048, length=limit / spring)
     exact = solve(fine, Omega, [])
-    right, found = abs(operating(fine, exact).watched[0, 1]), []
+    right, found = abs(operating(fine, exact).outputs[0, 1]), []
     for harmonics, samples in grids:
         p = balance.of(one, harmonics, samples, length=limit / spring)
         point = solve(p, Omega, [exact.x[: p.size]])
@@ -131,7 +131,7 @@ def test_harmonics_are_added_until_the_tolerance_is_met():
     problem = opening(1)
     found = enough(problem, readout(problem, 22.0)[0], tolerance=2e-3)
     exact = readout(opening(MANY), 22.0)[1]
-    amplitude = abs(operating(found.problem, found.point).watched[0, 1])
+    amplitude = abs(operating(found.problem, found.point).outputs[0, 1])
     assert found.reached and [e.harmonics for e in found.errors] == [1, 5, 10, 20][: len(found.errors)]
     assert abs(amplitude / exact - 1) < 2e-3 < found.errors[-2].readout
     assert not enough(problem, readout(problem, 22.0)[0], tolerance=1e-9, most=4).reached
@@ -139,7 +139,7 @@ def test_harmonics_are_added_until_the_tolerance_is_met():
 
 def test_harmonics_are_added_to_a_slider_and_too_few_are_told():
     """One harmonic where a Jenkins element slides is remarked on; the next number leaves an eighth of its error."""
-    built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="marched"))
+    built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
     problem = sliding(1)
     start = readout(problem, 17.0)[0]
     found = enough(problem, start, tolerance=1e-6, most=5)
@@ -153,7 +153,7 @@ def test_harmonics_are_added_to_a_slider_and_too_few_are_told():
 @pytest.mark.slow
 def test_a_case_says_where_its_harmonics_are_too_few():
     """One harmonic at a contact that slides and opens is remarked on; seven are not."""
-    built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="marched"))
+    built = SimpleNamespace(settings=SimpleNamespace(ring=None, mode="aft"))
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
         found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))

@@ -19,7 +19,7 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, across, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, across, touching
 
 
 def blade() -> ModalBasis:
@@ -43,7 +43,7 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     patch = Patch("right", places, areas, law)
     contact = touching("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=normal)
     member, load = Member("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
-    return Assembly((member,), (contact,), (load,), (Watch("blade", "tip", "u_x"),), Ring(blades, order))
+    return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 
 
 FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "settled": 1e-13, "length": 1e-6}
@@ -65,8 +65,8 @@ def test_a_sector_stands_for_the_whole_ring(blades: int, order: int, form: str) 
     assert a.converged and b.converged
     x, y = response.operating(lone, a), response.operating(ring, b)
     h = np.arange(4)
-    turned = x.watched[0] * np.exp(2j * np.pi * h * order * np.arange(blades)[:, None] / blades)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(2j * np.pi * h * order * np.arange(blades)[:, None] / blades)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert y.supplied == pytest.approx(blades * x.supplied, rel=1e-9)
     share = x.cycles["shroud"].slipping.mean()
     assert 0 < share < 1 or 2 * order == blades or order == 0  # the push does not slide there
@@ -92,15 +92,15 @@ def test_both_forms_are_the_same_equations() -> None:
     places, areas = grid(0.02, 0.01, (2, 2))
     law = PointContact(Penalty(jnp.asarray(2e6 / 4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e6 / 4))
     wall = touching("wall", Patch("left", places, areas, law), Side("blade_0", "left"), None, normal=30.0)
-    chain = Assembly(ring.members, (*ring.contacts[:2], wall), ring.loads, ring.watches)
+    chain = Assembly(ring.members, (*ring.contacts[:2], wall), ring.loads, ring.outputs)
     found = []
     for form in ("relative", "sides"):
         problem = balance.of(chain, form=form, **FINE)
         point = solve(problem, 2 * np.pi * 60.0, [])
         assert point.converged
         found.append(response.operating(problem, point))
-    scale = np.abs(found[0].watched).max()
-    np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * scale)
+    scale = np.abs(found[0].outputs).max()
+    np.testing.assert_allclose(found[1].outputs, found[0].outputs, rtol=0, atol=1e-9 * scale)
     for name, force in found[0].force.items():
         np.testing.assert_allclose(found[1].force[name], force, rtol=0, atol=1e-8 * np.abs(force).max())
 
@@ -124,8 +124,8 @@ def test_linear_limit_is_modal_superposition() -> None:
     point = newton(problem.at(Omega), np.zeros(problem.size))
     part, k = problem.parts[1][0], problem.stiffness[0]
     A = part.K - Omega**2 * part.M + 1j * Omega * part.C + part.rows.conj().T @ k @ part.rows
-    direct = part.watch @ np.linalg.solve(A, part.load)
-    np.testing.assert_allclose(response.operating(problem, point).watched[0, 1], direct[0], rtol=1e-10)
+    direct = part.output @ np.linalg.solve(A, part.load)
+    np.testing.assert_allclose(response.operating(problem, point).outputs[0, 1], direct[0], rtol=1e-10)
 
 
 def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
@@ -133,7 +133,7 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
     one, Omega = sector(6, 2, push=2.0), 2 * np.pi * 60.0
     given = one.contacts[0]
     wall = touching("shroud", given.patch, Side("blade", "right"), None, normal=20.0)
-    by_force = Assembly(one.members, (wall,), one.loads, one.watches)
+    by_force = Assembly(one.members, (wall,), one.loads, one.outputs)
     # the steady load that holds the blade against the wall where the contact is pressed by 20 N
     near = touching("shroud", given.patch, Side("blade", "right"), None, interference=float(wall.offset[0]))
     loads = (*one.loads, Load("blade", "hold", 1.0, harmonic=0))
@@ -142,14 +142,14 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
     held = replace(
         group, excitations={**group.excitations, "hold": replace(group.excitations["gas"], rows=rows, labels=("hold",))}
     )
-    by_balance = Assembly((Member("blade", {0: held}),), (near,), loads, one.watches)
+    by_balance = Assembly((Member("blade", {0: held}),), (near,), loads, one.outputs)
     found = []
     for each in (by_force, by_balance):
         problem = balance.of(each, **FINE)
         point = solve(problem, Omega, [])
         assert point.converged
         found.append(response.operating(problem, point))
-    np.testing.assert_allclose(found[1].watched, found[0].watched, rtol=0, atol=1e-9 * np.abs(found[0].watched).max())
+    np.testing.assert_allclose(found[1].outputs, found[0].outputs, rtol=0, atol=1e-9 * np.abs(found[0].outputs).max())
 
 
 @pytest.mark.slow
@@ -158,20 +158,20 @@ def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
     """Every order of two bodies and of three read-outs, two of them of one body: each row is the read-out's own, and
     so is the one that peaks are followed by (1e-9)."""
     ring = sector(2, 1).unrolled()
-    kinds = (Watch("blade_0", "tip", "u_x"), Watch("blade_1", "tip", "u_y"), Watch("blade_0", "tip", "u_y"))
+    kinds = (Output("blade_0", "tip", "u_x"), Output("blade_1", "tip", "u_y"), Output("blade_0", "tip", "u_y"))
     loads = (ring.loads[0],)  # on the first blade only, so that the two move differently
     Omega, right = 2 * np.pi * 60.0, None
     for members in permutations(ring.members):
-        for watches in permutations(kinds):
-            p = balance.of(Assembly(members, ring.contacts, loads, watches), form=form, **(FINE | {"harmonics": 1}))
+        for outputs in permutations(kinds):
+            p = balance.of(Assembly(members, ring.contacts, loads, outputs), form=form, **(FINE | {"harmonics": 1}))
             point = newton(p.at(Omega), p.at(Omega).reference)
             assert point.converged
-            rows = response.operating(p, point).watched[:, 1]
-            found, at = dict(zip(watches, rows, strict=True)), p.at(Omega)
+            rows = response.operating(p, point).outputs[:, 1]
+            found, at = dict(zip(outputs, rows, strict=True)), p.at(Omega)
             right = right or found
-            for i, w in enumerate(watches):
+            for i, w in enumerate(outputs):
                 assert found[w] == pytest.approx(right[w], rel=1e-9)
-                assert amplitude(at, point.x, *at.forces(point.x), watch=i).value == pytest.approx(right[w], rel=1e-9)
+                assert amplitude(at, point.x, *at.forces(point.x), output=i).value == pytest.approx(right[w], rel=1e-9)
     assert len({f"{abs(y):.3e}" for y in right.values()}) == 3
 
 
@@ -182,7 +182,7 @@ def rubbing(phase: float, push: float, friction: float) -> Assembly:
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(friction)), jnp.asarray(1e6 / n))
     wall = touching("wall", Patch("right", places, areas, law), Side("blade", "right"), None, normal=20.0)
     one = sector(4, 0)
-    return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.watches)
+    return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.outputs)
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_the_phase_of_all_loads_turns_the_answer_and_nothing_else(push: float, f
     for phase in (0.0, np.pi / 4):
         p = balance.of(rubbing(phase, push, friction), 1, 64)
         o = response.operating(p, solve(p, 2 * np.pi * 60.0, []))
-        found.append((o.watched[0, 1] * np.exp(-1j * phase), float(o.cycles["wall"].dissipated.sum())))
+        found.append((o.outputs[0, 1] * np.exp(-1j * phase), float(o.cycles["wall"].dissipated.sum())))
     assert found[1][0] == pytest.approx(found[0][0], rel=1e-10)
     share = o.cycles["wall"].slipping.mean()
     if state == "stuck":

@@ -22,7 +22,7 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.neighbours import frame_change
 from microslip.neighbours import stuck as stuck_neighbours
-from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, touching
 from microslip.system.damping import structural
 from microslip.system.disc import whole
 from microslip.system.meeting import in_ring
@@ -61,8 +61,8 @@ def sector(basis: ModalBasis, order: int, normal: float, push: float) -> Assembl
     patch = Patch("right", places, areas, law)
     contact = touching("gap", patch, Side("disc", "right"), Side("disc", "left", facing, 1), normal=normal)
     member = Member("disc", groups, N)
-    loads, watches = (Load("disc", "gas", push),), (Watch("disc", "top", "u_y"),)
-    return Assembly((member,), (contact,), loads, watches, Ring(N, order))
+    loads, outputs = (Load("disc", "gas", push),), (Output("disc", "top", "u_y"),)
+    return Assembly((member,), (contact,), loads, outputs, Ring(N, order))
 
 
 FINE = {"harmonics": 3, "samples": 36, "cycles": 30, "settled": 1e-13, "length": 1e-7}
@@ -81,8 +81,8 @@ def test_a_cyclic_sector_stands_for_the_whole_disc(basis: ModalBasis, order: int
     assert a.converged and b.converged
     x, y = response.operating(lone, a), response.operating(ring, b)
     h = np.arange(4)
-    turned = x.watched[0] * np.exp(2j * np.pi * h * order * np.arange(N)[:, None] / N)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(2j * np.pi * h * order * np.arange(N)[:, None] / N)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert y.supplied == pytest.approx(N * x.supplied, rel=1e-9)
     assert x.cycles["gap"].slipping.mean() > 0.01 or order == 0
 
@@ -99,8 +99,8 @@ def test_loss_factors_and_stuck_damping_of_a_cyclic_sector(basis: ModalBasis, ki
         np.testing.assert_allclose(part.loss, 0.004 * part.K, rtol=0, atol=1e-9 * np.abs(part.K).max())
     a, b = (balance.of(x, **FINE) for x in (one, one.unrolled()))
     x, y = (response.operating(p, solve(p, 2 * np.pi * 700.0, [])) for p in (a, b))
-    turned = x.watched[0] * np.exp(-2j * np.pi * np.arange(4) * np.arange(N)[:, None] / N)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(-2j * np.pi * np.arange(4) * np.arange(N)[:, None] / N)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert y.damped == pytest.approx(N * x.damped, rel=1e-9)
 
 
@@ -146,8 +146,8 @@ def test_a_patch_that_deforms_on_a_sector_and_on_the_whole_disc() -> None:
     points = [solve(p, 2 * np.pi * 700.0, []) for p in (lone, ring)]
     assert all(p.converged for p in points) and found.count > 6
     x, y = (response.operating(p, q) for p, q in zip((lone, ring), points, strict=True))
-    turned = x.watched[0] * np.exp(2j * np.pi * np.arange(2) * 2 * np.arange(N)[:, None] / N)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(2j * np.pi * np.arange(2) * 2 * np.arange(N)[:, None] / N)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert x.cycles["gap"].slipping.mean() > 0.01
     with pytest.raises(UserError, match="that of nodal diameter 0 was not asked for"):
         first = replace(sides[0], rows={2: sides[0].rows[2]})

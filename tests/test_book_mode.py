@@ -235,7 +235,7 @@ def test_normal_stiffness_is_the_integral(name: str, tmp_path: object) -> None:
 def test_a_lifting_spring_has_its_closed_form() -> None:
     y = np.linspace(-1.2, 1.2, 25)
     spring = Penalty(number(1.0))
-    sampled = book.swung(spring, jnp.asarray(y), jnp.ones(25), 4001)
+    sampled = book.describing_function(spring, jnp.asarray(y), jnp.ones(25), 4001)
     assert np.allclose(book.lifting(jnp.asarray(y)), sampled, rtol=0, atol=5e-4)
     assert np.allclose(book.lifting(jnp.asarray([-1.0, 0.0, 1.0])), [0, 0.5, 1], rtol=0, atol=1e-9)
 
@@ -245,7 +245,7 @@ def test_strips_lift_one_after_the_other() -> None:
     strips = rough_strips(C_N0, R_Z, Polynomial(), C_R0, MU, 40)
     u_G, u_A = jnp.linspace(0.1, 2, 9) * R_Z, jnp.full(9, 0.4 * R_Z)
     one = book.swings(strips)[0].at(u_G, u_A)
-    whole = book.swung(Rough(number(C_N0), number(R_Z), Polynomial()), u_G, u_A, 512)
+    whole = book.describing_function(Rough(number(C_N0), number(R_Z), Polynomial()), u_G, u_A, 512)
     assert np.allclose(one, whole, rtol=0, atol=2e-3 * C_N0)
 
 
@@ -295,7 +295,7 @@ def test_stiffness_is_symmetric_and_makes_the_force(name: str, made: dict[str, b
         assert np.allclose(K, K.T, rtol=0, atol=1e-12 * np.abs(K).max())
         assert np.allclose(K @ a, f, rtol=0, atol=1e-9 * np.abs(f).max())
         lost = np.pi * (a.conj() @ f).imag
-        work = contact.watch(u)[0].dissipated
+        work = contact.point_cycles(u)[0].dissipated
         assert (work >= -1e-16).all() and work.sum() == pytest.approx(lost, rel=1e-9, abs=1e-15)
 
 
@@ -304,7 +304,7 @@ def test_points_in_time_are_those_that_the_patch_is_made_of(name: str, made: dic
     """Mean, cos and sin of the points' forces, contracted with the kinematics, are the patch's."""
     contact = made[name]
     u = np.concatenate([motion(1), motion(2)])
-    for one, F, seen in zip(contact.traced(u), contact.force(u), contact.watch(u), strict=True):
+    for one, F, seen in zip(contact.traced(u), contact.force(u), contact.point_cycles(u), strict=True):
         whole = np.einsum("nia,sni->sa", contact.patch.kinematics, one.force)
         wave = np.fft.rfft(whole, axis=0)[:2] / len(whole)
         found = np.stack([wave[0].real, 2 * wave[1].real, -2 * wave[1].imag], axis=1)
@@ -320,7 +320,7 @@ def test_contacts_are_evaluated_on_their_own(made: dict[str, book.BookPatch]) ->
         assert np.allclose(force[i], one[0], rtol=1e-12) and np.allclose(slope[i], its[0], rtol=1e-9, atol=1e-3)
     assert made["rough"].rate(u) is None
     model: Forces = made["rough"]
-    assert model.watch(u, 1.0)[2].unsteady == 0
+    assert model.point_cycles(u, 1.0)[2].unsteady == 0
 
 
 def test_means_keep_the_preload_whatever_the_vibration(made: dict[str, book.BookPatch]) -> None:
@@ -418,7 +418,7 @@ def test_a_sector_stands_for_the_ring_and_energy_closes() -> None:
         assert point.converged
         found.append(response.operating(problem, point))
     turn = np.exp(2j * np.pi * np.arange(2) * np.arange(6)[:, None] / 6)
-    assert np.allclose(found[1].watched, found[0].watched[0] * turn, rtol=0, atol=1e-9 * np.abs(found[0].watched).max())
+    assert np.allclose(found[1].outputs, found[0].outputs[0] * turn, rtol=0, atol=1e-9 * np.abs(found[0].outputs).max())
     lost = found[0].cycles["shroud"].dissipated.sum()
     assert lost > 0 and found[0].supplied == pytest.approx(found[0].damped + lost, rel=1e-9)
     assert found[0].cycles["shroud"].slipping.mean() > 0 and found[1].supplied == pytest.approx(6 * found[0].supplied)

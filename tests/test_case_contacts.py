@@ -29,7 +29,7 @@ from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.data import UserError
 from microslip.harmonic_balance.accuracy import more
-from microslip.harmonic_balance.cost import marched_bytes
+from microslip.harmonic_balance.cost import aft_bytes
 
 PATH = Path("case.toml")
 HEIGHT, DEPTH = small.SIZE[2], small.SIZE[1]
@@ -421,7 +421,7 @@ def test_the_estimated_memory_is_that_of_a_response_within_a_factor_of_two(tmp_p
     points = int(np.prod(keys.get("contacts.right.points", [24, 5])))
     H, S = more(keys["harmonics"]), 2 * keys["samples"]
     unit = 1 if sys.platform == "darwin" else 1024
-    assert 0.5 < marched_bytes(points, 6, H, S) / (unit * int(peak)) < 2
+    assert 0.5 < aft_bytes(points, 6, H, S) / (unit * int(peak)) < 2
 
 
 def test_a_sweep_that_takes_long_is_told_from_its_second_point(monkeypatch) -> None:

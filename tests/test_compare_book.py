@@ -73,9 +73,9 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     assert abs(float(row["difference_Hz_percent"])) < 0.3 and 0 < abs(float(row["difference_m_percent"])) < 10
     assert (build / "pictures/book.png").stat().st_size > 5000
     modes = [read_response(f / "response.h5") for f in (build, build / "book")]
-    assert [r.mode for r in modes] == ["marched", "book"]
+    assert [r.mode for r in modes] == ["aft", "book"]
     told = [json.loads((f / "response.json").read_text()) for f in (build, build / "book")]
-    assert [summary["mode"] for summary in told] == ["marched", "book"]
+    assert [summary["mode"] for summary in told] == ["aft", "book"]
     said = f"tables are off by at most {orbits()[1].error:.2g} of what friction holds (orbits)"
     assert any("Book mode" in remark and said in remark for remark in modes[1].remarks)
     assert modes[1].series[0].converged.all()
@@ -100,8 +100,8 @@ def test_points_of_one_mode_serve_both_commands(folder: Path, own: str) -> None:
     assert told(running.compare_book) == (4, 1)
     assert told(running.respond) == (0, 1)
     assert told(running.compare_book) == (0, 2)
-    files = {way: folder / "build/vane" / way / "response.h5" for way in ("", "marched" if own else "book")}
-    assert [read_response(f).mode for f in files.values()] == (["book", "marched"] if own else ["marched", "book"])
+    files = {way: folder / "build/vane" / way / "response.h5" for way in ("", "aft" if own else "book")}
+    assert [read_response(f).mode for f in files.values()] == (["book", "aft"] if own else ["aft", "book"])
 
 
 @pytest.mark.slow

@@ -202,11 +202,11 @@ def test_newton_is_quadratic(monkeypatch):
     """With a fixed cut and fixed multipliers every step is about the square of the one before."""
     steps: list[float] = []
 
-    def watch(found):  # to the end, where Newton itself would foresee it
+    def output(found):  # to the end, where Newton itself would foresee it
         steps[:] = found
         return bool(found) and found[-1] < 1e-9
 
-    monkeypatch.setattr(newton, "_stands", watch)
+    monkeypatch.setattr(newton, "_stands", output)
     monkeypatch.setattr("microslip.modes.closing.NEAR", 0.0)  # multipliers stay
     monkeypatch.setattr("microslip.modes.closing.SETTLED", 10.0)
     mesh, pair = curved_pair("tetra10", "tetra10", False)

@@ -151,7 +151,7 @@ def test_over_the_load(case: Path) -> None:
     f = found["at_frequency_Hz"][0]
     assert 100 < f < 125 and found["load"][[0, -1]].tolist() == [0.1, 1.0]
     last = over_load(problem(case), f, 0.1, 1.0).points[-1]
-    np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).watched[0, 1]), rtol=1e-6)
+    np.testing.assert_allclose(found["amplitude_m"][-1], abs(operating(problem(case), last).outputs[0, 1]), rtol=1e-6)
 
 
 def test_over_the_normal_force(case: Path) -> None:
@@ -162,7 +162,7 @@ def test_over_the_normal_force(case: Path) -> None:
     np.testing.assert_allclose(found["normal_force_N"][[0, -1]], [15.0, 9.0], rtol=1e-12)
     for i, normal in ((0, 15.0), (-1, 9.0)):
         anew = problem(case, normal)
-        exact = operating(anew, solve(anew, 2 * np.pi * 100.0, [])).watched[0, 1]
+        exact = operating(anew, solve(anew, 2 * np.pi * 100.0, [])).outputs[0, 1]
         assert found["amplitude_m"][i] == pytest.approx(abs(exact), rel=1e-7)
 
 

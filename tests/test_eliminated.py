@@ -85,6 +85,6 @@ def test_without_damping_the_resonance_of_the_stuck_contact_is_a_point_as_any(by
             o = response.operating(p, point)
             lost = sum(float(c.dissipated.sum()) for c in o.cycles.values())
             assert o.supplied == pytest.approx(lost, rel=2e-3) and lost > 0  # the loss by the trapezoidal rule
-            assert amplitude(at, point.x, *at.forces(point.x)).value == pytest.approx(o.watched[0, 1], rel=1e-9)
-            found.append(abs(o.watched[0, 1]))
+            assert amplitude(at, point.x, *at.forces(point.x)).value == pytest.approx(o.outputs[0, 1], rel=1e-9)
+            found.append(abs(o.outputs[0, 1]))
         assert found[1] == pytest.approx(0.5 * (found[0] + found[2]), rel=1e-4)

@@ -21,7 +21,7 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.ring import aliased
 from microslip.system import damping, excitation, pressure
-from microslip.system.assembly import Assembly, Load, Member, Ring, Watch
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring
 
 # ---------------------------------------------------------------- engine orders and patterns
 
@@ -119,8 +119,8 @@ def test_several_orders_at_once_on_a_sector_are_those_on_the_ring() -> None:
     assert a.converged and b.converged
     x, y = response.operating(lone, a), response.operating(whole, b)
     h, j = np.arange(4), np.arange(blades)[:, None]
-    turned = x.watched[0] * np.exp(2j * np.pi * h * 2 * j / blades)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(2j * np.pi * h * 2 * j / blades)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-9 * np.abs(turned).max())
     assert y.supplied == pytest.approx(blades * x.supplied, rel=1e-9)
     assert x.supplied > 0
     assert x.cycles["shroud"].slipping.mean() > 0
@@ -134,9 +134,9 @@ def test_a_centrifugal_load_moves_a_loose_body_by_its_statics() -> None:
     changes = {"excitations": rows, "reduction": "rubin", **axis}
     g = modal_basis(small.beam(), small.BodySettings.model_validate(small.table(**changes))).groups[0, 0]
     load = excitation.centrifugal_load("beam", "spin", g, 100.0)
-    one = Assembly((Member("beam", {0: g}),), (), (load,), (Watch("beam", "tip-probe", "u_z"),))
+    one = Assembly((Member("beam", {0: g}),), (), (load,), (Output("beam", "tip-probe", "u_z"),))
     part = one.part(one.members[0], 0)
-    tip = part.watch @ np.linalg.solve(part.K, part.load)
+    tip = part.output @ np.linalg.solve(part.K, part.load)
     E, rho, L, r0 = 2.1e11, 7850.0, small.SIZE[2], 0.2
     bar = 100.0**2 * rho / E * (r0 * L**2 / 2 + L**3 / 3)  # integral of the force outside, over E A
     assert tip[0] == pytest.approx(bar, rel=0.02)  # the clamp holds the root's contraction

@@ -77,8 +77,8 @@ def test_over_the_normal_force(factor: float) -> None:
     exact = newton(anew.at(2 * np.pi * 60.0), found.points[-1].x)
     assert exact.converged
     np.testing.assert_allclose(found.points[-1].x, exact.x, rtol=0, atol=1e-8 * np.abs(exact.x).max())
-    a = response.operating(found.problem(factor), found.points[-1]).watched
-    np.testing.assert_allclose(a, response.operating(anew, exact).watched, rtol=1e-7)
+    a = response.operating(found.problem(factor), found.points[-1]).outputs
+    np.testing.assert_allclose(a, response.operating(anew, exact).outputs, rtol=1e-7)
 
 
 def test_derivatives_over_the_normal_force() -> None:

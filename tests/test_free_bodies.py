@@ -15,11 +15,11 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.data import ModalGroup
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance import response, slow
+from microslip.harmonic_balance import pseudo_transient, response
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import from_rest, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Side, Watch
+from microslip.system.assembly import Assembly, Load, Member, Output, Side
 from microslip.system.assembly import Contact as Touching
 
 Array = np.ndarray
@@ -57,8 +57,8 @@ def wedge(push: float, friction: float = 0.3, hold: float = 0.0, axial: float = 
         Touching(f"seat {name}", patch, *sides(groups, name), pressed / NORMAL, pressed) for name in normals
     ]  # fmt: skip
     loads = Load("a", "push", push), Load("b", "push", -push)
-    watches = [Watch(name, "tip", "u_y") for name in groups] + [Watch("damper", "tip", "u_z")]
-    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), tuple(contacts), loads, tuple(watches))
+    outputs = [Output(name, "tip", "u_y") for name in groups] + [Output("damper", "tip", "u_z")]
+    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), tuple(contacts), loads, tuple(outputs))
 
 
 def free_body(mass: float, springs: list[Any], faces: list[Contact], free: str = "x y z") -> ModalGroup:
@@ -83,8 +83,8 @@ def rider(push: float, gas: float) -> Assembly:
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), law, np.eye(3)[None])
     contact = Touching("seat", patch, *sides(groups, "a"), np.zeros(3), np.array([PRESSED, 0, 0]))
     loads = Load("a", "push", push), Load("damper", "gas", gas, harmonic=0)
-    watches = Watch("a", "tip", "u_y"), Watch("damper", "tip", "u_y")
-    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), (contact,), loads, watches)
+    outputs = Output("a", "tip", "u_y"), Output("damper", "tip", "u_y")
+    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), (contact,), loads, outputs)
 
 
 def coarse(assembly: Assembly, harmonics: int = 5, samples: int = 128) -> Problem:
@@ -113,11 +113,11 @@ def test_a_damper_that_sticks_slides_in_part_and_as_a_whole_against_time(
     assert all(least <= c.slipping[0] <= most for c in found.cycles.values())
     motion = steady(assembly, Omega, ((60, 128), (40, 512)))[-1]
     assert motion.change < 1e-4
-    h = motion.harmonics(motion.watched, 9)
-    np.testing.assert_allclose(found.watched[:, 1:10], h[:, 1:], rtol=0, atol=1e-3 * np.abs(h[:, 1:]).max())
+    h = motion.harmonics(motion.outputs, 9)
+    np.testing.assert_allclose(found.outputs[:, 1:10], h[:, 1:], rtol=0, atol=1e-3 * np.abs(h[:, 1:]).max())
     if least > 0.9:
         assert h[-1, 0].real > 5e-4
-        np.testing.assert_allclose(found.watched[-1, 0], h[-1, 0], rtol=1e-2)
+        np.testing.assert_allclose(found.outputs[-1, 0], h[-1, 0], rtol=1e-2)
 
 
 @pytest.mark.parametrize("friction", [1e3, 1e-7])
@@ -130,8 +130,8 @@ def test_limits_of_large_and_small_friction(friction: float) -> None:
     part = assembly.joined(1)
     k = np.diag([NORMAL, TANGENTIAL, TANGENTIAL] * 2 if friction > 1 else [NORMAL, 0.0, 0.0] * 2)
     A = part.K - Omega**2 * part.M + 1j * Omega * part.C + part.rows.T @ k @ part.rows
-    direct = part.watch @ np.linalg.solve(A, part.load)
-    found = response.operating(problem, point).watched
+    direct = part.output @ np.linalg.solve(A, part.load)
+    found = response.operating(problem, point).outputs
     tolerance = 1e-9 if friction > 1 else 1e-5
     np.testing.assert_allclose(found[:, 1], direct, rtol=0, atol=tolerance * np.abs(direct).max())
 
@@ -144,7 +144,7 @@ def test_a_place_that_nothing_determines_stays_the_one_at_rest() -> None:
         assert point.converged
         found = response.operating(problem, point)
         assert min(c.slipping[0] for c in found.cycles.values()) > 0.9
-        assert np.abs(found.watched[-1]).max() < 1e-3 * 0.3 * PRESSED / TANGENTIAL
+        assert np.abs(found.outputs[-1]).max() < 1e-3 * 0.3 * PRESSED / TANGENTIAL
 
 
 @pytest.mark.slow
@@ -156,11 +156,11 @@ def test_a_damper_that_slides_away_is_told_so() -> None:
     point = solve(problem, Omega, [])
     assert point.away and not point.converged
     assert point.status.startswith("no balance: damper slides away: nothing balances a mean force of")
-    found = response.operating(problem, point).watched
+    found = response.operating(problem, point).outputs
     early, late = steady(assembly, Omega, ((60, 128), (20, 256)))
-    places = [m.harmonics(m.watched, 1)[-1, 0].real for m in (early, late)]
+    places = [m.harmonics(m.outputs, 1)[-1, 0].real for m in (early, late)]
     assert places[1] > 1.2 * places[0] > 1e-3
-    h = late.harmonics(late.watched, 1)
+    h = late.harmonics(late.outputs, 1)
     np.testing.assert_allclose(found[:2, 1], h[:2, 1], rtol=0, atol=1e-2 * np.abs(h[:2, 1]).max())
 
 
@@ -171,7 +171,7 @@ def test_a_steady_force_is_held_by_friction_or_named() -> None:
     stuck = coarse(rider(1.0, 1.0))
     point = solve(stuck, Omega, [])
     assert point.converged
-    means = response.operating(stuck, point).watched[:, 0].real
+    means = response.operating(stuck, point).outputs[:, 0].real
     assert means[1] - means[0] == pytest.approx(1.0 / TANGENTIAL, rel=1e-9)
     away = solve(coarse(rider(60.0, 1.0)), Omega, [])
     assert away.status.startswith("no balance: damper slides away: nothing balances a mean force of 1 N on it")
@@ -180,7 +180,7 @@ def test_a_steady_force_is_held_by_friction_or_named() -> None:
 
 @pytest.mark.slow
 def test_slow_time_rests_at_solutions_and_leads_to_them() -> None:
-    """A solution is a fixed point of every step of slow time, and what is found from rest is the one of Newton's."""
+    """A solution is a fixed point of every step of pseudo-time, and what is found from rest is the one of Newton's."""
     for push in (30.0, 100.0):
         problem = coarse(wedge(push, hold=40.0))
         point, other = solve(problem, Omega, []), from_rest(problem, Omega)
@@ -188,16 +188,16 @@ def test_slow_time_rests_at_solutions_and_leads_to_them() -> None:
         at = problem.at(Omega)
         q = at.modal(point.x, at.force(point.x))
         for rate in (1e-3 * Omega, 0.1 * Omega):
-            R = slow.slowly(at, rate, q).residual(point.x)
+            R = pseudo_transient.slowly(at, rate, q).residual(point.x)
             assert np.abs(R).max() < 1e-8 * np.abs(point.x).max()
-        first, second = (response.operating(problem, p).watched for p in (point, other))
+        first, second = (response.operating(problem, p).outputs for p in (point, other))
         np.testing.assert_allclose(second, first, rtol=0, atol=1e-6 * np.abs(first).max())
 
 
 def test_a_damper_that_slides_as_a_whole_is_found() -> None:
     """Contacts so stiff and undamped, and held so softly, that Newton's method wanders from the sticking contacts."""
     problem = coarse(wedge(100.0, hold=5.0), 7)
-    assert slow.serves(problem) and not slow.unheld(problem)
+    assert pseudo_transient.serves(problem) and not pseudo_transient.unheld(problem)
     for f in (90.0, 105.0):
         point = solve(problem, 2 * np.pi * f, [])
         assert point.converged and point.iterations < 400

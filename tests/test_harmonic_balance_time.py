@@ -25,7 +25,7 @@ from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
-from microslip.system.assembly import Assembly, Contact, Load, Member, Ring, Side, Watch, across, touching
+from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, across, touching
 
 Array = np.ndarray
 
@@ -72,8 +72,8 @@ def held(body: ModalGroup, law: Law, directions: list[int], preload: Array, offs
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), law, shape)
     side = Side("body", "face", rows={0: body.interfaces["face"].rows[directions]})
     contact = Contact("face", patch, side, None, offset, preload)
-    load, watch = Load("body", "push", force), Watch("body", "tip", "u")
-    return Assembly((Member("body", {0: body}),), (contact,), (load,), (watch,))
+    load, output = Load("body", "push", force), Output("body", "tip", "u")
+    return Assembly((Member("body", {0: body}),), (contact,), (load,), (output,))
 
 
 def duffing() -> Assembly:
@@ -142,7 +142,7 @@ def ring_of_four() -> Assembly:
     patch = Patch("right", places, areas, law)
     contact = touching("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=20.0)
     member, load = Member("blade", {0: blade.groups[0, 0]}), Load("blade", "gas", 30.0)
-    return Assembly((member,), (contact,), (load,), (Watch("blade", "tip", "u_x"),), Ring(4, 1)).unrolled()
+    return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(4, 1)).unrolled()
 
 
 def balanced(assembly: Assembly, Omega: float, near: Steady | None = None, **fine: Any) -> Operating:
@@ -175,7 +175,7 @@ def begun(assembly: Assembly, found: Operating, samples: int) -> Start:
 
 def apart(found: Operating, motion: Array) -> float:
     """Largest difference of the harmonics of all read-outs, in parts of the largest one."""
-    return float(np.abs(found.watched[:, : motion.shape[1]] - motion).max() / np.abs(motion).max())
+    return float(np.abs(found.outputs[:, : motion.shape[1]] - motion).max() / np.abs(motion).max())
 
 
 def orders(values: list[Array]) -> Array:
@@ -195,9 +195,9 @@ def test_the_integrator_is_of_second_order() -> None:
     linear, Omega = replace(stuck, contacts=(contact,)), 3.9
     part = linear.joined(1)
     K = part.K + 20.0 * part.rows.T @ part.rows
-    exact = (part.watch @ np.linalg.solve(K - Omega**2 * part.M + 1j * Omega * part.C, part.load))[0]
+    exact = (part.output @ np.linalg.solve(K - Omega**2 * part.M + 1j * Omega * part.C, part.load))[0]
     stages = ((90, 64), (50, 128), (50, 256), (50, 512))
-    found = [s.harmonics(s.watched, 1)[0, 1] for s in steady(linear, Omega, stages)]
+    found = [s.harmonics(s.outputs, 1)[0, 1] for s in steady(linear, Omega, stages)]
     errors = np.abs(np.array(found) - exact) / abs(exact)
     np.testing.assert_allclose(-np.diff(np.log2(errors)), 2.0, atol=0.03)
     assert abs(extrapolated(found[1:], (2, 4)) - exact) < 2e-6 * abs(exact)
@@ -229,7 +229,7 @@ def solved(make: Any, harmonics: int, samples: int) -> Operating:
 
 
 def watched(make: Any, count: int) -> list[Array]:
-    return [m.harmonics(m.watched, count) for m in moving(make)]
+    return [m.harmonics(m.outputs, count) for m in moving(make)]
 
 
 def test_duffing_oscillator() -> None:
@@ -256,12 +256,12 @@ def test_beam_with_a_contact_in_space_that_lifts_off_has_two_motions() -> None:
     balance's solution. Either: 1e-4 in every harmonic, with steps of a length, since the laws follow a slider that
     turns to first order only. The two differ by a hundred times that."""
     rest, from_rest = moving(beam_in_space)[-1], solved(beam_in_space, 21, 2048)
-    assert apart(from_rest, rest.harmonics(rest.watched, 7)) < 1e-4
+    assert apart(from_rest, rest.harmonics(rest.outputs, 7)) < 1e-4
     other = balanced(beam_in_space(), 3.4, harmonics=21, samples=1024, length=0.05)
     motion = steady(beam_in_space(), 3.4, ((30, 1024),), begun(beam_in_space(), other, 1024))[0]
     assert motion.change < 1e-8
-    assert apart(other, motion.harmonics(motion.watched, 7)) < 1e-4
-    assert apart(other, rest.harmonics(rest.watched, 7)) > 1e-2
+    assert apart(other, motion.harmonics(motion.outputs, 7)) < 1e-4
+    assert apart(other, rest.harmonics(rest.outputs, 7)) > 1e-2
     for one in (from_rest, other):
         assert one.cycles["face"].open[0] > 0.03 and one.cycles["face"].slipping[0] > 0.5
 
@@ -272,7 +272,7 @@ def test_ring_of_four_in_a_wave() -> None:
     found, motion = solved(ring_of_four, 15, 2048), moving(ring_of_four)[-1]
     shares = [c for one in found.cycles.values() for c in (one.slipping.mean(), one.open.mean())]
     assert min(shares) > 0.2 and motion.change < 1e-4
-    assert apart(found, motion.harmonics(motion.watched, 5)) < 1e-4
+    assert apart(found, motion.harmonics(motion.outputs, 5)) < 1e-4
 
 
 # energy ------------------------------------------------------------------------------------------------------------

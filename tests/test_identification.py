@@ -149,7 +149,7 @@ def test_resonances_over_engine_order_are_those_of_the_stuck_ring() -> None:
         part, k = problem.parts[1][0], problem.stiffness[0]
         K = part.K + part.rows.conj().T @ k @ part.rows
         fine = 2 * np.pi * found.frequency[i] * (1 + np.linspace(-1e-3, 1e-3, 2001))
-        size = [abs((part.watch @ np.linalg.solve(K - w**2 * part.M + 1j * w * part.C, part.load))[0]) for w in fine]
+        size = [abs((part.output @ np.linalg.solve(K - w**2 * part.M + 1j * w * part.C, part.load))[0]) for w in fine]
         assert found.amplitude[i] == pytest.approx(max(size), rel=1e-6)
         assert found.frequency[i] == pytest.approx(fine[int(np.argmax(size))] / (2 * np.pi), rel=3e-6)
     assert found.index.tolist() == [1, 2, 3, 4] and not found.failed.any()

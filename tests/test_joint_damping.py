@@ -134,7 +134,7 @@ def test_half_power_width_of_a_computed_resonance(tmp_path: Path, more: str, eac
     points = [solve(problem, 2 * np.pi * at, []) for at in half]
     assert all(p.converged for p in points)
     found = [response.operating(problem, p) for p in points]
-    power = np.array([abs(o.watched[0, 1]) ** 2 for o in found])
+    power = np.array([abs(o.outputs[0, 1]) ** 2 for o in found])
     inverse = np.polynomial.Polynomial.fit(half, 1 / power, 2)  # of one mode a parabola
     low, high = (inverse - 2 * inverse(inverse.deriv().roots()[0])).roots()
     assert high - low == pytest.approx(2 * D * f, rel=2e-3)
@@ -146,7 +146,7 @@ def test_the_order_of_the_bodies_says_nothing(tmp_path: Path, more: str) -> None
     a, b = (strips(tmp_path, more, order=o) for o in (("clamped", "free"), ("free", "clamped")))
     np.testing.assert_allclose(damping(a)[1], damping(b)[1], rtol=1e-8)
     at = 2 * np.pi * float(damping(a)[0][0])
-    one, other = (response.operating(p, solve(p, at, [])).watched[0] for p in (problem_of(x, 1e3) for x in (a, b)))
+    one, other = (response.operating(p, solve(p, at, [])).outputs[0] for p in (problem_of(x, 1e3) for x in (a, b)))
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())
 
 
@@ -164,8 +164,8 @@ def test_a_sector_and_the_whole_ring_are_damped_alike(tmp_path: Path, more: str)
         assert near.any() and np.isclose(E[near], ratio, rtol=1e-6).any()
     Omega = 2 * np.pi * 60.0
     x, y = (response.operating(p, solve(p, Omega, [])) for p in (small, large))
-    turned = x.watched[0] * np.exp(2j * np.pi * np.arange(2) * 2 * np.arange(12)[:, None] / 12)
-    np.testing.assert_allclose(y.watched, turned, rtol=0, atol=1e-8 * np.abs(turned).max())
+    turned = x.outputs[0] * np.exp(2j * np.pi * np.arange(2) * 2 * np.arange(12)[:, None] / 12)
+    np.testing.assert_allclose(y.outputs, turned, rtol=0, atol=1e-8 * np.abs(turned).max())
     assert y.damped == pytest.approx(12 * x.damped, rel=1e-8)
 
 

@@ -33,7 +33,7 @@ from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
 from microslip.results import open_journal, response_of
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
 from microslip.system.assembly import Contact as Rub
 
 FREQUENCY = np.linspace(180.0, 270.0, 16)
@@ -144,13 +144,13 @@ def test_what_is_kept_is_the_point(problem: balance.Problem) -> None:
     again, same = restored(problem, record(problem, point, found))
     assert again.Omega == pytest.approx(point.Omega, rel=1e-15) and again.status == point.status
     np.testing.assert_array_equal(again.x, point.x)
-    np.testing.assert_array_equal(same.watched, found.watched)
+    np.testing.assert_array_equal(same.outputs, found.outputs)
     assert len(again.history) == point.iterations + 1 and again.history[-1] == point.error
     for a, b in zip(same.q["blade"], found.q["blade"], strict=True):
         np.testing.assert_array_equal(a, b)
     whole = response_of(HEAD, {SERIES: {60.0: record(problem, point, found)}}).one(normal_force=20.0)
     assert labels(problem) == {"monitors/tip": ["u_x"]}
-    np.testing.assert_array_equal(whole.monitor("tip")[0], found.watched)
+    np.testing.assert_array_equal(whole.monitor("tip")[0], found.outputs)
 
 
 def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
@@ -168,8 +168,8 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     patch, _ = linear_patch()
     contact = touching("rub", patch, Side("small", "right"), None, normal=100.0)
     member = Member("small", {0: group}, brings=np.ones(len(group.compliance.labels)))
-    watches = tuple(Watch("small", "tip-probe", f"u_{x}") for x in "xyz")
-    assembly = Assembly((member,), (contact,), (Load("small", "shaker", 300.0),), watches)
+    outputs = tuple(Output("small", "tip-probe", f"u_{x}") for x in "xyz")
+    assembly = Assembly((member,), (contact,), (Load("small", "shaker", 300.0),), outputs)
     problem = balance.of(assembly, harmonics=3, samples=64)
     point = solve(problem, 2 * np.pi * 400.0, [])
     assert point.converged
@@ -181,9 +181,9 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     node, away = nearest_point(basis, group.monitors["tip-probe"].point)
     assert away < 1e-12
     read = displacement(motion, node)[0, :, 0].T
-    np.testing.assert_allclose(read, found.watched, rtol=0, atol=1e-9 * np.abs(found.watched).max())
+    np.testing.assert_allclose(read, found.outputs, rtol=0, atol=1e-9 * np.abs(found.outputs).max())
     alone = displacement(motion_of(point.Omega, np.array(found.q["small"]), group), node)[0, :, 0].T
-    assert np.abs(alone - found.watched).max() > 1e-4 * np.abs(found.watched).max()  # it would be missed
+    assert np.abs(alone - found.outputs).max() > 1e-4 * np.abs(found.outputs).max()  # it would be missed
 
 
 READ = (("p0", "u_x"), ("p1", "u_x"), ("p0", "u_y"), ("p0", "u_x"))
@@ -202,8 +202,8 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
     along, T = np.array([[[0.0], [1.0], [0.0]]]), group.interfaces["sole"].rows[1:2]
     patch, none = Patch("sole", np.zeros((1, 2)), np.ones(1), law, along), np.zeros(1)
     rub = Rub("rub", patch, Side("pair", "sole", np.eye(6)[1:2], rows={0: T}), None, none, none)
-    watches = tuple(Watch("pair", name, label) for name, label in READ)
-    pair = Assembly((Member("pair", {0: group}),), (rub,), (Load("pair", "f"),), watches)
+    outputs = tuple(Output("pair", name, label) for name, label in READ)
+    pair = Assembly((Member("pair", {0: group}),), (rub,), (Load("pair", "f"),), outputs)
     problem = balance.of(pair, harmonics=1, samples=16)
     head = HEAD | {"labels": labels(problem)}
     for count in (2, 4):
@@ -211,7 +211,7 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
             found, _ = kept_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
             told = response_of(journal.head, journal.series)
     assert told.labels == {"monitors/p0": ("u_x", "u_y"), "monitors/p1": ("u_x",)}
-    for f, watched in zip(found.frequency, found.watched, strict=True):
+    for f, watched in zip(found.frequency, found.outputs, strict=True):
         Omega = 2 * np.pi * f
         A = group.K_r + 5e3 * T.T @ T - Omega**2 * group.M_r + 1j * Omega * group.C_r
         q = np.linalg.solve(A, group.excitations["f"].rows[0])
@@ -229,9 +229,9 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
     group = System("one", [Body("m", 1.0, free="xy")], held, monitors=[Monitor("tip", "m")]).basis().groups[0, 0]
     members = tuple(Member(name, {0: group}) for name in ("left", "right"))
     asked = [("left", "u_x"), ("right", "u_x"), ("left", "u_y"), ("right", "u_y")]
-    assembly = Assembly(members, (), (), tuple(Watch(m, "tip", label) for m, label in asked))
+    assembly = Assembly(members, (), (), tuple(Output(m, "tip", label) for m, label in asked))
     problem: Any = SimpleNamespace(assembly=assembly, harmonics=1)
     watched = np.arange(8.0).reshape(4, 2) + 0j
-    row = {name: watched[list(rows.values())] for name, rows in kept._watches(problem).items()}
+    row = {name: watched[list(rows.values())] for name, rows in kept._outputs(problem).items()}
     np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
     np.testing.assert_array_equal(kept._watched(problem, row), watched)

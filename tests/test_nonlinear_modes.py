@@ -20,7 +20,7 @@ from microslip.harmonic_balance.nonlinear_modes import _Curve, backbone, stronge
 from microslip.harmonic_balance.peak import highest, resonance
 from microslip.harmonic_balance.response import of_body, operating
 from microslip.harmonic_balance.solver import solve
-from microslip.system.assembly import Watch
+from microslip.system.assembly import Output
 
 ONE = np.array([1.0])
 
@@ -95,7 +95,7 @@ def test_forced_by_what_feeds_the_losses_the_motion_is_the_mode(harmonics):
         problem = sliding(harmonics, force=force)
         start = found.x[i].copy()
         point = solve(problem, found.Omega[i], [start])
-        y = operating(problem, point).watched[0, 1]
+        y = operating(problem, point).outputs[0, 1]
         tolerance = 1e-8 if harmonics == 1 else 1e-2
         assert point.converged and abs(y + 1j * A) < tolerance * A  # the force leads by a quarter of a period
 
@@ -121,7 +121,7 @@ def test_a_nodal_diameter_of_a_ring(order):
     """One sector for six blades: the mode at a large amplitude, put into all of them, is one of the whole ring; the
     wave that runs the other way has the same frequency and damping."""
     fine = {"harmonics": 3, "samples": 48, "length": 1e-6}
-    forward, backward = (replace(sector(6, e), watches=(Watch("blade", "tip", "u_y"),)) for e in (order, 6 - order))
+    forward, backward = (replace(sector(6, e), outputs=(Output("blade", "tip", "u_y"),)) for e in (order, 6 - order))
     lone, ring = balance.of(forward, **fine), balance.of(forward.unrolled(), **fine)
     mode = strongest(lone, 0.0, 2 * np.pi * 1000.0)
     ways = [backbone(balance.of(one, **fine), 1e-7, 3e-5, mode, asked=[1e-5]) for one in (forward, backward)]
@@ -156,6 +156,6 @@ def test_mistakes():
         backbone(sliding(), 1e-6, 1e-5, mode=1)
     problem = two_modes(4.0)
     part = problem.parts[1][0]
-    still = replace(part, watch=(np.linalg.inv(stuck_modes(problem)[1]) @ np.linalg.inv(part.M))[1:] @ part.M)
+    still = replace(part, output=(np.linalg.inv(stuck_modes(problem)[1]) @ np.linalg.inv(part.M))[1:] @ part.M)
     with pytest.raises(UserError, match="does not move"):
         backbone(replace(problem, parts=(problem.parts[0], (still,), *problem.parts[2:])), 1e-6, 1e-5)

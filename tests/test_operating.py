@@ -390,21 +390,21 @@ def test_contact_map_of_a_patch_that_opens_at_one_edge():
 
 def test_tractions_of_a_contact_map_add_up_to_the_forces_of_its_group():
     """Also where the wave leads by a phase, at whose zero the samples begin: mean and first harmonic, 1e-12."""
-    from microslip.harmonic_balance.forces import Marched
+    from microslip.harmonic_balance.forces import AFT
     from microslip.harmonic_balance.problem import Group
     from microslip.operating.patches import contact_map
 
     patch, u0 = linear_patch()
     zero, u = np.zeros((1, 6)), np.zeros((1, 6, 3))
     u[0, :, 0], u[0, 1, 1:], u[0, 2, 1:] = u0, (1.5e-5, 4e-6), (-3e-6, 1e-5)
-    g = Group(Marched(patch, 1, 64, 100), np.arange(6)[None], None, zero, zero, np.array([0.7]), (0,))
+    g = Group(AFT(patch, 1, 64, 100), np.arange(6)[None], None, zero, zero, np.array([0.7]), (0,))
     (F,), ((force, cycle),) = g.force(u, 0.01), g.traced(u, 0.01)
     side, shares = small_basis().groups[0, 0].interfaces["right"], (cycle.slipping, cycle.open)
     found = contact_map(patch, side, np.asarray(force), cycle.dissipated, *shares, 1, 0.7)
     whole = -np.einsum("n,nah->ah", patch.areas, found.tractions)
     np.testing.assert_allclose(whole[:, 0], F[:3, 0], rtol=0, atol=1e-12 * np.abs(F).max())
     np.testing.assert_allclose(whole[:, 1], F[:3, 1] - 1j * F[:3, 2], rtol=0, atol=1e-12 * np.abs(F).max())
-    assert found.loss == pytest.approx(g.watch(u, 0.01)[0].dissipated.sum(), rel=1e-12) and found.loss > 1e-4
+    assert found.loss == pytest.approx(g.point_cycles(u, 0.01)[0].dissipated.sum(), rel=1e-12) and found.loss > 1e-4
 
 
 def test_contact_map_as_vtu(tmp_path):

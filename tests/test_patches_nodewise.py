@@ -23,7 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
-from microslip.system.assembly import Assembly, Load, Member, Ring, Side, Watch, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, touching
 from microslip.system.meeting import facing, rigid_points
 from microslip.system.nodal import interpolation, nodal, static_compliance
 
@@ -254,7 +254,7 @@ def problem_of(a: Block, b: Block, push: float = 60.0, **settings: float) -> bal
     patch, first, second, C = pair(a, b)
     contact = touching("joint", patch, first, second, normal=100.0, compliance=C)
     whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", push),),
-                     (Watch("low", "end", "u_x"),))  # fmt: skip
+                     (Output("low", "end", "u_x"),))  # fmt: skip
     return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "settled": 1e-12, "length": 1e-7,
                                 **settings})  # fmt: skip
 
@@ -308,13 +308,13 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
     found = []
     for contact in (by_force, by_balance):
         whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", 60.0),),
-                         (Watch("low", "end", "u_z"),))  # fmt: skip
+                         (Output("low", "end", "u_z"),))  # fmt: skip
         problem = balance.of(whole, harmonics=1, samples=32, cycles=4, settled=1e-12, length=1e-7)
         point = solve(problem, 2 * np.pi * 3000.0, [])
         assert point.converged
         found.append(response.operating(problem, point))
     assert 0 < found[0].cycles["joint"].open.mean() < 0.9
-    moving = [f.watched[0, 1] for f in found]
+    moving = [f.outputs[0, 1] for f in found]
     assert moving[1] == pytest.approx(moving[0], rel=1e-8)
 
 

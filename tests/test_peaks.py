@@ -261,7 +261,7 @@ def test_amplitude_of_a_readout_and_its_derivatives():
     point = solve(problem, Omega, [])
     for harmonic in (0, 1, 2):
         found = amplitude(problem.at(Omega), point.x, *problem.at(Omega).forces(point.x), harmonic=harmonic)
-        assert found.value == pytest.approx(operating(problem, point).watched[0, harmonic], rel=1e-12)
+        assert found.value == pytest.approx(operating(problem, point).outputs[0, harmonic], rel=1e-12)
     x = point.x + 0.2 * rng.normal(size=problem.size)
     direction, h = rng.normal(size=problem.size), 1e-6
 
@@ -307,7 +307,7 @@ def test_the_peak_of_a_contact_with_microslip_is_the_highest():
     def height(f):
         point = solve(problem, 2 * np.pi * f, [found.x])
         assert point.converged
-        return -abs(operating(problem, point).watched[0, 1])
+        return -abs(operating(problem, point).outputs[0, 1])
 
     f = found.lam / (2 * np.pi)
     bounds = (0.98 * f, 1.02 * f)
@@ -327,7 +327,7 @@ def test_optimal_normal_force_against_sweeps():
     def swept(normal):
         problem = pressed(normal)
         points = sweep(problem, around, start=best.resonance.x)
-        return max(abs(operating(problem, p).watched[0, 1]) for p in points if p.converged)
+        return max(abs(operating(problem, p).outputs[0, 1]) for p in points if p.converged)
 
     here, beside = swept(best.parameter), [swept(best.parameter * share) for share in (0.9, 0.96, 1.04, 1.1)]
     assert best.resonance.amplitude == pytest.approx(here, rel=2e-4)
@@ -372,7 +372,7 @@ def test_the_optimum_of_a_slider_against_sweeps():
     def swept(normal):
         problem = masses(normal)
         points = sweep(problem, np.linspace(5, 14, 361))
-        return max(abs(operating(problem, p).watched[0, 1]) for p in points if p.converged)
+        return max(abs(operating(problem, p).outputs[0, 1]) for p in points if p.converged)
 
     for normal, one in best.found.items():
         assert one.status == "converged" and one.amplitude >= best.resonance.amplitude

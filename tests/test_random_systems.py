@@ -147,7 +147,7 @@ def exchanged(values: Mapping[str, Any]) -> dict[str, Any]:
 
 MISTAKES = {
     "read-outs exchanged": ("amplitude", lambda p: changed(p, reduced, "monitored", lambda found, *_: found[::-1])),
-    "rows of read-outs exchanged": ("amplitude", of_parts(lambda part, _: replace(part, watch=part.watch[::-1]))),
+    "rows of read-outs exchanged": ("amplitude", of_parts(lambda part, _: replace(part, output=part.output[::-1]))),
     "damping twice": ("amplitude", damped(2.0)),
     "damping left out": ("amplitude", damped(0.0)),
     "second side like the first": ("amplitude", lambda p: p.setattr(Assembly, "signs", property(alike))),

@@ -101,7 +101,7 @@ def test_interrupted_and_resumed(folder: Path) -> None:
     left = ["6", "7", "8", "9", "a", "normal"]  # a mode between them, the peak
     assert converged and [t.split()[0] for t in computed(told)] == left
     whole = read_response(build / "response.h5")
-    assert whole.finished and whole.mode == "marched" and len(whole.series[0].key) == 11
+    assert whole.finished and whole.mode == "aft" and len(whole.series[0].key) == 11
     kept = np.isin(whole.series[0].key, half.series[0].key)
     np.testing.assert_array_equal(whole.series[0].arrays["x"][kept], half.series[0].arrays["x"])
     assert computed(respond(folder)[0]) == []  # up to date
@@ -289,7 +289,7 @@ SLIDES = ("amplitude=20.0", "sweep.points=5")
     [*(pytest.param(m, marks=pytest.mark.slow) for m in (('mode="book"',), ("harmonics=3",))), ()],
 )
 def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more: tuple[str, ...]) -> None:
-    """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J a cycle, single
+    """What the mode found, whatever it leaves out: the VTU's J/m2 times areas against the file's J per cycle, single
     precision. The full law marched along the book's motion, or with other samples, takes more or less."""
     import meshio
 

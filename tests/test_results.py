@@ -30,7 +30,7 @@ from microslip.results import (
 RNG = np.random.default_rng(5)
 HEAD = {
     "case": "beam",
-    "mode": "marched",
+    "mode": "aft",
     "bodies": {"blade": vars(Body("small", "0" * 64, "basis.h5", 0, 0.0, ((0, False), (0, False))))},
     "parameters": {"normal_force = 10": {"normal_force": 10.0}},
     "labels": {"monitors/tip-probe": ["u_x", "u_y", "u_z"]},
@@ -299,10 +299,10 @@ def test_incomplete_and_newer_files_get_one_sentence(tmp_path):
 
 
 def test_empty_series_and_no_series(tmp_path):
-    empty = Response("none", "marched", (Series("a", {}, np.zeros(0), (), {}),))
+    empty = Response("none", "aft", (Series("a", {}, np.zeros(0), (), {}),))
     write_response(tmp_path / "r.h5", empty)
     assert read_response(tmp_path / "r.h5").series[0].status == ()
-    write_response(tmp_path / "r.h5", Response("none", "marched", ()))
+    write_response(tmp_path / "r.h5", Response("none", "aft", ()))
     assert read_response(tmp_path / "r.h5").series == ()
 
 

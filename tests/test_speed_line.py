@@ -18,7 +18,7 @@ from microslip.data import Rows, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
-from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
 ORDER = 4
@@ -30,7 +30,7 @@ def rubbing(push: float = 1e4) -> Assembly:
     law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
     wall = touching("wall", Patch("tip", places, areas, law), Side("blade", "tip"), None, normal=1.0)
     member = Member("blade", {0: ranged().groups[0, 0]})
-    return Assembly((member,), (wall,), (Load("blade", "gas", push),), (Watch("blade", "end", "u_x"),))
+    return Assembly((member,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))
 
 
 def pressed(rpm: float) -> float:
@@ -59,7 +59,7 @@ def test_every_speed_is_the_response_of_the_body_at_that_speed() -> None:
     for i in (0, 5, 11):
         problem = balance.of(at_speed(float(speeds()[i])), **FINE)
         point = solve(problem, 2 * np.pi * ORDER * speeds()[i] / 60, [])
-        alone = response.operating(problem, point).watched[0]
+        alone = response.operating(problem, point).outputs[0]
         np.testing.assert_allclose(found.harmonics[i], alone, rtol=0, atol=1e-7 * np.abs(alone).max())
     assert list(found.columns())[0] == "speed_rpm" and "normal_force_1_N" in found.columns()
 
@@ -69,14 +69,14 @@ def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
     step of the speeds (0.05 %); a body held at rest's modes would resonate elsewhere."""
     tracks = track_basis(ranged())
     meets = [c for c in crossings(tracks, [ORDER]) if c.curve == 0][0]
-    free = Assembly(rubbing().members, (), rubbing().loads, rubbing().watches)
+    free = Assembly(rubbing().members, (), rubbing().loads, rubbing().outputs)
     near = meets.speed * 30 / np.pi * (1 + np.linspace(-0.01, 0.01, 41))
     amplitude = []
     for n in near:
         at = speed_line.assembly_at(free, {"blade": ranged()}, float(n))
         part = at.part(at.members[0], 1)
         w = 2 * np.pi * float(speed_line.frequency(ORDER, n))
-        amplitude.append(abs((part.watch @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
+        amplitude.append(abs((part.output @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
     assert near[int(np.argmax(amplitude))] == pytest.approx(meets.speed * 30 / np.pi, rel=5e-4)
     at_rest = ranged().groups[0, 0].frequency[0] * 60 / ORDER
     assert abs(at_rest / near[20] - 1) > 0.05

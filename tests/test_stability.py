@@ -20,7 +20,7 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.data import UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.forces import Marched
+from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
 from microslip.harmonic_balance.stability import (
@@ -107,7 +107,7 @@ def one_mode(law, preload, load, K, C, directions=(1,), **more) -> Problem:
                 zero(6), unit[-1:], nothing, zero(1)),)
         for h in range(more.get("harmonics", 3) + 1)
     )  # fmt: skip
-    group = Group(Marched(patch, 1, *fine), np.arange(6)[None], None, offset[None], forces[None], zero(1), (0,))
+    group = Group(AFT(patch, 1, *fine), np.arange(6)[None], None, offset[None], forces[None], zero(1), (0,))
     return Problem(Assembly((), (contact,), (), ()), parts, (0,), (stiffness,), (group,), **more)
 
 

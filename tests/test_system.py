@@ -354,7 +354,7 @@ def rubbed(g=None, law=None, **changed):
     pytest.importorskip("jax")
     from microslip.contact.patch import Patch
     from microslip.contact.sliders import jenkins
-    from microslip.system.assembly import Assembly, Load, Member, Side, Watch, touching
+    from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
 
     g = g or chain().basis().groups[0, 0]
     patch = Patch("rub", np.zeros((1, 2)), np.ones(1), law or jenkins(2e3, 0.3, 1.0))
@@ -362,11 +362,11 @@ def rubbed(g=None, law=None, **changed):
         "members": (Member("m", {0: g}),),
         "contacts": (touching("rub", patch, Side("m", "rub"), None, normal=1.0),),
         "loads": (Load("m", "shaker", 2.0),),
-        "watches": (Watch("m", "end", "u_x"),),
+        "outputs": (Output("m", "end", "u_x"),),
     }
     if "amplitude" in changed:
         changed = {"loads": (Load("m", "shaker", changed["amplitude"]),)}
-    for key in ("loads", "watches"):
+    for key in ("loads", "outputs"):
         if isinstance(name := changed.get(key), tuple) and isinstance(name[0], str):
             changed[key] = (replace(parts[key][0], **dict([name])),)
     return Assembly(**(parts | changed))
@@ -404,8 +404,8 @@ def shaken(**changed):
         (shaken, {"members": ()}, "member"),
         (shaken, {"loads": ("member", "x")}, "x"),
         (shaken, {"loads": ("row", "x")}, "x"),
-        (shaken, {"watches": ("member", "x")}, "x"),
-        (shaken, {"watches": ("monitor", "x")}, "x"),
+        (shaken, {"outputs": ("member", "x")}, "x"),
+        (shaken, {"outputs": ("monitor", "x")}, "x"),
         *[(one, {key: bad}, key) for key in ("mass", "ratio") for bad in (np.nan, np.inf, -1.0)],
         (one, {"ratio": 5.0}, "ratio"),
         (one, {"k": np.inf}, "link"),

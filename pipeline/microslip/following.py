@@ -297,7 +297,7 @@ def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict
             f'{case.path}: ring.model: "sector" cannot tell whether the sectors stay alike; write model = "full"'
         )
     if built.settings.mode == "book":
-        raise UserError(f'{case.path}: mode: "book" has no motion in time to perturb; write mode = "marched"')
+        raise UserError(f'{case.path}: mode: "book" has no motion in time to perturb; write mode = "aft"')
     response = read_response(case.folder / "response.h5")
     done, count = 0, sum(int(series.converged.sum()) for series in response.series)
     for series in response.series:

@@ -232,7 +232,7 @@ class _Assessed:
 def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
     """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
     first = keeping.drawn_monitor(result.built)
-    basis = result.built.bodies[result.built.assembly.watches[0].member].basis
+    basis = result.built.bodies[result.built.assembly.outputs[0].member].basis
     if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
     member, monitor = first
@@ -497,13 +497,13 @@ def compare_book(
 
     given = list(assignments or [])
     own, _ = load_case(case_path, given)
-    case, _ = load_case(case_path, [*given, 'mode="marched"', "strips=0"])
+    case, _ = load_case(case_path, [*given, 'mode="aft"', "strips=0"])
     strips = load_case(case_path, [*given, 'mode="book"'])[0].strips
     files = existing_files(case, case_path, basis_file, root)
     folder = root / "build" / case.name
-    folders = {mode: folder if mode == own.mode else folder / mode for mode in ("marched", "book")}
+    folders = {mode: folder if mode == own.mode else folder / mode for mode in ("aft", "book")}
     ways = {
-        "marched": (folders["marched"], [*given, 'mode="marched"', "strips=0"]),
+        "aft": (folders["aft"], [*given, 'mode="aft"', "strips=0"]),
         "book": (folders["book"], [*given, 'mode="book"', f"strips={strips}"]),
     }
     found = {m: response_stage(case_path, files, f, a, force, report, log) for m, (f, a) in ways.items()}

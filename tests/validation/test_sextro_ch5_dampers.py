@@ -81,7 +81,7 @@ def test_twice_the_force_on_twice_the_mass_is_twice_the_strain(bases) -> None:
         problem = problem_of(built, 400.0 * share).loaded(share)
         point = solve(problem, 2 * np.pi * 140.0, [])
         assert point.converged
-        found.append(operating(problem, point).watched[0, 1])
+        found.append(operating(problem, point).outputs[0, 1])
     assert found[1] == pytest.approx(2 * found[0], rel=1e-8)
 
 

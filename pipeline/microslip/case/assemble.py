@@ -32,7 +32,7 @@ from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
     from ..contact.law import Law
-    from ..system.assembly import Assembly, Contact, Load, Member, Side, Watch
+    from ..system.assembly import Assembly, Contact, Load, Member, Output, Side
     from ..system.meeting import Met, Place
     from ..system.nodal import Nodal
 
@@ -236,7 +236,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     flowing, loads, said = _loads(settings, bodies, flowing, path)
     remarks += [*said, *remarks_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
-    assembly = Assembly(flowing, tuple(made), loads, _watches(settings, bodies, path), ring, settings.stuck_ratios)
+    assembly = Assembly(flowing, tuple(made), loads, _outputs(settings, bodies, path), ring, settings.stuck_ratios)
     said = list(dict.fromkeys(remarks))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
 
@@ -342,11 +342,11 @@ def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
     """Bytes that a response with a patch of so many points and coordinates takes, the finer balance that tells its
     error included; none in the book's mode, which has tables."""
     from ..harmonic_balance.accuracy import more
-    from ..harmonic_balance.cost import marched_bytes
+    from ..harmonic_balance.cost import aft_bytes
 
     contacts = settings.ring.blades if settings.ring and settings.ring.model == "full" else 1
     finer = more(settings.balanced), 2 * settings.samples
-    return 0.0 if settings.mode == "book" else marched_bytes(points, coordinates, *finer, contacts)
+    return 0.0 if settings.mode == "book" else aft_bytes(points, coordinates, *finer, contacts)
 
 
 def _refuse_too_many(settings: CaseSettings, c: ContactSettings, load: float | None, found: Nodal | None) -> None:
@@ -515,15 +515,15 @@ def _loads(
     return tuple(named.values()), tuple(found), said
 
 
-def _watches(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Watch, ...]:
-    from ..system.assembly import Watch
+def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Output, ...]:
+    from ..system.assembly import Output
 
     found = []
-    for m in settings.watches:
+    for m in settings.outputs:
         body, name = settings.address(m.monitor)
         group = _body(bodies, body, path, "monitor").group
         if name in group.gauges and name not in group.monitors:
-            found.append(Watch(body, name, group.gauges[name].labels[0]))
+            found.append(Output(body, name, group.gauges[name].labels[0]))
             continue
         known = group.monitors
         _among(known, name, path, "monitor")
@@ -531,7 +531,7 @@ def _watches(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | 
         if label not in known[name].labels:
             labels = ", ".join(known[name].labels)
             raise UserError(f"{path}: direction: monitor '{name}' reads {labels}, not {label}; choose one")
-        found.append(Watch(body, name, label))
+        found.append(Output(body, name, label))
     return tuple(found)
 
 

@@ -132,12 +132,12 @@ def _wave(built: Built, b: Loaded, harmonic: int) -> tuple[int, bool]:
 
 def drawn_monitor(built: Built) -> tuple[str, str] | None:
     """Member and array name of the first read-out; None where the member's coordinates are not those of its file."""
-    watch = built.assembly.watches[0]
-    if _joined(built, watch.member):
+    output = built.assembly.outputs[0]
+    if _joined(built, output.member):
         return None
-    member = _standing(built, watch.member)[0]
-    several = len(built.bodies) > 1 or member != watch.member
-    return member, f"{member}:{watch.monitor}" if several else watch.monitor
+    member = _standing(built, output.member)[0]
+    several = len(built.bodies) > 1 or member != output.member
+    return member, f"{member}:{output.monitor}" if several else output.monitor
 
 
 # contacts ----------------------------------------------------------------------------------------------------------
@@ -179,6 +179,6 @@ def _check_energy(names: list[str], maps: list[ContactMap], row: Mapping[str, An
     for name, found, energy in zip(names, maps, kept, strict=False):
         if not abs(found.loss - energy) <= most:
             raise UserError(
-                f"contact map of {name}: {found.loss:.6g} J a cycle, where the response has {energy:.6g} J; no map is "
-                "drawn: report it, the response itself is not touched by it"
+                f"contact map of {name}: {found.loss:.6g} J per cycle, where the response has {energy:.6g} J; no map "
+                "is drawn: report it, the response itself is not touched by it"
             )

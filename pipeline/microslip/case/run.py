@@ -286,7 +286,7 @@ def _book_can(built: Built, path: Path | str) -> None:
             normal_law(c.patch.law, built.settings.strips)
         except UserError as error:
             more = ", or isotropic = true in a curved contact" if "along t1 and t2" in str(error) else ""
-            raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "marched"') from error
+            raise UserError(f'{path}: contacts.{c.name}: {error}{more}, or write mode = "aft"') from error
 
 
 def _by_the_book(built: Built) -> list[str]:
@@ -322,17 +322,17 @@ def pressed_by(built: Built, problem: Problem) -> float:
 def free_response(built: Built, frequency: Array) -> FrequencyResponse:
     """The first read-out without any contact, over frequency (Hz) and, between its ends, over every resonance."""
     a = replace(built.assembly, contacts=())
-    watch = a.watches[0]
-    member = next(m for m in a.members if m.name == watch.member)
+    output = a.outputs[0]
+    member = next(m for m in a.members if m.name == output.member)
     part = replace(
         a, members=(member,), loads=tuple(x for x in a.loads if x.member == member.name),
-        watches=tuple(w for w in a.watches if w.member == member.name),
+        outputs=tuple(w for w in a.outputs if w.member == member.name),
     ).joined(1)  # fmt: skip
     frequency = np.union1d(frequency, _about_resonances(part, frequency))
     portions = np.array_split(2 * np.pi * frequency, len(frequency) // 256 + 1)
     q = np.concatenate([_moved(part, Omega) for Omega in portions])
     zero, none = np.zeros(len(frequency)), np.zeros((len(frequency), 0))
-    moved = q @ part.watch[0] + part.watch_given[0]
+    moved = q @ part.output[0] + part.output_given[0]
     return FrequencyResponse(frequency, moved, none, zero, np.ones(len(frequency), dtype=bool), np.zeros(0), none)
 
 
@@ -437,7 +437,7 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
     return [
         f"At F_N = {normal:g} N points of {problem.assembly.contacts[which].name} would lift off, for "
         f"{percent(share[at, which])} of points and time at {found.frequency[at]:.6g} Hz; the book's mode takes "
-        'their friction for that of a closed contact: compare with mode = "marched".'
+        'their friction for that of a closed contact: compare with mode = "aft".'
     ]
 
 

@@ -314,7 +314,7 @@ class CaseSettings(Model):
     monitor: Address | None = None
     direction: Literal["x", "y", "z"] = "x"
     monitors: Annotated[tuple[MonitorOfCase, ...], BeforeValidator(_tuple)] = ()
-    mode: Literal["marched", "book"] = "marched"
+    mode: Literal["aft", "book"] = "aft"
     strips: Annotated[int, Field(ge=0, le=1000)] = 0
     damping: Literal["modal", "structural", "stuck"] | None = None
     damping_ratio: Ratio | Ratios | None = None
@@ -386,7 +386,7 @@ class CaseSettings(Model):
         """A sentence where there are several bodies and a name does not say which of them has it; else nothing."""
         named = [("contacts", end) for c in self.contacts for end in (c.interface, c.against) if end != GROUND]
         named += [("excitations", x.row or x.face or "") for x in self.loads]
-        named += [("monitors", m.monitor) for m in self.watches]
+        named += [("monitors", m.monitor) for m in self.outputs]
         open_ = [(key, name) for key, name in named if ":" not in name]
         if not open_ or len(self.members) == 1:
             return ""
@@ -443,7 +443,7 @@ class CaseSettings(Model):
     @property
     def looks_for_harmonics(self) -> bool:
         """Whether their number follows from an estimated error."""
-        return self.harmonics == "auto" and self.mode == "marched"
+        return self.harmonics == "auto" and self.mode == "aft"
 
     def with_harmonics(self, count: int) -> CaseSettings:
         """The case with a number of harmonics, and of samples that grow with them: both errors fall."""
@@ -488,7 +488,7 @@ class CaseSettings(Model):
         return base_of(self.loads, self.ring.engine_order if self.ring else None, self.turning)
 
     @property
-    def watches(self) -> tuple[MonitorOfCase, ...]:
+    def outputs(self) -> tuple[MonitorOfCase, ...]:
         """The monitors; one that the short form names."""
         return self.monitors or (MonitorOfCase(monitor=self.monitor or "", direction=self.direction),)
 

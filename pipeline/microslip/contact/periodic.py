@@ -1,7 +1,7 @@
 """Periodic motion through a contact law: cycles are marched until what the sliders remember comes back with them.
 
 Most points forget their beginning within a cycle. A point that slides a little in each cycle, always nearly the same
-way, forgets it slowly: its force turns on the friction circle by a small angle a cycle. Where two marched cycles
+way, forgets it slowly: its force turns on the friction circle by a small angle per cycle. Where two marched cycles
 differ, the memory x at which a cycle begins is therefore solved for, by Newton's method with the exact derivative of
 the map P from it to the memory at the end, which costs two tangents more. Sliders do not know of each other, so this
 is a 2 x 2 system for each.

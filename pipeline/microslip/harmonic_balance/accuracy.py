@@ -19,7 +19,7 @@ import numpy as np
 
 from ..data import Array
 from . import problem as balance
-from .forces import Marched
+from .forces import AFT
 from .problem import Problem
 from .readout import amplitude
 from .response import HarmonicResponse
@@ -83,7 +83,7 @@ def more(harmonics: int) -> int:
 
 def samples_of(problem: Problem) -> int:
     """Samples of a cycle of the marched contacts; 0 where none is marched."""
-    return max((g.model.samples for g in problem.groups if isinstance(g.model, Marched)), default=0)
+    return max((g.model.samples for g in problem.groups if isinstance(g.model, AFT)), default=0)
 
 
 def finer(problem: Problem, harmonics: int, samples: int = 0) -> Problem:
@@ -95,30 +95,30 @@ def finer(problem: Problem, harmonics: int, samples: int = 0) -> Problem:
     ]
     groups = []
     for g in problem.groups:
-        if isinstance(g.model, Marched) and g.model.samples < least:
+        if isinstance(g.model, AFT) and g.model.samples < least:
             g = replace(g, model=replace(g.model, samples=least))
         groups.append(g)
     return replace(problem, harmonics=harmonics, parts=tuple(parts), groups=tuple(groups))
 
 
-def error(problem: Problem, x: Array, Omega: float, watch: int = 0) -> Error:
+def error(problem: Problem, x: Array, Omega: float, output: int = 0) -> Error:
     """Estimated error of the solution x (size,) at Omega (rad/s)."""
-    before, samples = _read(problem, x, Omega, watch), samples_of(problem)
+    before, samples = _read(problem, x, Omega, output), samples_of(problem)
     sampled, first = _resolved(problem, x, Omega)
     larger = finer(sampled, more(problem.harmonics))
     second = newton(larger.at(Omega), np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
     by_samples = by_harmonics = np.inf
     if first.converged:
-        after = _read(sampled, first.x, Omega, watch)
+        after = _read(sampled, first.x, Omega, output)
         by_samples = abs(after - before)
         if second.converged:
-            by_harmonics = abs(_read(larger, second.x, Omega, watch) - after)
+            by_harmonics = abs(_read(larger, second.x, Omega, output) - after)
     return Error(problem.harmonics, samples, before, by_harmonics, by_samples, second.x)
 
 
-def _read(problem: Problem, x: Array, Omega: float, watch: int) -> float:
+def _read(problem: Problem, x: Array, Omega: float, output: int) -> float:
     at = problem.at(Omega)
-    return abs(amplitude(at, x, *at.forces(x), watch).value)
+    return abs(amplitude(at, x, *at.forces(x), output).value)
 
 
 def _resolved(problem: Problem, x: Array, Omega: float) -> tuple[Problem, Point]:
@@ -194,7 +194,7 @@ class Enough:
 
 
 def enough(
-    problem: Problem, point: Point, tolerance: float = 0.01, watch: int = 0, most: int = 48, floor: float = 0.0,
+    problem: Problem, point: Point, tolerance: float = 0.01, output: int = 0, most: int = 48, floor: float = 0.0,
     first: Error | None = None,
 ) -> Enough:  # fmt: skip
     """Harmonics and samples doubled until the read-out's estimated error is within a tolerance (a share of it).
@@ -205,7 +205,7 @@ def enough(
     """
     found: list[Error] = []
     while True:
-        found.append(first if first and not found else error(problem, point.x, point.Omega, watch))
+        found.append(first if first and not found else error(problem, point.x, point.Omega, output))
         if found[-1].over(floor) <= tolerance:
             return Enough(problem, point, tuple(found), True)
         larger = finer(problem, more(problem.harmonics), 2 * samples_of(problem))

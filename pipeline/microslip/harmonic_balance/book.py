@@ -41,7 +41,7 @@ NORMAL_TOLERANCE = 1e-3
 # The normal direction ----------------------------------------------------------------------------------------------
 
 
-def swung(normal: Normal, mean: jax.Array, amplitude: jax.Array, count: int = 64) -> jax.Array:
+def describing_function(normal: Normal, mean: jax.Array, amplitude: jax.Array, count: int = 64) -> jax.Array:
     """Real stiffness of a normal law swinging about a mean approach (Sextro Eq. (5.2-12)), N/m; b of 5.2-13 is zero.
 
     Partial integration makes a mean of the tangent k over the swing of it,
@@ -107,7 +107,7 @@ class Swings:
 
         def outside(_: None) -> jax.Array:
             inside = jnp.where(beyond, x, self.middle), jnp.where(beyond, a, 0.0)
-            return jnp.where(beyond, swung(self.law, *inside), found)
+            return jnp.where(beyond, describing_function(self.law, *inside), found)
 
         return self.stiffness * jax.lax.cond(beyond.any(), outside, lambda _: found, None)
 
@@ -128,7 +128,7 @@ def normal_table(
     A tangent with kinks (heights that are equally frequent, a measured curve) may keep it from meeting the tolerance:
     small swings about a kink are finer than any grid. The error that is kept with the table says so.
     """
-    run = jax.jit(lambda x, a: (swung(law, x, a, 512),))
+    run = jax.jit(lambda x, a: (describing_function(law, x, a, 512),))
 
     def values(s: Array, t: Array) -> Array:
         low, high = np.meshgrid(middle + half * _near(s), middle + half * _near(t), indexing="ij")
@@ -502,18 +502,18 @@ class BookPatch:
     def rate(self, u: Array, period: float = 1.0) -> None:
         """The forces do not depend on the period."""
 
-    def watch(self, u: Array, period: float = 1.0) -> list[Cycle]:
+    def point_cycles(self, u: Array, period: float = 1.0) -> list[Cycle]:
         """What the points of each contact do in a cycle; a point that slips at all counts as slipping all of it."""
         self._one_harmonic(u)
-        parts = [np.asarray(p) for p in _watched(self.points, self.kinematics, u)]
+        parts = [np.asarray(p) for p in _point_cycles(self.points, self.kinematics, u)]
         return [Cycle(lost, lost, lost, slips, open_, 0.0) for lost, slips, open_ in zip(*parts, strict=True)]
 
     def traced(self, u: Array, period: float = 1.0) -> list[Traced]:
-        """`watch` and the points' forces in time: mean and first harmonic, which is all that the mode knows of them."""
+        """`point_cycles` and the points' forces in time: mean and first harmonic, all that the mode knows."""
         angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
         waves = np.stack([np.ones(SAMPLES), np.cos(angle), np.sin(angle)])
         forces = np.einsum("hs,cnih->csni", waves, np.asarray(_of_points(self.points, self.kinematics, u)))
-        return [Traced(f, one) for f, one in zip(forces, self.watch(u), strict=True)]
+        return [Traced(f, one) for f, one in zip(forces, self.point_cycles(u), strict=True)]
 
     def stiffness(self, u: Array) -> ComplexArray:
         """(c, k, k) complex stiffness of coordinates u (c, k, 3) (Sextro Eq. (5.2-32), or (5.2-35) if asked for).
@@ -530,7 +530,7 @@ class BookPatch:
 
 
 @jax.jit
-def _watched(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
+def _point_cycles(points: Points, G: jax.Array, u: jax.Array) -> tuple[jax.Array, ...]:
     """(c, n) J dissipated in the plane, and shares of the cycle that are slip and open."""
     wave = jnp.asarray(np.cos(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES))
 

@@ -13,7 +13,7 @@ BASE = 0.5 * GIB
 """Of a process with its packages and compiled programs."""
 
 
-def marched_bytes(points: int, coordinates: int, harmonics: int, samples: int, contacts: int = 1) -> float:
+def aft_bytes(points: int, coordinates: int, harmonics: int, samples: int, contacts: int = 1) -> float:
     """Peak of the memory that a response with the law of a patch takes; measured it is within a factor of 2.
 
     At the peak stand either the derivatives, W = 2 H + 1: twice the tangents of the force along 3 W harmonics in every

@@ -19,7 +19,7 @@ from ..units import METRES, Quantity
 from . import response
 from .peak import checked, resonance
 from .problem import Problem
-from .readout import Watched, measured
+from .readout import WithOutput, measured
 from .reduced import stuck
 from .response import HarmonicResponse
 from .solver import Report
@@ -104,7 +104,7 @@ def largest(problem: Problem, frequency: Array, report: Report = lambda _: None)
         return float("nan"), float("nan"), failed
     i = max(peaks, key=lambda j: abs(found.monitor[j]))
     report(f"peak near {frequency[i]:.6g} Hz")
-    top = resonance(checked(problem, climbed(Watched(problem, 0), *_near(problem, found, i))))
+    top = resonance(checked(problem, climbed(WithOutput(problem, 0), *_near(problem, found, i))))
     if top.status != CONVERGED:
         return float(frequency[i]), float(abs(found.monitor[i])), failed + 1
     return top.Omega / (2 * np.pi), top.amplitude, failed

@@ -37,7 +37,7 @@ class Forces(Protocol):
         """(c, k, W) derivative of `force` with respect to the period, N/s; None where it is zero."""
         ...
 
-    def watch(self, u: Array, period: float) -> list[Cycle]:
+    def point_cycles(self, u: Array, period: float) -> list[Cycle]:
         """What the points of each contact do in a cycle."""
         ...
 
@@ -47,7 +47,7 @@ class Forces(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Marched:
+class AFT:
     """The law of a patch, marched point by point: alternating frequency/time.
 
     Attributes:
@@ -83,7 +83,7 @@ class Marched:
             return None
         return np.asarray(_rate(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
 
-    def watch(self, u: Array, period: float) -> list[Cycle]:
+    def point_cycles(self, u: Array, period: float) -> list[Cycle]:
         return [one.cycle for one in self.traced(u, period)]
 
     def traced(self, u: Array, period: float) -> list[Traced]:

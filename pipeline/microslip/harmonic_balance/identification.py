@@ -111,7 +111,7 @@ def springs(patch: Patch, normal: float, tangential: float) -> Array:
 
 
 def _at_index(assembly: Assembly, index: int) -> Assembly:
-    bare = replace(assembly, loads=(), watches=())
+    bare = replace(assembly, loads=(), outputs=())
     return replace(bare, ring=Ring(assembly.ring.blades, index)) if assembly.ring else bare
 
 

@@ -14,7 +14,7 @@ from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.checks import Checks
 from ..results.journal import Journal
-from ..system.assembly import Assembly, Member, Watch
+from ..system.assembly import Assembly, Member, Output
 from .checks import forces_on, judged
 from .families import Family, followed
 from .patch import Cycle
@@ -58,7 +58,7 @@ def _peak(
     beside = float(response.frequency[bracket[1]])
     for key, row in journal.of(series).items():
         if row["peak"] == beside:
-            return key, float(abs(restored(problem, row)[1].watched[0, 1]))
+            return key, float(abs(restored(problem, row)[1].outputs[0, 1]))
     report(f"{series}: peak near {beside:.6g} Hz")
     found = highest(problem, response, bracket)
     if found is None:
@@ -154,8 +154,8 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
         "exchanged": found.exchanged,
     } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
-    for name, rows in _watches(problem).items():
-        kept[name] = found.watched[list(rows.values())]
+    for name, rows in _outputs(problem).items():
+        kept[name] = found.outputs[list(rows.values())]
     for member in problem.assembly.members:
         kept[f"bodies/{member.name}/q"] = _rectangle(found.q[member.name])
         forces = [_beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
@@ -191,7 +191,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     found = Operating(
         point.Omega,
         {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
-        _watched(problem, row),
+        _outputs_of(problem, row),
         {name: row[f"contacts/{name}/displacement"] for name in names},
         {name: row[f"contacts/{name}/force"] for name in names},
         row["supplied"],
@@ -203,33 +203,33 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     return point, found
 
 
-def _named(a: Assembly, w: Watch) -> str:
+def _named(a: Assembly, w: Output) -> str:
     """Name of the array of a read-out: the member's name stands before the monitor's where there are several."""
     group = next(iter(next(m for m in a.members if m.name == w.member).groups.values()))
     kind = "monitors" if w.monitor in group.monitors else "gauges"
     return f"{kind}/" + (f"{w.member}:{w.monitor}" if len(a.members) > 1 else w.monitor)
 
 
-def _watches(problem: Problem) -> dict[str, dict[str, int]]:
+def _outputs(problem: Problem) -> dict[str, dict[str, int]]:
     """Name of an array -> label of each of its rows -> number of the read-out in the assembly; the first one first.
 
     A read-out that is asked for twice is one row.
     """
     out: dict[str, dict[str, int]] = {}
-    for i, w in enumerate(problem.assembly.watches):
+    for i, w in enumerate(problem.assembly.outputs):
         out.setdefault(_named(problem.assembly, w), {}).setdefault(w.label, i)
     return out
 
 
 def labels(problem: Problem) -> dict[str, list[str]]:
     """Name of an array -> its rows, for the head of a journal; the first row of the first one is the first read-out."""
-    return {name: list(rows) for name, rows in _watches(problem).items()}
+    return {name: list(rows) for name, rows in _outputs(problem).items()}
 
 
-def _watched(problem: Problem, row: dict[str, Any]) -> ComplexArray:
+def _outputs_of(problem: Problem, row: dict[str, Any]) -> ComplexArray:
     """(w, H + 1) the read-outs in the order of the assembly, from a kept point."""
-    places, a = _watches(problem), problem.assembly
-    found = [row[name][list(places[name]).index(w.label)] for w in a.watches for name in [_named(a, w)]]
+    places, a = _outputs(problem), problem.assembly
+    found = [row[name][list(places[name]).index(w.label)] for w in a.outputs for name in [_named(a, w)]]
     return np.array(found, dtype=complex).reshape(-1, problem.harmonics + 1)
 
 

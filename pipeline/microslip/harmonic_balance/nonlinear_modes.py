@@ -78,19 +78,19 @@ def _only(problem: Problem) -> Linear:
 
 
 def backbone(
-    problem: Problem, low: float, high: float, mode: int = 0, watch: int = 0, asked: Sequence[float] = (),
+    problem: Problem, low: float, high: float, mode: int = 0, output: int = 0, asked: Sequence[float] = (),
     settings: Settings | None = None, report: Report = lambda _: None,
 ) -> Backbone:  # fmt: skip
     """A nonlinear mode from a small amplitude of a read-out to a large one.
 
     Args:
         low, high: m; at the low one the contacts should hardly slide. mode: number of the mode with sticking contacts,
-            0 the lowest. watch: read-out. asked: amplitudes (m) that are hit exactly.
+            0 the lowest. output: read-out. asked: amplitudes (m) that are hit exactly.
 
     Raises:
         UserError: a mode that does not move the read-out, or that there is not.
     """
-    curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), watch)
+    curve = _Curve(replace(problem, stiffness=tuple(HELD * k for k in problem.stiffness), share=0.0), output)
     z, omega = curve.linear(problem, mode)
     settings = settings or Settings(step=0.05, step_max=0.2, folds=False, branch_points=False)
     bounds = np.log([low, high])
@@ -109,14 +109,14 @@ def backbone(
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)
 
 
-def strongest(problem: Problem, low: float, high: float, watch: int = 0) -> int:
+def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int:
     """Number of the mode with sticking contacts that makes the highest resonance of a read-out under the loads, among
     those between two frequencies (rad/s), or among all if there is none.
 
     With (w phi)(phi^H f) / (phi^H C phi omega) as the height of each.
     """
     part, (omega, shapes) = _only(problem), stuck_modes(problem)
-    seen, driven = np.abs(part.watch[watch] @ shapes), np.abs(shapes.conj().T @ part.load)
+    seen, driven = np.abs(part.output[output] @ shapes), np.abs(shapes.conj().T @ part.load)
     loss = np.einsum("im,ij,jm->m", shapes.conj(), 0.5 * (part.C + part.C.conj().T), shapes).real * omega
     if part.loss is not None:
         loss += np.einsum("im,ij,jm->m", shapes.conj(), part.loss, shapes).real
@@ -125,10 +125,10 @@ def strongest(problem: Problem, low: float, high: float, watch: int = 0) -> int:
     return int(np.argmax(np.where(inside, height, 0.0) if height[inside].any() else height))
 
 
-def sliding_amplitude(problem: Problem, mode: int = 0, watch: int = 0) -> float:
+def sliding_amplitude(problem: Problem, mode: int = 0, output: int = 0) -> float:
     """About the amplitude of a read-out, m, at which the contacts begin to slide in a mode: their largest motion is
     then `Problem.length`."""
-    curve = _Curve(problem, watch)
+    curve = _Curve(problem, output)
     curve.linear(problem, mode)
     return float(problem.length / curve.x_scale[0])
 
@@ -136,8 +136,8 @@ def sliding_amplitude(problem: Problem, mode: int = 0, watch: int = 0) -> float:
 class _Curve:
     """The equations of `backbone` for `continuation`: z = (x / (A / length), Omega, xi), lambda = ln A."""
 
-    def __init__(self, problem: Problem, watch: int) -> None:
-        self.problem, self.watch = problem, watch
+    def __init__(self, problem: Problem, output: int) -> None:
+        self.problem, self.output = problem, output
         self.x_scale: Array = np.ones(problem.size + 2)
         self.lam_scale = 1.0
 
@@ -148,8 +148,8 @@ class _Curve:
             raise UserError(f"mode: number {mode + 1}; there are {len(omega)}, counted from 1")
         part, k, q = _only(stuck), stuck.stiffness[0], shapes[:, mode].astype(complex)
         d = np.linalg.solve(np.eye(part.count) + part.residual @ k, part.rows @ q)
-        seen = complex(part.watch[self.watch] @ q - part.watch_residual[self.watch] @ (k @ d))
-        if abs(seen) < 1e-9 * np.abs(part.watch[self.watch]).max(initial=0.0) * np.abs(q).max():
+        seen = complex(part.output[self.output] @ q - part.output_residual[self.output] @ (k @ d))
+        if abs(seen) < 1e-9 * np.abs(part.output[self.output]).max(initial=0.0) * np.abs(q).max():
             at = f"{mode + 1} at {omega[mode] / 2 / np.pi:.6g} Hz"
             raise UserError(f"mode: number {at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
@@ -167,7 +167,7 @@ class _Curve:
         unit = A / self.problem.length
         x, at = z[:-2] * unit, self._at(Omega, xi)
         force, slopes = at.forces(x)
-        R, y = at.residual_of(x, force), amplitude(at, x, force, slopes, self.watch)
+        R, y = at.residual_of(x, force), amplitude(at, x, force, slopes, self.output)
         J, by_x = at.jacobian(slopes).dense(), y.by_x * unit / A
         sides = [self._given(self._at(Omega, xi + way * 1e-6 * Omega), x, force, slopes) for way in (1.0, -1.0)]
         R_xi, y_xi = ((a - b) / (2e-6 * Omega) for a, b in zip(*sides, strict=True))
@@ -180,7 +180,7 @@ class _Curve:
         return np.concatenate([R / unit, _pair(y.value / A - 1.0)]), D, lam_rate
 
     def _given(self, at: AtFrequency, x: Array, force: Array, slopes: list[Array]) -> tuple[Array, complex]:
-        return at.residual_of(x, force), amplitude(at, x, force, slopes, self.watch).value
+        return at.residual_of(x, force), amplitude(at, x, force, slopes, self.output).value
 
     def checks(self, x: Array, Omega: float, xi: float) -> Checks:
         """Of a point of the mode."""

@@ -56,7 +56,7 @@ def traced(
         law: of n points. G: (n, 3, k) kinematics. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... period: s.
         samples: of a cycle. count: cycles marched at most before. settled: see `contact.periodic.periodic`.
     """
-    parts = _watched(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
+    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 
@@ -80,7 +80,7 @@ def derivative(waves: int) -> Array:
 
 
 @partial(program, static_argnames=("samples", "count"))
-def _watched(
+def _point_cycles(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
     settled: jax.Array | float,
 ) -> tuple[jax.Array, ...]:  # fmt: skip

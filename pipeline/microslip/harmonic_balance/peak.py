@@ -15,7 +15,7 @@ from ..continuation import SEARCH, Lowest, Peak, lowest, rated
 from ..continuation import peak as climbed
 from ..data import Array
 from .problem import Problem
-from .readout import Watched
+from .readout import WithOutput
 from .response import operating
 from .solver import CONVERGED, Point, Report, sweep
 from .sweeps import prominent
@@ -62,7 +62,7 @@ class Optimum:
 
 
 def highest(
-    problem: Problem, Omega: Array, watch: int = 0, report: Report = lambda _: None
+    problem: Problem, Omega: Array, output: int = 0, report: Report = lambda _: None
 ) -> tuple[Peak, float | None]:
     """The highest peak of a read-out in a band, and the end (rad/s) at which the response is higher than that, if one.
 
@@ -70,11 +70,11 @@ def highest(
     without any peak gives one that says so.
     """
     points = [p for p in sweep(problem, Omega / (2 * np.pi), report) if p.converged]
-    watched = Watched(problem, watch)
+    seen = WithOutput(problem, output)
     none = Peak(np.zeros(problem.size), float(Omega[0]), np.nan, False, "no solution in the band", np.zeros(0))
     if not points:
         return none, None
-    height = np.array([watched.output(p.x, p.Omega)[0] for p in points])
+    height = np.array([seen.output(p.x, p.Omega)[0] for p in points])
     walled = np.concatenate([[0.0], height, [0.0]])
     tops = np.flatnonzero((walled[1:-1] > walled[:-2]) & (walled[1:-1] >= walled[2:]))
     tops = prominent(np.sqrt(height), tops)
@@ -83,7 +83,7 @@ def highest(
     for i in sorted(tops, key=lambda k: -height[k]):
         if height[i] < SEEN**2 * best.value:
             break
-        found = climbed(watched, points[i].x, points[i].Omega, within)
+        found = climbed(seen, points[i].x, points[i].Omega, within)
         if found.converged and within.low < found.lam < within.high and found.value > best.value:
             best = checked(problem, found)
     end = max((0, -1), key=lambda k: height[k])
@@ -104,7 +104,7 @@ def resonance(peak: Peak) -> Resonance:
 
 
 def optimum(
-    make: Make, values: Sequence[float], Omega: Array, watch: int = 0, report: Report = lambda _: None,
+    make: Make, values: Sequence[float], Omega: Array, output: int = 0, report: Report = lambda _: None,
     keep: Callable[[dict[float, Resonance]], None] = lambda found: None,
 ) -> Optimum:  # fmt: skip
     """The value between the first and the last one at which the highest resonance in a band is lowest.
@@ -116,12 +116,12 @@ def optimum(
     rising: dict[float, float] = {}
     found: dict[float, Resonance] = {}
 
-    def family(value: float) -> Watched:
-        return Watched(make(value), watch)
+    def family(value: float) -> WithOutput:
+        return WithOutput(make(value), output)
 
     def at(value: float) -> Peak:
         report(f"highest resonance at {value:.5g}")
-        top, end = highest(make(value), Omega, watch, report)
+        top, end = highest(make(value), Omega, output, report)
         if end is not None:
             rising[value] = end
         one = found[value] = resonance(top)

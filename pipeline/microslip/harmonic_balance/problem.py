@@ -19,7 +19,7 @@ import scipy.linalg
 from ..data import Array, ComplexArray, Indices
 from ..mistakes import bounded
 from ..system.assembly import Assembly, Linear
-from . import blocks, played, reduced
+from . import blocks, play, reduced
 from .blocks import Matrix
 from .forces import Forces
 from .patch import Cycle, Traced
@@ -77,9 +77,9 @@ class Group:
         rate = self.model.rate(self._back(u), period)
         return None if rate is None else self._ahead(rate)
 
-    def watch(self, u: Array, period: float) -> list[Cycle]:
+    def point_cycles(self, u: Array, period: float) -> list[Cycle]:
         """See `forces.Forces`."""
-        return self.model.watch(self._back(u), period)
+        return self.model.point_cycles(self._back(u), period)
 
     def traced(self, u: Array, period: float) -> list[Traced]:
         """See `forces.Forces`; where a wave leads by a phase, samples begin where it is at zero phase."""
@@ -406,7 +406,7 @@ def of(
     """The balance of an assembly.
 
     Args:
-        harmonics: H. samples: of a cycle. cycles: marched at most. settled: see `forces.Marched`. length: m, see
+        harmonics: H. samples: of a cycle. cycles: marched at most. settled: see `forces.AFT`. length: m, see
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
             the number of members if not given; always relative where damping couples them. models: first contact of a
             group of equal ones -> its force model, if it is not the marched law.
@@ -428,7 +428,7 @@ def of(
     groups = []
     for same in _equal(assembly):
         patch = contacts[same[0]].patch
-        model = (models or {}).get(same[0]) or played.model(patch, len(same), samples, cycles, settled)
+        model = (models or {}).get(same[0]) or play.model(patch, len(same), samples, cycles, settled)
         first = np.array([where[i, 0] for i in same])
         second = None if together or contacts[same[0]].second is None else np.array([where[i, 1] for i in same])
         offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))

@@ -12,11 +12,11 @@ from ..units import METRES, Quantity
 from .problem import AtFrequency, Group, Problem
 
 
-def measured(assembly: Assembly, watch: int = 0) -> Quantity:
+def measured(assembly: Assembly, output: int = 0) -> Quantity:
     """What a read-out of an assembly measures: by the unit of its row; metres where nothing is read."""
-    if watch >= len(assembly.watches):
+    if output >= len(assembly.outputs):
         return METRES
-    w = assembly.watches[watch]
+    w = assembly.outputs[output]
     group = next(iter(next(m for m in assembly.members if m.name == w.member).groups.values()))
     of_gauge = w.monitor in group.gauges and w.label in group.gauges[w.monitor].labels
     rows = (group.gauges if of_gauge else group.monitors).get(w.monitor)
@@ -37,9 +37,9 @@ class Amplitude:
 
 
 def amplitude(
-    at: AtFrequency, x: Array, force: Array, slopes: list[Array], watch: int = 0, harmonic: int = 1
+    at: AtFrequency, x: Array, force: Array, slopes: list[Array], output: int = 0, harmonic: int = 1
 ) -> Amplitude:  # fmt: skip
-    """The amplitude of read-out number `watch` for forces (W, c) and their derivatives as `AtFrequency.forces` gives.
+    """The amplitude of read-out number `output` for forces (W, c) and their derivatives as `AtFrequency.forces` gives.
 
     y = W q + e - r F with q = q_ref - X (F - k v): linear in the forces and in v.
     """
@@ -49,9 +49,9 @@ def amplitude(
     of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
     value, by_Omega = 0.0j, 0.0j
     for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices(), strict=True):
-        row, beside = part.watch[watch], part.watch_residual[watch]
+        row, beside = part.output[output], part.output_residual[output]
         excess = f[s] - k @ v[s]
-        driven = share * (row @ seen.modal + part.watch_given[watch])
+        driven = share * (row @ seen.modal + part.output_given[output])
         value += complex(driven - row @ (seen.modal_compliance @ excess) - beside @ f[s])
         by_Omega += complex(share * (row @ seen.modal_rate) - row @ (seen.modal_compliance_rate @ excess))
         of_force[s] = -(row @ seen.modal_compliance + beside)
@@ -96,14 +96,14 @@ def _force_rates(at: AtFrequency, x: Array, harmonic: int) -> list[tuple[tuple[i
     return [((wave, unit), whole[wave]) for wave, unit in _waves(harmonic)]
 
 
-class Watched:
+class WithOutput:
     """A problem whose output is the squared amplitude of a read-out, as `continuation.extremum` asks for it.
 
     The forces found last are kept: residual, derivative and output of one place cost them once.
     """
 
-    def __init__(self, problem: Problem, watch: int = 0, harmonic: int = 1) -> None:
-        self.problem, self.watch, self.harmonic = problem, watch, harmonic
+    def __init__(self, problem: Problem, output: int = 0, harmonic: int = 1) -> None:
+        self.problem, self.number, self.harmonic = problem, output, harmonic
         self._kept: tuple[bytes, float, AtFrequency, Array, list[Array]] | None = None
 
     @property
@@ -122,7 +122,7 @@ class Watched:
     def output(self, x: Array, Omega: float) -> tuple[float, Array, float]:
         """|y|^2 in m2 and its derivatives with respect to x and Omega."""
         at, force, slopes = self._at(x, Omega)
-        y = amplitude(at, x, force, slopes, self.watch, self.harmonic)
+        y = amplitude(at, x, force, slopes, self.number, self.harmonic)
         turned = 2.0 * np.conj(y.value)
         return abs(y.value) ** 2, (turned * y.by_x).real, float((turned * y.rate).real)
 

@@ -228,14 +228,14 @@ def _alike(a: Linear, b: Linear) -> bool:
 
 def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float = 1.0) -> ComplexArray:
     """(w,) read-outs under (c,) contact forces less the preload and a share of the loads, of one harmonic."""
-    return part.watch @ q + share * part.watch_given - part.watch_residual @ force
+    return part.output @ q + share * part.output_given - part.output_residual @ force
 
 
 def work(
     part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
 ) -> tuple[float, float, float]:
     """Work of a share of the loads, loss in the bodies' own damping, and what the loads would do in phase with the
-    speed, J a cycle, in one harmonic that is not 0."""
+    speed, J per cycle, in one harmonic that is not 0."""
     moved = share * (part.load.conj() @ q - part.given.conj() @ force)
     lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
     if part.residual_loss is not None:

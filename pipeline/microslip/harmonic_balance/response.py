@@ -14,13 +14,13 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
-from ..system.assembly import Assembly, Load, Member, Side, Watch, touching
+from ..system.assembly import Assembly, Load, Member, Output, Side, touching
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged
 from .patch import Cycle, Traced
 from .problem import Problem
-from .readout import Watched, measured
+from .readout import WithOutput, measured
 from .solver import CONVERGED as CONVERGED
 from .solver import Point as Point
 from .solver import Report, solve, sweep
@@ -34,15 +34,15 @@ class Operating:
 
     Attributes:
         Omega: rad/s. q: member -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
-            mean from the preloaded state. watched: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
-            the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J a cycle.
+            mean from the preloaded state. outputs: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
+            the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J per cycle.
         exchanged: J that loads and contacts would do and take were they in phase with the speed.
         cycles: contact -> what its points do. checks: of all this.
     """
 
     Omega: float
     q: Mapping[str, list[ComplexArray]]
-    watched: ComplexArray
+    outputs: ComplexArray
     relative: Mapping[str, Array]
     force: Mapping[str, Array]
     supplied: float
@@ -58,20 +58,20 @@ def operating(problem: Problem, point: Point) -> Operating:
     v = p.displacement(point.x)
     relative = [g.relative(v) for g in p.groups]
     forces = [g.force(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
-    cycles = [g.watch(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
+    cycles = [g.point_cycles(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
-    watched, work = [], np.zeros(3)
+    outputs, work = [], np.zeros(3)
     for h, parts in enumerate(p.parts):
         each = list(zip(parts, q[h], [f[h][s] for s in p.slices()], strict=True))
         share = p.share if h else 1.0
-        watched.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
+        outputs.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
         if h:
             work += np.sum([reduced.work(part, at.Omega, h, own, F, share) for part, own, F in each], axis=0)
     found = Operating(
         at.Omega,
         {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.members)},
-        np.array(watched).T,
+        np.array(outputs).T,
         _by_contact(p, relative),
         _by_contact(p, forces),
         float(work[0]),
@@ -110,7 +110,7 @@ class HarmonicResponse(FrequencyResponse):
 
     Attributes:
         x: (f, k) unknowns, see `Problem`. harmonics: (f, H + 1) complex 0-peak amplitudes of the first read-out, m; the
-            mean is measured from the preloaded state. watched: (f, w, H + 1) all read-outs. contact: (f, c, 2 H + 1)
+            mean is measured from the preloaded state. outputs: (f, w, H + 1) all read-outs. contact: (f, c, 2 H + 1)
             displacements of the contacts, m and rad.
         dissipated: work done on the contacts in time. by_slip: (f,) friction force times path slid, J.
         slipping, open: (f, patches) share of points times cycle that slips, or is open; the rest sticks.
@@ -120,7 +120,7 @@ class HarmonicResponse(FrequencyResponse):
 
     x: Array
     harmonics: ComplexArray
-    watched: ComplexArray
+    outputs: ComplexArray
     contact: Array
     by_slip: Array
     slipping: Array
@@ -190,12 +190,12 @@ def _not_in(Omega: Sequence[float], asked: Array) -> Array:
 def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
     u, F = list(found.relative.values()), list(found.force.values())
     first = [one[:, 1] - 1j * one[:, 2] for one in u]
-    harmonics = found.watched[0] if len(found.watched) else np.zeros(problem.harmonics + 1, dtype=complex)
+    harmonics = found.outputs[0] if len(found.outputs) else np.zeros(problem.harmonics + 1, dtype=complex)
     cycles = list(found.cycles.values())
     return {
         "monitor": harmonics[1],
         "harmonics": harmonics,
-        "watched": found.watched,
+        "outputs": found.outputs,
         "slip": [max(d[1:3] if len(d) > 2 else d, key=abs) for d in first],
         "normal_swing": [np.hypot(one[0, 1], one[0, 2]) for one in F],
         "contact": np.vstack(u) if u else np.zeros((0, problem.waves)),
@@ -211,19 +211,19 @@ def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
 
 
 def of_body(
-    group: ModalGroup, patches: tuple[Patch, ...], normal: Array, force: Array, watched: Array, **settings: Any
+    group: ModalGroup, patches: tuple[Patch, ...], normal: Array, force: Array, output: Array, **settings: Any
 ) -> Problem:
     """The problem of one modal group whose patches are pressed to the ground by normal forces (Sextro Eq. (5.2-5)).
 
     Args:
         group: in modal or any other coordinates. normal: (patches,) N. force: (m,) modal force of the first harmonic.
-            watched: (m,) row that is read. settings: see `problem.of`.
+            output: (m,) row that is read. settings: see `problem.of`.
     """
     empty = Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False)
     named = replace(
         group,
         excitations={"force": Rows(np.asarray(force)[None], ("force",), "m", np.zeros(3))},
-        monitors={"watched": Rows(np.asarray(watched)[None], ("u",), "m", np.zeros(3))},
+        monitors={"output": Rows(np.asarray(output)[None], ("u",), "m", np.zeros(3))},
         compliance=empty,
     )
     contacts = tuple(
@@ -231,8 +231,8 @@ def of_body(
         for p, n in zip(patches, np.asarray(normal, dtype=float), strict=True)
     )
     member = Member("body", {0: named})
-    loads, watches = (Load("body", "force"),), (Watch("body", "watched", "u"),)
-    return balance.of(Assembly((member,), contacts, loads, watches), **settings)
+    loads, read = (Load("body", "force"),), (Output("body", "output", "u"),)
+    return balance.of(Assembly((member,), contacts, loads, read), **settings)
 
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
@@ -259,7 +259,7 @@ def highest(
         point = solve(problem, 2 * np.pi * at, [start])
         found = operating(problem, point)
         point = judged(point, found.checks)
-        tried.append((point, float(abs(found.watched[0, 1])) if point.converged else 0.0))
+        tried.append((point, float(abs(found.outputs[0, 1])) if point.converged else 0.0))
         return tried[-1][1]
 
     options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 12}
@@ -271,7 +271,7 @@ def highest(
     if _closed_in(tried):
         return near, height
     band = replace(SEARCH, low=2 * np.pi * float(f[0]), high=2 * np.pi * float(f[-1]))
-    found = climbed(Watched(problem), near.x, near.Omega, band)
+    found = climbed(WithOutput(problem), near.x, near.Omega, band)
     if found.converged and band.low < found.lam < band.high and amplitude(found.lam / (2 * np.pi), found.x) >= height:
         return tried[-1]
     return near, height

@@ -13,7 +13,7 @@ import numpy as np
 from .. import continuation
 from ..data import Array, UserError
 from ..mistakes import bounded
-from . import slow
+from . import pseudo_transient
 from .problem import NO_NUMBER, AtFrequency, Problem
 
 Report = Callable[[str], None]
@@ -118,8 +118,8 @@ def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) ->
 
 
 def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
-    """Newton's method from one start after the other, then from the sticking contact, then from rest in slow time, then
-    along the load.
+    """Newton's method from one start after the other, then from the sticking contact, then from rest in
+    pseudo-time, then along the load.
 
     Raises:
         UserError: a frequency that is not positive.
@@ -154,23 +154,23 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
     yield from (partial(newton, at, x, slope=slope) for x in starts)
-    if slow.serves(problem):
+    if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
     yield partial(_raised, problem, at.Omega)
 
 
 def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
-    """The vibration that the assembly comes to from rest, in slow time with steps that grow (`slow`).
+    """The vibration that the assembly comes to from rest, in pseudo-time with steps that grow (`slow`).
 
     Where the place of a body remains undetermined, the one that it came to is taken, if the mean forces balance there.
 
     Args:
-        most: steps of slow time.
+        most: steps of pseudo-time.
     """
     at, spent, rate = problem.at(Omega), 0, FIRST * Omega
-    q, point = slow.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
+    q, point = pseudo_transient.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
     for count in range(most):
-        step = slow.slowly(at, rate, q)
+        step = pseudo_transient.slowly(at, rate, q)
         trial = newton(step, point.x, TOLERANCE, most=20, slope=point.slope)
         spent += trial.iterations
         if not trial.converged:
@@ -184,11 +184,11 @@ def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
             if found.converged or found.away:
                 return replace(found, iterations=spent)
     error = float(np.abs(at.residual(point.x)).max() / max(np.abs(point.x).max(), 1e-300))
-    return Point(Omega, point.x, f"no rest in {most} steps of slow time", error, spent)
+    return Point(Omega, point.x, f"no rest in {most} steps of pseudo-time", error, spent)
 
 
 FIRST = 0.3
-"""Rate of the first step of slow time over the frequency of the vibration."""
+"""Rate of the first step of pseudo-time over the frequency of the vibration."""
 
 LAST = 1e-3
 """Rate over frequency from which on Newton's method is tried."""
@@ -197,12 +197,12 @@ TOLERANCE = 1e-9
 """Of the balances on the way."""
 
 
-def _ended(at: AtFrequency, point: Point, q: slow.Places) -> Point:
-    """Newton's method where slow time ends; where that fails, with the place of what nothing holds left as it is."""
+def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
+    """Newton's method where pseudo-time ends; where that fails, with the place of what nothing holds left as it is."""
     found = newton(at, point.x, most=20, slope=point.slope)
-    if found.converged or not slow.unheld(at.problem):
+    if found.converged or not pseudo_transient.unheld(at.problem):
         return found
-    held = slow.in_place(at, q)
+    held = pseudo_transient.in_place(at, q)
     fixed = newton(held, point.x, most=20)
     spent = found.iterations + fixed.iterations
     if not fixed.converged:
@@ -210,7 +210,7 @@ def _ended(at: AtFrequency, point: Point, q: slow.Places) -> Point:
     last = newton(at, fixed.x, most=1)
     if last.converged:
         return replace(last, iterations=spent)
-    force, whom = slow.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
+    force, whom = pseudo_transient.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
     words = f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body hold or a spring"
     return replace(last, status=words, iterations=spent)
 

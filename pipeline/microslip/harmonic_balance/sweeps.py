@@ -22,7 +22,7 @@ class FrequencyResponse:
         converged: (f,) bool. limit: the friction limits, N, for reports. normal_swing: (f, c) 0-peak
             amplitude of each contact's normal force, N; beyond the normal force the contact would lift off.
         quantity: what the monitored row measures; m stands for its unit.
-        supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J a cycle.
+        supplied: (f,) work of the excitation, damped: (f,) loss in the bodies' own damping, J per cycle.
         balance, counted, motion: (f,), see `results.checks.Checks`. All of these are empty where nothing is in contact.
         added: (f,) bool, points between those asked for, see `hidden`; empty: none.
     """

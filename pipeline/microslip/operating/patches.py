@@ -57,7 +57,7 @@ class ContactMap:
 
     @property
     def loss(self) -> float:
-        """J a cycle of the whole patch."""
+        """J per cycle of the whole patch."""
         return float(self.areas @ self.dissipated)
 
 

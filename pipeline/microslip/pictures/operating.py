@@ -200,7 +200,7 @@ def _margin(worst: Endurance) -> str:
 _PANELS = (
     ("pressure_mean", "mean pressure", 1e-6, "MPa", "YlOrRd"),
     ("traction", "swing of the traction", 1e-6, "MPa", "YlOrRd"),
-    ("dissipated", "energy a cycle", 1.0, "J/m²", "BuPu"),
+    ("dissipated", "energy per cycle", 1.0, "J/m²", "BuPu"),
     ("slipping", "slips", 100.0, "% of the cycle", "viridis"),
     ("open", "is open", 100.0, "% of the cycle", "viridis"),
 )

@@ -55,7 +55,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
 
 def _read(s: CaseSettings, of: Quantity) -> str:
     """The first read-out; without a direction where none is told, or of a gauge, which has its own."""
-    first = s.watches[0]
+    first = s.outputs[0]
     if of != METRES or (s.monitor is None and "direction" not in first.model_fields_set):
         return first.monitor
     return f"{first.monitor}, {first.direction}"
@@ -79,7 +79,7 @@ def comparison_picture(
     for axes in panels.ravel()[len(marched) :]:
         axes.remove()
     for axes, force, told in zip(panels.ravel(), marched, apart(list(marched)), strict=False):
-        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="marched")
+        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="aft")
         axes.semilogy(book[force][0], 1e6 * book[force][1], color="#d1603d", lw=1.4, ls="--", label="book")
         axes.set_title(f"$F_N$ = {told} N", fontsize=10)
         axes.grid(True, which="both", alpha=0.25)

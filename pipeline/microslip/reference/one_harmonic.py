@@ -38,7 +38,7 @@ class OneHarmonic:
 
     Attributes:
         monitor: (f,) m. modal: (f, m) coordinates. contact: (f, 6 c) motions of the contacts, m and rad, and force:
-            what acts on them, N and N m. dissipated: (f,) J a cycle. converged: (f,) bool.
+            what acts on them, N and N m. dissipated: (f,) J per cycle. converged: (f,) bool.
     """
 
     monitor: ComplexArray
@@ -78,7 +78,7 @@ def frequency_response(
     """Steady response to a harmonic force (Sextro Eqs. (5.1-4) to (5.1-10) with Jenkins elements).
 
     Args:
-        force: (m,) modal force amplitude, N kg^-1/2. monitor: (m,) row to watch. frequency: (f,) Hz, swept in the given
+        force: (m,) modal force amplitude, N kg^-1/2. monitor: (m,) row to read. frequency: (f,) Hz, swept in the given
             order; each point starts from its neighbour.
     """
     rows, springs, limits = contact_coordinates(group, contacts)

@@ -78,7 +78,7 @@ def exchanged(force: Array, displacement: Array) -> Array:
 
 
 def shares(supplied: Any, damped: Any, taken: Any, lost: Any, exchanged: Any) -> tuple[Any, Any]:
-    """`Checks.balance` and `Checks.counted` of energies a cycle, J, numbers or (f,).
+    """`Checks.balance` and `Checks.counted` of energies per cycle, J, numbers or (f,).
 
     Args:
         taken: work done on the contacts. lost: what their laws count of it. exchanged: see `exchanged`, of loads and

@@ -280,7 +280,7 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Watch:
+class Output:
     """A read-out of a member: a row of a monitor or a gauge."""
 
     member: str
@@ -296,8 +296,8 @@ class Linear:
         M, K, C: (m, m); C with the gyroscopic matrix. rows: (c, m) motion along the contact coordinates.
         residual: (c, c) static compliance along them that the coordinates leave out, m/N.
         load: (m,) amplitude of the generalised force. given: (c,) motion by the loads beside the coordinates, m.
-        watch: (w, m) all read-outs of the assembly in its order, zero where another member is read; those of several
-            parts add up. watch_residual: (w, c) and watch_given: (w,) of them beside the coordinates.
+        output: (w, m) all read-outs of the assembly in its order, zero where another member is read; those of several
+            parts add up. output_residual: (w, c) and output_given: (w,) of them beside the coordinates.
         loss: (m, m) H of bodies with a loss factor, residual_loss: (c, c) S: a vibration meets the stiffness K + i H
             and the compliance residual - i S. None: nothing, as in the mean.
     """
@@ -309,9 +309,9 @@ class Linear:
     residual: Array
     load: ComplexArray
     given: ComplexArray
-    watch: Array
-    watch_residual: Array
-    watch_given: ComplexArray
+    output: Array
+    output_residual: Array
+    output_given: ComplexArray
     loss: Array | None = None
     residual_loss: Array | None = None
 
@@ -340,7 +340,7 @@ class Assembly:
     """Members, contacts, loads and read-outs.
 
     Attributes:
-        members, contacts, loads, watches. ring: if the members are one sector that stands for N, or N sectors.
+        members, contacts, loads, outputs. ring: if the members are one sector that stands for N, or N sectors.
         stuck_damping: ratios of the modes with sticking contacts, one for all or one a mode from the lowest, the last
             one for all that follow; None: what the members bring. It couples them, so they are eliminated together.
     """
@@ -348,7 +348,7 @@ class Assembly:
     members: tuple[Member, ...]
     contacts: tuple[Contact, ...]
     loads: tuple[Load, ...]
-    watches: tuple[Watch, ...]
+    outputs: tuple[Output, ...]
     ring: Ring | None = None
     stuck_damping: tuple[float, ...] | None = None
 
@@ -360,7 +360,7 @@ class Assembly:
         sides = [s for c in self.contacts for s in (c.first, c.second) if s]
         named = [("interface", s.member, s.interface, lambda g: g.interfaces) for s in sides if s.rows is None]
         named += [("load", x.member, x.row, lambda g: g.excitations) for x in self.loads]
-        named += [("read-out", w.member, w.monitor, lambda g: {**g.monitors, **g.gauges}) for w in self.watches]
+        named += [("read-out", w.member, w.monitor, lambda g: {**g.monitors, **g.gauges}) for w in self.outputs]
         for what, member, row, known in named:
             if member not in has:
                 raise UserError(f"{what} '{row}': there is no member '{member}'; the assembly has {', '.join(has)}")
@@ -396,15 +396,15 @@ class Assembly:
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]
         forced = [_load_label(at.group.excitations[x.row], x.row) for x in loads]
-        own = [w.member == member.name for w in self.watches]
-        seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.watches, own, strict=True)]
+        own = [w.member == member.name for w in self.outputs]
+        seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.outputs, own, strict=True)]
         zero = np.zeros(m)
-        watch = np.array([at.monitor(w.monitor, w.label) if mine else zero
-                          for w, mine in zip(self.watches, own, strict=True)]).reshape(-1, m)  # fmt: skip
+        output = np.array([at.monitor(w.monitor, w.label) if mine else zero
+                          for w, mine in zip(self.outputs, own, strict=True)]).reshape(-1, m)  # fmt: skip
         B = A @ at.residual(labels, labels) @ A.conj().T
         lost = (at.loss, member.residual_loss * B) if harmonic and at.loss is not None else (None, None)
         return Linear(
-            M, K, C, rows, B, f, A @ (at.residual(labels, forced) @ amplitudes), watch,
+            M, K, C, rows, B, f, A @ (at.residual(labels, forced) @ amplitudes), output,
             at.residual(seen, labels) @ A.conj().T, at.residual(seen, forced) @ amplitudes, *lost,
         )  # fmt: skip
 
@@ -447,14 +447,14 @@ class Assembly:
             turn = complex(np.exp(2j * np.pi * (j * ring.index(x.harmonic) % N) / N))
             return Load(body(x.member, j), row(x.member, x.row, j), x.amplitude * turn, x.harmonic)
 
-        def watch(w: Watch, j: int) -> Watch:
-            return Watch(body(w.member, j), row(w.member, w.monitor, j), w.label)
+        def output(w: Output, j: int) -> Output:
+            return Output(body(w.member, j), row(w.member, w.monitor, j), w.label)
 
         return Assembly(
             _all_round(self.members, N),
             tuple(met(c, j) for j in range(N) for c in self.contacts),
             tuple(load(x, j) for j in range(N) for x in self.loads),
-            tuple(watch(w, j) for j in range(N) for w in self.watches),
+            tuple(output(w, j) for j in range(N) for w in self.outputs),
             None,
             self.stuck_damping,
         )
@@ -529,8 +529,8 @@ def join(parts: Sequence[Linear], E: Array) -> Linear:
         diag(*[p.M for p in parts]), diag(*[p.K for p in parts]), diag(*[p.C for p in parts]),
         E @ diag(*[p.rows for p in parts]), residual,
         np.concatenate([p.load for p in parts]), E @ np.concatenate([p.given for p in parts]),
-        np.hstack([p.watch for p in parts]), np.hstack([p.watch_residual for p in parts]) @ E.T,
-        np.sum([p.watch_given for p in parts], axis=0), loss, S,
+        np.hstack([p.output for p in parts]), np.hstack([p.output_residual for p in parts]) @ E.T,
+        np.sum([p.output_given for p in parts], axis=0), loss, S,
     )  # fmt: skip
 
 

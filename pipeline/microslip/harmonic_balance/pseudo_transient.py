@@ -1,4 +1,4 @@
-"""From rest to a vibration in slow time: a way to solutions where Newton's method alone does not arrive.
+"""From rest to a vibration in pseudo-time: a way to solutions where Newton's method alone does not arrive.
 
 A body that nothing but its contacts holds may slide as a whole. Its mean place then hardly matters to the forces, and
 Newton's method sends it anywhere; where it stops sticking, the solution that was followed ends, and the next one is
@@ -21,7 +21,7 @@ import scipy.linalg
 
 from ..data import Array, ComplexArray
 from ..system.assembly import Linear
-from .forces import Marched
+from .forces import AFT
 from .problem import AtFrequency, Problem
 from .reduced import Eliminated
 
@@ -41,7 +41,7 @@ def at_rest(problem: Problem) -> Places:
 
 
 def slowly(at: AtFrequency, rate: float, q: Places) -> AtFrequency:
-    """The balance a step of slow time 1 / rate (1/s) after q."""
+    """The balance a step of pseudo-time 1 / rate (1/s) after q."""
     share = [[rate * _inertia(part, at.Omega, h) for part in parts] for h, parts in enumerate(at.problem.parts)]
     return _tied(at, share, q)
 
@@ -74,7 +74,7 @@ def unbalanced(at: AtFrequency, before: Places, after: Places) -> tuple[float, s
 
 def serves(problem: Problem) -> bool:
     """Whether laws are marched: those of the book's mode do not know the mean place."""
-    return any(isinstance(g.model, Marched) for g in problem.groups)
+    return any(isinstance(g.model, AFT) for g in problem.groups)
 
 
 def unheld(problem: Problem) -> bool:

@@ -10,8 +10,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance.forces import Marched
-from microslip.harmonic_balance.played import Played, model
+from microslip.harmonic_balance.forces import AFT
+from microslip.harmonic_balance.play import JenkinsPlay, model
 
 
 def patch(along: tuple[float, float, float] = (0.0, 0.6, -1.6), **more: object) -> Patch:
@@ -27,14 +27,14 @@ def test_by_hand_and_marched_are_one(size: float) -> None:
     """Force, derivative, work, path slid and share of slip, of contacts that stick, slide once, or to and fro."""
     width = 0.6 / (2e4 * np.hypot(0.6, 1.6))
     u = size * width * np.random.default_rng(2).normal(size=(7, 1, 9))
-    hand, marched = Played(patch(), 7, 96, 3, 1e-12), Marched(patch(), 7, 96, 3, 1e-12)
-    assert isinstance(model(patch(), 7, 96, 3, 1e-12), Played)
+    hand, marched = JenkinsPlay(patch(), 7, 96, 3, 1e-12), AFT(patch(), 7, 96, 3, 1e-12)
+    assert isinstance(model(patch(), 7, 96, 3, 1e-12), JenkinsPlay)
     F, J = hand.forces(u, 0.1)
     expected = marched.forces(u, 0.1)
     for a, b in ((F, expected[0]), (J, expected[1]), (hand.force(u, 0.1), F)):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(b).max())
     assert hand.rate(u, 0.1) is None
-    for one, other in zip(hand.watch(u, 0.1), marched.watch(u, 0.1), strict=True):
+    for one, other in zip(hand.point_cycles(u, 0.1), marched.point_cycles(u, 0.1), strict=True):
         for key in ("dissipated", "by_slip", "lost"):
             np.testing.assert_allclose(getattr(one, key), getattr(other, key), rtol=0, atol=1e-12 * 0.6 * size * width)
         assert one.slipping == pytest.approx(other.slipping, abs=1e-6)  # a mean in single precision
@@ -44,7 +44,7 @@ def test_by_hand_and_marched_are_one(size: float) -> None:
 
 
 def test_derivative_against_differences() -> None:
-    hand = Played(patch(), 1, 64, 2)
+    hand = JenkinsPlay(patch(), 1, 64, 2)
     u = 1e-4 * np.random.default_rng(5).normal(size=(1, 1, 7))
     way = np.random.default_rng(6).normal(size=u.shape)
     h = 1e-11
@@ -60,10 +60,10 @@ def test_energy_is_what_the_harmonics_of_the_force_take() -> None:
     u[0, 0, 1:] = 1e-4 * np.array([1.0, 0.5, 0.2, -0.1])
     errors = []
     for samples in (64, 256, 1024):
-        hand = Played(patch(), 1, samples, 2)
+        hand = JenkinsPlay(patch(), 1, samples, 2)
         F = hand.force(u, 1.0)[0, 0]
         area = sum(np.pi * h * (u[0, 0, 2 * h] * F[2 * h - 1] - u[0, 0, 2 * h - 1] * F[2 * h]) for h in (1, 2))
-        cycle = hand.watch(u, 1.0)[0]
+        cycle = hand.point_cycles(u, 1.0)[0]
         assert cycle.dissipated[0] == pytest.approx(area, rel=1e-12)
         errors.append(abs(area / cycle.lost[0] - 1))
     slopes = np.diff(np.log(errors)) / np.log(4)
@@ -71,17 +71,17 @@ def test_energy_is_what_the_harmonics_of_the_force_take() -> None:
 
 
 def test_other_contacts_are_marched() -> None:
-    """A coordinate that presses, a force that depends on it, two stiffnesses, a damper, a cycle alone."""
+    """A coordinate that presses, a force that depends on it, two stiffnesses, a damper, per cycle alone."""
     value = jnp.asarray
     others = [
         patch((0.1, 1.0, 0.0)), patch(normal=Penalty(value(1e5))), patch(stiffness_2=value(1e4)),
         patch(damping=value(1e-4)),
     ]  # fmt: skip
-    assert not any(isinstance(model(one, 1, 64, 2, 0.0), Played) for one in others)
-    assert not isinstance(model(patch(), 1, 64, 1, 0.0), Played)
+    assert not any(isinstance(model(one, 1, 64, 2, 0.0), JenkinsPlay) for one in others)
+    assert not isinstance(model(patch(), 1, 64, 1, 0.0), JenkinsPlay)
 
 
 def test_what_never_slides_is_a_spring() -> None:
     """A motion that only sticks is carried by a spring, its mean included."""
     u = 1e-6 * np.array([[[2.0, 1, 0, 0, 1]]])
-    np.testing.assert_allclose(Played(patch(), 1, 16, 2).force(u, 1.0), 2e4 * (0.36 + 2.56) * u, atol=1e-13)
+    np.testing.assert_allclose(JenkinsPlay(patch(), 1, 16, 2).force(u, 1.0), 2e4 * (0.36 + 2.56) * u, atol=1e-13)

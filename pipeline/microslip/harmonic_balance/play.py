@@ -20,13 +20,13 @@ from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..data import Array, Indices
-from .forces import Forces, Marched
+from .forces import AFT, Forces
 from .patch import Cycle, Traced, above_rounding, derivative
 
 
 @dataclass(frozen=True, eq=False)
-class Played(Marched):
-    """`Marched` for a patch of one point and one coordinate along its tangents, with a constant normal force."""
+class JenkinsPlay(AFT):
+    """`AFT` for a patch of one point and one coordinate along its tangents, with a constant normal force."""
 
     @cached_property
     def spring(self) -> float:
@@ -85,7 +85,7 @@ class Played(Marched):
     def _sliders(self, u: Array) -> tuple[Array, Array, Indices]:
         """(c, s) the coordinate over a cycle, places of its slider, samples that dragged it there (-1: none)."""
         path = u[:, 0] @ self._waves(u)[0].T
-        found = [played(one, self.width) for one in path.tolist()]
+        found = [play(one, self.width) for one in path.tolist()]
         dragged, signs = np.array([f[0] for f in found]), np.array([f[1] for f in found])
         at = np.take_along_axis(path, dragged, axis=1) - self.width * signs
         return path, np.where(dragged >= 0, at, 0.0), dragged
@@ -97,7 +97,7 @@ def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
     return np.asarray(values), np.asarray(transform)
 
 
-def played(path: list[float], width: float) -> tuple[list[int], list[int]]:
+def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
     """Of every sample of the second cycle of a path: the sample that dragged the slider last (-1: none yet),
     and in which direction, +1 or -1. It begins at 0."""
     low, high, last, sign = -width, width, -1, 0
@@ -117,7 +117,7 @@ def played(path: list[float], width: float) -> tuple[list[int], list[int]]:
 def model(patch: Patch, contacts: int, samples: int, cycles: int, settled: float) -> Forces:
     """Of the forces of equal contacts: by hand where that is possible, else marched."""
     plain = _plain(patch)
-    return (Played if plain and cycles > 1 else Marched)(patch, contacts, samples, cycles, settled)
+    return (JenkinsPlay if plain and cycles > 1 else AFT)(patch, contacts, samples, cycles, settled)
 
 
 def _plain(patch: Patch) -> bool:
