@@ -1324,8 +1324,8 @@ def rig() -> None:
         return made(f"{name}-coarse", path + (f"/{rest}.toml" if rest else ""), *LIGHT, *coarse)
 
     forces = (780.0, 300.0, 100.0, 50.0, 20.0, 10.0)
-    first = study.over_forces("rig", forces, body, "harmonics=3", "settled=1e-6")
-    second = study.over_forces("rig-second", forces, body, "harmonics=3", "settled=1e-6")
+    first = study.over_forces("rig", forces, body, "harmonics=3", "periodicity=1e-6")
+    second = study.over_forces("rig-second", forces, body, "harmonics=3", "periodicity=1e-6")
     fig = figure(10.0, 4.0)
     study.rig_picture(first, second, *fig.subplots(1, 2))
     save(drawn(fig), "rig_forces")

@@ -355,8 +355,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                         "0.01 if not given"),
     "samples": ("", "of a cycle; at least four a harmonic, sixteen are better"),
     "cycles": ("", "marched at most until the sliders are periodic"),
-    "settled": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles are "
-                "aft"),
+    "periodicity": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles "
+                    "are marched"),
     "memory_limit": ("GiB", "that the points of contact may take, by [an estimate](harmonic_balance.md#what-it-costs) "
                      "before they begin; that of the machine if not given"),
     "bodies.name": ("", "in this case"),

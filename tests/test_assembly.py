@@ -46,7 +46,7 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 
 
-FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "settled": 1e-13, "length": 1e-6}
+FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "periodicity": 1e-13, "length": 1e-6}
 
 
 RINGS = [(b, e, form) for b, e in ((6, 1), (6, 5), (4, 2), (7, 2), (5, 0)) for form in ("relative", "sides")]

@@ -65,7 +65,7 @@ def sector(basis: ModalBasis, order: int, normal: float, push: float) -> Assembl
     return Assembly((member,), (contact,), loads, outputs, Ring(N, order))
 
 
-FINE = {"harmonics": 3, "samples": 36, "cycles": 30, "settled": 1e-13, "length": 1e-7}
+FINE = {"harmonics": 3, "samples": 36, "cycles": 30, "periodicity": 1e-13, "length": 1e-7}
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3, -1])

@@ -356,7 +356,7 @@ def test_the_marched_law_agrees_where_the_book_assumes_no_more(name: str) -> Non
     u = np.zeros((24, 3, 3))
     u[:, 1:, 1:] = orbit.reshape(-1, 2, 2) * limit / spring
     u[:, 0, 0] = 5e-6
-    marched = [np.asarray(force_harmonics(law, jnp.asarray(u), 1.0, s, 20, settled=1e-9)[0]) for s in (512, 1024)]
+    marched = [np.asarray(force_harmonics(law, jnp.asarray(u), 1.0, s, 20, periodicity=1e-9)[0]) for s in (512, 1024)]
     contact = book.book_patch(Patch("point", np.zeros((1, 2)), np.ones(1), law))
     whole = np.zeros((24, 6, 3))
     whole[:, :3] = u

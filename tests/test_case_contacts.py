@@ -220,7 +220,7 @@ CHANGES: dict[str, tuple[dict[str, Any], bool]] = {
     "modes": ({"modes": 4}, True),
     "harmonics": ({"harmonics": 2}, True),
     "samples": ({"samples": 17}, True),
-    "settled": ({"settled": 1e-8}, True),
+    "periodicity": ({"periodicity": 1e-8}, True),
     "cycles": ({"cycles": 21}, True),
     "mode": ({"mode": "book"}, True),
     "name": ({"name": "other", "description": "x"}, False),

@@ -139,8 +139,8 @@ def test_cycles_go_on_until_the_sliders_have_settled(name: str, enough: int) -> 
     example, u = swinging(name)
     u = u[jnp.array([6, 15, 18, 38, 39])]  # the slow ones
     long, ended, short = (
-        np.array(force_alone(example.law, u, example.period, samples=32, count=count, settled=settled))
-        for count, settled in ((enough, 0.0), (20, 1e-9), (2, 0.0))
+        np.array(force_alone(example.law, u, example.period, samples=32, count=count, periodicity=periodicity))
+        for count, periodicity in ((enough, 0.0), (20, 1e-9), (2, 0.0))
     )
     largest = np.abs(long).max()
     assert np.abs(ended - long).max() < 5 * RECALL * largest < 0.3 * np.abs(short - long).max()
@@ -173,9 +173,9 @@ def test_sliders_are_solved_for_in_few_cycles_whatever_their_motion() -> None:
 
 @pytest.mark.parametrize("name", ["smooth point", "rough strips", "Iwan"])
 def test_derivatives_are_those_of_the_periodic_state(name: str) -> None:
-    """Also where one cycle changes little of it: by differences of the settled force."""
+    """Also where one cycle changes little of it: by differences of the periodic force."""
     example, u = swinging(name)
-    given = {"period": example.period, "samples": 32, "count": 100, "settled": 1e-13}
+    given = {"period": example.period, "samples": 32, "count": 100, "periodicity": 1e-13}
     slope = np.array(force_harmonics(example.law, u, **given)[1])
     moved = np.random.default_rng(1).normal(size=u.shape) * example.tangential
     h = 1e-6
@@ -194,10 +194,10 @@ def test_force_and_derivative_belong_to_the_same_number_of_cycles(name: str, apa
     Sliders that are solved for do not care for it: their force is the periodic one, as the derivative is.
     """
     example, u = swinging(name)
-    coarse = {"period": example.period, "samples": 32, "count": 100, "chunk": 16, "settled": 1e-3}
+    coarse = {"period": example.period, "samples": 32, "count": 100, "chunk": 16, "periodicity": 1e-3}
     force, slope = (np.array(part) for part in force_harmonics(example.law, u, **coarse))
     alone, exact, fine = (
-        np.array(force_alone(example.law, u, **{**coarse, "settled": settled})) for settled in (1e-3, 0.0, 1e-10)
+        np.array(force_alone(example.law, u, **{**coarse, "periodicity": within})) for within in (1e-3, 0.0, 1e-10)
     )
     size = np.abs(force).max()
     assert np.abs(alone - force).max() < 1e-12 * size

@@ -484,16 +484,16 @@ def test_a_case_with_a_law_slides_and_its_table_says_how(answered: CaseResult) -
 def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
     """None at all marches every cycle and finds the same; a wide share leaves its mark, and a remark says so."""
     found = {}
-    for settled in (0.0, 1e-10, 1e-2):
-        settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nsettled = {settled}"))
+    for periodicity in (0.0, 1e-10, 1e-2):
+        settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nsettled = {periodicity}"))
         built = build(settings, {"sled": sled()}, "case.toml")
         problem = problem_of(built, 5.0)
-        assert getattr(problem.groups[0].model, "settled", None) == settled
-        found[settled] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
+        assert getattr(problem.groups[0].model, "periodicity", None) == periodicity
+        found[periodicity] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
     assert found[1e-10] == pytest.approx(found[0.0], rel=1e-8)
     assert found[1e-2] == pytest.approx(found[0.0], rel=1e-2)
     (remark,) = _not_periodic(5.0, np.array([4e-3]), settings)
-    assert "up to 0.4 % in the next one; lower settled." in remark
+    assert "up to 0.4 % in the next one; lower periodicity." in remark
 
 
 @pytest.mark.parametrize(
@@ -504,8 +504,8 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
         ("samples = 32", "samples = 8\n", "are too few for"),
         ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
         ("points = [4, 2]", "points = [4, 0]", "points"),
-        ("samples = 32", "samples = 32\nsettled = 0.1", "settled: must not be greater than 0.01"),
-        ("samples = 32", "samples = 32\nsettled = -1e-9", "settled: must not be less than 0"),
+        ("samples = 32", "samples = 32\nsettled = 0.1", "periodicity: must not be greater than 0.01"),
+        ("samples = 32", "samples = 32\nsettled = -1e-9", "periodicity: must not be less than 0"),
         ("[sweep]", SECOND + "\n[sweep]", "stands in contacts 1 and 2"),
     ],
 )  # fmt: skip

@@ -170,7 +170,7 @@ def test_a_sector_and_the_whole_ring_are_damped_alike(tmp_path: Path, more: str)
 
 
 def coarse(b: Built):  # type: ignore[no-untyped-def]
-    return problem_of(b, 20.0, harmonics=1, samples=40, settled=1e-13)
+    return problem_of(b, 20.0, harmonics=1, samples=40, periodicity=1e-13)
 
 
 def test_bodies_that_slide_freely_keep_their_own_damping(tmp_path: Path) -> None:

@@ -255,7 +255,7 @@ def problem_of(a: Block, b: Block, push: float = 60.0, **settings: float) -> bal
     contact = touching("joint", patch, first, second, normal=100.0, compliance=C)
     whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", push),),
                      (Output("low", "end", "u_x"),))  # fmt: skip
-    return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "settled": 1e-12, "length": 1e-7,
+    return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "periodicity": 1e-12, "length": 1e-7,
                                 **settings})  # fmt: skip
 
 
@@ -309,7 +309,7 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
     for contact in (by_force, by_balance):
         whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", 60.0),),
                          (Output("low", "end", "u_z"),))  # fmt: skip
-        problem = balance.of(whole, harmonics=1, samples=32, cycles=4, settled=1e-12, length=1e-7)
+        problem = balance.of(whole, harmonics=1, samples=32, cycles=4, periodicity=1e-12, length=1e-7)
         point = solve(problem, 2 * np.pi * 3000.0, [])
         assert point.converged
         found.append(response.operating(problem, point))

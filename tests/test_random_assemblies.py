@@ -299,7 +299,7 @@ CHANGES: dict[str, Callable[[dict[str, Any]], Any]] = {
     "points": put("sweep", "points", 4),
     "harmonics": put("harmonics", 2),
     "samples": put("samples", 32),
-    "settled": put("settled", 1e-3),
+    "periodicity": put("periodicity", 1e-3),
     "mode": put("mode", "book"),
     "amplitude": put("excitations", 0, "amplitude", 4.0),
     "phase": put("excitations", 0, "phase", 77.0),

@@ -397,7 +397,7 @@ def shaken(**changed):
         (swept, {"harmonics": 0}, "harmonics"),
         (swept, {"harmonics": -1}, "harmonics"),
         (swept, {"cycles": 0}, "cycles"),
-        (swept, {"settled": np.nan}, "settled"),
+        (swept, {"periodicity": np.nan}, "periodicity"),
         (swept, {"length": -1.0}, "length"),
         (shaken, {"amplitude": np.nan}, "amplitude"),
         (shaken, {"amplitude": complex(0, np.inf)}, "amplitude"),

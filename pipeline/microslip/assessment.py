@@ -92,8 +92,8 @@ class Assessment:
         row |= {"stress_amplitude_Pa": r.worst.amplitude, "frequency_of_stress_Hz": r.stressed_at}
         row |= {"mean_stress_Pa": r.worst.mean}
         if self.limits is not None:
-            row["vibration_may_grow"] = r.worst.vibration
-        return row | {"at_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
+            row["reserve_factor"] = r.worst.vibration
+        return row | {"location_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
 
 
 def assess(

@@ -459,7 +459,7 @@ def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> lis
     worst = float(unsteady.max(initial=0.0))
     if worst < 1e-3:
         return []
-    todo = "lower settled" if settings.settled > 1e-4 else "raise cycles"
+    todo = "lower periodicity" if settings.periodicity > 1e-4 else "raise cycles"
     return [
         f"At F_N = {normal:g} N the sliders were not periodic after {settings.cycles} cycles at most: contact forces "
         f"change by up to {percent(worst)} in the next one; {todo}."

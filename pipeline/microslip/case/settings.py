@@ -289,7 +289,7 @@ class CaseSettings(Model):
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
     [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
     many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
-    a cycle), cycles (marched at most until the sliders are periodic) and settled (within which share of the largest
+    a cycle), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
     force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
     before they begin, the machine's if not given. mode: ``marched``, their laws in time, or ``book``
     (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
@@ -322,7 +322,7 @@ class CaseSettings(Model):
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
     samples: Annotated[int, Field(ge=8, le=100000)] = 48
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
-    settled: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
+    periodicity: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
     memory_limit: Positive | None = None
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
@@ -453,7 +453,7 @@ class CaseSettings(Model):
     @property
     def marching(self) -> dict[str, Any]:
         """How finely forces are marched in time, as `harmonic_balance.problem.of` asks."""
-        return {"samples": self.samples, "cycles": self.cycles, "settled": self.settled}
+        return {"samples": self.samples, "cycles": self.cycles, "periodicity": self.periodicity}
 
     @property
     def members(self) -> tuple[BodyOfCase, ...]:

@@ -39,17 +39,17 @@ def waves(harmonics: int, samples: int) -> tuple[Array, Array]:
 @partial(jax.jit, static_argnames=("samples", "count", "chunk"))
 def force_harmonics(
     law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
-    settled: Array | float = 0.0,
+    periodicity: Array | float = 0.0,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Harmonics of the force in the last cycle, and their derivative.
 
     A point that slides all the way both ways has forgotten its beginning after one cycle. A point that slides little,
-    or whose normal load swings, may creep for many: ask for more, and let ``settled`` end them (`periodic.periodic`).
+    or whose normal load swings, may creep for many: ask for more, and let ``periodicity`` end them.
 
     Args:
         u: (n, 3, 2 H + 1) displacement: mean, cos, sin, cos 2, sin 2, ... in m. period: s. samples: a cycle.
         count: of cycles at most. chunk: points at a time; the cost is linear in the number of points whatever it is.
-        settled: the cycles of a chunk end when its sliders are periodic within this share of its largest force
+        periodicity: the cycles of a chunk end when its sliders are periodic within this share of its largest force
             (`periodic.periodic`); 0 marches all of them.
 
     Returns:
@@ -57,7 +57,7 @@ def force_harmonics(
     """
 
     def one(law: Law, u: Array) -> tuple[Array, Array]:
-        return _with_derivative(law, u, period, samples, count, settled)
+        return _with_derivative(law, u, period, samples, count, periodicity)
 
     force, slope = _chunked(one, law, u, chunk)
     return force, slope
@@ -66,14 +66,14 @@ def force_harmonics(
 @partial(jax.jit, static_argnames=("samples", "count", "chunk"))
 def force_alone(
     law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
-    settled: Array | float = 0.0,
+    periodicity: Array | float = 0.0,
 ) -> Array:  # fmt: skip
     """The force of `force_harmonics` without its derivative, after the same number of cycles of every chunk."""
     values, transform = waves(u.shape[2] // 2, samples)
 
     def one(law: Law, u: Array) -> tuple[Array]:
         path = jnp.einsum("sh,nkh->snk", values, u)
-        return (jnp.einsum("hs,snk->nkh", transform, cycles(law, path, period, count, settled)[0]),)
+        return (jnp.einsum("hs,snk->nkh", transform, cycles(law, path, period, count, periodicity)[0]),)
 
     return _chunked(one, law, u, chunk)[0]
 
@@ -106,10 +106,10 @@ def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
 
 
 def _with_derivative(
-    law: Law, u: Array, period: Array | float, samples: int, count: int, settled: Array | float
+    law: Law, u: Array, period: Array | float, samples: int, count: int, periodicity: Array | float
 ) -> tuple[Array, Array]:
     """AFT together with the tangents along every harmonic of every direction."""
     values, transform = waves(u.shape[2] // 2, samples)
     path = jnp.einsum("sh,nkh->snk", values, u)
-    found, slope = with_slopes(law, path, period, count, settled, values, transform)
+    found, slope = with_slopes(law, path, period, count, periodicity, values, transform)
     return jnp.einsum("hs,snk->nkh", transform, found.force), jnp.einsum("hzjnk->nkhjz", slope)

@@ -64,7 +64,7 @@ class _At(NamedTuple):
         change: of the memory over the last marched cycle, the largest entry. tried: (..., n) what each slider missed of
             the solution when it was solved for last. solved: (..., n) whether the next start was solved for.
         failed: (..., n) how often that was in vain. wait: (..., n) cycles to march before it is tried again.
-        first: memory after the first cycle. settled: whether the memory is periodic.
+        first: memory after the first cycle. periodic: whether the memory is periodic.
     """
 
     found: Periodic
@@ -77,11 +77,11 @@ class _At(NamedTuple):
     failed: Array
     wait: Array
     first: Array
-    settled: Array
+    periodic: Array
 
 
 def periodic(
-    law: Law, path: Array, period: float | Array, count: int = 2, settled: float | Array = 0.0
+    law: Law, path: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
 ) -> Periodic:  # fmt: skip
     """Force in the last cycle of a periodic path, marched from rest.
 
@@ -91,16 +91,16 @@ def periodic(
     cycle makes periodic takes two.
 
     Args:
-        path: (s, n, 3) m. period: s. count: of cycles at most. settled: tolerance as a share of the cycle's largest
+        path: (s, n, 3) m. period: s. count: of cycles at most. periodicity: tolerance as a share of the cycle's largest
             force; 0 marches all of them and solves for nothing.
     """
-    laps = _Laps(law, path, period / len(path), settled, count)
-    at = jax.lax.while_loop(laps.unfinished, laps.marching, laps.rest())
-    return (laps.solved(at) if laps.solves else at).found
+    loop = _Loop(law, path, period / len(path), periodicity, count)
+    at = jax.lax.while_loop(loop.unfinished, loop.marching, loop.rest())
+    return (loop.solved(at) if loop.solves else at).found
 
 
 def with_slopes(
-    law: Law, path: Array, period: float | Array, count: int, settled: float | Array, signals: Array, weights: Array
+    law: Law, path: Array, period: float | Array, count: int, periodicity: float | Array, signals: Array, weights: Array
 ) -> tuple[Periodic, Array]:
     """`periodic` and the derivative of the force.
 
@@ -113,23 +113,23 @@ def with_slopes(
     Returns:
         The cycle, and (h, w, 3, n, 3) weighted sums of the derivatives over its samples.
     """
-    laps = _Laps(law, path, period / len(path), settled, count)
-    return laps.periodic_slopes(signals, weights) if laps.solves else laps.marched_slopes(signals, weights)
+    loop = _Loop(law, path, period / len(path), periodicity, count)
+    return loop.periodic_slopes(signals, weights) if loop.solves else loop.marched_slopes(signals, weights)
 
 
 def cycles(
-    law: Law, u: Array, period: float | Array, count: int = 2, settled: float | Array = 0.0
+    law: Law, u: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
 ) -> tuple[Array, State]:
     """Forces (s, n, 3) over the last cycle of a periodic path u (s, n, 3), and the state at its end: `periodic`."""
-    found = periodic(law, u, period, count, settled)
+    found = periodic(law, u, period, count, periodicity)
     return found.force, found.state
 
 
-class _Laps:
+class _Loop:
     """A path through a law, again and again; arguments as in `periodic`."""
 
-    def __init__(self, law: Law, path: Array, dt: Array | float, settled: Array | float, count: int) -> None:
-        self.law, self.path, self.dt, self.settled, self.count = law, path, dt, settled, count
+    def __init__(self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int) -> None:
+        self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
         one = law.init(1)
         self.solves = count >= FEWEST and law.recalled(one, law.memory(jnp.zeros((1, 3)), one)) is not None
 
@@ -144,7 +144,7 @@ class _Laps:
 
     def unfinished(self, at: _At) -> Array:
         """Whether to march on; where sliders can be solved for, not for long."""
-        return (at.found.cycles < (PLAIN if self.solves else self.count)) & ~at.settled
+        return (at.found.cycles < (PLAIN if self.solves else self.count)) & ~at.periodic
 
     def marching(self, at: _At) -> _At:
         """One cycle more, and the next begins where it ends."""
@@ -154,13 +154,13 @@ class _Laps:
     def solved(self, at: _At) -> _At:
         """Cycles that begin where Newton's method puts them."""
         return jax.lax.while_loop(
-            lambda at: (at.found.cycles >= PLAIN) & (at.found.cycles < self.count) & ~at.settled, self._solving, at
+            lambda at: (at.found.cycles >= PLAIN) & (at.found.cycles < self.count) & ~at.periodic, self._solving, at
         )
 
     def marched_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents are marched along with every cycle."""
 
-        def lap(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
+        def cycle(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
             at, tangents, _ = carried
             (force, after), (slope, changed) = self._push(at.start, tangents, moves)
             return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
@@ -168,7 +168,7 @@ class _Laps:
         moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
         size, rest = moves.shape[1], self.rest()
         begin = rest, _blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
-        at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), lap, begin)
+        at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), cycle, begin)
         return at.found, slope.reshape(len(weights), -1, 3, *self.path.shape[1:])
 
     def periodic_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
@@ -200,22 +200,22 @@ class _Laps:
         vain = ready & ~at.solved & (left > _GAIN * at.tried)
         failed = at.failed + vain
         wait = jnp.where(vain, failed, jnp.maximum(at.wait - 1, 0))
-        use = ready & ~vain & newton.regular & (self.settled > 0)
+        use = ready & ~vain & newton.regular & (self.periodicity > 0)
         tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
-        marched = jnp.where(self.settled > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
+        marched = jnp.where(self.periodicity > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
-        settled = (self.settled > 0) & (jnp.abs(step).max() <= jnp.minimum(self.settled, _SOLVED) * size)
+        ended = (self.periodicity > 0) & (jnp.abs(step).max() <= jnp.minimum(self.periodicity, _SOLVED) * size)
         found = Periodic(force, after, at.found.cycles + 1)
         start = self.law.recalled(after, held)
-        return _At(found, at.start, start, held, at.change, tried, use, failed, wait, at.first, settled)
+        return _At(found, at.start, start, held, at.change, tried, use, failed, wait, at.first, ended)
 
     def _marched(self, at: _At, force: Array, state: State) -> _At:
         memory = self.law.memory(force[-1], state)
-        change, settled = self._change(at, force, memory)
+        change, ended = self._change(at, force, memory)
         found = Periodic(force, state, at.found.cycles + 1)
         first = jnp.where(at.found.cycles > 0, at.first, memory)
         return at._replace(
-            found=found, begun=at.start, start=state, memory=memory, change=change, first=first, settled=settled
+            found=found, begun=at.start, start=state, memory=memory, change=change, first=first, periodic=ended
         )
 
     def _units(self, at: _At) -> State:
@@ -235,9 +235,9 @@ class _Laps:
         gap, size = at.change - change, jnp.abs(force).max()
         left = jnp.where(gap > 0, change**2 / jnp.where(gap > 0, gap, 1.0), jnp.inf)
         if self.solves:
-            return change, change <= jnp.minimum(self.settled, _STILL) * size
-        rounding = change <= jnp.minimum(self.settled, 1e-15) * size
-        return change, rounding | (jnp.maximum(change, left) <= self.settled * size)
+            return change, change <= jnp.minimum(self.periodicity, _STILL) * size
+        rounding = change <= jnp.minimum(self.periodicity, 1e-15) * size
+        return change, rounding | (jnp.maximum(change, left) <= self.periodicity * size)
 
     def _march(self, state: State) -> tuple[Array, State]:
         """One cycle."""

@@ -52,14 +52,14 @@ class AFT:
 
     Attributes:
         patch. contacts: c, how many equal ones. samples: of a cycle. cycles: at most, the last one counts.
-        settled: they end when the sliders are periodic within this share of the largest force; 0 marches all.
+        periodicity: they end when the sliders are periodic within this share of the largest force; 0 marches all.
     """
 
     patch: Patch
     contacts: int
     samples: int
     cycles: int
-    settled: float = 1e-10
+    periodicity: float = 1e-10
 
     @cached_property
     def law(self) -> Law:
@@ -72,23 +72,23 @@ class AFT:
         return jnp.asarray(self.patch.kinematics)
 
     def force(self, u: Array, period: float) -> Array:
-        return np.asarray(_alone(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
+        return np.asarray(_alone(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
-        F, J = _both(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles)
+        F, J = _both(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles)
         return np.asarray(F), np.asarray(J)
 
     def rate(self, u: Array, period: float) -> Array | None:
         if not needs_rate(self.patch.law):
             return None
-        return np.asarray(_rate(self.law, self.kinematics, u, period, self.settled, self.samples, self.cycles))
+        return np.asarray(_rate(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
 
     def point_cycles(self, u: Array, period: float) -> list[Cycle]:
         return [one.cycle for one in self.traced(u, period)]
 
     def traced(self, u: Array, period: float) -> list[Traced]:
         G = self.kinematics
-        return [traced(self.patch.law, G, one, period, self.samples, self.cycles, self.settled) for one in u]
+        return [traced(self.patch.law, G, one, period, self.samples, self.cycles, self.periodicity) for one in u]
 
 
 def repeated(law: Law, n: int, times: int) -> Law:
@@ -113,20 +113,20 @@ def _points(G: jax.Array, u: jax.Array) -> jax.Array:
 
 @partial(program, static_argnames=("samples", "count"))
 def _both(
-    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, samples: int,
     count: int,
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     c, n, W = u.shape[0], G.shape[0], u.shape[2]
-    force, slope = force_harmonics(law, _points(G, u), period, samples, count, CHUNK, settled)
+    force, slope = force_harmonics(law, _points(G, u), period, samples, count, CHUNK, periodicity)
     half = jnp.einsum("nia,cnikjl->cnajkl", G, slope.reshape(c, n, 3, W, 3, W))
     return jnp.einsum("nia,cniw->caw", G, force.reshape(c, n, 3, W)), jnp.einsum("cnajkl,njb->cakbl", half, G)
 
 
 def _force(
-    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, samples: int,
     count: int,
 ) -> jax.Array:  # fmt: skip
-    force = force_alone(law, _points(G, u), period, samples, count, CHUNK, settled)
+    force = force_alone(law, _points(G, u), period, samples, count, CHUNK, periodicity)
     return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2]))
 
 
@@ -135,7 +135,7 @@ _alone = partial(program, static_argnames=("samples", "count"))(_force)
 
 @partial(program, static_argnames=("samples", "count"))
 def _rate(
-    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, settled: jax.Array | float, samples: int,
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, samples: int,
     count: int,
 ) -> jax.Array:  # fmt: skip
-    return jax.jvp(lambda T: _force(law, G, u, T, settled, samples, count), (period,), (jnp.ones(()),))[1]
+    return jax.jvp(lambda T: _force(law, G, u, T, periodicity, samples, count), (period,), (jnp.ones(()),))[1]

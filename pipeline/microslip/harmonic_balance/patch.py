@@ -48,15 +48,15 @@ class Traced(NamedTuple):
 
 
 def traced(
-    law: Law, G: Array, u: Array, period: float, samples: int, count: int, settled: float = 0.0
+    law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0
 ) -> Traced:  # fmt: skip
     """One more cycle than the force is found from, looked at in time.
 
     Args:
         law: of n points. G: (n, 3, k) kinematics. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... period: s.
-        samples: of a cycle. count: cycles marched at most before. settled: see `contact.periodic.periodic`.
+        samples: of a cycle. count: cycles marched at most before. periodicity: see `contact.periodic.periodic`.
     """
-    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, settled)
+    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, periodicity)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 
@@ -82,11 +82,11 @@ def derivative(waves: int) -> Array:
 @partial(program, static_argnames=("samples", "count"))
 def _point_cycles(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
-    settled: jax.Array | float,
+    periodicity: jax.Array | float,
 ) -> tuple[jax.Array, ...]:  # fmt: skip
     values, _ = waves(u.shape[1] // 2, samples)
     path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, values @ derivative(u.shape[1])))
-    before, state = cycles(law, path, period, count, settled)
+    before, state = cycles(law, path, period, count, periodicity)
     moved = path - jnp.roll(path, 1, axis=0)
     dt = period / samples
 

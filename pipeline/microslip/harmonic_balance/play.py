@@ -114,10 +114,10 @@ def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
     return dragged, signs
 
 
-def model(patch: Patch, contacts: int, samples: int, cycles: int, settled: float) -> Forces:
+def model(patch: Patch, contacts: int, samples: int, cycles: int, periodicity: float) -> Forces:
     """Of the forces of equal contacts: by hand where that is possible, else marched."""
     plain = _plain(patch)
-    return (JenkinsPlay if plain and cycles > 1 else AFT)(patch, contacts, samples, cycles, settled)
+    return (JenkinsPlay if plain and cycles > 1 else AFT)(patch, contacts, samples, cycles, periodicity)
 
 
 def _plain(patch: Patch) -> bool:

@@ -400,13 +400,13 @@ def _add_slopes(pieces: dict[tuple[int, int], Array], g: Group, S: Array, p: Pro
 
 
 def of(
-    assembly: Assembly, harmonics: int = 3, samples: int = 64, cycles: int = 100, settled: float = 1e-10,
+    assembly: Assembly, harmonics: int = 3, samples: int = 64, cycles: int = 100, periodicity: float = 1e-10,
     length: float | None = None, form: str | None = None, models: dict[int, Forces] | None = None,
 ) -> Problem:  # fmt: skip
     """The balance of an assembly.
 
     Args:
-        harmonics: H. samples: of a cycle. cycles: marched at most. settled: see `forces.AFT`. length: m, see
+        harmonics: H. samples: of a cycle. cycles: marched at most. periodicity: see `forces.AFT`. length: m, see
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
             the number of members if not given; always relative where damping couples them. models: first contact of a
             group of equal ones -> its force model, if it is not the marched law.
@@ -416,7 +416,7 @@ def of(
     """
     assembly.check_names()
     for name, value, bounds in (
-        ("harmonics", harmonics, {"ge": 1}), ("cycles", cycles, {"ge": 1}), ("settled", settled, {"ge": 0}),
+        ("harmonics", harmonics, {"ge": 1}), ("cycles", cycles, {"ge": 1}), ("periodicity", periodicity, {"ge": 0}),
         ("length", length, {"gt": 0}),
     ):  # fmt: skip
         if value is not None:
@@ -428,7 +428,7 @@ def of(
     groups = []
     for same in _equal(assembly):
         patch = contacts[same[0]].patch
-        model = (models or {}).get(same[0]) or play.model(patch, len(same), samples, cycles, settled)
+        model = (models or {}).get(same[0]) or play.model(patch, len(same), samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
         second = None if together or contacts[same[0]].second is None else np.array([where[i, 1] for i in same])
         offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))

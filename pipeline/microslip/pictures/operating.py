@@ -192,7 +192,7 @@ def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
 def _margin(worst: Endurance) -> str:
     if not np.isfinite(worst.vibration):
         return "nothing vibrates"
-    return f"the vibration may grow {worst.vibration:.3g} times"
+    return f"reserve factor {worst.vibration:.3g}"
 
 
 # contacts ----------------------------------------------------------------------------------------------------------
@@ -202,7 +202,7 @@ _PANELS = (
     ("traction", "swing of the traction", 1e-6, "MPa", "YlOrRd"),
     ("dissipated", "energy per cycle", 1.0, "J/m²", "BuPu"),
     ("slipping", "slips", 100.0, "% of the cycle", "viridis"),
-    ("open", "is open", 100.0, "% of the cycle", "viridis"),
+    ("open", "separated", 100.0, "% of the cycle", "viridis"),
 )
 
 

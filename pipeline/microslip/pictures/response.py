@@ -79,7 +79,7 @@ def comparison_picture(
     for axes in panels.ravel()[len(marched) :]:
         axes.remove()
     for axes, force, told in zip(panels.ravel(), marched, apart(list(marched)), strict=False):
-        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="aft")
+        axes.semilogy(marched[force][0], 1e6 * marched[force][1], color="#1f4e79", lw=2.2, label="marched in time")
         axes.semilogy(book[force][0], 1e6 * book[force][1], color="#d1603d", lw=1.4, ls="--", label="book")
         axes.set_title(f"$F_N$ = {told} N", fontsize=10)
         axes.grid(True, which="both", alpha=0.25)

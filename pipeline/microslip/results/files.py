@@ -20,7 +20,7 @@ from ..store import complete_or_absent, ordinary
 from .journal import is_journal, read_journal
 
 FORMAT = "microslip-response"
-FORMAT_VERSION = "0.1"
+FORMAT_VERSION = "0.2"
 CONVERGED = "converged"
 
 UNITS = {
@@ -280,7 +280,7 @@ def read_response(path: Path | str) -> Response:
     """Read ``response.h5``, or the journal of a response that is still computed or was killed.
 
     Raises:
-        UserError: missing, damaged, foreign or of another major version.
+        UserError: missing, damaged, foreign or of another version.
     """
     path = Path(path)
     if not ordinary(path).is_file():
@@ -317,8 +317,10 @@ def _read(path: Path) -> Response:
             form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
             if form != FORMAT:
                 raise UserError(f"{path}: is no response (its attribute 'format' is {form!r}, not '{FORMAT}')")
-            if version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-                raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}")
+            if version != FORMAT_VERSION:
+                raise UserError(
+                    f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; run the case again"
+                )
             inspect(file)
             return _response(file)
     except _DAMAGE as error:
