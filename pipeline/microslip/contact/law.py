@@ -189,8 +189,9 @@ class Law:
     def recalled(self, state: State, memory: Array) -> State | None:
         """A state with another memory, linear in both; None (the default) lets `periodic` march and solve for nothing.
 
-        For laws whose next cycle depends on the last one by nothing else, with a memory (..., 2, n) of sliders that
-        each know of no other: where it ends may depend on its own beginning alone. `memory` must not need the force.
+        For laws whose next step depends on the last one by nothing else but where that ended, with a memory (..., 2, n)
+        of sliders that each know of no other: where it ends may depend on its own beginning alone. `memory` must not
+        need the force.
         """
         return None
 
