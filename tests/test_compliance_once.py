@@ -222,11 +222,12 @@ def test_the_gap_of_a_sector_is_the_gap_of_the_whole_ring(k: int) -> None:
 
 def case(includes: str | None, normal: float, interface: str = "tip") -> CaseSettings:
     contact = {"interface": interface, "normal_stiffness": normal, "tangential_stiffness": 1e6, "friction": 0.3}
+    contact["law"] = "jenkins"
     if includes:
         contact["includes"] = includes
     return CaseSettings.model_validate(
         {
-            "name": "block", "body": "bar", "excitation": "push", "monitor": "look", "contacts": [contact],
+            "name": "block", "harmonics": 1, "body": "bar", "excitation": "push", "monitor": "look", "contacts": [contact],
             "sweep": {"start": 500.0, "stop": 520.0, "points": 2, "normal_forces": [10.0]},
         }
     )  # fmt: skip

@@ -442,7 +442,7 @@ def test_case_takes_the_normal_force_of_the_static_state():
         "interfaces": interfaces, "monitors": [{"name": "m", "point": point}],
         "excitations": [{"name": "e", "point": point, "direction": [1.0, 0.0, 0.0]}],
     }  # fmt: skip
-    contact = {"normal_stiffness": 1e8, "tangential_stiffness": 1e7, "friction": 0.2}
+    contact = {"law": "jenkins", "normal_stiffness": 1e8, "tangential_stiffness": 1e7, "friction": 0.2}
     case = CaseSettings.model_validate({
         "name": "c", "body": "test", "excitation": "e", "monitor": "m",
         "contacts": [{"interface": n, **contact} for n in sides],

@@ -363,7 +363,9 @@ def test_friction_response_is_the_same_through_every_method_that_is_statically_e
     """Peaks of a stuck block between rigid neighbours: MacNeal's residual, and coordinates without mass or of force."""
     case = CaseSettings.model_validate({
         "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
-        "contacts": [{"interface": "tip", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 0.3}],
+        "contacts": [
+            {"interface": "tip", "law": "jenkins", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 0.3}
+        ],
         "sweep": {"start": 3000.0, "stop": 5000.0, "points": 5, "normal_forces": [1e9]},
     })  # fmt: skip
     found = {}

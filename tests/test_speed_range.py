@@ -502,6 +502,7 @@ amplitude = 1e5
 monitor = "end"
 [[contacts]]
 interface = "tip"
+law = "jenkins"
 normal_stiffness = 2e7
 tangential_stiffness = 1e7
 friction = 0.2
