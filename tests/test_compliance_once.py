@@ -227,7 +227,8 @@ def case(includes: str | None, normal: float, interface: str = "tip") -> CaseSet
         contact["includes"] = includes
     return CaseSettings.model_validate(
         {
-            "name": "block", "harmonics": 1, "body": "bar", "excitation": "push", "monitor": "look", "contacts": [contact],
+            "name": "block", "body": "bar", "excitation": "push", "monitor": "look", "contacts": [contact],
+            "harmonics": 1,
             "sweep": {"start": 500.0, "stop": 520.0, "points": 2, "normal_forces": [10.0]},
         }
     )  # fmt: skip

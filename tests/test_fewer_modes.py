@@ -40,7 +40,10 @@ def test_first_modes_are_the_leading_ones_and_leave_more_compliance(sample: Moda
     assert first_modes(g, g.n_modes) is g
 
 
-LINEAR = ["sweep.normal_forces=[100.0]", *(f'contacts.{side}.{key}' for side in ("right", "left") for key in ('law="jenkins"', "points=[2, 1]"))]
+LINEAR = [
+    "sweep.normal_forces=[100.0]",
+    *(f"contacts.{side}.{key}" for side in ("right", "left") for key in ('law="jenkins"', "points=[2, 1]")),
+]
 
 
 def test_a_case_takes_as_many_modes_as_it_says(sample: ModalBasis) -> None:

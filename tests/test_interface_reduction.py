@@ -182,13 +182,14 @@ def test_settings_that_contradict_each_other_are_refused(wrong):
         body(interfaces=[{**RIGHT, **wrong}])
 
 
+STIFF = {"normal_stiffness": 1e8, "tangential_stiffness": 1e8}  # N/m
+
+
 def test_a_case_uses_the_rigid_coordinates_of_a_patch_that_has_more():
     """The friction response with six springs a patch is the same with and without further coordinates on the patch."""
     case = CaseSettings.model_validate({
         "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
-        "contacts": [
-            {"interface": "right", "law": "jenkins", "normal_stiffness": 1e8, "tangential_stiffness": 1e8, "friction": 0.3}
-        ],
+        "contacts": [{"interface": "right", "law": "jenkins", "friction": 1, **STIFF}],
         "sweep": {"start": 3000.0, "stop": 5000.0, "points": 4, "normal_forces": [1e9]},
     })  # fmt: skip
     plain = body(

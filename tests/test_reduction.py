@@ -364,7 +364,7 @@ def test_friction_response_is_the_same_through_every_method_that_is_statically_e
     case = CaseSettings.model_validate({
         "name": "c", "body": "test", "excitation": "push", "monitor": "look", "direction": "y",
         "contacts": [
-            {"interface": "tip", "law": "jenkins", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 0.3}
+            {"interface": "tip", "law": "jenkins", "normal_stiffness": 1e9, "tangential_stiffness": 1e9, "friction": 1}
         ],
         "sweep": {"start": 3000.0, "stop": 5000.0, "points": 5, "normal_forces": [1e9]},
     })  # fmt: skip
