@@ -2,7 +2,7 @@
 # and pipeline/cases/<case>.toml + the modal files it names -> build/<case>/response.csv.
 # Each stage decides by the hash of its inputs whether there is work to do; make only calls it.
 
-BODIES   := blade shroud pendulum half-pipe rig-neighbour pin pin-blade wire wire-blade damper pit-blade
+BODIES   := $(sort $(patsubst geometry/%/body.toml,%,$(wildcard geometry/*/body.toml)))
 CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipeline/cases/*.toml)))))
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip

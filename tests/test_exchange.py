@@ -20,7 +20,7 @@ from microslip.basis import read_basis, write_basis
 from microslip.body import BodySettings
 from microslip.cli import main
 from microslip.data import INTERFACE_ROWS, ModalBasis, UserError
-from microslip.exchange import WRITERS, to_xarray, writer
+from microslip.exchange import formats, to_xarray, writer
 from microslip.exchange.choice import elastic, select
 from microslip.floating_frame import floating_body, inertia, mass_matrix, right_side
 from microslip.frames import skew
@@ -463,7 +463,7 @@ def test_a_body_that_knows_points_only_is_shown_as_points(tmp_path: Path) -> Non
 MOTION = ("exudyn", "mbdyn", "sid")
 
 
-@pytest.mark.parametrize("form", sorted(WRITERS))
+@pytest.mark.parametrize("form", formats())
 def test_a_folder_that_cannot_be_written(form: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     basis = body(reduction="craig-bampton") if form == "pyharm" else small.basis()
@@ -472,21 +472,21 @@ def test_a_folder_that_cannot_be_written(form: str, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.parametrize("form", sorted(WRITERS))
+@pytest.mark.parametrize("form", formats())
 def test_same_basis_same_bytes(form: str, tmp_path: Path) -> None:
     basis = body(reduction="craig-bampton")
     for name in ("a", "b"):
-        writer(form)(basis, tmp_path / name / f"x{WRITERS[form].ending}")
+        writer(form)(basis, tmp_path / name / f"x{formats()[form].ending}")
     files = [p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file()]
     assert files
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
 
 
-@pytest.mark.parametrize("form", sorted(WRITERS))
+@pytest.mark.parametrize("form", formats())
 def test_every_file_says_units_frame_order_and_signs(form: str, tmp_path: Path) -> None:
     """In words, where its reader sees them; the universal file has 80 columns and a data set of units for it."""
-    path = tmp_path / f"x{WRITERS[form].ending}"
+    path = tmp_path / f"x{formats()[form].ending}"
     writer(form)(body(reduction="craig-bampton"), path)
     if form in ("mat", "pyharm"):
         said = str(loadmat(path, squeeze_me=True)["readme"])
@@ -497,12 +497,7 @@ def test_every_file_says_units_frame_order_and_signs(form: str, tmp_path: Path) 
         texts = [p.read_bytes()[:3000].decode("latin-1") for p in files]
         said = texts[0]
         assert all("SI" in t for t in texts)
-    order = {
-        "mat": "", "pyharm": "Physical coordinates first", "exudyn": "x, y, z of each node in turn",
-        "mtx": "coordinates.csv", "mbdyn": "x y z rx ry rz", "sid": "m1(row, q, column)", "uff": "x y z of each node",
-        "vtu": "vectors x y z", "pvd": "vectors x y z",
-    }  # fmt: skip
-    assert "SI" in said and "of the mesh" in said and order[form] in said
+    assert "SI" in said and "of the mesh" in said and formats()[form].order in said
     assert form == "uff" or "forces positive along their displacements" in said
 
 
@@ -567,17 +562,17 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("form", sorted(WRITERS))
+@pytest.mark.parametrize("form", formats())
 def test_the_command_line_writes_each_format(form: str, file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(file), "--to", form]) == 0
     said = Path(capsys.readouterr().out.strip())
-    assert said.exists() and said.name == f"basis{WRITERS[form].ending}"
+    assert said.exists() and said.name == f"basis{formats()[form].ending}"
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--to", "nastran"], "unknown format; choose one of exudyn, mat"),
+        (["--to", "nastran"], "unknown format; choose one of exudyn (Exudyn), mat (MATLAB"),
         (["--to", "sid", "--speed", "3"], "count from 0"),
         (["--to", "uff", "--nodal-diameter", "2"], "the file has 0"),
     ],
@@ -622,7 +617,31 @@ def test_the_readers_lines_of_the_page_run(
         np.testing.assert_array_equal(names["normal"], g.interfaces["right"].rows[0])
 
 
-def test_every_format_has_its_line_in_the_table() -> None:
+def test_the_table_names_what_there_is() -> None:
     page = (Path(__file__).parents[1] / "docs" / "exchange.md").read_text(encoding="utf-8")
-    table = "\n".join(line for line in page.splitlines() if line.startswith("| ["))
-    assert all(f"`{form}`" in table for form in WRITERS)
+    first = [line.split("|")[1] for line in page.splitlines() if line.startswith("| [")]
+    named = {name for cell in first for name in re.findall(r"`(\w+)`", cell)}
+    assert named - {"to_xarray"} <= set(formats())
+
+
+def test_an_exporter_of_another_package_is_one_file(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Named by an entry point; one that is none, or takes a name that is taken, is refused."""
+    package = tmp_path / "site"
+    (package / "other-1.0.dist-info").mkdir(parents=True)
+    (package / "other.py").write_text(
+        "from microslip.exchange.choice import Format\n"
+        "own = Format('names', '.txt', 'people', lambda basis, path: path.write_text(basis.name))\n"
+        "taken = Format('mat', '.m', 'nobody', own.write)\n"
+    )
+    points = package / "other-1.0.dist-info" / "entry_points.txt"
+    (package / "other-1.0.dist-info" / "METADATA").write_text("Name: other\nVersion: 1.0\n")
+    monkeypatch.syspath_prepend(package)
+    for value, code in (("other:own", 0), ("other:taken", 2), ("other:write", 2)):
+        points.write_text(f"[microslip.exporter]\nx = {value}\n")
+        formats.cache_clear()
+        assert main(["export", str(file), "--to", "names", "-o", str(tmp_path / "names.txt")]) == code
+        assert code == 0 or "microslip.exporter: other:" in capsys.readouterr().err
+    formats.cache_clear()
+    assert (tmp_path / "names.txt").read_text() == read_basis(file).name

@@ -23,7 +23,7 @@ from test_exchange import blocks
 
 from microslip.body import BodySettings
 from microslip.data import Array, ModalBasis
-from microslip.exchange import WRITERS, writer
+from microslip.exchange import formats, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.modes import modal_basis
@@ -226,7 +226,7 @@ def crossing_frequency(time: Array, signal: Array) -> float:
 def test_the_readers_lines_of_the_page_run(peer: str, head: str, tmp_path: Path) -> None:
     if interpreter(peer) is None:
         pytest.skip(f"{peer} is not installed: make peers")
-    writer(peer)(body("craig-bampton"), tmp_path / f"basis{WRITERS[peer].ending}")
+    writer(peer)(body("craig-bampton"), tmp_path / f"basis{formats()[peer].ending}")
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(
         [str(interpreter(peer)), "-c", blocks()[head]],

@@ -14,7 +14,7 @@ import small
 from scipy.io import loadmat
 
 from microslip.data import UserError
-from microslip.exchange import WRITERS, writer
+from microslip.exchange import formats, writer
 from microslip.exchange.mat import field_names, write_mat
 
 
@@ -141,7 +141,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
 
 def test_the_table_of_writers(tmp_path: Path) -> None:
     assert writer("mat") is write_mat
-    assert set(WRITERS) >= {"mat", "vtu"}
+    assert set(formats()) >= {"mat", "vtu"}
 
 
 @pytest.mark.skipif(shutil.which("octave-cli") is None, reason="Octave is not installed")

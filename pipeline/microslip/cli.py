@@ -520,18 +520,17 @@ def export(
 
     Args:
         file: a basis.h5.
-        to: exudyn, mat (MATLAB, Octave, NLvib), mbdyn, mtx (Matrix Market), pvd and vtu (ParaView), pyharm, sid, uff.
+        to: format; one that does not exist lists them all, with the programs that read them.
         speed: this one of the file's speeds only, counted from 0.
         nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: this speed alone.
     """
     from .basis import read_basis
-    from .exchange import WRITERS, writer
+    from .exchange import formats, writer
     from .exchange.choice import select
 
     file = _modal_file(file)
-    if to not in WRITERS:
-        raise UserError(f"export --to {to}: unknown format; choose one of {', '.join(sorted(WRITERS))}")
+    write = writer(to)
     if ring:
         if to != "vtu":
             raise UserError("export --ring: only vtu can hold the ring; leave --ring out for one sector")
@@ -543,9 +542,9 @@ def export(
         return
     if rpm is not None and speed is not None:
         raise UserError("export --rpm: it chooses the speed already; leave --speed out")
-    target = output or file.with_name(file.stem + WRITERS[to].ending)
+    target = output or file.with_name(file.stem + formats()[to].ending)
     basis = read_basis(file)
-    writer(to)(select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter), target)
+    write(select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter), target)
     print(target)
 
 

@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ..coordinates import in_modes
 from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
 from ..resonances import speeds_of
+
+
+@dataclass(frozen=True)
+class Format:
+    """Another program's format.
+
+    Attributes:
+        name: as in ``--to``. ending: of the file's name if none is asked for. reader: who takes it. write: a
+            `ModalBasis` and a path; it leaves the file complete or absent. order: words of the file that say the order
+            of its rows.
+    """
+
+    name: str
+    ending: str
+    reader: str
+    write: Callable[[ModalBasis, Path], None]
+    order: str = ""
+
 
 STATEMENT = (
     "SI units (m, kg, s, N, rad, Pa), frequencies in Hz where so called; right-handed frame of the mesh; "

@@ -17,7 +17,7 @@ from ..data import Array, ModalBasis, ModalGroup
 from ..frames import skew
 from ..mesh import boundary_facets
 from ..store import complete_or_absent
-from .choice import STATEMENT, body_in_motion, with_shapes
+from .choice import STATEMENT, Format, body_in_motion, with_shapes
 from .multibody import position_cross_shape, shape_cross_shape, tilde_tilde
 
 
@@ -83,3 +83,6 @@ def _triangles(basis: ModalBasis) -> Array:
         if kind.startswith("quad"):
             found.append(facets[:, [0, 2, 3]])
     return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)
+
+
+FORMATS = (Format("exudyn", "_exudyn.npz", "Exudyn", write_exudyn, "x, y, z of each node in turn"),)

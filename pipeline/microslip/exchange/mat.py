@@ -19,7 +19,7 @@ import numpy as np
 from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
 from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows, UserError
 from ..store import complete_or_absent
-from .choice import STATEMENT
+from .choice import STATEMENT, Format
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"
 _KEYWORDS = {
@@ -201,3 +201,6 @@ def field_names(names: Iterable[str]) -> list[str]:
             text = f"{text[:58].removesuffix(f'_{number - 1}')}_{number}"
         out.append(text)
     return out
+
+
+FORMATS = (Format("mat", ".mat", "MATLAB, Octave, NLvib", write_mat),)

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Invariants, ModalBasis, ModalGroup
-from .choice import STATEMENT, one_line
+from .choice import STATEMENT, Format, one_line
 from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
@@ -88,3 +88,6 @@ def _invariants(v: Invariants) -> list[str]:
     for (group, invariant), table in tables.items():
         lines += [f"** RECORD GROUP {group}, INVARIANT {invariant}", *_rows(table), "**"]
     return lines
+
+
+FORMATS = (Format("mbdyn", ".fem", "MBDyn", write_mbdyn, "x y z rx ry rz"),)

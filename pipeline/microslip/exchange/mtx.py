@@ -21,7 +21,7 @@ import numpy as np
 from ..coordinates import compliance_row
 from ..data import Array, ModalBasis, ModalGroup, UserError
 from ..store import refused
-from .choice import STATEMENT
+from .choice import STATEMENT, Format
 from .mat import field_names
 
 MARK = "Reduced matrices in Matrix Market form, written by microslip"
@@ -145,3 +145,6 @@ Check: the eigenvalues of V^H K_r V (or of K_r) are omega^2.
 Folders:
 {chr(10).join(groups)}
 """
+
+
+FORMATS = (Format("mtx", "_mtx", "anything: Matrix Market, a folder", write_mtx, "coordinates.csv"),)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup, UserError
 from ..store import complete_or_absent
-from .choice import STATEMENT, only_group, real
+from .choice import STATEMENT, Format, only_group, real
 from .mat import clean_header
 from .mtx import interface_coordinates
 
@@ -83,3 +83,6 @@ def physical_first(basis: ModalBasis, g: ModalGroup) -> tuple[list[str], Indices
         )
     first = [column[f"{name}:{row}"] for name in nodes for row in INTERFACE_ROWS]
     return nodes, np.array(first + [j for j in range(g.n_modes) if j not in set(first)])
+
+
+FORMATS = (Format("pyharm", "_pyharm.mat", "pyHarm", write_pyharm, "Physical coordinates first"),)

@@ -29,7 +29,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
 from ..frames import skew
-from .choice import one_line
+from .choice import Format, one_line
 from .multibody import Attachment, position_cross_shape, shape_cross_shape, tilde_tilde, write_flexible
 
 
@@ -124,3 +124,6 @@ def _taylor(name: str, m0: Array | None, m1: Array | None, modes: int) -> list[s
             for i in range(rows) for q in range(modes) for k in range(columns)
         ]  # fmt: skip
     return [*head, *body, f"end {name}"]
+
+
+FORMATS = (Format("sid", ".SID_FEM", "multibody programs: standard input data", write_sid, "m1(row, q, column)"),)

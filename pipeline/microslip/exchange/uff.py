@@ -22,7 +22,7 @@ from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..mesh import boundary_facets
 from ..resonances import eigenmodes
 from ..store import write_text
-from .choice import node_numbers, one_line, with_shapes
+from .choice import Format, node_numbers, one_line, with_shapes
 
 TRIANGLE, QUAD = 41, 44
 """FE descriptors of data set 2412 (linear plane-stress elements, which stand for a skin to draw)."""
@@ -117,3 +117,6 @@ def _parameters(g: ModalGroup, j: int, speed: int, complex_shapes: bool) -> list
 def _interleaved(shape: Array) -> Array:
     """(n, 6) real and imaginary part of each component in turn."""
     return np.stack([shape.real, shape.imag], axis=2).reshape(len(shape), 6)
+
+
+FORMATS = (Format("uff", ".uff", "test programs: universal file format", write_uff, "x y z of each node"),)

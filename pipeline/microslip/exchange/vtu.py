@@ -20,7 +20,7 @@ from ..mesh import boundary_facets
 from ..resonances import eigenmodes, speeds_of
 from ..ring import expand, multiplicity, replicate, ring_scale, sector_rotation
 from ..store import complete_or_absent, write_text
-from .choice import STATEMENT, with_shapes
+from .choice import STATEMENT, Format, with_shapes
 
 
 def write_vtu(basis: ModalBasis, path: Path | str) -> None:
@@ -209,3 +209,9 @@ def collection(files: Mapping[int, Path]) -> str:
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
         f"{COMMENT}\n  <Collection>\n{sets}  </Collection>\n</VTKFile>\n"
     )
+
+
+FORMATS = (
+    Format("pvd", ".pvd", "ParaView: a file a mode", write_pvd, "vectors x y z"),
+    Format("vtu", ".vtu", "ParaView", write_vtu, "vectors x y z"),
+)
