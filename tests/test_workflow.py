@@ -295,8 +295,6 @@ def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:
     assert {"blade", "shroud", "pendulum", "half-pipe"} <= set(bodies)
     for name in bodies:
         assert load_toml(root / "geometry" / name / "body.toml")["name"] == name
-    makefile = (root / "Makefile").read_text()
-    assert set(makefile.split("BODIES   := ")[1].splitlines()[0].split()) <= set(bodies)
 
 
 def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> None:
