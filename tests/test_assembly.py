@@ -19,7 +19,7 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, across, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, across, preloaded_contact
 
 
 def blade() -> ModalBasis:
@@ -41,7 +41,7 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(0.05)), jnp.asarray(1e6 / n))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
-    contact = touching("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=normal)
+    contact = preloaded_contact("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=normal)
     member, load = Member("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
     return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 
@@ -91,7 +91,7 @@ def test_both_forms_are_the_same_equations() -> None:
     ring = sector(3, 1, normal=50.0, push=2.0).unrolled()
     places, areas = grid(0.02, 0.01, (2, 2))
     law = PointContact(Penalty(jnp.asarray(2e6 / 4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e6 / 4))
-    wall = touching("wall", Patch("left", places, areas, law), Side("blade_0", "left"), None, normal=30.0)
+    wall = preloaded_contact("wall", Patch("left", places, areas, law), Side("blade_0", "left"), None, normal=30.0)
     chain = Assembly(ring.members, (*ring.contacts[:2], wall), ring.loads, ring.outputs)
     found = []
     for form in ("relative", "sides"):
@@ -132,10 +132,10 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
     """Pressed together by what the preload makes: the same response from a given approach as from a given force."""
     one, Omega = sector(6, 2, push=2.0), 2 * np.pi * 60.0
     given = one.contacts[0]
-    wall = touching("shroud", given.patch, Side("blade", "right"), None, normal=20.0)
+    wall = preloaded_contact("shroud", given.patch, Side("blade", "right"), None, normal=20.0)
     by_force = Assembly(one.members, (wall,), one.loads, one.outputs)
     # the steady load that holds the blade against the wall where the contact is pressed by 20 N
-    near = touching("shroud", given.patch, Side("blade", "right"), None, interference=float(wall.offset[0]))
+    near = preloaded_contact("shroud", given.patch, Side("blade", "right"), None, interference=float(wall.offset[0]))
     loads = (*one.loads, Load("blade", "hold", 1.0, harmonic=0))
     group = one.members[0].groups[0]
     rows = group.interfaces["right"].rows[0][None] * 20.0
@@ -180,7 +180,7 @@ def rubbing(phase: float, push: float, friction: float) -> Assembly:
     places, areas = grid(0.02, 0.01, (4, 3))
     n = len(areas)
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(friction)), jnp.asarray(1e6 / n))
-    wall = touching("wall", Patch("right", places, areas, law), Side("blade", "right"), None, normal=20.0)
+    wall = preloaded_contact("wall", Patch("right", places, areas, law), Side("blade", "right"), None, normal=20.0)
     one = sector(4, 0)
     return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.outputs)
 

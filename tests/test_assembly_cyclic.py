@@ -22,11 +22,11 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.neighbours import frame_change
 from microslip.neighbours import stuck as stuck_neighbours
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
 from microslip.system.damping import structural
 from microslip.system.disc import whole
-from microslip.system.meeting import in_ring
 from microslip.system.nodal import nodal
+from microslip.system.pairing import in_ring
 
 N = 5
 FACES = [
@@ -59,7 +59,7 @@ def sector(basis: ModalBasis, order: int, normal: float, push: float) -> Assembl
     law = PointContact(Penalty(jnp.asarray(2e7 / n)), Coulomb(jnp.asarray(0.1)), jnp.asarray(1e7 / n))
     facing = frame_change(basis, faces["right"], faces["left"])
     patch = Patch("right", places, areas, law)
-    contact = touching("gap", patch, Side("disc", "right"), Side("disc", "left", facing, 1), normal=normal)
+    contact = preloaded_contact("gap", patch, Side("disc", "right"), Side("disc", "left", facing, 1), normal=normal)
     member = Member("disc", groups, N)
     loads, outputs = (Load("disc", "gas", push),), (Output("disc", "top", "u_y"),)
     return Assembly((member,), (contact,), loads, outputs, Ring(N, order))
@@ -141,7 +141,7 @@ def test_a_patch_that_deforms_on_a_sector_and_on_the_whole_disc() -> None:
     law = PointContact(Penalty(jnp.asarray(2e7 * share)), Coulomb(jnp.asarray(0.1)), jnp.asarray(1e7 * share))
     sides = found.sides(Side("disc", "right"), Side("disc", "left", met.frame, 1))
     patch = Patch("right", found.points, found.areas, law, found.shapes)
-    one = replace(sector(basis, 2, 50.0, 3e3), contacts=(touching("gap", patch, *sides, normal=50.0),))
+    one = replace(sector(basis, 2, 50.0, 3e3), contacts=(preloaded_contact("gap", patch, *sides, normal=50.0),))
     lone, ring = (balance.of(a, **{**FINE, "harmonics": 1, "samples": 20}) for a in (one, one.unrolled()))
     points = [solve(p, 2 * np.pi * 700.0, []) for p in (lone, ring)]
     assert all(p.converged for p in points) and found.count > 6

@@ -25,7 +25,7 @@ from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
-from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, across, touching
+from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, across, preloaded_contact
 
 Array = np.ndarray
 
@@ -140,7 +140,7 @@ def ring_of_four() -> Assembly:
     law = PointContact(Penalty(jnp.asarray(1e6)), Coulomb(jnp.asarray(0.2)), jnp.asarray(5e5))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
-    contact = touching("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=20.0)
+    contact = preloaded_contact("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=20.0)
     member, load = Member("blade", {0: blade.groups[0, 0]}), Load("blade", "gas", 30.0)
     return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(4, 1)).unrolled()
 

@@ -33,7 +33,7 @@ from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
 from microslip.results import open_journal, response_of
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 from microslip.system.assembly import Contact as Rub
 
 FREQUENCY = np.linspace(180.0, 270.0, 16)
@@ -166,7 +166,7 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     from test_operating import linear_patch
 
     patch, _ = linear_patch()
-    contact = touching("rub", patch, Side("small", "right"), None, normal=100.0)
+    contact = preloaded_contact("rub", patch, Side("small", "right"), None, normal=100.0)
     member = Member("small", {0: group}, brings=np.ones(len(group.compliance.labels)))
     outputs = tuple(Output("small", "tip-probe", f"u_{x}") for x in "xyz")
     assembly = Assembly((member,), (contact,), (Load("small", "shaker", 300.0),), outputs)

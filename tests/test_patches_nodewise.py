@@ -23,9 +23,9 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, touching
-from microslip.system.meeting import facing, rigid_points
+from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
 from microslip.system.nodal import interpolation, nodal, static_compliance
+from microslip.system.pairing import facing, rigid_points
 
 FOUNDATION = 2e13  # N/m3, stiffness of the surface per area
 T2 = (0.0, 1.0, 0.0)
@@ -252,7 +252,7 @@ def test_meshes_that_do_not_match_agree_with_those_that_do() -> None:
 
 def problem_of(a: Block, b: Block, push: float = 60.0, **settings: float) -> balance.Problem:
     patch, first, second, C = pair(a, b)
-    contact = touching("joint", patch, first, second, normal=100.0, compliance=C)
+    contact = preloaded_contact("joint", patch, first, second, normal=100.0, compliance=C)
     whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", push),),
                      (Output("low", "end", "u_x"),))  # fmt: skip
     return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "periodicity": 1e-12, "length": 1e-7,
@@ -301,10 +301,10 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
     a, b = soft((2, 2, 1), "low"), soft((2, 2, 1), "high")
     patch, first, second, C = pair(a, b)
     patch = replace(patch, law=law(patch.areas, 0.0))
-    by_force = touching("joint", patch, first, second, normal=20.0, compliance=C)
+    by_force = preloaded_contact("joint", patch, first, second, normal=20.0, compliance=C)
     far = by_force.offset + C @ by_force.preload
     assert np.abs(far[[4, 5]]).max() < 1e-9 * far[0] / 0.01  # the bricks stand straight, so that nothing tilts
-    by_balance = touching("joint", patch, first, second, interference=float(far[0]))
+    by_balance = preloaded_contact("joint", patch, first, second, interference=float(far[0]))
     found = []
     for contact in (by_force, by_balance):
         whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", 60.0),),

@@ -18,7 +18,7 @@ from microslip.data import Rows, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
+from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
 ORDER = 4
@@ -28,7 +28,7 @@ def rubbing(push: float = 1e4) -> Assembly:
     """A blade whose tip rubs on a wall, pushed by a pressure."""
     places, areas = grid(0.02, 0.003, (3, 1))
     law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
-    wall = touching("wall", Patch("tip", places, areas, law), Side("blade", "tip"), None, normal=1.0)
+    wall = preloaded_contact("wall", Patch("tip", places, areas, law), Side("blade", "tip"), None, normal=1.0)
     member = Member("blade", {0: ranged().groups[0, 0]})
     return Assembly((member,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))
 

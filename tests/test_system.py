@@ -354,13 +354,13 @@ def rubbed(g=None, law=None, **changed):
     pytest.importorskip("jax")
     from microslip.contact.patch import Patch
     from microslip.contact.sliders import jenkins
-    from microslip.system.assembly import Assembly, Load, Member, Output, Side, touching
+    from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 
     g = g or chain().basis().groups[0, 0]
     patch = Patch("rub", np.zeros((1, 2)), np.ones(1), law or jenkins(2e3, 0.3, 1.0))
     parts = {
         "members": (Member("m", {0: g}),),
-        "contacts": (touching("rub", patch, Side("m", "rub"), None, normal=1.0),),
+        "contacts": (preloaded_contact("rub", patch, Side("m", "rub"), None, normal=1.0),),
         "loads": (Load("m", "shaker", 2.0),),
         "outputs": (Output("m", "end", "u_x"),),
     }

@@ -33,8 +33,8 @@ from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 if TYPE_CHECKING:
     from ..contact.law import Law
     from ..system.assembly import Assembly, Contact, Load, Member, Output, Side
-    from ..system.meeting import Met, Place
     from ..system.nodal import Nodal
+    from ..system.pairing import Pairing, Place
 
 T = TypeVar("T")
 
@@ -308,7 +308,7 @@ def _contact(
     springs: Springs, path: Path | str,
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and remarks. springs: of one that is not curved."""
-    from ..system.assembly import Side, touching
+    from ..system.assembly import Side, preloaded_contact
 
     ends, law = _ends(settings, c), c.law_name
     loaded, faces = _sides(settings, bodies, c, path)
@@ -332,7 +332,7 @@ def _contact(
         else:
             patch = _told(path, c, lambda: patch_of(c, k, law, faces[0], load, whole))
         more = [words] * bool(words) + _told(path, c, lambda: resolved(c, patch, load))
-        press = partial(touching, second=second, normal=c.normal_force, interference=c.interference or 0.0)
+        press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
         return _told(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
 
     return at, said
@@ -370,7 +370,7 @@ def _of_force(at: At, normal: float) -> Contact:
 
 def _nodal(
     settings: CaseSettings, members: Mapping[str, Member], c: ContactSettings, sides: tuple[Side, Side | None],
-    met: Met | None,
+    met: Pairing | None,
 ) -> tuple[Nodal, Side, Side | None, Array]:  # fmt: skip
     """A patch that deforms, its sides, and the compliance of the bodies along its coordinates."""
     from ..system.nodal import nodal, static_compliance
@@ -411,9 +411,9 @@ def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> 
     return found
 
 
-def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Met:
+def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Pairing:
     """How the two faces of a contact meet."""
-    from ..system.meeting import facing, in_ring
+    from ..system.pairing import facing, in_ring
 
     names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
     seen = two.seen_from(one)
@@ -426,7 +426,7 @@ def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces
 
 def _place(b: Loaded) -> Place:
     """Where a body stands in the axes of the case."""
-    from ..system.meeting import Place
+    from ..system.pairing import Place
 
     R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))
     centre = b.basis.rotation_point

@@ -106,7 +106,7 @@ def number_of_points(c: ContactSettings, load: float | None) -> int:
 def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tuple[Array, Array]:
     """Places and areas: a rectangle as the settings have it, or what the outline leaves of it."""
     from ..contact.patch import grid
-    from ..system.meeting import rigid_points
+    from ..system.pairing import rigid_points
 
     width, height = c.width or 0.0, c.height or 0.0
     counts = (asked[0] if width else 1, asked[1] if height else 1)

@@ -62,7 +62,7 @@ def unbalanced(at: AtFrequency, before: Places, after: Places) -> tuple[float, s
     """
     most, whom, p = 0.0, "", at.problem
     for i, (part, k, s) in enumerate(zip(p.parts[0], p.stiffness, p.slices(), strict=True)):
-        motions, shares = loose(part, k)
+        motions, shares = unconstrained(part, k)
         free = motions[:, shares < FREE]
         forces = np.abs(free.conj().T @ _stuck(part, k) @ (before[0][i] - after[0][i]))
         travel = np.abs(part.rows @ free) * (p.length / p.scale[s])[:, None]
@@ -82,7 +82,7 @@ def unheld(problem: Problem) -> bool:
     return any(bool((shares < FREE).any()) for shares in _shares(problem))
 
 
-def loose(part: Linear, stiffness: Array) -> tuple[Array, Array]:
+def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
     """Mean motions that the contacts hold far better than anything else.
 
     Args:
@@ -96,7 +96,7 @@ def loose(part: Linear, stiffness: Array) -> tuple[Array, Array]:
 
 
 def _shares(problem: Problem) -> list[Array]:
-    return [loose(part, k)[1] for part, k in zip(problem.parts[0], problem.stiffness, strict=True)]
+    return [unconstrained(part, k)[1] for part, k in zip(problem.parts[0], problem.stiffness, strict=True)]
 
 
 def _stuck(part: Linear, stiffness: Array) -> Array:
@@ -105,7 +105,7 @@ def _stuck(part: Linear, stiffness: Array) -> Array:
 
 
 def _springs(part: Linear, stiffness: Array) -> Array:
-    motions, shares = loose(part, stiffness)
+    motions, shares = unconstrained(part, stiffness)
     P = _stuck(part, stiffness) @ motions[:, shares < FREE]
     return P @ P.conj().T
 

@@ -14,7 +14,7 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
-from ..system.assembly import Assembly, Load, Member, Output, Side, touching
+from ..system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged
@@ -227,7 +227,7 @@ def of_body(
         compliance=empty,
     )
     contacts = tuple(
-        touching(p.interface, p, Side("body", p.interface), None, normal=float(n))
+        preloaded_contact(p.interface, p, Side("body", p.interface), None, normal=float(n))
         for p, n in zip(patches, np.asarray(normal, dtype=float), strict=True)
     )
     member = Member("body", {0: named})

@@ -27,8 +27,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
 
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
     examined at the quadrature points when they are assembled). Warnings: a file without its end, first-order cells,
-    sets of facets that cannot serve as faces, parts that share no points (`modes.loose` refuses those that nothing
-    holds).
+    sets of facets that cannot serve as faces, parts that share no points (`modes.unconstrained` refuses those that
+    nothing holds).
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():

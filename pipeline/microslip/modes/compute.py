@@ -34,7 +34,6 @@ from .characteristic import with_characteristic
 from .closures import ContactCurve, bolt_forces, contact_curve, contact_pairs, contact_states
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
 from .invariants import inertia_invariants, stiffening_operators, with_stiffening
-from .loose import refuse_unlinked_parts
 from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
 from .sector import Sector, cut_faces, make_sector
@@ -49,6 +48,7 @@ from .solution import (
 )
 from .spectrum import make_pencil
 from .stress import gauss_set, nodal_set
+from .unconstrained import refuse_unlinked_parts
 
 Report = Callable[[str], None]
 

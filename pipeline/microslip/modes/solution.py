@@ -20,8 +20,8 @@ from . import rigid
 from .body_rows import BodyRows
 from .common import SPARE
 from .equilibrium import BodyModel, what_loads
-from .loose import refuse_loose_parts, refuse_unresolved
 from .spectrum import leading_rows, rigid_shift, static_answers
+from .unconstrained import refuse_unconstrained_parts, refuse_unresolved
 
 Report = Callable[[str], None]
 
@@ -99,7 +99,7 @@ def search(
             "ask for fewer or refine"
         )
     if isinstance(unknowns, FreeUpper):
-        refuse_loose_parts(model, pencil)
+        refuse_unconstrained_parts(model, pencil)
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:

@@ -231,11 +231,13 @@ class Contact:
 
     def pressed(self, normal: float) -> Contact:
         """The contact under another normal force (N)."""
-        found = touching(self.name, self.patch, self.first, self.second, normal=normal, compliance=self.compliance)
+        found = preloaded_contact(
+            self.name, self.patch, self.first, self.second, normal=normal, compliance=self.compliance
+        )
         return replace(found, phase=self.phase)
 
 
-def touching(
+def preloaded_contact(
     name: str, patch: Patch, first: Side, second: Side | None, normal: float | None = None, interference: float = 0.0,
     compliance: Array | None = None,
 ) -> Contact:  # fmt: skip

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from ..data import Array, Interface, UserError
 from .assembly import InWave, Member, Side
-from .meeting import Met
+from .pairing import Pairing
 
 NEIGHBOURS = 12
 """Points that an interpolation looks at: twice the six terms of a quadratic."""
@@ -62,7 +62,7 @@ Face = tuple[Member, str]
 
 
 def nodal(
-    first: Face, second: Face | None = None, met: Met | None = None, indices: Sequence[int] = (0,),
+    first: Face, second: Face | None = None, met: Pairing | None = None, indices: Sequence[int] = (0,),
     tolerance: float = COMPLIANT,
 ) -> Nodal:  # fmt: skip
     """Common coordinates of two faces that deform, or of one against a rigid wall.
@@ -134,7 +134,7 @@ def _interface(member: Member, name: str) -> Interface:
 # points that both faces have -----------------------------------------------------------------------------------------
 
 
-def _shared(one: Interface, two: Interface, met: Met) -> tuple[Array, Array, tuple[Array | None, Array | None]]:
+def _shared(one: Interface, two: Interface, met: Pairing) -> tuple[Array, Array, tuple[Array | None, Array | None]]:
     """Points and areas in the first face's frame, and the interpolation (n, p) from each face's own points to them."""
     a = (one.points - one.origin) @ one.rotation[1:].T
     Q = met.frame[:3, :3]

@@ -42,7 +42,7 @@ def refuse_unlinked_parts(model: BodyModel, settings: BodySettings) -> None:
         )
 
 
-def refuse_loose_parts(model: BodyModel, pencil: eigen.Pencil) -> None:
+def refuse_unconstrained_parts(model: BodyModel, pencil: eigen.Pencil) -> None:
     """Refuse parts that the stiffness about the static state does not hold, since their contacts do not count in it.
 
     Raises:

@@ -29,7 +29,7 @@ OWN_FRAME = np.diag([-1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Met:
+class Pairing:
     """Two faces that meet.
 
     Attributes:
@@ -66,8 +66,8 @@ class Place:
 
 def facing(
     first: Interface, second: Interface, place: Place | None = None, names: tuple[str, str] = ("first", "second")
-) -> Met:  # fmt: skip
-    """The meeting of a face with another body's.
+) -> Pairing:  # fmt: skip
+    """The pairing of a face with another body's.
 
     Args:
         place: of the second body in the first one's axes; None: it has the same axes. names: for messages.
@@ -85,8 +85,8 @@ def facing(
 def in_ring(
     first: Interface, second: Interface, axis: Array, point: Array, blades: int, names: tuple[str, str],
     sector: int = 1, place: Place | None = None,
-) -> Met:  # fmt: skip
-    """The meeting of a face with one of another body in a ring, its own neighbour perhaps.
+) -> Pairing:  # fmt: skip
+    """The pairing of a face with one of another body in a ring, its own neighbour perhaps.
 
     Where the second body, turned by the sectors between, does not face the first but does so as it is drawn (flat
     faces at +-b of a blade that is meant as a part of any ring), each body's contact frame is used as it is: the
@@ -117,7 +117,7 @@ def in_ring(
     return own
 
 
-def _meeting(first: Interface, second: Interface, place: Place) -> tuple[Met, str]:
+def _meeting(first: Interface, second: Interface, place: Place) -> tuple[Pairing, str]:
     """How they meet, and what keeps them from it, in words."""
     away = first.rotation @ (place.turn @ second.origin + place.shift - first.origin)
     axes = second.rotation @ place.turn.T
@@ -133,7 +133,7 @@ def _degrees(a: Array, b: Array) -> float:
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
-def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Met:
+def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Pairing:
     """axes: (3, 3) rows of the second face's frame in the first body's axes. offset: (2,) along t1, t2, gap: m."""
     arm = -offset @ first.rotation[1:]  # the faces touch, so what lies between them along n turns nothing
     angle = _degrees(axes[0], -first.rotation[0])
@@ -144,10 +144,10 @@ def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Met:
     if abs(gap) > NOTICEABLE * np.max(first.extent, initial=0.0) > 0:
         words = "apart" if gap > 0 else "inside each other"
         remarks += (f"The faces are drawn {1e3 * abs(gap):.3g} mm {words}; the contact counts from where they touch.",)
-    return Met(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), False, remarks)
+    return Pairing(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), False, remarks)
 
 
-def _missing(met: Met, first: Interface, second: Interface, axes: Array) -> str:
+def _missing(met: Pairing, first: Interface, second: Interface, axes: Array) -> str:
     """What keeps two faces from lying on each other, in words; nothing if nothing does."""
     angle = np.degrees(met.angle)
     if angle > OPPOSITE:
@@ -166,7 +166,7 @@ def _missing(met: Met, first: Interface, second: Interface, axes: Array) -> str:
     return ""
 
 
-def _own_frames(first: Interface, second: Interface, drawn: Place, sector: int, blades: int) -> Met | None:
+def _own_frames(first: Interface, second: Interface, drawn: Place, sector: int, blades: int) -> Pairing | None:
     """See `in_ring`; None where the faces as drawn are not opposite, have other tangents or pass by each other."""
     there = second.rotation @ drawn.turn.T
     normal, tangent = _degrees(there[0], -first.rotation[0]), _degrees(there[2], first.rotation[2])
@@ -174,14 +174,14 @@ def _own_frames(first: Interface, second: Interface, drawn: Place, sector: int, 
         return None
     offset = first.rotation[1:] @ (drawn.turn @ second.origin + drawn.shift - first.origin)
     axes = OWN_FRAME @ first.rotation
-    if _missing(Met(np.eye(6), 0.0, offset, 0.0), first, second, axes):
+    if _missing(Pairing(np.eye(6), 0.0, offset, 0.0), first, second, axes):
         return None
     remark = (
         f"Turned by {360 * sector / blades:.4g} degrees the faces of neighbours do not meet, as drawn they are "
         "opposite: each blade's own contact frame is used, as if the wedge between them were filled."
     )
     arm = -offset @ first.rotation[1:]
-    return Met(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), True, (remark,))
+    return Pairing(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), True, (remark,))
 
 
 def rigid_points(interface: Interface, counts: tuple[int, int] | None = None) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from small import basis
 from microslip.contact.patch import grid
 from microslip.data import Array, Interface, UserError
 from microslip.frames import rotation
-from microslip.system.meeting import Place, facing, in_ring, rigid_points
+from microslip.system.pairing import Place, facing, in_ring, rigid_points
 
 Y = np.array([0.0, 1.0, 0.0])
 
