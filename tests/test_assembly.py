@@ -41,7 +41,8 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(0.05)), jnp.asarray(1e6 / n))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
-    contact = preloaded_contact("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=normal)
+    sides = Side("blade", "right"), Side("blade", "left", facing, 1)
+    contact = preloaded_contact("shroud", patch, *sides, normal=normal)
     member, load = Member("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
     return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 

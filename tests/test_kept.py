@@ -234,4 +234,4 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
     watched = np.arange(8.0).reshape(4, 2) + 0j
     row = {name: watched[list(rows.values())] for name, rows in kept._outputs(problem).items()}
     np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
-    np.testing.assert_array_equal(kept._watched(problem, row), watched)
+    np.testing.assert_array_equal(kept._outputs_of(problem, row), watched)
