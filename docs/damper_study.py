@@ -27,7 +27,7 @@ class Curve:
     """A response: frequency (f,) in Hz, first harmonics (f, w) of the read-outs, and which points converged (f,)."""
 
     frequency: Array
-    watched: Array
+    outputs: Array
     converged: Array
 
     def largest(self, pick: Callable[[Array], Array]) -> tuple[float, float]:

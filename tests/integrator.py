@@ -28,7 +28,7 @@ class Steady:
 
     Attributes:
         q: (s, m). relative: contact -> (s, k) motion of its coordinates with the preloaded state. force: contact ->
-            (s, k). load: (s, m) generalised force. watched: (s, w). slip_work: contact -> J, friction force times the
+            (s, k). load: (s, m) generalised force. outputs: (s, w). slip_work: contact -> J, friction force times the
             path slid. change: largest difference of q over the period, relative.
     """
 
@@ -36,7 +36,7 @@ class Steady:
     relative: list[Array]
     force: list[Array]
     load: Array
-    watched: Array
+    outputs: Array
     slip_work: list[float]
     change: float
 

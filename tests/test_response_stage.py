@@ -508,7 +508,7 @@ def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.Mo
     table, pairs, _ = running.compare_book(folder / "case.toml", None, ["sweep.points=5"])
     strains = [text for text in said if "amplitude of root" in text or "read-out" in text]
     assert len(strains) == 3 and all("µm/m" in text for text in strains)
-    assert "marched_strain" in table.read_text().splitlines()[0]
+    assert "aft_strain" in table.read_text().splitlines()[0]
     assert all(p.quantity.unit == "1" for p in pairs)
 
 

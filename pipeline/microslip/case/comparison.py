@@ -55,7 +55,7 @@ def _peaks(rows: Sequence[Mapping[str, Any]], normal: float) -> list[tuple[float
 def comparison_table(pairs: Sequence[Pair], of: Quantity = METRES) -> str:
     """CSV text; a resonance that one mode does not have leaves its cells empty. of: what the amplitudes measure."""
     amplitudes_of = [of.column(name) for name in ("aft", "book", "difference")]
-    head = ["normal_force_N", "marched_Hz", "book_Hz", "difference_Hz_percent", *amplitudes_of[:2]]
+    head = ["normal_force_N", "aft_Hz", "book_Hz", "difference_Hz_percent", *amplitudes_of[:2]]
     rows = [",".join([*head, f"{amplitudes_of[2]}_percent"])]
     for p in pairs:
         frequencies, amplitudes = ([one[k] if one else None for one in (p.marched, p.book)] for k in (0, 1))
