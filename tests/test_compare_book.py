@@ -166,7 +166,7 @@ def test_a_law_that_is_not_the_books_is_told_by_contact(folder: Path) -> None:
     start, stop = CASE.index("law ="), CASE.index("\n[sweep]")
     own = CASE[:start] + 'file = "contact.toml"\nincludes = "surface"\n' + CASE[stop:]
     (folder / "case.toml").write_text(own)
-    with pytest.raises(UserError, match=r"case.toml: contacts.right: book mode: friction StaticSliding.*marched"):
+    with pytest.raises(UserError, match=r"case.toml: contacts.right: book mode: friction StaticSliding.*aft"):
         running.respond(folder / "case.toml", None, ['mode="book"'])
 
 

@@ -485,7 +485,7 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
     """None at all marches every cycle and finds the same; a wide share leaves its mark, and a remark says so."""
     found = {}
     for periodicity in (0.0, 1e-10, 1e-2):
-        settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nsettled = {periodicity}"))
+        settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nperiodicity = {periodicity}"))
         built = build(settings, {"sled": sled()}, "case.toml")
         problem = problem_of(built, 5.0)
         assert getattr(problem.groups[0].model, "periodicity", None) == periodicity
@@ -504,8 +504,8 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
         ("samples = 32", "samples = 8\n", "are too few for"),
         ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
         ("points = [4, 2]", "points = [4, 0]", "points"),
-        ("samples = 32", "samples = 32\nsettled = 0.1", "periodicity: must not be greater than 0.01"),
-        ("samples = 32", "samples = 32\nsettled = -1e-9", "periodicity: must not be less than 0"),
+        ("samples = 32", "samples = 32\nperiodicity = 0.1", "periodicity: must not be greater than 0.01"),
+        ("samples = 32", "samples = 32\nperiodicity = -1e-9", "periodicity: must not be less than 0"),
         ("[sweep]", SECOND + "\n[sweep]", "stands in contacts 1 and 2"),
     ],
 )  # fmt: skip
