@@ -108,7 +108,7 @@ def _split(leaf: Array, axis: int, parts: int, chunk: int) -> Array:
 def _with_derivative(
     law: Law, u: Array, period: Array | float, samples: int, count: int, periodicity: Array | float
 ) -> tuple[Array, Array]:
-    """AFT together with the tangents along every harmonic of every direction."""
+    """With the tangents along every harmonic of every direction."""
     values, transform = waves(u.shape[2] // 2, samples)
     path = jnp.einsum("sh,nkh->snk", values, u)
     found, slope = with_slopes(law, path, period, count, periodicity, values, transform)

@@ -81,22 +81,18 @@ def linearised(
         (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, signal, before))
 
         def more() -> list[Array]:
-            G, (along, begun) = steps.G, each
-            force = jnp.sum(G[:, None, None] * along[:, :, :, None], axis=(4, 5))
-            force += signal[:, :, None, None, None] * steps.D[:, None]
-            force += before[:, :, None, None, None] * steps.E[:, None]
-            by_start = jnp.sum(G[:, None] * begun[:, :, None], axis=4)
-            return [a + jnp.einsum("sh,s...->h...", weight, b) for a, b in zip(sums, (force, by_start), strict=True)]
+            forces = _forces(steps, signal, before, *each)
+            return [a + jnp.einsum("sh,s...->h...", weight, b) for a, b in zip(sums, forces, strict=True)]
 
         sums = jax.lax.cond(whole, more, lambda: sums)
         return (after, held, x, by_memory, *sums), None
 
     held = jax.tree_util.tree_map(lambda leaf: leaf * whole, _held(law, path[-1], rate[-1], dt, start))
-    units = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
+    each = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
     sums = jnp.zeros((h, w, 3, 3, n)), jnp.zeros((h, 2, 3, m, n))
     rows = (path, rate, signals, jnp.roll(signals, 1, axis=0), weights.T)
     blocks = tuple(row.reshape(samples // size, size, *row.shape[1:]) for row in rows)
-    _, _, *found = jax.lax.scan(block, (start, held, jnp.zeros((w, 3, m, 2, n)), units, *sums), blocks)[0]
+    _, _, *found = jax.lax.scan(block, (start, held, jnp.zeros((w, 3, m, 2, n)), each, *sums), blocks)[0]
     return Linearised(*found)
 
 
@@ -123,12 +119,11 @@ def _steps(law: Law, u: Array, v: Array, dt: Array | float, states: State, held:
 
     def step(u: Array, v: Array, state: State, held: State) -> _Steps:
         memory = law.memory(u, state)
-        units = jnp.stack([jnp.zeros_like(memory).at[..., k, :].set(1.0) for k in range(2)])
-        along = (_none(state, 3), held, jax.vmap(law.recalled)(_none(state, 2), units))
+        along = (blank(state, 3), held, units(law, state, memory))
         tangents = jax.tree_util.tree_map(lambda *leaves: jnp.concatenate(leaves), *along)
         still = jnp.zeros_like(ways[:2])
         du, dv = jnp.concatenate([ways, 0 * ways, still]), jnp.concatenate([ways / dt, -ways / dt, still])
-        force, ended = _along(law, u, v, dt, state, du, dv, tangents)
+        force, ended = _pushed(law, u, v, dt, state, du, dv, tangents)
         remembered, force = sliders(jax.vmap(law.memory, (None, 0))(u, ended), 1), force.swapaxes(1, 2)
         one = remembered.shape[1] == 1
         G = force[6:].swapaxes(0, 1)[:, None] if one else _by_slider(law, u, v, dt, state, memory)
@@ -143,10 +138,10 @@ def _by_slider(law: Law, u: Array, v: Array, dt: Array | float, state: State, me
     return sliders(jax.vmap(pull)(_ways(u.shape[0]))[0], 1)
 
 
-def _along(
+def _pushed(
     law: Law, u: Array, v: Array, dt: Array | float, state: State, du: Array, dv: Array, along: State
 ) -> tuple[Array, State]:  # fmt: skip
-    """Tangents of force and state at the end of a step along several changes."""
+    """Tangents of force and state at the end of a step along several changes: (p, n, 3) m, m/s, and of the state."""
 
     def push(du: Array, dv: Array, along: State) -> tuple[Array, State]:
         return jax.jvp(lambda u, v, s: stepped(law, u, v, dt, s), (u, v, state), (du, dv, along))[1]
@@ -157,7 +152,7 @@ def _along(
 def _held(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> State:
     """Tangents of the state at the end of a step along where that is, but for the memory."""
     ways = _ways(len(u))
-    _, after = _along(law, u, v, dt, state, ways, ways / dt, _none(state, 3))
+    _, after = _pushed(law, u, v, dt, state, ways, ways / dt, blank(state, 3))
     return jax.vmap(law.recalled, (0, None))(after, jnp.zeros_like(law.memory(u, state)))
 
 
@@ -166,9 +161,15 @@ def _ways(n: int) -> Array:
     return jnp.broadcast_to(jnp.eye(3)[:, None], (3, n, 3))
 
 
-def _none(state: State, count: int) -> State:
+def blank(state: State, count: int) -> State:
     """No tangents, so many."""
     return jax.tree_util.tree_map(lambda leaf: jnp.zeros((count, *leaf.shape)), state)
+
+
+def units(law: Law, state: State, memory: Array) -> State:
+    """Tangents of a state along both directions of its memory (..., 2, n)."""
+    each = jnp.stack([jnp.zeros_like(memory).at[..., k, :].set(1.0) for k in range(2)])
+    return jax.vmap(law.recalled)(blank(state, 2), each)
 
 
 def _recursion(
@@ -180,3 +181,11 @@ def _recursion(
     turned = [step.A[0] * y[..., :1, :] + step.A[1] * y[..., 1:, :] for y in (x, begun)]
     way = signal[:, None, None, None, None] * step.B + before[:, None, None, None, None] * step.C
     return (turned[0] + way, turned[1]), carried
+
+
+def _forces(steps: _Steps, signal: Array, before: Array, x: Array, begun: Array) -> tuple[Array, Array]:
+    """Tangents (s, w, 3, 3, n) of the force, and (s, 2, 3, m, n) those under the memory at the beginning."""
+    force = jnp.sum(steps.G[:, None, None] * x[:, :, :, None], axis=(4, 5))
+    force += signal[:, :, None, None, None] * steps.D[:, None]
+    force += before[:, :, None, None, None] * steps.E[:, None]
+    return force, jnp.sum(steps.G[:, None] * begun[:, :, None], axis=4)

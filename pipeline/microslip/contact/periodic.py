@@ -26,7 +26,7 @@ import jax
 import jax.numpy as jnp
 
 from .law import Array, Law, State
-from .linearised import Linearised, linearised, stepped
+from .linearised import Linearised, blank, linearised, stepped, units
 
 PLAIN = 2
 """Cycles that are marched before slow sliders are solved for."""
@@ -167,7 +167,7 @@ class _Loop:
 
         moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
         size, rest = moves.shape[1], self.rest()
-        begin = rest, _blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
+        begin = rest, blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
         at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), cycle, begin)
         return at.found, slope.reshape(len(weights), -1, 3, *self.path.shape[1:])
 
@@ -187,7 +187,8 @@ class _Loop:
 
     def _solving(self, at: _At) -> _At:
         """One cycle more, and the next begins where Newton's method expects the solution."""
-        (force, after), (_, changed) = self._push(at.start, self._units(at), jnp.zeros((len(self.path), 2, 3)))
+        still = jnp.zeros((len(self.path), 2, 3))
+        (force, after), (_, changed) = self._push(at.start, units(self.law, at.start, at.memory), still)
         memory, size = self.law.memory(force[-1], after), jnp.abs(force).max()
         newton = _Newton(self._remembered(changed))
         missing = memory - at.memory + RECALL * (at.first - at.memory)
@@ -217,11 +218,6 @@ class _Loop:
         return at._replace(
             found=found, begun=at.start, start=state, memory=memory, change=change, first=first, periodic=ended
         )
-
-    def _units(self, at: _At) -> State:
-        """Tangents of a start along both directions of its memory."""
-        units = jnp.stack([jnp.zeros_like(at.memory).at[..., k, :].set(1.0) for k in range(2)])
-        return jax.vmap(self.law.recalled)(_blank(at.start, 2), units)
 
     def _remembered(self, tangents: State) -> Array:
         """(p, ..., 2, n) tangents of the memory."""
@@ -273,11 +269,6 @@ class _Loop:
 
     def _rate(self, path: Array) -> Array:
         return (path - jnp.roll(path, 1, axis=0)) / self.dt
-
-
-def _blank(state: State, size: int) -> State:
-    """No tangents, so many."""
-    return jax.tree_util.tree_map(lambda leaf: jnp.zeros((size, *leaf.shape)), state)
 
 
 def _length(memory: Array) -> Array:

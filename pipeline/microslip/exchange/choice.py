@@ -19,15 +19,13 @@ class Format:
 
     Attributes:
         name: as in ``--to``. ending: of the file's name if none is asked for. reader: who takes it. write: a
-            `ModalBasis` and a path; it leaves the file complete or absent. order: words of the file that say the order
-            of its rows.
+            `ModalBasis` and a path; it leaves the file complete or absent.
     """
 
     name: str
     ending: str
     reader: str
     write: Callable[[ModalBasis, Path], None]
-    order: str = ""
 
 
 STATEMENT = (

@@ -85,4 +85,4 @@ def _triangles(basis: ModalBasis) -> Array:
     return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)
 
 
-FORMATS = (Format("exudyn", "_exudyn.npz", "Exudyn", write_exudyn, "x, y, z of each node in turn"),)
+FORMATS = (Format("exudyn", "_exudyn.npz", "Exudyn", write_exudyn),)

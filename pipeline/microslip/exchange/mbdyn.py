@@ -90,4 +90,4 @@ def _invariants(v: Invariants) -> list[str]:
     return lines
 
 
-FORMATS = (Format("mbdyn", ".fem", "MBDyn", write_mbdyn, "x y z rx ry rz"),)
+FORMATS = (Format("mbdyn", ".fem", "MBDyn", write_mbdyn),)

@@ -147,4 +147,4 @@ Folders:
 """
 
 
-FORMATS = (Format("mtx", "_mtx", "anything: Matrix Market, a folder", write_mtx, "coordinates.csv"),)
+FORMATS = (Format("mtx", "_mtx", "anything: Matrix Market, a folder", write_mtx),)

@@ -85,4 +85,4 @@ def physical_first(basis: ModalBasis, g: ModalGroup) -> tuple[list[str], Indices
     return nodes, np.array(first + [j for j in range(g.n_modes) if j not in set(first)])
 
 
-FORMATS = (Format("pyharm", "_pyharm.mat", "pyHarm", write_pyharm, "Physical coordinates first"),)
+FORMATS = (Format("pyharm", "_pyharm.mat", "pyHarm", write_pyharm),)

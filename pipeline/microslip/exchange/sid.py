@@ -126,4 +126,4 @@ def _taylor(name: str, m0: Array | None, m1: Array | None, modes: int) -> list[s
     return [*head, *body, f"end {name}"]
 
 
-FORMATS = (Format("sid", ".SID_FEM", "multibody programs: standard input data", write_sid, "m1(row, q, column)"),)
+FORMATS = (Format("sid", ".SID_FEM", "multibody programs: standard input data", write_sid),)

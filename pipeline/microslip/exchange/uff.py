@@ -119,4 +119,4 @@ def _interleaved(shape: Array) -> Array:
     return np.stack([shape.real, shape.imag], axis=2).reshape(len(shape), 6)
 
 
-FORMATS = (Format("uff", ".uff", "test programs: universal file format", write_uff, "x y z of each node"),)
+FORMATS = (Format("uff", ".uff", "test programs: universal file format", write_uff),)

@@ -212,6 +212,6 @@ def collection(files: Mapping[int, Path]) -> str:
 
 
 FORMATS = (
-    Format("pvd", ".pvd", "ParaView: a file a mode", write_pvd, "vectors x y z"),
-    Format("vtu", ".vtu", "ParaView", write_vtu, "vectors x y z"),
+    Format("pvd", ".pvd", "ParaView: a file a mode", write_pvd),
+    Format("vtu", ".vtu", "ParaView", write_vtu),
 )
