@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb, Scattered
+from microslip.contact.harmonics import force_alone, force_harmonics
 from microslip.contact.law import Step, history, march
 from microslip.contact.periodic import cycles
 from microslip.errors import UserError
@@ -222,6 +223,37 @@ def _counted(law, u, dt):
 
 
 COUNTED = jax.jit(_counted)
+
+
+def error_of_periodic_derivative(example) -> float:
+    """Of the derivative of a periodic cycle's force, against differences; over the largest."""
+    samples = 32
+    u, moved = (np.random.default_rng(seed).normal(size=(2, 3, 5)) for seed in (0, 1))
+    u = u * np.array([example.normal, example.tangential, example.tangential])[:, None] * 0.3
+    u[:, 0, 0] = 2 * example.normal
+    given = (example.period, samples, 100, 120, 1e-13)
+    slope = np.array(force_harmonics(example.law, u, *given)[1])
+    h = 1e-6 * example.tangential
+    up, down = (np.array(force_alone(example.law, u + x * moved, *given)) for x in (h, -h))
+    expected = np.einsum("nkhjl,njl->nkh", slope, moved)
+    return float(np.abs(0.5 * (up - down) / h - expected).max() / np.abs(expected).max())
+
+
+def solved_for(example) -> bool:
+    state = example.law.init(1)
+    return example.law.recalled(state, example.law.memory(jnp.zeros((1, 3)), state)) is not None
+
+
+@LAWS
+def test_the_derivative_of_a_periodic_cycle_matches_differences(example) -> None:
+    """Of laws whose sliders are solved for: what `Law.recalled` promises of their state is used for it."""
+    if not solved_for(example):
+        pytest.skip("its cycles are marched")
+    assert error_of_periodic_derivative(example) < 1e-4
+
+
+def test_a_state_that_holds_more_than_recalled_says_is_seen() -> None:
+    assert error_of_periodic_derivative(wrong_laws.LAGGING) > 0.1
 
 
 @LAWS

@@ -1,6 +1,7 @@
 """Contact laws with the mistakes found in other programs: the contract tests must catch each of them."""
 
 import dataclasses
+from typing import Any
 
 import jax.numpy as jnp
 
@@ -74,3 +75,26 @@ PRINTED = Example(Printed(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
 BOX = Example(Box(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
 JUMP = Example(PointContact(Offset(jnp.asarray(2.4e8)), COULOMB, STIFFNESS), 1e-5, 1e-5)
 PRESTRESSED = Example(Prestressed(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
+
+
+@settings
+class Lagging(PointContact):
+    """Pressed by the mean of many steps: its state holds more than where the last one ended, which `recalled` denies."""
+
+    def init(self, n: int) -> tuple[PointState, Array]:
+        return super().init(n), jnp.zeros(n)
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: tuple[PointState, Array]) -> tuple[Array, Any]:
+        own, before = state
+        mean = 0.9 * before + 0.1 * u[:, 0]
+        force, after = super().step(u.at[:, 0].set(mean), v, dt, own)
+        return force, (after, mean)
+
+    def memory(self, force: Array, state: tuple[PointState, Array]) -> Array:
+        return state[0].elastic
+
+    def recalled(self, state: tuple[PointState, Array], memory: Array) -> Any:
+        return state[0]._replace(elastic=memory), state[1]
+
+
+LAGGING = Example(Lagging(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
