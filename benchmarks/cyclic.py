@@ -36,10 +36,10 @@ GOAL = 2.0
 def prepared(mesh_file: str, clock: modal.Clock):
     """Mesh, settings and model of the sector, and what both ways share."""
     with clock.stage("read"):
-        from microslip.body import BodySettings
         from microslip.fem.discretise import discretise
         from microslip.mesh import read_mesh
         from microslip.modes.boundary import fixed_dofs
+        from microslip.settings.body import BodySettings
 
         mesh = read_mesh(mesh_file, "mm")
     settings = BodySettings.model_validate(
@@ -59,13 +59,11 @@ def model_of(d, settings, free, fixed, clock: modal.Clock):
 
     with clock.stage("K and M"):
         rest = np.zeros((d.mesh.n_points, 3))
-        return make_model(
-            d, settings.material.material(), free, fixed, np.eye(3)[1], rest[0], None, 293.0, rest, True
-        )
+        return make_model(d, settings.material.material(), free, fixed, np.eye(3)[1], rest[0], None, 293.0, rest, True)
 
 
 def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
-    from microslip import eigen
+    from microslip.linalg import eigen
     from microslip.modes.sector import make_sector, sector_pencils
     from microslip.modes.solution import shared_shifts
 
@@ -86,9 +84,7 @@ def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
 
         shifts = shared_shifts([s.gap for s in found.values()])
         for k in sorted(found, key=lambda k: shifts[k]):
-            found[k] = eigen.certify(
-                pencils[k], replace(found[k], upper_shift=shifts[k]), tolerance=modal.TOLERANCE
-            )
+            found[k] = eigen.certify(pencils[k], replace(found[k], upper_shift=shifts[k]), tolerance=modal.TOLERANCE)
     return {
         "dof": pencils[0].n, "cut": len(sector.unknowns.left), "certified": all(s.certified for s in found.values()),
         "shifts": len(set(shifts)), "solves": sum(s.solves for s in found.values()),
@@ -97,8 +93,8 @@ def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
 
 
 def real_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
-    from microslip import eigen
     from microslip.fem.discretise import free_upper
+    from microslip.linalg import eigen
     from microslip.modes.spectrum import make_pencil
 
     d, settings, fixed = prepared(mesh_file, clock)

@@ -67,12 +67,12 @@ def microslip_worker(mesh_file: str, modes: int) -> dict:
         import meshio  # noqa: F401
         import skfem  # noqa: F401
 
-        from microslip import eigen
-        from microslip.body import MaterialSettings
         from microslip.fem.discretise import discretise, free_upper
+        from microslip.linalg import eigen
         from microslip.mesh import read_mesh
         from microslip.modes.equilibrium import make_model
         from microslip.modes.spectrum import make_pencil
+        from microslip.settings.body import MaterialSettings
 
         solver = timed_solver(eigen.new_solver(), clock)
     with clock.stage("read"):
@@ -105,7 +105,7 @@ def microslip_worker(mesh_file: str, modes: int) -> dict:
 
 def timed_solver(inner, clock: Clock):
     """The same direct solver; the clock gets the stages ``factor`` and ``solves`` (the eigensolve's yardstick)."""
-    from microslip.eigen import DirectSolver
+    from microslip.linalg.eigen import DirectSolver
 
     class Timed(DirectSolver):
         name = inner.name

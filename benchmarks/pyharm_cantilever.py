@@ -37,14 +37,19 @@ def maestro() -> Maestro:
     }  # fmt: skip
     if str(job["solver"]) == "NewtonRaphson":
         analysis["solver_options"] = {"tol_residual": float(job["tolerance"]), "tol_delta_x": 1e-8}
-    return Maestro({
-        "analysis": {"frf": analysis},
-        "system": {
-            "type": "Base", "nh": int(job["harmonics"]), "nti": int(job["samples"]), "adim": {"status": False},
-        },
-        "substructures": {"body": {"ndofs": n, "nmodes": 0, "matrix": matrix}},
-        "connectors": connectors,
-    })
+    return Maestro(
+        {
+            "analysis": {"frf": analysis},
+            "system": {
+                "type": "Base",
+                "nh": int(job["harmonics"]),
+                "nti": int(job["samples"]),
+                "adim": {"status": False},
+            },
+            "substructures": {"body": {"ndofs": n, "nmodes": 0, "matrix": matrix}},
+            "connectors": connectors,
+        }
+    )
 
 
 wall, cpu = [], []

@@ -33,12 +33,14 @@ def maestro() -> Maestro:
     }  # fmt: skip
     if job["solver"] == "NewtonRaphson":
         analysis["solver_options"] = {"tol_residual": 1e-9, "tol_delta_x": 1e-8}
-    return Maestro({
-        "analysis": {"frf": analysis},
-        "system": {"type": "Base", "nh": job["harmonics"], "nti": job["samples"], "adim": {"status": False}},
-        "substructures": {"body": body},
-        "connectors": connectors,
-    })
+    return Maestro(
+        {
+            "analysis": {"frf": analysis},
+            "system": {"type": "Base", "nh": job["harmonics"], "nti": job["samples"], "adim": {"status": False}},
+            "substructures": {"body": body},
+            "connectors": connectors,
+        }
+    )
 
 
 wall, cpu = [], []

@@ -96,7 +96,7 @@ def write_file(path: Path, n: int) -> int:
 def measure(path: Path) -> dict[str, float]:
     """What one process spends on the file."""
     from microslip.basis import read_basis
-    from microslip.ring import certify_ring, expand
+    from microslip.ring.expansion import certify_ring, expand
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     marks = [time.process_time()]

@@ -28,7 +28,8 @@ from microslip.case.settings import CaseSettings
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import sweep
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 ROOT = Path(__file__).resolve().parents[1]
 BLADES, ORDER, FORCE, POINTS, COUNT = 24, 6, 30.0, (72, 5), 150

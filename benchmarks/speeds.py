@@ -21,11 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from microslip.body import BodySettings
 from microslip.data import Mesh, ModalBasis, SpeedRange
 from microslip.modes import modal_basis
-from microslip.speed_range import frequencies_over
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.modes.speed_range import frequencies_over
+from microslip.settings.body import BodySettings
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 ROOT = Path(__file__).resolve().parents[1]
 COARSE = "{pressure_side=7, suction_side=7, contact_left=5, contact_right=5}"

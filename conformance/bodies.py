@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from microslip.body import BodySettings
 from microslip.data import Array, Mesh, ModalBasis
 from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
+from microslip.settings.body import BodySettings
 from microslip.system import Body, Damper, Force, Monitor, Spring, System, system_basis
 
 ROOT = Path(__file__).resolve().parents[1]

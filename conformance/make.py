@@ -23,8 +23,8 @@ import numpy as np
 from bodies import LARGE, ROOT, SAMPLES
 
 from microslip.basis import write_basis
-from microslip.coordinates import compliance_row, in_modes
 from microslip.data import Array, ModalBasis, ModalGroup
+from microslip.reduced.coordinates import compliance_row, in_modes
 
 HERE = Path(__file__).resolve().parent
 TOLERANCE = 1e-7

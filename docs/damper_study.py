@@ -113,6 +113,7 @@ RPM = 2700.0
 
 def under_platforms(shape: str, mass: float, bases: Bases, frequency: Array, *changes: str, finer: int = 3) -> Curve:
     """The spin-pit rig with dampers of one shape and mass (kg) at 2700 rpm."""
+
     def scaled(name: str) -> ModalBasis:
         return of_mass(bases(name), mass) if name == SHAPES[shape] else bases(name)
 

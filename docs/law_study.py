@@ -8,15 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from microslip.contact.friction import (
-    Coulomb,
-    Exponential,
-    Falling,
-    Friction,
-    StaticSliding,
-    characteristic,
-    scattered,
-)
+from microslip.contact.friction import Coulomb, Exponential, Falling, Friction, StaticSliding, characteristic, scattered
 from microslip.contact.study import Study, study
 from microslip.pictures.contact import loops_figure, microslip_panel, motion_figure
 

@@ -18,25 +18,28 @@ import damper_study
 import numpy as np
 from pages import HERE, body_reference, case_reference, contact_reference, fill, play, table
 
-from microslip import truncation
 from microslip.basis import read_basis
-from microslip.campbell import track_basis
 from microslip.case import CaseSettings, load_case, run_case
 from microslip.case.assemble import sized
 from microslip.case.settings import ContactSettings
-from microslip.compliance import contact_share, without_bulk
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
 from microslip.modes import modal_basis
+from microslip.modes.campbell import track_basis
 from microslip.modes.patches import patch_bounds
+from microslip.modes.speed_range import frequencies_over
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
+from microslip.reduced import truncation
+from microslip.reduced.compliance import contact_share, without_bulk
 from microslip.reduction import METHODS
 from microslip.reference.one_harmonic import JenkinsContact, stuck_frequencies
-from microslip.running import compare_book
-from microslip.speed_range import frequencies_over
-from microslip.workflow import closure_stage, load_mesh, mesh_stage, modes_stage, open_job
+from microslip.stages.closure import closure_stage
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
+from microslip.stages.modal import modes_stage
+from microslip.stages.running import compare_book
 
 ROOT = HERE.parent
 BUILD = ROOT / "build" / "docs"
@@ -1070,8 +1073,9 @@ SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
 
 def cyclic() -> None:
     """Conventions of cyclic symmetry drawn, and the shrouded blade's diagrams with free and with sticking shrouds."""
-    from microslip import resonances, ring
     from microslip.pictures import diagrams, ring_views
+    from microslip.ring import expansion as ring
+    from microslip.ring import resonances
 
     save(drawn(conventions_sketch()), "cyclic_conventions")
     speeds = ("rotation.speeds_rpm=[0, 1500, 3000, 4500]", "modes.count=8", 'cyclic.nodal_diameters="all"')
@@ -1099,7 +1103,7 @@ def cyclic() -> None:
 
 def sticking(basis: ModalBasis) -> ModalBasis:
     """The ring whose contacts stick without any relative motion: its frequencies and shapes in the same groups."""
-    from microslip.neighbours import stuck
+    from microslip.ring.neighbours import stuck
 
     groups = {}
     for key, g in basis.groups.items():
@@ -1263,8 +1267,8 @@ def results() -> None:
     """Stresses of the test blade on a rotor, and its contacts in partial slip."""
     import result_study as study
 
-    from microslip.assessment import draw
     from microslip.pictures import operating
+    from microslip.stages.assessment import draw
 
     basis = made("blade-at-speed", "blade", *study.AT_SPEED)
     found = study.assessed(basis)
@@ -1385,12 +1389,43 @@ def bolted_pipes() -> None:
 STUDIES = {
     f.__name__: f
     for f in (
-        reference, geometry, meeting, damping_element, damping_wire, spin_pit, closure, closed, contact_stiffness,
-        bolts, contact, convergence, sensitivity,
+        reference,
+        geometry,
+        meeting,
+        damping_element,
+        damping_wire,
+        spin_pit,
+        closure,
+        closed,
+        contact_stiffness,
+        bolts,
+        contact,
+        convergence,
+        sensitivity,
         arrangement2,
-        first, speed, speeds, rotation, compliance, counted_once, reduction, own, cyclic,
-        stiffness_sources, rough, laws, microslip, continuation, followed, accuracy, book_mode, patches, results,
-        ring, rig, multicoupling, bolted_pipes,
+        first,
+        speed,
+        speeds,
+        rotation,
+        compliance,
+        counted_once,
+        reduction,
+        own,
+        cyclic,
+        stiffness_sources,
+        rough,
+        laws,
+        microslip,
+        continuation,
+        followed,
+        accuracy,
+        book_mode,
+        patches,
+        results,
+        ring,
+        rig,
+        multicoupling,
+        bolted_pipes,
     )  # fmt: skip
 }
 

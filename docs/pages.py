@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from microslip.body import BodySettings, _is_length
 from microslip.case.settings import CaseSettings, ContactSettings
 from microslip.contact.settings import ContactFile
+from microslip.settings.body import BodySettings, _is_length
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(r"<!-- (file|run)(?: ([^\n]*?))? -->\n+```\w*\n(.*?)```", re.S)
@@ -105,8 +105,10 @@ MEANING: dict[str, tuple[str, str]] = {
     "reduction": ("", "method of reduction, see reduction.md"),
     "free": ("", "the body is meant to float; rigid motions are kept and flagged"),
     "note": ("", "a remark the report repeats"),
-    "geometry.build": ("", "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, "
-                       "is refused"),
+    "geometry.build": (
+        "",
+        "a Python file that draws the body with gmsh; one outside its folder, by a path or a link, is refused",
+    ),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
     "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .op4, DMIG cards, .sti"),
@@ -114,7 +116,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "geometry.matrices.damping": ("", "C, likewise; instead of [damping]"),
     "geometry.matrices.gyroscopic": ("", "G, likewise, skew-symmetric, at the speed of rotation.speeds_rpm"),
     "geometry.matrices.dofs": (
-        "", "node and direction (1 to 6) of every row: lines `node.direction` or two columns; not needed where the "
+        "",
+        "node and direction (1 to 6) of every row: lines `node.direction` or two columns; not needed where the "
         "matrices name their rows, or where every node has three or six rows in the order of `nodes`",
     ),
     "geometry.matrices.nodes": ("", "number, x, y, z: .csv, .mat, .h5, GRID cards, or a mesh with its sets"),
@@ -179,8 +182,11 @@ MEANING: dict[str, tuple[str, str]] = {
     "closures.interference": ("*", "by how much the drawn faces overlap when assembled; negative: a further gap"),
     "closures.point": ("*", "of the ground; the middle of the face if not given"),
     "closures.normal": ("", "of the ground, towards the body; opposite to the face if not given"),
-    "closures.modes": ("", "`open`: the modes leave the contact to the friction law, its static force stays; "
-        "`closed`: they keep its stiffness along the normal, free to slide"),
+    "closures.modes": (
+        "",
+        "`open`: the modes leave the contact to the friction law, its static force stays; "
+        "`closed`: they keep its stiffness along the normal, free to slide",
+    ),
     "closures.slide": ("*", "how far the faces may slide on each other; 1.5 elements if not given"),
     "closures.penalty": ("Pa/m", "only the number of iterations depends on it; chosen from the modulus if not given"),
     "bolts.name": ("", ""),
@@ -193,7 +199,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "interfaces.partner": ("", "name of the interface it faces"),
     "interfaces.sector_shift": ("", "where the partner is: next blade 1, previous -1, else 0"),
     "interfaces.t2": (
-        "", "direction whose projection on the patch becomes t2; if not given z, or y where the patch lies across z",
+        "",
+        "direction whose projection on the patch becomes t2; if not given z, or y where the patch lies across z",
     ),
     "interfaces.normal": ("", "outward normal of a list of nodes that does not tell it itself (matrices only)"),
     "interfaces.coordinates": ("", "rigid: six; characteristic: six and the softest shapes of the patch"),

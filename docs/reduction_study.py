@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from microslip.body import BodySettings
 from microslip.data import Array, Mesh, ModalGroup
 from microslip.modes import modal_basis
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.settings.body import BodySettings
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / "tests"))  # the full model on springs, and the bar, are the tests' own

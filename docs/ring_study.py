@@ -27,6 +27,7 @@ CASE = Path(__file__).parents[1] / "pipeline/cases/ring.toml"
 FOOT = 0.1
 """Share of the height that counts as the foot."""
 
+
 @dataclass(frozen=True)
 class Ring:
     """The case of the ring and its blade. points: of a contact along t1 and t2, those of the file if None."""

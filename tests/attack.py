@@ -28,14 +28,14 @@ from typing import Any
 import numpy as np
 from answers import Answer, Change, Raw, answer, changed_bits, differences
 
-from microslip import running
 from microslip.basis import read_basis, write_basis
-from microslip.case import CaseSettings
+from microslip.case import CaseSettings, load_case
 from microslip.case.assemble import Built, build
-from microslip.case.keeping import files_of
+from microslip.case.checkpoint import files_of
 from microslip.contact.settings import _to_metres, load_contact
 from microslip.data import Array, UserError
 from microslip.results import read_journal
+from microslip.stages import places, running
 
 SAME = 1e-6
 """Share of the largest value of a kind: answers are solved for to 1e-10 of the contacts' motion, from which a body
@@ -91,11 +91,11 @@ class Case:
 
 def opened(path: Path, assignments: list[str] | None = None, root: Path = Path(".")) -> Case:
     """A case with the modal files that are there, or are made now."""
-    settings, raw = running.load_case(path, assignments)
+    settings, raw = load_case(path, assignments)
     try:
-        files = running.existing_files(settings, path, None, root)
+        files = places.existing_files(settings, path, None, root)
     except UserError:
-        files = running.modal_files(settings, path, root, lambda text: print(f"  {text}", file=sys.stderr))
+        files = places.modal_files(settings, path, root, lambda text: print(f"  {text}", file=sys.stderr))
     beside = {os.path.relpath(f, path.parent): f for f in files_of(settings, path).values()}
     case = Case(raw, settings, files, beside)
     if outside := [name for name in case.inputs if name.startswith(("..", "/"))]:
@@ -106,7 +106,7 @@ def opened(path: Path, assignments: list[str] | None = None, root: Path = Path("
 def responded(folder: Path, assignments: list[str] | None = None, force: bool = False) -> Answer:
     """The answer of a copy."""
     running.respond(folder / "case.toml", None, assignments, force, root=folder)
-    return answer(folder / "build" / running.load_case(folder / "case.toml")[0].name)
+    return answer(folder / "build" / load_case(folder / "case.toml")[0].name)
 
 
 # other ways of writing it --------------------------------------------------------------------------------------------
@@ -185,7 +185,7 @@ def later(values: Array, lag: float) -> Array:
 
 def in_millimetres(folder: Path) -> bool:
     """Write every contact.toml and every .csv of a pressure field of a copy in mm; whether there is any."""
-    settings, raw = running.load_case(folder / "case.toml")
+    settings, raw = load_case(folder / "case.toml")
     files = {c.file for c in settings.contacts if c.file}
     for name in files:
         found = load_contact(folder / name)
@@ -212,7 +212,7 @@ def interrupted(folder: Path, after: int, wait: float) -> int:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", "microslip", "respond", "case.toml", "-q"]
     process = subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.DEVNULL)
-    (name,) = {running.load_case(folder / "case.toml")[0].name}
+    (name,) = {load_case(folder / "case.toml")[0].name}
     while process.poll() is None and _kept(folder / "build" / name / "response.points") < after:
         time.sleep(0.01)
     time.sleep(wait)
@@ -238,7 +238,7 @@ def spoilt(file: Path) -> bytes:
         more = {k: replace(g, C_r=1.01 * g.C_r, damping_ratio=1.01 * g.damping_ratio) for k, g in basis.groups.items()}
         write_basis(file, replace(basis, groups=more))
     elif file.name == "case.toml":
-        _, raw = running.load_case(file)
+        _, raw = load_case(file)
         load = (raw.get("excitations") or [raw])[0]
         key = next((k for k in ("amplitude", "steady") if k in load), "amplitude")
         load[key] = 1.01 * load.get(key, 1.0)

@@ -12,9 +12,9 @@ from itertools import permutations
 
 import numpy as np
 
-from microslip.body import BodySettings
 from microslip.data import Array, Indices, Mesh
 from microslip.mesh import boundary_facets
+from microslip.settings.body import BodySettings
 
 QUADRATIC = ("tetra10", "hexahedron20", "hexahedron27")
 LINEAR = ("tetra", "hexahedron")

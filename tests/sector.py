@@ -12,13 +12,13 @@ import numpy as np
 import scipy.linalg
 from meshes import brick
 
-from microslip.body import BodySettings
-from microslip.canonical import by_place, signs
 from microslip.data import Array, Compliance, Mesh, ModalBasis, ModalGroup
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.frames import skew
+from microslip.linalg.canonical import by_place, signs
 from microslip.modes.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
+from microslip.settings.body import BodySettings
 
 BORE, RIM, WIDTH = 0.05, 0.12, 0.012  # m
 YOUNG, POISSON, DENSITY = 2.1e11, 0.3, 7850.0

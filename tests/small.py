@@ -7,10 +7,10 @@ from itertools import product
 
 import numpy as np
 
-from microslip.body import BodySettings
 from microslip.data import Mesh, ModalBasis
 from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
+from microslip.settings.body import BodySettings
 
 SIZE = (0.02, 0.03, 0.12)  # m along x, y, z
 _EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))

@@ -12,16 +12,16 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from microslip import eigen
-from microslip.body import BodySettings
 from microslip.data import Array, Mesh, ModalGroup
 from microslip.fem.discretise import discretise, free_upper
+from microslip.linalg import eigen
 from microslip.modes import rigid
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.compute import inertia_of
 from microslip.modes.equilibrium import BodyModel, make_model
 from microslip.modes.spectrum import make_pencil, rigid_shift
+from microslip.settings.body import BodySettings
 
 
 class Sprung(eigen.DirectSolver):

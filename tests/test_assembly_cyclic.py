@@ -20,8 +20,8 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
-from microslip.neighbours import frame_change
-from microslip.neighbours import stuck as stuck_neighbours
+from microslip.ring.neighbours import frame_change
+from microslip.ring.neighbours import stuck as stuck_neighbours
 from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
 from microslip.system.damping import structural
 from microslip.system.disc import whole

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from small import basis as small_basis
 
-from microslip.assessment import (
+from microslip.operating import MaterialLimits
+from microslip.operating.stress import cycle_stress, stress_peaks
+from microslip.results import Body, Response, response_of
+from microslip.stages.assessment import (
     Assessment,
     _ranges,
     assess,
@@ -20,9 +23,6 @@ from microslip.assessment import (
     over_force,
     write_shape,
 )
-from microslip.operating import MaterialLimits
-from microslip.operating.stress import cycle_stress, stress_peaks
-from microslip.results import Body, Response, response_of
 
 LIMITS = MaterialLimits(fatigue_strength=300e6, tensile_strength=900e6)
 GROUP = small_basis().groups[0, 0]
@@ -202,8 +202,8 @@ def test_stress_over_engine_orders(response: Response) -> None:
 
 def test_long_sweeps_are_drawn_by_some_of_their_points() -> None:
     """At most 400 of 5000 points and those beside a resonance; all of a short sweep."""
-    from microslip.assessment import drawn_points
     from microslip.results import Series
+    from microslip.stages.assessment import drawn_points
 
     peak = np.zeros(5000)
     peak[1234] = 1

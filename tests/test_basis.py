@@ -21,12 +21,12 @@ import sector
 import small
 
 from microslip.basis import check_basis, open_file, read_basis, write_basis
-from microslip.basis.hdf5 import seal, seal_state
 from microslip.basis.integrals import modal_mass
-from microslip.body import BodySettings
 from microslip.data import Mesh, ModalBasis, UserError
-from microslip.hostile import HostileFile, inspect, trial
+from microslip.files.hdf5 import seal, seal_state
+from microslip.files.hostile import HostileFile, inspect, trial
 from microslip.modes import modal_basis
+from microslip.settings.body import BodySettings
 from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]

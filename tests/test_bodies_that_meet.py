@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from drawn import GEOMETRY, STEEL, about_y, build, close, face, made, parameters, volume
 
-from microslip.body import load_body
 from microslip.data import Mesh
 from microslip.modes.rows import Patch, patch
+from microslip.settings.body import load_body
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed")
 

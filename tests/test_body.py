@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import small
 
-from microslip.body import BodySettings, implausible, load_body, load_toml, override, validate
 from microslip.data import UserError
+from microslip.settings.body import BodySettings, implausible, load_body, load_toml, override, validate
 
 ROOT = Path(__file__).resolve().parents[1]
 NAN, INF = float("nan"), float("inf")

@@ -11,8 +11,8 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.campbell import LINK, Tracks, crossings, mac, track, track_basis
 from microslip.data import Array, ModalGroup
+from microslip.modes.campbell import LINK, Tracks, crossings, mac, track, track_basis
 
 
 def shapes(n: int, m: int, seed: int = 0) -> Array:

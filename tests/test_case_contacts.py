@@ -16,20 +16,21 @@ import pytest
 import small
 from attack import toml
 
-from microslip import running, store
 from microslip.basis import write_basis
-from microslip.body import validate
 from microslip.case import CaseSettings, run_case
 from microslip.case.assemble import build, memory_of
+from microslip.case.checkpoint import files_of, of_points
 from microslip.case.curves import curves
-from microslip.case.keeping import files_of, of_points
 from microslip.cli import main
 from microslip.contact.curved import Line, foundation_of_line
 from microslip.contact.patch import pressure
 from microslip.contact.solids import Solid
 from microslip.data import UserError
+from microslip.files import store
 from microslip.harmonic_balance.accuracy import more
 from microslip.harmonic_balance.cost import aft_bytes
+from microslip.settings.body import validate
+from microslip.stages import checkpoint
 
 PATH = Path("case.toml")
 HEIGHT, DEPTH = small.SIZE[2], small.SIZE[1]
@@ -165,7 +166,7 @@ def test_points_depend_on_every_file_that_a_file_names(tmp_path: Path) -> None:
     for scale in (1, 100, 1):
         rows = (line.split() for line in CURVE.splitlines())
         (tmp_path / "curve.txt").write_text("".join(f"{u} {scale * float(f)}\n" for u, f in rows))
-        files = running.hashes_of(files_of(settings, path))
+        files = checkpoint.hashes_of(files_of(settings, path))
         found.append((files, of_points(build(settings, {"small": small.basis()}, path))))
     assert len(found[0][0]) == 2 and found[0] == found[2]
     assert found[0][0] != found[1][0] and found[0][1] != found[1][1]

@@ -17,7 +17,8 @@ from microslip.elasticity import isotropic, orthotropic
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modes import modal_basis
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 # SOLID186, Element Reference: corners I J K L M N O P, mid-sides Q R S T U V W X Y Z A B on
 # IJ JK KL LI MN NO OP PM IM JN KO LP. Degenerate forms repeat corners; a mid-side between equal ones repeats them.

@@ -14,7 +14,6 @@ from test_harmonic_balance_time import cantilever, group, held
 from test_nonlinear_modes import sliding
 from test_response_stage import CASE, SAMPLES, respond
 
-from microslip import running
 from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
@@ -27,6 +26,7 @@ from microslip.harmonic_balance.nonlinear_modes import backbone
 from microslip.harmonic_balance.solver import solve
 from microslip.results import Response, read_response, write_response
 from microslip.results.checks import COUNTED, cause, check_response, largest, sentence
+from microslip.stages import response as making
 
 CLOSED = CASE.replace('law = "smooth"\npoints = [2, 2]', 'law = "jenkins"')
 
@@ -39,7 +39,7 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]
     (folder / "case.toml").write_text(CASE)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(running, "_can_draw", lambda: "not in this test")
+        patch.setattr(making, "_can_draw", lambda: "not in this test")
         told, converged = respond(folder, "sweep.points=3")
     assert converged
     return folder, told
@@ -165,7 +165,7 @@ def test_a_coarse_sweep_and_a_fine_one_print_the_same_resonances(
     shutil.copy(SAMPLES / "basis.h5", tmp_path)
     (tmp_path / "case.toml").write_text(CASE if law == "smooth" else CLOSED)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    monkeypatch.setattr(making, "_can_draw", lambda: "not in this test")
     tables = []
     for points in (3, 61):
         assert respond(tmp_path, f"sweep.points={points}", "sweep.start=250", "sweep.stop=450")[1]

@@ -177,7 +177,7 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
 def test_run_prints_the_first_frequencies(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("microslip.running.run_body", lambda job, *_: (job.build_folder / "report.html", True))
+    monkeypatch.setattr("microslip.stages.running.run_body", lambda job, *_: (job.build_folder / "report.html", True))
     assert main(["run", "box"]) == 0
     table, page = said(capsys)[0].splitlines()
     first = read_basis(folder / "build/box/basis.h5").groups[0, 0].frequency[:5]
@@ -203,7 +203,7 @@ def test_run_of_a_case_and_a_response_that_does_not_converge(
         failed = {f: replace(r, converged=np.zeros_like(r.converged)) for f, r in result.responses.items()}
         return replace(result, responses=failed)
 
-    monkeypatch.setattr("microslip.running.run_case", spoilt)
+    monkeypatch.setattr("microslip.stages.response.run_case", spoilt)
     assert main(["run", "other.toml", "--set", "sweep.points=11"]) == 1
     out, err = said(capsys)
     assert out == "build/other/response.csv\n" and "did not converge" in err.splitlines()[-1]

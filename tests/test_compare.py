@@ -13,13 +13,13 @@ import sector
 import small
 
 from microslip.basis import read_basis, write_basis
-from microslip.body import BodySettings
 from microslip.cli import main
-from microslip.correlation import POINT, compare_groups
 from microslip.data import ModalBasis, Rows, UserError
 from microslip.modes import modal_basis
 from microslip.modes.sampling import at_points, on_common_points
 from microslip.pictures import can_draw
+from microslip.reduced.correlation import POINT, compare_groups
+from microslip.settings.body import BodySettings
 
 
 @cache

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from microslip import running
+from microslip.case.checkpoint import series_name
 from microslip.case.comparison import Pair, comparison_table, paired, sentence
-from microslip.case.keeping import series_name
 from microslip.case.run import _lifting
 from microslip.cli import main
 from microslip.data import UserError
@@ -23,9 +22,11 @@ from microslip.harmonic_balance import FrequencyResponse, response_table
 from microslip.harmonic_balance.orbits import orbits
 from microslip.results import read_response, response_of, write_response
 from microslip.results.names import exact
+from microslip.stages import response as making
+from microslip.stages import running
 
 pytest.importorskip("matplotlib")
-SAMPLES = Path(running.__file__).parent / "samples"
+SAMPLES = Path(running.__file__).parents[1] / "samples"
 
 CASE = """
 name = "vane"
@@ -59,7 +60,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copy(SAMPLES / "basis.h5", tmp_path)
     (tmp_path / "case.toml").write_text(CASE)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    monkeypatch.setattr(making, "_can_draw", lambda: "not in this test")
     return tmp_path
 
 

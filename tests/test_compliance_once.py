@@ -16,15 +16,18 @@ from test_truncation import chain
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, run_case
-from microslip.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.data import Compliance, ModalBasis, ModalGroup, UserError
 from microslip.modes import modal_basis
 from microslip.modes.patches import patch_bounds
+from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
+from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS
 from microslip.reference.half_space import mean_inverse_distance, rectangle_compliance
 from microslip.report import report_html
-from microslip.truncation import closing, verdict
-from microslip.workflow import basis_summary, load_mesh, mesh_stage, modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
+from microslip.stages.modal import modes_stage
+from microslip.stages.summary import basis_summary
 
 L, B, H = 1.0, 0.04, 0.05
 EA = STEEL["young"] * B * H

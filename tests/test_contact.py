@@ -12,7 +12,6 @@ import pytest
 from meshes import STEEL, body, brick, graded, rotation_matrix
 from touching import SECTORS, shrouded, together
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import Mesh, NotConverged, UserError
@@ -28,11 +27,12 @@ from microslip.fem.contact import (
 )
 from microslip.fem.discretise import discretise, free_upper
 from microslip.fem.segments import clip, facet_functions, reference_nodes
+from microslip.linalg import eigen
 from microslip.modes import equilibrium as newton
 from microslip.modes import modal_basis
 from microslip.modes.closures import contact_curve, contact_pairs
 from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
-from microslip.speed_range import frequencies_over, group_at
+from microslip.modes.speed_range import frequencies_over, group_at
 
 E, NU = STEEL["young"], STEEL["poisson"]
 FACETS = ("triangle", "triangle6", "quad", "quad8", "quad9")

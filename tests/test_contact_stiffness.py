@@ -11,7 +11,6 @@ import scipy.linalg
 from meshes import STEEL, body, brick
 from scipy.special import ellipe, ellipk, gamma
 
-from microslip.compliance import BULK_AND_SURFACE, SURFACE, contact_share
 from microslip.contact.hertz import Hertz, axis_ratio, ellipse_integrals, half_curvatures
 from microslip.contact.identification import Resonance, identify, joined, two_beams
 from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, modes_needed, quasi_static_error
@@ -21,6 +20,7 @@ from microslip.contact.series import BULK, ContactStiffness, for_basis, in_serie
 from microslip.contact.solids import Solid, mismatch, normal_modulus, tangential_modulus
 from microslip.data import UserError
 from microslip.modes import modal_basis
+from microslip.reduced.compliance import BULK_AND_SURFACE, SURFACE, contact_share
 from microslip.reference import indentation, joined_beams
 from microslip.reference.bars import rod_frequencies
 from microslip.reference.beams import euler_bernoulli, rectangle

@@ -10,8 +10,8 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.correlation import compare_groups, mac, nearest_points, pair_table, pairs, share_in
 from microslip.data import ModalBasis, UserError
+from microslip.reduced.correlation import compare_groups, mac, nearest_points, pair_table, pairs, share_in
 
 
 def shapes(seed: int, count: int, d: int = 12) -> np.ndarray:

@@ -12,15 +12,7 @@ import pytest
 from blocks import block
 from meshes import brick
 
-from microslip.contact.curved import (
-    Line,
-    apart,
-    foundation_of_line,
-    foundation_of_point,
-    gap,
-    in_hole,
-    point_curve,
-)
+from microslip.contact.curved import Line, apart, foundation_of_line, foundation_of_point, gap, in_hole, point_curve
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.hertz import Hertz

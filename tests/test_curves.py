@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from microslip import surveying
 from microslip.basis import write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
@@ -20,6 +19,7 @@ from microslip.harmonic_balance.families import over_frequency, over_load
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.results import read_response
+from microslip.stages import surveying
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
 CASE = """

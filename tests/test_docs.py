@@ -18,7 +18,8 @@ sys.path.insert(0, str(DOCS))
 import pages  # noqa: E402
 
 from microslip.basis import read_basis  # noqa: E402
-from microslip.workflow import modes_stage, open_job  # noqa: E402
+from microslip.stages.job import open_job  # noqa: E402
+from microslip.stages.modal import modes_stage  # noqa: E402
 
 PAGES = sorted([*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"])
 PACKAGE = ROOT / "pipeline" / "microslip"
@@ -190,7 +191,7 @@ def test_modes_page(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_cyclic_page(tmp_path: Path) -> None:
     """Aliases as computed, resonances on their engine-order lines, frequencies of the free shroud at two k."""
-    from microslip.ring import aliased, multiplicity
+    from microslip.ring.expansion import aliased, multiplicity
 
     for e, k, wave in rows("cyclic.md", "aliases"):
         assert aliased(int(e), 24) == (int(k), wave)
@@ -284,7 +285,8 @@ def test_build_file_of_the_geometry_page(tmp_path: Path) -> None:
 
 def test_platforms_page() -> None:
     """Its system libraries are those the set-up installs and the pictures ask for; its solvers are all there are."""
-    from microslip import eigen, pictures
+    from microslip import pictures
+    from microslip.linalg import eigen
 
     text = (DOCS / "platforms.md").read_text(encoding="utf-8")
     line = re.search(r"apt-get install -y (lib.*)", text)

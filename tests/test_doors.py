@@ -20,9 +20,10 @@ import pytest
 from box import edit, write_box
 from test_response_stage import QUICK, SAMPLES
 
-from microslip import running, store
 from microslip.cli import main
+from microslip.files import store
 from microslip.results import open_journal, read_journal, read_response
+from microslip.stages import response as making
 
 pytest.importorskip("matplotlib")
 POSIX = pytest.mark.skipif(os.name != "posix", reason="pipes, links and locks of POSIX systems")
@@ -54,7 +55,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copy(SAMPLES / "basis.h5", tmp_path)
     (tmp_path / "case.toml").write_text(QUICK)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(running, "_assessed", lambda *_: None)
+    monkeypatch.setattr(making, "_assessed", lambda *_: None)
     monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"picture"))
     return tmp_path
 
@@ -188,7 +189,7 @@ def test_a_file_that_a_file_names_is_a_file(key: str, folder: Path, capsys: pyte
 
 HOLD = """
 import sys, time
-from microslip.store import making
+from microslip.files.store import making
 with making(sys.argv[1]):
     print("ready", flush=True)
     time.sleep(60)
@@ -238,9 +239,10 @@ def test_a_mistake_leaves_no_folder_behind(folder: Path, capsys: pytest.CaptureF
 
 RACER = """
 import sys, time
-from microslip import cli, running
+from microslip import cli
 from microslip.pictures import response
-running._assessed = lambda *_: None
+from microslip.stages import response as making
+making._assessed = lambda *_: None
 pause = float(sys.argv[1])
 response.response_picture = lambda _, path: (path.write_bytes(b"picture"), time.sleep(pause))
 print("ready", flush=True)

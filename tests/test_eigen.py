@@ -12,11 +12,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
 
-from microslip import eigen
-from microslip.canonical import clusters, signs, turn_clusters
 from microslip.data import NotConverged, UserError
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
+from microslip.linalg import eigen
+from microslip.linalg.canonical import clusters, signs, turn_clusters
 from microslip.mesh import read_mesh
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs

@@ -17,15 +17,15 @@ import small
 from scipy.io import loadmat, mmread
 
 from microslip.basis import read_basis, write_basis
-from microslip.body import BodySettings
 from microslip.cli import main
 from microslip.data import INTERFACE_ROWS, ModalBasis, UserError
 from microslip.exchange import formats, to_xarray, writer
 from microslip.exchange.choice import elastic, select
-from microslip.floating_frame import floating_body, inertia, mass_matrix, right_side
 from microslip.frames import skew
 from microslip.mesh import boundary_facets
 from microslip.modes import modal_basis
+from microslip.reduced.floating_frame import floating_body, inertia, mass_matrix, right_side
+from microslip.settings.body import BodySettings
 
 SOURCE = {"settings": "small", "mesh_sha256": "0" * 64}
 ROUNDING = 1e-12

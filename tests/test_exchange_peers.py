@@ -21,13 +21,13 @@ import small
 from scipy.io import loadmat
 from test_exchange import blocks
 
-from microslip.body import BodySettings
 from microslip.data import Array, ModalBasis
 from microslip.exchange import formats, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.modes import modal_basis
 from microslip.reference.one_harmonic import jenkins_harmonic
+from microslip.settings.body import BodySettings
 
 PEERS = Path(__file__).parent / "peers"
 

@@ -19,7 +19,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
-from microslip.ring import aliased
+from microslip.ring.expansion import aliased
 from microslip.system import damping, excitation, pressure
 from microslip.system.assembly import Assembly, Load, Member, Output, Ring
 

@@ -11,10 +11,10 @@ from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.case.assemble import build
 from microslip.case.run import free_response
-from microslip.coordinates import first_modes
 from microslip.data import ModalBasis, UserError
 from microslip.operating.motion import motion_of
-from microslip.running import respond
+from microslip.reduced.coordinates import first_modes
+from microslip.stages.running import respond
 
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
 

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from meshes import STEEL, body, brick, shaken, twisted_blade
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import MOTIONS, UserError
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
-from microslip.floating_frame import (
+from microslip.linalg import eigen
+from microslip.modes import modal_basis
+from microslip.modes.boundary import fixed_dofs
+from microslip.modes.equilibrium import equilibrium, linear_stiffness, make_model
+from microslip.reduced.floating_frame import (
     energy,
     first_moment,
     flight,
@@ -26,9 +29,6 @@ from microslip.floating_frame import (
     rotation_shape,
     spin_up,
 )
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import equilibrium, linear_stiffness, make_model
 
 POINT = [0.01, -0.02, 0.03]
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from test_harmonic_balance_laws import CASE, sled
 
-from microslip import cli, following
+from microslip import cli
 from microslip.basis import write_basis
 from microslip.case import load_case, run_case
 from microslip.cli import main
 from microslip.harmonic_balance import peak
+from microslip.stages import following
 
 
 @pytest.fixture(scope="module")

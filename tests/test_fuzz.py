@@ -26,12 +26,12 @@ from hypothesis import strategies as st
 from test_mesh import INP, TET
 
 from microslip.basis import read_basis, write_basis
-from microslip.body import BodySettings, load_body, override, validate
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.data import UserError
 from microslip.mesh import mesh_problems, read_mesh
 from microslip.modes import modal_basis
+from microslip.settings.body import BodySettings, load_body, override, validate
 from microslip.system import system_basis
 
 ROOT = Path(__file__).resolve().parents[1]

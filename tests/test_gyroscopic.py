@@ -12,14 +12,12 @@ import scipy.linalg
 import small
 from meshes import STEEL, body, brick, nearest, pipe, twisted_blade
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.campbell import gyroscopic_change, track_gyroscopic
-from microslip.coordinates import in_modes
 from microslip.fem import discretise
 from microslip.fem.discretise import free_upper
 from microslip.frames import skew
-from microslip.gyroscopic import (
+from microslip.linalg import eigen
+from microslip.linalg.gyroscopic import (
     damped_modes,
     general_modes,
     gyroscopic_modes,
@@ -27,8 +25,10 @@ from microslip.gyroscopic import (
     stability_sentence,
 )
 from microslip.modes import modal_basis
+from microslip.modes.campbell import gyroscopic_change, track_gyroscopic
 from microslip.modes.equilibrium import equilibrium, make_model
 from microslip.modes.run_up import run_up_terms
+from microslip.reduced.coordinates import in_modes
 from microslip.reference.rings import ring_at_rest, spinning_ring
 from microslip.reference.shafts import spinning_mass
 from microslip.report import report_html

@@ -19,8 +19,8 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import _snake
 from microslip.harmonic_balance.identification import Measured
 from microslip.modes import modal_basis
-from microslip.neighbours import frame_change, stuck
-from microslip.ring import phase
+from microslip.ring.expansion import phase
+from microslip.ring.neighbours import frame_change, stuck
 from microslip.system.assembly import Assembly, Contact, Member, Ring, Side
 
 SHROUD = (0.02, 0.03)  # m, of the patch whose springs are spread

@@ -11,16 +11,17 @@ import scipy.sparse as sp
 from meshes import body, brick
 from rings import bladed_sector
 
-from microslip import eigen, neighbours
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
+from microslip.linalg import eigen
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model
 from microslip.modes.spectrum import make_pencil
 from microslip.reduction import METHODS
+from microslip.ring import neighbours
 
 COUNT = 3
 RIGHT = {"name": "right", "face": "x1", "t2": [0.0, 0.0, 1.0]}

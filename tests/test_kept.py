@@ -14,24 +14,24 @@ from small import beam, table
 from test_assembly import FINE, sector
 from test_harmonic_balance_time import Cubic, cantilever, group, held
 
-from microslip.body import BodySettings
 from microslip.case.edges import rising
-from microslip.compliance import statics_beside
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.coordinates import in_modes
 from microslip.harmonic_balance import kept, refinement, response
 from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.checkpoint import kept_response, labels, record, restored
 from microslip.harmonic_balance.checks import forces_on
-from microslip.harmonic_balance.kept import kept_response, labels, record, restored
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.harmonic_balance.sweeps import overhanging
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
+from microslip.reduced.compliance import statics_beside
+from microslip.reduced.coordinates import in_modes
 from microslip.results import open_journal, response_of
+from microslip.settings.body import BodySettings
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 from microslip.system.assembly import Contact as Rub

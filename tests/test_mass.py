@@ -12,14 +12,14 @@ import pytest
 from small import beam, table
 
 from microslip.basis import read_basis
-from microslip.body import BodySettings
 from microslip.case import load_case, run_case
 from microslip.case.assemble import load_bodies
 from microslip.cli import main
-from microslip.coordinates import of_density
 from microslip.data import CENTRIFUGAL, ModalBasis, UserError
 from microslip.modes import modal_basis
-from microslip.running import respond
+from microslip.reduced.coordinates import of_density
+from microslip.settings.body import BodySettings
+from microslip.stages.running import respond
 
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
 BODIES = """

@@ -25,7 +25,8 @@ from microslip.exchange.matrices import matrix_names, read_matrices
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.modes import modal_basis
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 SIZE = (0.01, 0.014, 0.04)
 ROWS = """
@@ -665,7 +666,7 @@ def test_damage_that_kills_the_parser_is_a_sentence(tmp_path):
     from test_fuzz import flipped
 
     from microslip.exchange.matrices import _read
-    from microslip.hostile import trial
+    from microslip.files.hostile import trial
 
     scipy.io.savemat(tmp_path / "whole.mat", {"K": sp.csr_matrix(np.diag([2.0, 3.0, 4.0])), "M": np.eye(3)})
     whole = (tmp_path / "whole.mat").read_bytes()

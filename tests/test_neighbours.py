@@ -18,10 +18,10 @@ from microslip.fem.operators import mass, stiffness
 from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
-from microslip.neighbours import closed_gap, frame_change, relative_rows, stuck
-from microslip.resonances import families, travelling, wave_tracks
-from microslip.ring import certify_ring, phase
-from microslip.speed_range import basis_at
+from microslip.modes.speed_range import basis_at
+from microslip.ring.expansion import certify_ring, phase
+from microslip.ring.neighbours import closed_gap, frame_change, relative_rows, stuck
+from microslip.ring.resonances import families, travelling, wave_tracks
 
 N = 6
 AXIS = np.array([0.0, 1.0, 0.0])

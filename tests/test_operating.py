@@ -258,7 +258,7 @@ def test_residual_shapes_are_read_with_the_forces():
     """MacNeal: displacement is phi q + residual phi f, stress alike."""
     from small import beam, table
 
-    from microslip.body import BodySettings
+    from microslip.settings.body import BodySettings
 
     settings = BodySettings.model_validate(table(reduction="macneal", output={"nodal_stress": True}))
     group = modal_basis(beam(), settings).groups[0, 0]

@@ -14,7 +14,8 @@ from microslip.cli import main
 from microslip.data import Mesh, UserError
 from microslip.elasticity import isotropic, orthotropic
 from microslip.mesh import read_mesh
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 BODY = """
 name = "part"

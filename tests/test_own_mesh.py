@@ -9,7 +9,8 @@ from functools import cache
 import pytest
 
 from microslip.modes import modal_basis
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 DRAW = """
 import gmsh, sys

@@ -13,7 +13,6 @@ import small
 from blocks import Block, block
 from meshes import brick
 
-from microslip.body import BodySettings
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, equilibrium, pressed_by, pressure
@@ -23,6 +22,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
+from microslip.settings.body import BodySettings
 from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
 from microslip.system.nodal import interpolation, nodal, static_compliance
 from microslip.system.pairing import facing, rigid_points

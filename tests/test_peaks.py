@@ -16,12 +16,12 @@ from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
 from microslip.continuation import NO_OPTIMUM, Settings, lowest, peak, rated
-from microslip.following import missed, told
 from microslip.harmonic_balance import peak as peaks
 from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.response import of_body, operating
 from microslip.harmonic_balance.solver import solve, sweep
+from microslip.stages.following import missed, told
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from attack import SAME, Case, attack, exchangeable, exchanged, later, opened, r
 from meshes import body
 from test_assembly_cyclic import FACES
 
-from microslip import running
 from microslip.basis import write_basis
 from microslip.data import Array
 from microslip.frames import rotation
 from microslip.modes import modal_basis
+from microslip.stages import running
 
 pytest.importorskip("matplotlib")
 
@@ -389,7 +389,7 @@ def test_an_attack_on_an_assembly(place: Path) -> None:
 @pytest.mark.slow
 def test_a_whole_attack_on_a_shipped_case(tmp_path: Path) -> None:
     """With pictures and pages, as a person runs it."""
-    path = Path(running.__file__).parent / "templates" / "three-masses" / "case.toml"
+    path = Path(running.__file__).parents[1] / "templates" / "three-masses" / "case.toml"
     found = dict(attack(path, assignments=["sweep.points=60"], root=tmp_path))
     assert {"case.toml changed and restored", "basis.h5 changed and restored"} < {*found}
     assert max(found.values()) <= EQUAL

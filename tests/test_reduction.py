@@ -8,21 +8,21 @@ import scipy.linalg
 import scipy.sparse as sp
 from meshes import STEEL, body, brick
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
+from microslip.linalg import eigen
 from microslip.modes import modal_basis
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model
 from microslip.modes.solution import held_compliance
 from microslip.modes.spectrum import make_pencil
-from microslip.quality import percent_off
+from microslip.reduced.quality import percent_off
 from microslip.reduction import METHODS, Problem
 from microslip.reduction.craig_bampton import fixed_interface_modes
-from microslip.workflow import basis_summary
+from microslip.stages.summary import basis_summary
 
 STATICALLY_EXACT = ("rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary")
 PHYSICAL = ("craig-bampton", "massless-boundary")  # interface displacements are coordinates

@@ -11,7 +11,8 @@ from sprung import full_frequencies, patch_statics, reduced_frequencies
 
 from microslip.modes import modal_basis
 from microslip.reduction import METHODS
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 pytestmark = [
     pytest.mark.slow, pytest.mark.skipif(importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed")

@@ -12,7 +12,7 @@ from test_harmonic_balance_time import Cubic, group, held
 from microslip.contact.law import settings
 from microslip.data import Array, UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.kept import kept_response, labels
+from microslip.harmonic_balance.checkpoint import kept_response, labels
 from microslip.harmonic_balance.refinement import HALVINGS, filled_response
 from microslip.harmonic_balance.sweeps import hidden
 from microslip.results import open_journal

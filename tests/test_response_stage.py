@@ -18,15 +18,16 @@ import numpy as np
 import pytest
 from test_harmonic_balance_laws import sled
 
-from microslip import running
 from microslip.basis import read_basis, write_basis
 from microslip.data import UserError
-from microslip.following import open_case
 from microslip.results import read_response
-from microslip.surveying import survey_stage
+from microslip.stages import response as making
+from microslip.stages import running
+from microslip.stages.following import open_case
+from microslip.stages.surveying import survey_stage
 
 pytest.importorskip("matplotlib")
-SAMPLES = Path(running.__file__).parent / "samples"
+SAMPLES = Path(running.__file__).parents[1] / "samples"
 
 CASE = """
 name = "vane"
@@ -63,7 +64,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copy(SAMPLES / "basis.h5", tmp_path)
     (tmp_path / "case.toml").write_text(CASE)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    monkeypatch.setattr(making, "_can_draw", lambda: "not in this test")
     return tmp_path
 
 
@@ -136,7 +137,7 @@ def test_what_was_spoiled_is_made_again(folder: Path) -> None:
 def test_killed_at_any_write_by_another_case(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`respond`, `respond --set amplitude=4` killed at its first, second, ... write, `respond`: the first answer."""
     (folder / "case.toml").write_text(QUICK)
-    monkeypatch.setattr(running, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
+    monkeypatch.setattr(making, "_assessed", lambda *_: None)  # which takes a second, and writes more of the same
     monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"picture"))
     respond(folder)
     build, replaced, written = folder / "build" / "vane", os.replace, 0
@@ -194,7 +195,7 @@ def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "_can_draw", lambda: "not in this test")
+    monkeypatch.setattr(making, "_can_draw", lambda: "not in this test")
 
 
 @pytest.mark.usefixtures("undrawn")

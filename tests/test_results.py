@@ -105,9 +105,9 @@ def test_coordinates_in_modes_are_read_in_modes():
     """A basis in physical interface coordinates: the same displacement from both kinds of coordinates."""
     from small import beam, table
 
-    from microslip.body import BodySettings
     from microslip.modes import modal_basis
     from microslip.operating.motion import displacement
+    from microslip.settings.body import BodySettings
 
     basis = modal_basis(beam(), BodySettings.model_validate(table(reduction="craig-bampton")))
     group = basis.groups[0, 0]

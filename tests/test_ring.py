@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import Array, ModalBasis, UserError
-from microslip.resonances import families, margins, resonance_csv, resonances, tracks, unanswered, zigzag
-from microslip.ring import (
+from microslip.ring.expansion import (
     aliased,
     certify_ring,
     exciting,
@@ -30,6 +29,7 @@ from microslip.ring import (
     standing,
     tied_points,
 )
+from microslip.ring.resonances import families, margins, resonance_csv, resonances, tracks, unanswered, zigzag
 
 # --- engine orders and nodal diameters -----------------------------------------------------------------------------
 
@@ -584,8 +584,8 @@ def test_both_waves_are_printed_and_stand_in_the_report() -> None:
     """Every frequency with gyroscopic coupling is shown with its nodal diameter and its direction of travel."""
     from microslip.data import GyroscopicModes
     from microslip.report import _ring_whirl
-    from microslip.resonances import waves_of
-    from microslip.workflow import basis_summary
+    from microslip.ring.resonances import waves_of
+    from microslip.stages.summary import basis_summary
 
     basis, groups = chain(12, 1e5, 3e4, 0.3, (0.0, 20000.0)), {}
     for (s, k), g in basis.groups.items():

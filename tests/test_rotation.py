@@ -9,10 +9,10 @@ import pytest
 from meshes import STEEL, body, brick, nearest, roller_box, shaken, twisted_blade, with_sets
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from microslip import eigen
 from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, internal_force
 from microslip.fem.discretise import free_upper
+from microslip.linalg import eigen
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import (

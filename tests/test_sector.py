@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import body
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.condensed import negative_eigenvalues, new_condensed
 from microslip.data import Mesh, UserError
 from microslip.fem.cyclic import cyclic_upper, pair_cut_faces, sector_unknowns
 from microslip.fem.discretise import discretise
 from microslip.frames import rotation
+from microslip.linalg import eigen
+from microslip.linalg.condensed import negative_eigenvalues, new_condensed
 from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model

@@ -245,11 +245,12 @@ def test_the_lock_holds_every_dependency_at_an_allowed_version() -> None:
 
 
 def test_the_system_libraries_are_the_same_everywhere() -> None:
-    from microslip import pictures, workflow
+    from microslip import pictures
+    from microslip.stages import meshing
 
     assert f'LIBRARIES="{LIBRARIES}"' in (ROOT / "pipeline/setup.sh").read_text()
     assert pictures.PACKAGES == tuple(LIBRARIES.split())
-    assert LIBRARIES in Path(workflow.__file__).read_text()
+    assert LIBRARIES in Path(meshing.__file__).read_text()
 
 
 # ---------------------------------------------------------------- packages

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from test_speed_range import TOP, ranged, solved
 
-from microslip.campbell import crossings, track_basis
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
@@ -18,6 +17,7 @@ from microslip.data import Rows, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
+from microslip.modes.campbell import crossings, track_basis
 from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}

@@ -9,12 +9,11 @@ import pytest
 import rings
 from meshes import STEEL, body, brick, nearest, twisted_blade
 
-from microslip import eigen
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.body import Rotation
-from microslip.campbell import track_basis
 from microslip.data import ModalBasis, UserError
+from microslip.linalg import eigen
 from microslip.modes import modal_basis
+from microslip.modes.campbell import track_basis
 from microslip.modes.common import (
     Interpolant,
     Settled,
@@ -29,7 +28,8 @@ from microslip.modes.common import (
     variable,
 )
 from microslip.modes.equilibrium import equilibrium, stiffness_slope
-from microslip.speed_range import basis_at, dense_pencil, frequencies_over, group_at
+from microslip.modes.speed_range import basis_at, dense_pencil, frequencies_over, group_at
+from microslip.settings.body import Rotation
 
 BLADE = twisted_blade(n=(1, 3, 7), thickness=0.003)
 TOP = 16000.0

@@ -23,16 +23,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
-from microslip.harmonic_balance.stability import (
-    Orbit,
-    Settings,
-    _carrier,
-    hill,
-    judged,
-    multipliers,
-    orbit,
-    stability,
-)
+from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, hill, judged, multipliers, orbit, stability
 from microslip.system.assembly import Assembly, Contact, Linear, Side
 
 

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 import small
 
-from microslip import store
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.contact.examples import EXAMPLES
 from microslip.data import UserError
 from microslip.exchange.mat import write_mat
+from microslip.files import store
 
 ROOT = Path(__file__).resolve().parents[1]
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX systems")
@@ -123,7 +123,7 @@ from microslip.basis import read_basis, write_basis
 from microslip.contact.examples import EXAMPLES
 from microslip.data import UserError
 from microslip.exchange.mat import write_mat
-from microslip.store import write_text
+from microslip.files.store import write_text
 basis = read_basis(sys.argv[1])
 for limit in map(int, sys.argv[3:]):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))

@@ -8,15 +8,7 @@ import scipy.sparse.linalg as spla
 from meshes import CELLS, QUADRATIC, STEEL, body, brick, pipe, shaken
 
 from microslip.data import Mesh
-from microslip.fem import (
-    discretise,
-    displacement_gradient,
-    green_strain,
-    isotropic,
-    mass,
-    orthotropic,
-    stiffness,
-)
+from microslip.fem import discretise, displacement_gradient, green_strain, isotropic, mass, orthotropic, stiffness
 from microslip.fem.discretise import face_blocks, free_upper
 from microslip.fem.loads import traction
 from microslip.fem.operators import engineering, to_symmetric

@@ -16,7 +16,7 @@ from microslip.case.assemble import build
 from microslip.case.run import problem_of
 from microslip.cli import main
 from microslip.harmonic_balance import identification, response
-from microslip.surveying import survey_stage
+from microslip.stages.surveying import survey_stage
 
 RING = """
 name = "ring"

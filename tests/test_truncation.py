@@ -9,7 +9,7 @@ import pytest
 import small
 
 from microslip.data import Compliance, Interface, ModalGroup
-from microslip.truncation import Coordinate, coordinates, percent, verdict
+from microslip.reduced.truncation import Coordinate, coordinates, percent, verdict
 
 
 def chain(keep: int, n: int = 12) -> ModalGroup:

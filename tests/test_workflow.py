@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 from box import edit, write_box
 
-from microslip import running, store, workflow
 from microslip.basis import read_basis
-from microslip.body import load_toml
 from microslip.data import UserError
+from microslip.files import store
+from microslip.settings.body import load_toml
+from microslip.stages import meshing, modal, places, response, running
+from microslip.stages.job import Job, open_job
+from microslip.stages.stage import PACKAGE, _imported, hash_of_code
 
-PACKAGE = Path(workflow.__file__).parent
 MESH, BASIS, RESPONSE = "meshes/box.msh", "build/box/basis.h5", "build/box/response.json"
 
 
@@ -24,10 +26,10 @@ def run_chain(folder: Path, assignments: list[str] | None = None) -> set[str]:
     """Run mesh, modes and response of the box in `folder`; returns which products were made."""
     made: set[str] = set()
     told: list[str] = []
-    job = workflow.open_job(folder, assignments, root=folder)
-    workflow.modes_stage(job, report=told.append)
+    job = open_job(folder, assignments, root=folder)
+    modal.modes_stage(job, report=told.append)
     assert job.case_file is not None
-    running.response_stage(job.case_file, {job.settings.name: job.basis_file}, job.build_folder, report=told.append)
+    response.response_stage(job.case_file, {job.settings.name: job.basis_file}, job.build_folder, report=told.append)
     begins = {"meshing": MESH, "assembling": BASIS, "friction response": RESPONSE}
     for product in (p for text in told for words, p in begins.items() if text.startswith(words)):
         made.add(product)
@@ -139,7 +141,7 @@ def stopped(*_: object, **__: object) -> None:
 
 
 def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    job = workflow.open_job(box, root=box)
+    job = open_job(box, root=box)
     page, converged = running.run_body(job)
     assert converged and page == box / "build/box/report.html"
     build = box / "build" / "box"
@@ -167,7 +169,7 @@ def test_a_case_of_another_name_has_its_own_folder(box: Path, monkeypatch: pytes
     monkeypatch.chdir(box)
     other = box / "stiff.toml"
     other.write_text((box / "case.toml").read_text().replace('name = "box"', 'name = "stiff"', 1))
-    assert running.is_case(other) and not running.is_case(box / "body.toml")
+    assert places.is_case(other) and not places.is_case(box / "body.toml")
     product, converged = running.run_case_file(other)
     assert converged and product == Path("build/stiff/response.csv") and product.is_file()
     assert (box / BASIS).is_file() and not (box / "build/stiff/basis.h5").exists()
@@ -181,19 +183,19 @@ def test_a_case_finds_its_body_wherever_it_is_run(tmp_path: Path) -> None:
         file = tmp_path / place
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f'name = "{name}"\n')
-        return running.find_body(case, name, root) == file
+        return places.find_body(case, name, root) == file
 
     for folder in (case.parent, elsewhere / "geometry"):
         folder.mkdir(parents=True)
     with pytest.raises(UserError, match="body: no body.toml of a body 'box'"):
-        running.find_body(case, "box", elsewhere)
+        places.find_body(case, "box", elsewhere)
     for place in ("elsewhere/box", "mine/geometry/box", "mine/project/box", "mine/project/geometry/box"):
         assert found(f"{place}/body.toml")
     assert found("mine/project/geometry/box/other.toml", "box-other")
     for place in ("geometry/box", "box"):
         shutil.rmtree(tmp_path / "mine/project" / place)
     (tmp_path / "mine").chmod(0o777)
-    assert running.find_body(case, "box", elsewhere) == elsewhere / "box/body.toml"
+    assert places.find_body(case, "box", elsewhere) == elsewhere / "box/body.toml"
     for place in ("cases/box", "cases"):
         assert found(f"mine/project/{place}/body.toml")
 
@@ -226,7 +228,7 @@ def test_a_mesher_that_may_not_be_started_is_not_told_as_a_product(
     (tmp_path / "python").write_text("")
     monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
     with pytest.raises(UserError, match="python: cannot be started to draw the body .Permission denied."):
-        workflow.mesh_stage(workflow.open_job(box), force=True)
+        meshing.mesh_stage(open_job(box), force=True)
 
 
 @pytest.mark.parametrize("key", ["build", "cad", "mesh"])
@@ -242,13 +244,13 @@ def test_temperatures_of_a_table_reach_the_nodes(box: Path) -> None:
     rows = [f"{x}, {y}, {z}, {300 + 2 * z}" for x in (-10, 10) for y in (-15, 15) for z in (0, 70, 120)]
     (box / "heat.csv").write_text("# x, y, z in mm, T in K\n" + "\n".join(rows) + "\n")
     edit(box / "body.toml", "[[supports]]", '[temperature]\nfile = "heat.csv"\n\n[[supports]]')
-    job = workflow.open_job(box, root=box)
-    mesh, _ = workflow.load_mesh(job)
-    found = workflow.nodal_temperature(job, mesh)
+    job = open_job(box, root=box)
+    mesh, _ = meshing.load_mesh(job)
+    found = modal.nodal_temperature(job, mesh)
     assert found == pytest.approx(300 + 2000 * mesh.points[:, 2], rel=1e-9)
     (box / "heat.csv").write_text("1, 2, 3\n")
     with pytest.raises(UserError, match="heat.csv: must be lines of x, y, z, T"):
-        workflow.nodal_temperature(job, mesh)
+        modal.nodal_temperature(job, mesh)
     (box / "heat.csv").unlink()
     with pytest.raises(UserError, match="temperature.file: there is no file"):
         run_chain(box)
@@ -275,18 +277,23 @@ def imported(module: str) -> set[str]:
     return {m for m in found if m and source(m).is_file()}
 
 
-def test_every_module_behind_a_modal_file_counts_as_its_input() -> None:
-    """A modal file is made anew when code that makes it changes: the list in workflow.py must miss no module."""
-    needed, todo = set(), ["modes", "basis", "mesh"]
-    while todo:
-        module = todo.pop()
-        if module not in needed:
-            needed.add(module)
-            todo += imported(module)
-    without_numbers = {"errors", "mistakes", "store", "basis_checks"}
-    listed = {p.removesuffix(".py") for p in workflow._MODES_CODE}
-    assert {m.split(".")[0] for m in needed} - without_numbers <= listed
-    assert all((PACKAGE / p).exists() for p in (*workflow._MODES_CODE, *running.CASE_CODE, *workflow._REPORT_CODE))
+def test_every_module_behind_a_product_counts_as_its_input() -> None:
+    """What a file is found to import, by its text, is what Python's own parser finds, for every file of the package."""
+    for file in PACKAGE.rglob("*.py"):
+        found = {
+            ".".join(f.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__") for f in _imported(file)
+        }
+        module = ".".join(file.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+        assert found - {"__init__", module} == imported("" if module == "__init__" else module) - {module}, file
+
+
+def test_a_change_of_code_is_another_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step of a law counts for responses, not for modal files; the solver behind modes counts for both."""
+    first = {m: hash_of_code.__wrapped__((m,)) for m in ("modes.compute", "stages.response")}
+    own = store.hash_file
+    for changed, differing in (("contact/point.py", {"stages.response"}), ("linalg/eigen.py", set(first))):
+        monkeypatch.setattr(store, "hash_file", lambda f, c=changed: "other" if f == PACKAGE / c else own(f))
+        assert {m for m in first if hash_of_code.__wrapped__((m,)) != first[m]} == differing
 
 
 def test_the_bodies_of_the_project_have_what_make_asks_for() -> None:
@@ -301,15 +308,15 @@ def test_boxes_of_one_name_add_up_and_none_takes_a_sets_name(tmp_path: Path) -> 
     """Two boxes of one name: both ends, as rules of a CAD file add up; a name of the mesh file is refused."""
     from small import SIZE, beam, table
 
-    from microslip.body import BodySettings
+    from microslip.settings.body import BodySettings
 
     x, y, z = SIZE
     ends = [{"name": "ends", "box": [0, 0, h, x, y, h]} for h in (0.0, z)]
 
     def faces(rules: list[dict]) -> dict:
         settings = BodySettings.model_validate(table(geometry={"mesh": "small.msh", "faces": rules}))
-        job = workflow.Job(tmp_path / "body.toml", settings, {}, tmp_path)
-        return workflow._faces_by_rule(job, beam()).faces
+        job = Job(tmp_path / "body.toml", settings, {}, tmp_path)
+        return meshing._faces_by_rule(job, beam()).faces
 
     own, made = beam().faces, faces([*ends, ends[0]])["ends"]["triangle6"]
     assert len(made) == len(own["clamp"]["triangle6"]) + len(own["tip"]["triangle6"])
@@ -321,17 +328,17 @@ def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
     """A deck in three files: a node moved in the innermost is another mesh."""
     from small import table
 
-    from microslip.body import BodySettings
+    from microslip.settings.body import BodySettings
 
     (tmp_path / "sets").mkdir()
     deck, inner = tmp_path / "part.inp", tmp_path / "sets" / "nodes.inp"
     deck.write_text("*NODE, INPUT=sets/all.inp\n** *INCLUDE, INPUT=none.inp\n*STEP\n")
     (tmp_path / "sets" / "all.inp").write_text("*include, input=nodes.inp\n")
     settings = BodySettings.model_validate(table(geometry={"mesh": "part.inp"}))
-    job = workflow.Job(tmp_path / "body.toml", settings, {"geometry": {}}, tmp_path)
+    job = Job(tmp_path / "body.toml", settings, {"geometry": {}}, tmp_path)
     inner.write_text("1, 0, 0, 0\n")
-    first = workflow.modes_inputs(job, deck)
+    first = modal.modes_inputs(job, deck)
     inner.write_text("1, 0, 0, 1\n")
-    assert workflow.modes_inputs(job, deck) != first
+    assert modal.modes_inputs(job, deck) != first
     inner.write_text("1, 0, 0, 0\n")
-    assert workflow.modes_inputs(job, deck) == first
+    assert modal.modes_inputs(job, deck) == first

@@ -79,7 +79,7 @@ PRESTRESSED = Example(Prestressed(ROUGH, COULOMB, STIFFNESS), 1.2e-5, 8e-6)
 
 @settings
 class Lagging(PointContact):
-    """Pressed by the mean of many steps: its state holds more than where the last one ended, which `recalled` denies."""
+    """Pressed by the mean of many steps: its state holds more than `recalled` says."""
 
     def init(self, n: int) -> tuple[PointState, Array]:
         return super().init(n), jnp.zeros(n)

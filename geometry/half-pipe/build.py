@@ -172,9 +172,9 @@ def name_heads(p: dict, far_side: Callable[[np.ndarray, np.ndarray], bool], near
     reach = 2 * p["washer_radius"] + near
     for number, place in enumerate(bolts(p), 1):
         ring = surfaces_where(
-            lambda centre, box, place=place: far_side(centre, box)
-            and np.hypot(*(centre[:2] - place)) < near
-            and np.ptp(box[:, 0]) < reach
+            lambda centre, box, place=place: (
+                far_side(centre, box) and np.hypot(*(centre[:2] - place)) < near and np.ptp(box[:, 0]) < reach
+            )
         )
         name_face(f"head_{number}", ring)
 

@@ -25,8 +25,8 @@ from .progress import progress
 if TYPE_CHECKING:
     from .basis.checks import Check
     from .data import ModalBasis
-    from .following import Case
     from .results import Response
+    from .stages.following import Case
 
 app = App(
     name="microslip",
@@ -148,7 +148,8 @@ def mesh(body: Path, /, *, output: Output = None, set_: Set = (), force: Force =
     Args:
         body: a body.toml or the folder that holds it.
     """
-    from .workflow import load_mesh, mesh_stage, open_job
+    from .stages.job import open_job
+    from .stages.meshing import load_mesh, mesh_stage
 
     job = open_job(body, list(set_))
     with progress(f"mesh {job.settings.name}", quiet) as report:
@@ -167,7 +168,9 @@ def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force 
         body: a body.toml or the folder that holds it; a system.toml of masses, rigid bodies or matrices.
     """
     from .basis import read_basis
-    from .workflow import basis_summary, modes_stage, open_job, system_file, system_stage
+    from .stages.job import open_job, system_file
+    from .stages.modal import modes_stage, system_stage
+    from .stages.summary import basis_summary
 
     if (system := system_file(body)) is not None:
         path = system_stage(system, list(set_), output, force)
@@ -191,8 +194,10 @@ def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = F
         path: a body.toml, a system.toml, a case.toml, or the folder that holds it.
     """
     from .basis import read_basis
-    from .running import is_case, run_body, run_case_file, run_system
-    from .workflow import frequency_lines, holds_a_case_alone, open_job, system_file
+    from .stages.job import holds_a_case_alone, open_job, system_file
+    from .stages.places import is_case
+    from .stages.running import run_body, run_case_file, run_system
+    from .stages.summary import frequency_lines
 
     path = path / "case.toml" if holds_a_case_alone(path) else path
     if (system := system_file(path)) is not None:
@@ -229,7 +234,8 @@ def closure(
         rpm: speed of rotation.
         output: folder for the table and the picture; build/NAME if not given.
     """
-    from .workflow import closure_stage, open_job
+    from .stages.closure import closure_stage
+    from .stages.job import open_job
 
     job = open_job(body, list(set_))
     with progress(f"closure of {job.settings.name}", quiet) as report:
@@ -245,7 +251,7 @@ def contact(file: Path, /, *, output: Output = None, set_: Set = (), quiet: Quie
         file: a contact.toml, or the number of one of the book's figures: 3.5-2, 3.7-7, 3.9-2 (`init contact` has all).
         output: folder for pictures and tables; build/NAME if not given.
     """
-    from .workflow import contact_stage
+    from .stages.contact import contact_stage
 
     file = file if file.exists() else _figure_of_the_book(file)
     with progress(f"contact {file}", quiet) as report:
@@ -282,8 +288,10 @@ def respond(
             in the case asks; the resonance of every engine order, the line f = e n / 60 over speeds, or the envelope
             over ranges of damping, load and friction, as the table of that name asks.
     """
-    from . import running
+    from .case import load_case
     from .case.comparison import sentence
+    from .stages import running
+    from .stages.response import response_of_case
 
     case = _case_file(case)
     if over is not None:
@@ -291,14 +299,14 @@ def respond(
         return
     with (
         progress(f"respond {case}", quiet) as report,
-        running.making_response(Path("build") / running.load_case(case, list(set_))[0].name, report),
+        response_of_case(Path("build") / load_case(case, list(set_))[0].name, report=report).making(),
     ):
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
         else:
             table, converged = running.respond(case, basis, list(set_), force, report, log=log)
         if stability:
-            from . import following
+            from .stages import following
 
             opened = _followed(case, basis, set_)
             found = following.stabilities(opened, report)
@@ -328,7 +336,7 @@ def identify(
 
 def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], force: bool, quiet: bool) -> None:
     from .case.curves import OVER
-    from .surveying import survey_stage
+    from .stages.surveying import survey_stage
 
     with progress(f"{kind.replace('_', ' ')} of {case}", quiet) as report:
         made, sentences, converged = survey_stage(case, basis, kind, list(set_), force, report)
@@ -355,8 +363,8 @@ def backbone(
             slide if not given.
         high: largest amplitude, m; thirty times that if not given.
     """
-    from . import following
-    from .store import making
+    from .files.store import making
+    from .stages import following
 
     case = _case_file(case)
     with progress(f"backbone {case}", quiet) as report:
@@ -386,8 +394,8 @@ def optimum(
         high: last value of it; the largest of sweep.normal_forces if not given.
         points: values from one end to the other at which a sweep looks for it first.
     """
-    from . import following
-    from .store import making
+    from .files.store import making
+    from .stages import following
 
     case = _case_file(case)
     with progress(f"optimum {case}", quiet) as report:
@@ -412,8 +420,8 @@ def _case_file(case: Path) -> Path:
 def _followed(case: Path, basis: Path | None, assignments: Sequence[str]) -> Case:
     """A case with its modal files, for what is followed from it."""
     from .case import load_case
-    from .following import open_case
-    from .running import existing_files
+    from .stages.following import open_case
+    from .stages.places import existing_files
 
     settings, _ = load_case(case, list(assignments))
     files = existing_files(settings, case, basis, Path("."))
@@ -431,7 +439,7 @@ def check(file: Path, /, *, short: Short = False, quiet: Quiet = False) -> None:
     from .basis import check_basis, read_basis
     from .basis.files import OtherFormat
     from .results.files import FORMAT
-    from .ring import ring_checks
+    from .ring.expansion import ring_checks
 
     file = _modal_file(file)
     try:
@@ -462,7 +470,7 @@ def _check_response(file: Path, short: bool, quiet: bool) -> None:
 def _modal_files(response: Response) -> tuple[dict[str, ModalBasis], list[str]]:
     """Member -> modal file that a response was computed with, and the members whose files are gone or others."""
     from .basis import read_basis
-    from .store import hash_file
+    from .files.store import hash_file
 
     there = {name: Path(b.file) for name, b in response.bodies.items() if Path(b.file).is_file()}
     fits = {name: file for name, file in there.items() if hash_file(file) == response.bodies[name].sha256}
@@ -489,7 +497,7 @@ def _verdict(file: Path, findings: list[Check], short: bool, quiet: bool) -> Non
 
 def _say_seal(file: Path, quiet: bool) -> None:
     """A line if a file that could be read has no seal."""
-    from .basis.hdf5 import seal_state
+    from .files.hdf5 import seal_state
 
     if seal_state(file) == "absent":
         _say(f"{file}: not sealed: written by another program, or changed since it was written", quiet)
@@ -505,7 +513,7 @@ def import_(file: Path, folder: Path | None = None, /, *, unit: str = "mm") -> N
         folder: of the new body.toml or basis.h5; one of the file's name if not given.
         unit: of its lengths, where the file does not tell.
     """
-    from .importing import import_file
+    from .stages.importing import import_file
 
     for line in import_file(file, folder, unit).told:
         print(line)
@@ -565,8 +573,8 @@ def compare(
         least: MAC below which modes stay unpaired.
     """
     from .basis import read_basis
-    from .correlation import compare_groups, pair_table
     from .modes.sampling import on_common_points
+    from .reduced.correlation import compare_groups, pair_table
 
     if not 0 <= least <= 1:
         raise UserError(f"compare --least {least:g}: a MAC lies between 0 and 1; choose a number there")
@@ -577,9 +585,9 @@ def compare(
     if output is None:
         return
     from . import pictures
-    from .correlation import pair_rows
+    from .files.store import write_text
     from .pictures.comparison import draw_comparison
-    from .store import write_text
+    from .reduced.correlation import pair_rows
 
     reason = pictures.can_draw()
     write_text(output / "pairs.csv", pair_rows(found))
@@ -598,9 +606,9 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     """
     from . import pictures
     from .basis import read_basis
-    from .campbell import engine_orders
+    from .files.store import making
+    from .modes.campbell import engine_orders
     from .report import write_report
-    from .store import making
 
     file = _modal_file(file)
     basis = read_basis(file)
@@ -628,8 +636,8 @@ def info(
         nodal_diameter: of a cyclic body: this one only.
         rpm: of a modal file with a speed range: what it holds at this speed.
     """
-    from .importing import CAD, MATRICES, cad_table
     from .mesh import UNITS
+    from .stages.importing import CAD, MATRICES, cad_table
 
     if not file.exists():
         raise UserError(f"{file}: there is no such file; correct the path")
@@ -639,7 +647,7 @@ def info(
     if suffix in (".h5", ".hdf5"):
         from .basis import read_basis
         from .exchange.choice import select
-        from .workflow import basis_summary
+        from .stages.summary import basis_summary
 
         basis = read_basis(file)
         basis = select(basis if rpm is None else _at_speed(basis, rpm), speed, nodal_diameter)
@@ -651,7 +659,7 @@ def info(
         if output is not None and not reason:
             print(output)
     elif suffix == ".toml" or file.is_dir():
-        from .workflow import open_job
+        from .stages.job import open_job
 
         job = open_job(file)
         s = job.settings
@@ -701,7 +709,7 @@ def _not_foreign(path: Path) -> Path:
     """
     import h5py
 
-    from .importing import KINDS
+    from .stages.importing import KINDS
 
     what = KINDS.get(path.suffix.lower())
     if what is None or not path.is_file() or h5py.is_hdf5(path):
@@ -711,7 +719,7 @@ def _not_foreign(path: Path) -> Path:
 
 
 def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
-    from .speed_range import basis_at
+    from .modes.speed_range import basis_at
 
     return basis_at(basis, rpm)
 

@@ -16,14 +16,16 @@ from typing import Any
 import numpy as np
 
 from .basis import check_basis
-from .body import GROUND
-from .campbell import crossings, engine_orders, track_basis
-from .compliance import SUPPLIED, Share, sentence, shares, statics_beside
-from .coordinates import basis_in_modes
 from .data import ContactState, Interface, ModalBasis, ModalGroup, SpeedRange
-from .gyroscopic import stability_sentence
-from .quality import sentences
-from .resonances import (
+from .files.store import write_text
+from .linalg.gyroscopic import stability_sentence
+from .modes.campbell import crossings, engine_orders, track_basis
+from .reduced.compliance import SUPPLIED, Share, sentence, shares, statics_beside
+from .reduced.coordinates import basis_in_modes
+from .reduced.quality import sentences
+from .reduced.truncation import percent, verdict
+from .ring.expansion import aliased, certificate_words, certify_ring, ring_checks
+from .ring.resonances import (
     HEAD,
     eigenmodes,
     harmonics_of,
@@ -35,10 +37,8 @@ from .resonances import (
     whirl_bounds,
     whirl_sentence,
 )
-from .resonances import rows as resonance_rows
-from .ring import aliased, certificate_words, certify_ring, ring_checks
-from .store import write_text
-from .truncation import percent, verdict
+from .ring.resonances import rows as resonance_rows
+from .settings.body import GROUND
 from .units import Quantity
 
 STYLE = """

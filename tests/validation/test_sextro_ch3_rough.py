@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from microslip.contact.heights import (
-    Cut,
-    Exponential,
-    Gaussian,
-    Linear,
-    Polynomial,
-    as_table,
-    combined,
-)
+from microslip.contact.heights import Cut, Exponential, Gaussian, Linear, Polynomial, as_table, combined
 from microslip.contact.normal import Greenwood, Hyperbolic, Penalty, Potential, Rough
 from microslip.contact.wear import course, stepped
 

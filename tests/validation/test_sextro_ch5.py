@@ -14,7 +14,8 @@ import pytest
 from microslip.case import load_case, run_case
 from microslip.case.assemble import build
 from microslip.harmonic_balance.reduced import stuck
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 ROOT = Path(__file__).parents[2]
 JENKINS = ["harmonics=1"] + [

@@ -15,7 +15,8 @@ import pytest
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.data import ModalBasis
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))

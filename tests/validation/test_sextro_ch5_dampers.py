@@ -22,7 +22,8 @@ from microslip.data import ModalBasis
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
-from microslip.workflow import load_mesh, mesh_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.meshing import load_mesh, mesh_stage
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))

@@ -16,7 +16,8 @@ from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.run import problem_of
 from microslip.data import ModalBasis
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))

@@ -19,7 +19,8 @@ from microslip.case import CaseResult, CaseSettings, load_case, run_case
 from microslip.case.assemble import build
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.reduced import stuck
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 ROOT = Path(__file__).parents[2]
 PRINTED = (120.0, 320.0, 470.0)

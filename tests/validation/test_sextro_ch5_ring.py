@@ -16,7 +16,8 @@ import pytest
 
 from microslip.basis import read_basis
 from microslip.harmonic_balance.reduced import stuck
-from microslip.workflow import modes_stage, open_job
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs"))

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..coordinates import compliance_row, held, in_modes
 from ..data import (
     INTERFACE_ROWS,
     MOTIONS,
@@ -25,8 +24,9 @@ from ..data import (
     RunUp,
     SpeedRange,
 )
-from ..gyroscopic import stability_sentence
+from ..linalg.gyroscopic import stability_sentence
 from ..modes.common import Interpolant, frequencies, largest_difference
+from ..reduced.coordinates import compliance_row, held, in_modes
 from .integrals import cell_volumes, face_mean, modal_mass
 
 TOLERANCES = {

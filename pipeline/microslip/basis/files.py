@@ -38,11 +38,11 @@ from ..data import (
     StressSet,
     UserError,
 )
-from ..hostile import inspect, trial
-from ..store import complete_or_absent, ordinary
+from ..files.hdf5 import IMAGINARY, create, put, put_scale, seal, seal_state
+from ..files.hostile import inspect, trial
+from ..files.store import complete_or_absent, ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
-from .hdf5 import IMAGINARY, create, put, put_scale, seal, seal_state
 
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from microslip.cad.curved import refuse_inverted, straighten
 from microslip.data import UserError
-from microslip.store import complete_or_absent, ordinary
+from microslip.files.store import complete_or_absent, ordinary
 
 warnings: list[str] = []
 MOST_ELEMENTS = 5e6  # beyond it a size is taken for a mistake in the unit

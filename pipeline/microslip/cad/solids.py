@@ -19,8 +19,8 @@ import numpy as np
 from microslip.cad.drawing import boundary_surfaces, warn
 from microslip.cad.marks import Marks, marks_of
 from microslip.data import UserError
+from microslip.files.store import ordinary
 from microslip.mesh import UNITS
-from microslip.store import ordinary
 
 OCC_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "um": "UM", "in": "INCH", "ft": "FT"}
 ENDS = {  # how a complete text file of the kind ends; OpenCASCADE takes half files for whole, or hangs in them

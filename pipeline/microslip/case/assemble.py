@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..compliance import SURFACE, statics_beside
-from ..coordinates import first_modes, in_modes, of_density
 from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserError
+from ..files.store import ordinary
 from ..frames import rotation
-from ..speed_range import basis_at
-from ..store import ordinary
+from ..modes.speed_range import basis_at
+from ..reduced.compliance import SURFACE, statics_beside
+from ..reduced.coordinates import first_modes, in_modes, of_density
 from .counting import Face, Springs, brought, counted_once
 from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
 from .patches import (

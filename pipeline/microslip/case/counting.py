@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, facing, without_bulk
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
+from ..reduced.compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, facing, without_bulk
 from .settings import ContactSettings
 
 Springs = tuple[float, float, float]

@@ -41,8 +41,8 @@ class Followed:
     Attributes:
         over: of `OVER`. normal: N of the contacts that the sweep presses; None where it presses none, or is what
             varies. frequency: Hz at which the others vary, or None. ends: of the parameter, as asked for. name: of its
-            series. rows: points in order, see `harmonic_balance.kept.kept_curve`. status: why it ended. quantity: what
-            is read; m stands for its unit.
+            series. rows: points in order, see `harmonic_balance.checkpoint.kept_curve`. status: why it ended.
+            quantity: what is read; m stands for its unit.
     """
 
     over: str
@@ -145,7 +145,7 @@ def curves(
     Raises:
         UserError: ends that are missing, no resonance to begin at.
     """
-    from ..harmonic_balance.kept import kept_curve, labels, points_of_curve
+    from ..harmonic_balance.checkpoint import kept_curve, labels, points_of_curve
     from ..harmonic_balance.readout import measured
 
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..body import Model, NotNegative, Number, Numbers, Positive
 from ..data import ModalGroup, UserError
+from ..settings.body import Model, NotNegative, Number, Numbers, Positive
 from .keys import Address, Order
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..compliance import BULK_AND_SURFACE
 from ..data import Array, Interface, UserError
+from ..reduced.compliance import BULK_AND_SURFACE
 from .counting import Springs
 from .settings import CaseSettings, ContactSettings
 

@@ -20,8 +20,8 @@ from ..results.checks import cause
 from ..units import Quantity, counted, percent
 from . import edges
 from .assemble import Built, build, memory_of, swept
+from .checkpoint import series_name
 from .edges import Rising
-from .keeping import series_name
 from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
@@ -222,15 +222,15 @@ def _swept(
     normal: float,
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
     """One sweep and its peaks, from what a journal holds of it and what is computed now."""
-    from ..harmonic_balance import kept, refinement, response
+    from ..harmonic_balance import checkpoint, refinement, response
 
     if journal is None:
         found = refinement.filled_response(problem, frequency, limits, report)
         return found, response.refined_peaks(problem, found)
     name = series_name(normal)
     parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
-    journal.say({**journal.head, "parameters": parameters, "labels": kept.labels(problem)})
-    return kept.kept_response(problem, frequency, limits, journal, name, report)
+    journal.say({**journal.head, "parameters": parameters, "labels": checkpoint.labels(problem)})
+    return checkpoint.kept_response(problem, frequency, limits, journal, name, report)
 
 
 def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..body import (
+from ..contact.settings import AnyElement, AnyFriction, AnyRoughness, AnyStiffness, ContactFile, Temperature
+from ..operating.fatigue import MaterialLimits
+from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.body import (
     Coefficient,
     Model,
     Name,
@@ -26,9 +29,6 @@ from ..body import (
     override,
     validate,
 )
-from ..compliance import BULK_AND_SURFACE
-from ..contact.settings import AnyElement, AnyFriction, AnyRoughness, AnyStiffness, ContactFile, Temperature
-from ..operating.fatigue import MaterialLimits
 from .driving import ROTATION, ExcitationOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
@@ -62,9 +62,8 @@ BodyName = Annotated[Name, BeforeValidator(_no_path)]
 class BodyOfCase(Model):
     """A body of an assembly.
 
-    name: in this case. body: the name of a body.toml (see `running.find_body`) or of a system.toml beside the case,
-    whose modal file it is; the name if not given. file: a modal file instead, beside the case. speed: of the file,
-    counted from 0, or speed_rpm.
+    name: in this case. body: the name of a body.toml (see `places.find_body`) or of a system.toml beside the case, the
+    name if not given. file: a modal file instead, beside the case. speed: of the file, counted from 0, or speed_rpm.
     turn: degrees about the body's rotation axis, and shift: m, from where its file has it to where it stands here.
     damping_ratio: instead of the file's, one for all modes or one a mode, the last one for all that follow.
     aerodynamics: a table beside the case (.csv: nodal_diameter, frequency_shift, damping_ratio and, where they differ,

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
 from ..data import Array, ModalBasis, UserError
 from ..results.names import apart
+from ..settings.body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
 from .keys import Orders, Positives
 
 if TYPE_CHECKING:

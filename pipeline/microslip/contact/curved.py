@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..compliance import SURFACE
 from ..data import Array, UserError
+from ..reduced.compliance import SURFACE
 from ..reference.half_space import mean_inverse_distance
 from .curves import NormalCurve
 from .hertz import Hertz

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import isotonic_regression
 
-from ..compliance import BULK_AND_SURFACE
 from ..data import Array, Indices, UserError
-from ..store import ordinary
+from ..files.store import ordinary
+from ..reduced.compliance import BULK_AND_SURFACE
 from .hertz import Hertz
 from .profiles import RoundContact
 from .series import BULK, INCLUDES

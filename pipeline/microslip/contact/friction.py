@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
-from ..body import Coefficient, NotNegative, Number, Positive
 from ..errors import UserError
-from ..mistakes import bounded
+from ..settings.body import Coefficient, NotNegative, Number, Positive
+from ..settings.mistakes import bounded
 from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName

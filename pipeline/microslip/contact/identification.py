@@ -16,9 +16,9 @@ import scipy.linalg
 import scipy.ndimage
 import scipy.optimize
 
-from ..compliance import BULK_AND_SURFACE, SURFACE
-from ..coordinates import in_modes
 from ..data import INTERFACE_ROWS, Array, ModalGroup, UserError
+from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
+from ..reduced.coordinates import in_modes
 from ..reference import joined_beams
 from ..reference.beams import Section
 

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 
 from pydantic import Field
 
-from ..body import Model, load_toml
 from ..data import UserError
-from ..store import ordinary
+from ..files.store import ordinary
+from ..settings.body import Model, load_toml
 
 if TYPE_CHECKING:
     from .composed import Contact

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..mistakes import bounded
+from ..settings.mistakes import bounded
 
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from ..body import NotNegative, Positive, PositiveLength
-from ..compliance import BULK_AND_SURFACE
+from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.body import NotNegative, Positive, PositiveLength
 from .friction import Friction
 from .kinds import Element
 from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value

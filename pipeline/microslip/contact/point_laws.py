@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from ..compliance import BULK_AND_SURFACE, SURFACE
 from ..data import UserError
+from ..reduced.compliance import BULK_AND_SURFACE, SURFACE
 from .curved import Line
 from .curves import NormalCurve, of_contact
 from .friction import Friction

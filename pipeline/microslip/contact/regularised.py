@@ -17,9 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..body import NotNegative, Positive
-from ..compliance import BULK_AND_SURFACE
 from ..errors import NotConverged
+from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.body import NotNegative, Positive
 from .friction import Friction, creep
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal

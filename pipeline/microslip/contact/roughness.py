@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..body import Numbers, Positive, PositiveLength
 from ..data import UserError
+from ..settings.body import Numbers, Positive, PositiveLength
 from . import topography
 from .curves import read_table
 from .heights import Cut, Exponential, Gaussian, Heights, Linear, Polynomial, combined, tabulated

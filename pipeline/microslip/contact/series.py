@@ -1,7 +1,7 @@
 """Contact stiffnesses from different sources in one noun that says which compliance it counts; springs in series.
 
-See `microslip.compliance`: `SURFACE` is the roughness alone, `BULK_AND_SURFACE` the elasticity of the bodies about the
-contact as well, `BULK` that elasticity without any roughness (a layer, a half-space, finite elements).
+See `microslip.reduced.compliance`: `SURFACE` is the roughness alone, `BULK_AND_SURFACE` the elasticity of the bodies
+about the contact as well, `BULK` that elasticity without any roughness (a layer, a half-space, finite elements).
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, without_bulk
 from ..data import ModalGroup, UserError
+from ..reduced.compliance import BULK_AND_SURFACE, SURFACE, Share, contact_share, without_bulk
 from .hertz import Hertz
 from .layer import Layer
 from .profiles import RoundContact

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from ..body import (
+from ..mesh import UNITS
+from ..settings.body import (
     Coefficient,
     Model,
     Name,
@@ -27,7 +28,6 @@ from ..body import (
     override,
     validate,
 )
-from ..mesh import UNITS
 from .friction import (
     FrictionKind,
     OfCoulomb,

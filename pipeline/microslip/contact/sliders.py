@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from ..body import NotNegative, Number
-from ..compliance import BULK_AND_SURFACE
 from ..errors import UserError
+from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.body import NotNegative, Number
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
 from .kinds import Element

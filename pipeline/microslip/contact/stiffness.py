@@ -10,8 +10,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ..basis import read_basis
-from ..body import Name, NotNegative, Number, Positive, PositiveLength
 from ..data import UserError
+from ..settings.body import Name, NotNegative, Number, Positive, PositiveLength
 from .curves import FORCES, LENGTHS, read_curve
 from .hertz import Hertz, half_curvatures
 from .keys import Boundary, Columns, FileName, OneOrTwo, Poisson, Radii

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UserError
-from ..store import ordinary
+from ..files.store import ordinary
 from .curves import LENGTHS, read_columns
 
 if TYPE_CHECKING:

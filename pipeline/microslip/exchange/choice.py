@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..coordinates import in_modes
 from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
-from ..resonances import speeds_of
+from ..reduced.coordinates import in_modes
+from ..ring.resonances import speeds_of
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
+from ..files.store import complete_or_absent
 from ..frames import skew
 from ..mesh import boundary_facets
-from ..store import complete_or_absent
 from .choice import STATEMENT, Format, body_in_motion, with_shapes
 from .multibody import position_cross_shape, shape_cross_shape, tilde_tilde
 

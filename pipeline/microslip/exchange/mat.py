@@ -18,7 +18,7 @@ import numpy as np
 
 from ..basis import CONVENTIONS, FORMAT, FORMAT_VERSION
 from ..data import INTERFACE_ROWS, Array, Interface, ModalBasis, ModalGroup, Rows, UserError
-from ..store import complete_or_absent
+from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from ..canonical import signs
-from ..correlation import DIRECTIONS, POINT
 from ..data import Array, Compliance, Indices, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..files.store import ordinary
+from ..linalg.canonical import signs
 from ..mesh import UNITS
-from ..store import ordinary
+from ..reduced.correlation import DIRECTIONS, POINT
 from .functions import fits
 from .functions import told as functions_told
 

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..coordinates import compliance_row
 from ..data import Array, ModalBasis, ModalGroup, UserError
-from ..store import refused
+from ..files.store import refused
+from ..reduced.coordinates import compliance_row
 from .choice import STATEMENT, Format
 from .mat import field_names
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, Invariants, ModalBasis, ModalGroup, UserError
-from ..floating_frame import rotation_shape
-from ..store import write_text
+from ..files.store import write_text
+from ..reduced.floating_frame import rotation_shape
 from .choice import body_in_motion
 
 _EYE = np.eye(3)

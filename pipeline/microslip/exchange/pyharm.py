@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..data import INTERFACE_ROWS, Array, Indices, ModalBasis, ModalGroup, UserError
-from ..store import complete_or_absent
+from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format, only_group, real
 from .mat import clean_header
 from .mtx import interface_coordinates

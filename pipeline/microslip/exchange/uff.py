@@ -19,9 +19,9 @@ import numpy as np
 
 from .. import __version__
 from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..files.store import write_text
 from ..mesh import boundary_facets
-from ..resonances import eigenmodes
-from ..store import write_text
+from ..ring.resonances import eigenmodes
 from .choice import Format, node_numbers, one_line, with_shapes
 
 TRIANGLE, QUAD = 41, 44

@@ -14,12 +14,12 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..coordinates import basis_in_modes, in_modes
 from ..data import Array, Indices, Mesh, ModalBasis, ModalGroup, UserError
+from ..files.store import complete_or_absent, write_text
 from ..mesh import boundary_facets
-from ..resonances import eigenmodes, speeds_of
-from ..ring import expand, multiplicity, replicate, ring_scale, sector_rotation
-from ..store import complete_or_absent, write_text
+from ..reduced.coordinates import basis_in_modes, in_modes
+from ..ring.expansion import expand, multiplicity, replicate, ring_scale, sector_rotation
+from ..ring.resonances import eigenmodes, speeds_of
 from .choice import STATEMENT, Format, with_shapes
 
 

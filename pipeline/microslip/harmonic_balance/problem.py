@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, ComplexArray, Indices
-from ..mistakes import bounded
+from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear
 from . import blocks, play, reduced
 from .blocks import Matrix

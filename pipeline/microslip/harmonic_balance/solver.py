@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import continuation
 from ..data import Array, UserError
-from ..mistakes import bounded
+from ..settings.mistakes import bounded
 from . import pseudo_transient
 from .problem import NO_NUMBER, AtFrequency, Problem
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
-from ..speed_range import basis_at
+from ..modes.speed_range import basis_at
 from ..system.assembly import Assembly, Load, Member
 from ..system.damping import structural
 from . import problem as balance

@@ -22,7 +22,7 @@ import numpy as np
 from .. import __version__
 from ..contact.law import settings
 from ..data import Array, UserError
-from ..store import complete_or_absent
+from ..files.store import complete_or_absent
 
 FORMAT, VERSION = "microslip table", 1
 

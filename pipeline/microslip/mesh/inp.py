@@ -16,7 +16,7 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
-from ..store import ordinary
+from ..files.store import ordinary
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
 from .supports import Constraints, add_supports

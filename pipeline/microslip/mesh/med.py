@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from ..data import Indices
-from ..hostile import HostileFile, read_hdf5
+from ..files.hostile import HostileFile, read_hdf5
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .raw import NODES, Damaged, RawMesh
 

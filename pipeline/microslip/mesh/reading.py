@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
-from ..hostile import tried
-from ..store import ordinary
+from ..files.hostile import tried
+from ..files.store import ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf import read_bdf
 from .cdb import read_cdb

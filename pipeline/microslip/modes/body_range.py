@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import canonical, eigen
-from ..body import BodySettings
 from ..data import Array, ModalGroup, SpeedRange, UserError
+from ..linalg import canonical, eigen
 from ..reduction import Reduced
+from ..settings.body import BodySettings
 from .body_rows import BodyRows
 from .common import Common, Guess, Settled, Solved, common_coordinates, lagrange
 from .compute import assemble_group, searched_state

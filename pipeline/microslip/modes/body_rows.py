@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..body import BodySettings, Excitation, InterfaceSettings, Monitor
 from ..data import CENTRIFUGAL, INTERFACE_ROWS, Array, Interface, Mesh, Rows, UserError
 from ..fem.discretise import face_blocks
 from ..fem.loads import centrifugal, pressure, traction
+from ..settings.body import BodySettings, Excitation, InterfaceSettings, Monitor
 from .boundary import AXES, require_face
 from .equilibrium import BodyModel, StaticState
 from .rows import Location, Locator, NodeLocator, Patch, at_node, node_patch, patch, point_rows, slope_rows

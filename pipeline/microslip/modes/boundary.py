@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..body import BodySettings, MaterialSettings
 from ..data import Array, Indices, Material, Mesh, UserError
 from ..fem.discretise import Discretisation, face_blocks
 from ..fem.loads import body_force, pressure, traction
+from ..settings.body import BodySettings, MaterialSettings
 from . import rigid
 from .equilibrium import BodyModel
 from .rows import Locator

@@ -14,10 +14,10 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from .. import canonical, eigen
-from ..body import BodySettings
 from ..data import Array, Indices, Mesh, UserError
+from ..linalg import canonical, eigen
 from ..reduction.craig_bampton import static_shapes
+from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel

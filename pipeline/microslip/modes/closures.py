@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..body import GROUND, BodySettings, Closure
 from ..data import Array, ContactState, Indices, Material, Mesh, UserError
-from ..eigen import DirectSolver
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
+from ..linalg.eigen import DirectSolver
+from ..settings.body import GROUND, BodySettings, Closure
 from .boundary import require_face
 from .equilibrium import BodyModel, StaticState, equilibrium
 

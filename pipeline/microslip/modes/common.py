@@ -31,8 +31,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import eigen
 from ..data import Array, NotConverged
+from ..linalg import eigen
 
 SPAN = 1e-12
 """Directions of the union of shapes whose squared M-norm is a smaller share than this are rounding."""

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import eigen
-from ..body import BodySettings
 from ..data import (
     Array,
     Compliance,
@@ -25,8 +23,10 @@ from ..data import (
 from ..fem.contact import coupled_points
 from ..fem.discretise import Discretisation, discretise, free_upper
 from ..fem.operators import per_block
-from ..gyroscopic import Certified, gyroscopic_modes
+from ..linalg import eigen
+from ..linalg.gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
+from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows, with_centrifugal
 from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
@@ -37,15 +37,7 @@ from .invariants import inertia_invariants, stiffening_operators, with_stiffenin
 from .preload import pressed_modes, pressed_state
 from .run_up import run_up_terms
 from .sector import Sector, cut_faces, make_sector
-from .solution import (
-    Searched,
-    Solution,
-    held_compliance,
-    reduced_solution,
-    searched,
-    with_spares,
-    without_spares,
-)
+from .solution import Searched, Solution, held_compliance, reduced_solution, searched, with_spares, without_spares
 from .spectrum import make_pencil
 from .stress import gauss_set, nodal_set
 from .unconstrained import refuse_unlinked_parts

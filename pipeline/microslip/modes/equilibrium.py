@@ -14,7 +14,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices, Material, NotConverged, UserError
-from ..eigen import DirectSolver, Unstable, symmetric_product
 from ..elasticity import pushed, strain_tensor
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
@@ -33,6 +32,7 @@ from ..fem.operators import (
     tangent_tensor,
     tangent_tensor_slope,
 )
+from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
 from .closing import Closing
 
 Report = Callable[[str], None]

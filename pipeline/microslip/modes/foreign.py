@@ -10,11 +10,11 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
-from .. import canonical, eigen
-from ..body import BodySettings
 from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual, UserError
 from ..frames import skew
+from ..linalg import canonical, eigen
 from ..reduction import Reduced, stuck
+from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from .boundary import AXES, check_held, require_face

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Array, Invariants, ModalGroup, NotConverged
-from ..eigen import DirectSolver
 from ..fem.operators import displacement_gradient, green_strain, stress_stiffness
+from ..linalg.eigen import DirectSolver
 from . import rigid
 from .equilibrium import BodyModel, StaticState, stress_of
 from .spectrum import make_pencil, rigid_shift

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .. import eigen
-from ..body import BodySettings
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import Discretisation, discretise, free_upper
+from ..linalg import eigen
+from ..settings.body import BodySettings
 from .body_rows import INTERFACE_LABELS, BodyRows, body_rows
 from .boundary import fixed_dofs, materials_of
 from .equilibrium import make_model

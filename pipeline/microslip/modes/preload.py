@@ -17,10 +17,10 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from .. import eigen
 from ..data import Array, Indices, UserError
 from ..fem.contact import Grip, cut_pair, grip
 from ..fem.discretise import FreeUpper, free_upper
+from ..linalg import eigen
 from . import rigid
 from .equilibrium import BodyModel, StaticState, equilibrium
 

@@ -12,9 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .. import eigen
-from ..body import BodySettings
-from ..condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
 from ..data import Array, Indices, Mesh
 from ..fem.contact import Grip, contact_matrix
 from ..fem.cyclic import (
@@ -27,6 +24,9 @@ from ..fem.cyclic import (
     sector_unknowns,
 )
 from ..fem.discretise import Discretisation
+from ..linalg import eigen
+from ..linalg.condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
+from ..settings.body import BodySettings
 from .body_rows import BodyRows
 from .boundary import refuse_uncyclic, require_face
 from .equilibrium import BodyModel, StaticState

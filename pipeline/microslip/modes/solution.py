@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .. import canonical, eigen
-from ..body import BodySettings
-from ..coordinates import held
 from ..data import Array, Indices, UserError
 from ..fem.discretise import FreeUpper
+from ..linalg import canonical, eigen
 from ..mesh import longest_over_shortest
+from ..reduced.coordinates import held
 from ..reduction import METHODS, Problem, Reduced, stuck
+from ..settings.body import BodySettings
 from . import rigid
 from .body_rows import BodyRows
 from .common import SPARE

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .. import eigen
-from ..body import BodySettings
 from ..data import Array, Indices
 from ..fem.discretise import FreeUpper
+from ..linalg import eigen
+from ..settings.body import BodySettings
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
 

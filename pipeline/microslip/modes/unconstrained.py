@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import eigen
-from ..body import BodySettings
 from ..data import Array, Indices, Mesh, UserError
+from ..linalg import eigen
 from ..mesh import part_numbers
+from ..settings.body import BodySettings
 from . import rigid
 from .equilibrium import BodyModel
 from .preload import not_resisted, touching_now

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..data import Array, ModalBasis, UserError
 from ..exchange import vtu
+from ..files.store import write_text
 from ..modes.stress import von_mises
-from ..ring import replicate, sector_rotation
-from ..store import write_text
+from ..ring.expansion import replicate, sector_rotation
 from .fatigue import MaterialLimits, vibration_margin
 from .motion import Motion, at_time, displacement, longest
 from .stress import cycle_stress

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..campbell import track_basis
-from ..coordinates import basis_in_modes
 from ..data import ModalBasis, ModalGroup
-from ..resonances import eigenmodes
-from ..ring import multiplicity
-from ..store import complete_or_absent
+from ..files.store import complete_or_absent
+from ..modes.campbell import track_basis
+from ..reduced.coordinates import basis_in_modes
+from ..ring.expansion import multiplicity
+from ..ring.resonances import eigenmodes
 from . import plots
 from .scene import quiet_vtk
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..coordinates import in_modes
-from ..correlation import Comparison, Pair, measured_directions, nearest_points
 from ..data import Array, ModalBasis, ModalGroup
+from ..reduced.coordinates import in_modes
+from ..reduced.correlation import Comparison, Pair, measured_directions, nearest_points
 from ..topology import CELL_TYPES
 from . import plots
 from .lettering import INK, captioned, scaled, sheet, side_by_side

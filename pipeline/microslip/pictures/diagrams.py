@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campbell import Tracks
 from ..data import Array, ModalBasis
-from ..neighbours import closed_gap, stuck
-from ..resonances import (
+from ..modes.campbell import Tracks
+from ..ring.expansion import FORWARD, STANDING, aliased
+from ..ring.neighbours import closed_gap, stuck
+from ..ring.resonances import (
     Families,
     Margin,
     Resonance,
@@ -27,7 +28,6 @@ from ..resonances import (
     wave_tracks,
     zigzag,
 )
-from ..ring import FORWARD, STANDING, aliased
 from .plots import COLOURS, _end_labels, _figure, _order_label, _per_minute, _per_second, _plain, _save
 
 if TYPE_CHECKING:

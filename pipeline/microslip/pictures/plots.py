@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
 from ..data import Array, ContactState, ModalBasis, ModalGroup
-from ..store import complete_or_absent
-from ..truncation import Coordinate, coordinates, percent
+from ..files.store import complete_or_absent
+from ..modes.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
+from ..reduced.truncation import Coordinate, coordinates, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

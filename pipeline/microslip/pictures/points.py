@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..coordinates import in_modes
 from ..data import Array, ModalBasis, ModalGroup
+from ..reduced.coordinates import in_modes
 from .plots import _figure, _save
 
 MOST = 12

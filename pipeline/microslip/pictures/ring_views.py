@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array, Indices, ModalBasis, ModalGroup
-from ..resonances import eigenmodes
-from ..ring import expand, multiplicity, sector_rotation
+from ..ring.expansion import expand, multiplicity, sector_rotation
+from ..ring.resonances import eigenmodes
 from .lettering import captioned, colour_bar, sheet, stacked
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
 from .views import AREA, STEEPEST, _map, at_speed, hertz

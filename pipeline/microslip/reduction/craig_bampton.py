@@ -14,9 +14,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from .. import eigen
-from ..canonical import signs
 from ..data import Array, UserError
+from ..linalg import eigen
+from ..linalg.canonical import signs
 from .problem import Problem, Reduced, diagonalised, hermitian, own_modes, without_modes
 
 

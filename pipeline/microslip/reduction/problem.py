@@ -8,9 +8,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..canonical import signs
 from ..data import Array, Indices, UserError
-from ..eigen import Pencil
+from ..linalg.canonical import signs
+from ..linalg.eigen import Pencil
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ..data import Array
-from ..eigen import Pencil
+from ..linalg.eigen import Pencil
 from .problem import Reduced, hermitian, own_modes, without_modes
 
 COUNT = 3  # frequencies that are told

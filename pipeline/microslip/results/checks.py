@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..basis.checks import Check
-from ..compliance import statics_beside
 from ..data import Array, ModalBasis
 from ..operating.motion import read_out
+from ..reduced.compliance import statics_beside
 from ..units import counted, percent
 from .files import CONVERGED, Response, Series
 

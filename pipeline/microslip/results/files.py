@@ -11,12 +11,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..basis.hdf5 import IMAGINARY, create, put, seal, seal_state
-from ..coordinates import first_modes, in_modes
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
-from ..hostile import HostileFile, inspect, trial
+from ..files.hdf5 import IMAGINARY, create, put, seal, seal_state
+from ..files.hostile import HostileFile, inspect, trial
+from ..files.store import complete_or_absent, ordinary
 from ..operating.motion import Motion, motion_of
-from ..store import complete_or_absent, ordinary
+from ..reduced.coordinates import first_modes, in_modes
 from .journal import is_journal, read_journal
 
 FORMAT = "microslip-response"
@@ -163,7 +163,7 @@ def _names(series: Sequence[Series]) -> str:
 
 def _groups(body: Body, basis: ModalBasis) -> list[ModalGroup]:
     if body.speed < 0:
-        from ..speed_range import basis_at
+        from ..modes.speed_range import basis_at
 
         basis = basis_at(basis, body.rpm)
     known = {k: basis.groups[max(body.speed, 0), k] for k, _ in body.harmonics}

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, UserError
-from ..store import open_to_append, ordinary, refused
+from ..files.store import open_to_append, ordinary, refused
 
 FORMAT = "microslip-points"
 FORMAT_VERSION = "0.1"

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import INTERFACE_ROWS, Array, ComplexArray, ModalGroup, Rows, UserError
-from ..mistakes import bounded
+from ..settings.mistakes import bounded
 
 if TYPE_CHECKING:
     from ..contact.patch import Patch

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ..data import Array, ModalGroup, UserError
-from ..ring import BACKWARD, FORWARD
-from ..store import ordinary
+from ..files.store import ordinary
+from ..ring.expansion import BACKWARD, FORWARD
 from .assembly import Member
 from .excitation import Turning, direction, index_of
 

@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from ..data import CENTRIFUGAL, Array, ComplexArray, ModalGroup, UserError
-from ..ring import BACKWARD, FORWARD, STANDING
+from ..ring.expansion import BACKWARD, FORWARD, STANDING
 from .assembly import Load, Ring
 
 Turning = Literal[1, -1]

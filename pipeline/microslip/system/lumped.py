@@ -20,7 +20,10 @@ import numpy as np
 import scipy.linalg
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..body import (
+from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
+from ..frames import skew
+from ..linalg.canonical import signs, turn_clusters
+from ..settings.body import (
     Direction,
     Model,
     Name,
@@ -40,10 +43,7 @@ from ..body import (
     override,
     validate,
 )
-from ..canonical import signs, turn_clusters
-from ..data import INTERFACE_ROWS, Array, Compliance, Interface, Mesh, ModalBasis, ModalGroup, Rows, UserError
-from ..frames import skew
-from ..mistakes import bounded
+from ..settings.mistakes import bounded
 
 GROUND = "ground"
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

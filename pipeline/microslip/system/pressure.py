@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..data import Array, ComplexArray, Interface, ModalGroup, Rows, UserError
+from ..files.store import ordinary
 from ..mesh import UNITS, point_data
-from ..store import ordinary
 from .assembly import Load, Member
 
 COLUMNS = ("x", "y", "z", "p_real", "p_imag")

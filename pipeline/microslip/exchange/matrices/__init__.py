@@ -11,14 +11,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...data import Array, Indices, Matrices, Mesh, UserError
-from ...store import ordinary
+from ...files.store import ordinary
 from ...units import SYSTEMS, usual_system
 from . import calculix, hdf5, market, matlab, nastran
 from .found import Found, Unreadable, pick
 from .nodes import read_dofs, read_nodes
 
 if TYPE_CHECKING:
-    from ...body import MatrixFiles
+    from ...settings.body import MatrixFiles
 
 READERS: dict[str, ModuleType] = {
     ".mtx": market, ".mm": market, ".mat": matlab, ".h5": hdf5, ".hdf5": hdf5, ".op4": nastran, ".pch": nastran,

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...data import Array, Indices, UserError
-from ...mistakes import is_number
+from ...settings.mistakes import is_number
 
 LARGEST = 50_000_000
 """Rows at most: more is a damaged header."""

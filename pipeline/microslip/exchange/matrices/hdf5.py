@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import scipy.sparse as sp
 
-from ...hostile import HostileFile, read_hdf5
+from ...files.hostile import HostileFile, read_hdf5
 from .found import DENSE, Found, Unreadable, square
 
 _WAYS = (("row", "col", "data"), ("indptr", "indices", "data"), ("jc", "ir", "data"))

@@ -7,7 +7,7 @@ from typing import Any
 
 import h5py
 
-from ...hostile import tried
+from ...files.hostile import tried
 from . import hdf5
 from .found import DENSE, Found, Unreadable, square
 

@@ -1,0 +1,134 @@
+"""Files of unknown origin: what they must not hold, and a process of its own in which damaged ones may crash."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+_DEPTH, _OBJECTS, _EXPANSION = 12, 200_000, 64
+
+
+class HostileFile(ValueError):
+    """Content that no file of numbers needs and that could harm the reader."""
+
+
+def inspect(file: h5py.File) -> None:
+    """Look at every object before any data is read.
+
+    Raises:
+        HostileFile: links that leave the file or run in circles, types other than numbers and fixed-length text,
+            data held elsewhere, more data than a file of this size can hold.
+    """
+    allowed = _EXPANSION * max(Path(file.filename).stat().st_size, 1 << 14)
+    _inspect_group(file, "", (), [allowed, _OBJECTS])
+
+
+def _inspect_group(group: h5py.Group, where: str, above: tuple[Any, ...], budget: list[int]) -> None:
+    here = h5py.h5o.get_info(group.id).addr
+    if here in above or len(above) > _DEPTH:
+        raise HostileFile(f"{where or '/'} contains itself or is nested too deeply")
+    for name in group:
+        place = f"{where}/{name}"
+        budget[1] -= 1
+        if budget[1] < 0:
+            raise HostileFile("there are too many objects")
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise HostileFile(f"{place} is a link to another place")
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            _inspect_group(item, place, (*above, here), budget)
+        elif isinstance(item, h5py.Dataset):
+            _inspect_dataset(item, place, budget)
+        else:
+            raise HostileFile(f"{place} is neither group nor dataset")
+
+
+def _inspect_dataset(item: h5py.Dataset, place: str, budget: list[int]) -> None:
+    if item.dtype.base.kind not in "fiuS":
+        raise HostileFile(f"{place} holds neither numbers nor fixed-length text")
+    if item.shape is None or item.is_virtual or item.external:
+        raise HostileFile(f"{place} holds no data of its own")
+    budget[0] -= int(np.prod(item.shape, dtype=object)) * item.dtype.itemsize
+    if budget[0] < 0:
+        raise HostileFile(f"{place} claims more data than the file can hold")
+
+
+def read_hdf5(path: Path, action: Callable[[h5py.File], Any]) -> Any:
+    """What `action` makes of a file of unknown origin.
+
+    Raises:
+        HostileFile: hostile content, no HDF5 file, or damage in whatever way it shows. The text leaves out the file.
+    """
+    if trouble := tried(path, _READ_ALL):
+        raise HostileFile(f"it is damaged (HDF5 {trouble} on it)")
+    try:
+        with h5py.File(path, "r") as file:
+            inspect(file)
+            return action(file)
+    except HostileFile:
+        raise
+    except Exception as error:  # HDF5 raises whatever it meets
+        raise HostileFile(f"it is damaged or no HDF5 file ({' '.join(str(error).split())[:100]})") from error
+
+
+def tried(path: Path, code: str) -> str:
+    """`trial`, once for each state of a file."""
+    return _tried(path.resolve(), code, path.stat().st_mtime_ns, path.stat().st_size)
+
+
+@cache
+def _tried(path: Path, code: str, changed: int, size: int) -> str:
+    return trial(code, path)
+
+
+_READ_ALL = """
+import h5py
+from microslip.files.hostile import inspect
+with h5py.File(path, "r") as file:
+    inspect(file)
+    file.visititems(lambda name, item: item[()] if isinstance(item, h5py.Dataset) else None)
+"""
+
+_GUARD = """
+import sys
+from pathlib import Path
+path, memory, source, code = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3], sys.argv[4]
+sys.path.insert(0, source)
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+except (ImportError, ValueError, OSError):
+    pass  # not on Windows
+try:
+    exec(code)
+except MemoryError:
+    sys.exit(7)
+except Exception:
+    pass
+"""
+
+
+def trial(code: str, path: Path, seconds: float = 20.0) -> str:
+    """Run `code` on a file (it sees ``path``) in a process of its own, whatever becomes of it.
+
+    Returns:
+        Nothing if the process came to an end, with a result or a Python exception; else what happened.
+    """
+    size = path.stat().st_size
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    words = [str(path.resolve()), str((4 << 30) + 100 * size), str(Path(__file__).parents[2]), code]
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _GUARD, *words], capture_output=True, env=environment, timeout=seconds + size / 1e7
+        )
+    except subprocess.TimeoutExpired:
+        return "does not come to an end"
+    return {0: "", 7: "wants too much memory"}.get(done.returncode, "crashes")

@@ -1,0 +1,1 @@
+"""A whole ring from one cyclic sector: expansion, neighbours, what excites it."""

@@ -1,0 +1,844 @@
+"""body.toml: what a person may write about one body, checked, with every mistake named by its key.
+
+`load_body` returns the settings in SI: every length of the file, given in `length_unit`, has become metres. The
+build and CAD meshers are handed the file's own numbers (`BodySettings.raw`), in the file's own unit.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
+
+from ..data import Array, Material, UserError
+from ..elasticity import isotropic, orthotropic, turned_strain
+from ..files.store import ordinary
+from ..mesh import UNITS
+from .mistakes import validate
+
+_LENGTH = "length"  # metadata that marks a number as a length in the file's unit
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _finite_vector(value: Any) -> Any:
+    return tuple(map(_float, value)) if isinstance(value, list) else value
+
+
+def _float(value: Any) -> Any:
+    """Whole numbers stand for numbers; true and false do not."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("must be a whole number, not true or false")
+    return value
+
+
+def _nodal_diameters(value: Any) -> Any:
+    if value == "all":
+        return value
+    listed = value if isinstance(value, list | tuple) else [None]
+    if any(isinstance(v, bool) or not isinstance(v, int) or v < 0 for v in listed):
+        raise ValueError('must be "all" or a list of whole numbers, none negative; write [0, 3] for 0 and 3')
+    return tuple(value)
+
+
+def has_length(value: tuple[float, ...]) -> tuple[float, ...]:
+    """A direction as it is, if it is one.
+
+    Raises:
+        ValueError: it has no length.
+    """
+    if not any(value):
+        raise ValueError("a direction must not be [0, 0, 0]")
+    of_sensible_size(max(map(abs, value)))
+    return value
+
+
+def of_sensible_size(value: float) -> float:
+    """A number as it is, if its square and products with others neither overflow nor vanish, as no quantity's do.
+
+    Raises:
+        ValueError: they do.
+    """
+    if value and math.isfinite(value) and not 1 / BEYOND <= abs(value) <= BEYOND:
+        raise ValueError(f"{value:g} is beyond all bounds; write 0, or a number between {1 / BEYOND:g} and {BEYOND:g}")
+    return value
+
+
+def not_too_large(value: float) -> float:
+    """A component of a vector as it is, if it is small enough; what is left of zero by rounding is none too small.
+
+    Raises:
+        ValueError: it is larger than any quantity.
+    """
+    return of_sensible_size(value) if abs(value) > 1 else value
+
+
+BEYOND = 1e30
+"""Size of a number, in any unit that files are written in, that is a mistake; its inverse too."""
+
+
+def damping_ratio(value: float) -> float:
+    """A damping ratio as it is, if a vibration with it swings at all.
+
+    Raises:
+        ValueError: it does not.
+    """
+    if not 0 <= value < 1:
+        raise ValueError(f"a damping ratio of {value:g} must lie below 1 and not below 0; 0.01 is 1 % of the critical")
+    return value
+
+
+MOST_FRICTION = 5.0
+"""Rubber on a rough road reaches 2 to 4, metals in air stay below 2: what is larger is a percentage or an angle."""
+
+
+def _friction(value: float) -> float:
+    if value > MOST_FRICTION:
+        raise ValueError(
+            f"a friction coefficient of {value:g} must not be greater than {MOST_FRICTION:g}; 0.3 is usual of dry "
+            "metals, and a contact sticks if it is pressed harder"
+        )
+    return value
+
+
+NodalDiameters = Annotated[Literal["all"] | tuple[int, ...], BeforeValidator(_nodal_diameters)]
+Number = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(of_sensible_size)]
+Component = Annotated[float, BeforeValidator(_float), Field(allow_inf_nan=False), AfterValidator(not_too_large)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Ratio = Annotated[NotNegative, AfterValidator(damping_ratio), Field(lt=1)]
+Coefficient = Annotated[NotNegative, AfterValidator(_friction), Field(le=MOST_FRICTION)]
+Length = Annotated[Number, _LENGTH]
+PositiveLength = Annotated[Positive, _LENGTH]
+Vector = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector)]
+Direction = Annotated[
+    tuple[Component, Component, Component], BeforeValidator(_finite_vector), AfterValidator(has_length)
+]
+Point = Annotated[tuple[Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH]
+Box = Annotated[
+    tuple[Component, Component, Component, Component, Component, Component], BeforeValidator(_finite_vector), _LENGTH
+]
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)]
+Positives = Annotated[tuple[Positive, ...], BeforeValidator(_finite_vector)]
+Ratios = Annotated[tuple[Ratio, ...], BeforeValidator(_finite_vector)]
+Directions = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
+FaceName = Annotated[str, Field(min_length=1, max_length=200)]  # as other programs name their sets
+
+
+Byte = Annotated[int, Field(ge=0, le=255)]
+NodeNumber = Annotated[int, Field(ge=1)]
+EngineOrder = Annotated[int, Field(ge=1, le=10000)]
+
+
+class Model(BaseModel):
+    """Strict, frozen, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+def only_one(model: Model, *keys: str, what: str = "") -> None:
+    """Refuse a section that does not give exactly one of some keys; an empty text is none.
+
+    Args:
+        what: who needs it, if the section's name does not tell.
+
+    Raises:
+        ValueError: none, or several.
+    """
+    given = [k for k in keys if getattr(model, k) not in (None, "")]
+    if len(given) != 1:
+        has, do = (" and ".join(given), "keep") if given else ("none", "give")
+        raise ValueError(f"{what}needs exactly one of {', '.join(keys)}, and has {has}; {do} one")
+
+
+def named_once(settings: Any, *groups: str) -> None:
+    """Refuse two entries of lists of tables under one name: the second would take the place of the first.
+
+    Args:
+        groups: keys of lists whose entries have a name; several in one text, apart by blanks, share their names.
+
+    Raises:
+        ValueError: with the list and the name.
+    """
+    for group in groups:
+        names: set[str] = set()
+        for key in group.split():
+            for item in getattr(settings, key):
+                if item.name in names:
+                    raise ValueError(f"{key}: the name '{item.name}' is used twice; rename one")
+                names.add(item.name)
+
+
+GROUND = "ground"
+"""Name of the rigid plane a face may press on."""
+
+
+class FaceRule(Model):
+    """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways."""
+
+    name: Name
+    label: str | None = None
+    colour: Annotated[tuple[Byte, Byte, Byte], BeforeValidator(_tuple)] | None = None
+    box: Box | None = None
+    surfaces: Annotated[tuple[int, ...], BeforeValidator(_tuple)] | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> FaceRule:
+        only_one(self, "label", "colour", "box", "surfaces", what="a face ")
+        return self
+
+
+UnitSystem = Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"]
+
+
+class MatrixFiles(Model):
+    """Stiffness and mass that another program has assembled, the node and direction of every row, and positions.
+
+    A file that holds several matrices is written FILE#NAME.
+    """
+
+    stiffness: str
+    mass: str
+    damping: str | None = None
+    gyroscopic: str | None = None
+    dofs: str | None = None
+    nodes: str
+    units: UnitSystem | None = None
+    grounded: bool = False
+    superelement: bool = False
+    sets: dict[FaceName, Annotated[tuple[NodeNumber, ...], BeforeValidator(_tuple)]] = Field(default_factory=dict)
+
+
+class Geometry(Model):
+    """Where the body comes from: one of build (a script), cad (STEP, BREP, IGES), mesh (a file) or matrices."""
+
+    build: str | None = None
+    cad: str | None = None
+    mesh: str | None = None
+    matrices: MatrixFiles | None = None
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Geometry:
+        only_one(self, "build", "cad", "mesh", "matrices")
+        return self
+
+
+class Meshing(Model):
+    """Target element size (length_unit) and local sizes by face name."""
+
+    size: Annotated[Positive | None, _LENGTH] = None
+    order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
+    local: dict[str, Positive] = Field(default_factory=dict)
+
+
+def _at_right_angles(axes: Array) -> bool:
+    with np.errstate(all="ignore"):  # a zero or immense axis gives NaN, which compares false
+        unit = axes / np.linalg.norm(axes, axis=1)[:, None]
+        return bool(np.abs(unit @ unit.T - np.eye(3)).max() < 1e-6)
+
+
+class MaterialSettings(Model):
+    """Isotropic (young, poisson) or orthotropic (young, poisson, shear as three numbers each, with axes)."""
+
+    name: str = "material"
+    density: Positive
+    young: Positive | Positives
+    poisson: Annotated[float, BeforeValidator(_float), Field(gt=-1, lt=0.5)] | Numbers
+    shear: Positives | None = None
+    axes: Annotated[tuple[Vector, Vector, Vector], BeforeValidator(_finite_vector)] | None = None
+    expansion: Number | Numbers = 0.0
+    temperature: Positives | None = None
+    modulus_factor: Positives | None = None
+    unusual: bool = False
+
+    @model_validator(mode="after")
+    def _consistent(self) -> MaterialSettings:
+        if isinstance(self.young, tuple):
+            for key in ("young", "poisson", "shear"):
+                value = getattr(self, key)
+                if not isinstance(value, tuple) or len(value) != 3:
+                    raise ValueError(f"an orthotropic material needs three numbers for {key}")
+        elif self.shear is not None or isinstance(self.poisson, tuple):
+            raise ValueError("an isotropic material has one young, one poisson and no shear")
+        if (self.temperature is None) != (self.modulus_factor is None):
+            raise ValueError("temperature and modulus_factor come together")
+        if self.temperature is not None:
+            if not self.temperature or len(self.temperature) != len(self.modulus_factor or ()):
+                raise ValueError("temperature and modulus_factor must have the same length")
+            if any(b <= a for a, b in zip(self.temperature[:-1], self.temperature[1:], strict=True)):
+                raise ValueError("temperature must rise from entry to entry")
+        if isinstance(self.expansion, tuple) and len(self.expansion) != 3:
+            raise ValueError("expansion is one number or three along the material axes")
+        if self.axes is not None and not _at_right_angles(np.array(self.axes)):
+            raise ValueError("axes must be three directions at right angles")
+        with np.errstate(all="ignore"):
+            built = self.material()
+        if not (np.isfinite(built.elasticity).all() and np.isfinite(built.expansion).all()):
+            raise ValueError("young, poisson, shear and expansion give no finite stiffness")
+        return self
+
+    def material(self) -> Material:
+        """The `Material` in body axes."""
+        axes = None if self.axes is None else np.array([np.array(a) / np.linalg.norm(a) for a in self.axes])
+        if isinstance(self.young, tuple):
+            try:
+                C = orthotropic(np.array(self.young), np.array(self.poisson), np.array(self.shear), axes)
+            except ValueError as error:
+                raise ValueError(f"the {error}; lower poisson's ratios or check the order of the moduli") from error
+        else:
+            assert isinstance(self.poisson, float)
+            C = isotropic(self.young, self.poisson)
+        alpha = np.broadcast_to(np.asarray(self.expansion, dtype=float), 3)
+        voigt = turned_strain(alpha, axes)
+        table = None
+        if self.temperature is not None:
+            table = np.column_stack([self.temperature, self.modulus_factor or ()])
+        return Material(self.density, C, voigt, table, self.name)
+
+
+class ForeignMaterial(Model):
+    """The material stands elsewhere: in the mesh file itself, or in the matrices, which hold it already.
+
+    units: of the mesh file's numbers; those that go with length_unit if not given.
+    """
+
+    source: Annotated[Literal["mesh", "matrices"], Field(alias="from")]
+    units: UnitSystem | None = None
+    unusual: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"from the {self.source}"
+
+
+def _material_kind(value: Any) -> str:
+    return "foreign" if isinstance(value, ForeignMaterial) or (isinstance(value, dict) and "from" in value) else "own"
+
+
+AnyMaterial = Annotated[
+    Annotated[MaterialSettings, Tag("own")] | Annotated[ForeignMaterial, Tag("foreign")], Discriminator(_material_kind)
+]
+
+
+class Temperature(Model):
+    """Stress-free (reference) and actual temperature: uniform, a CSV file of x, y, z, T, or those of the mesh file."""
+
+    source: Annotated[Literal["mesh"] | None, Field(alias="from")] = None
+    scale: Literal["C", "K"] = "C"
+    reference: Positive = 293.15
+    uniform: Positive | None = None
+    file: str | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Temperature:
+        if self.uniform is not None and self.file is not None:
+            raise ValueError("give uniform or file, not both")
+        if self.source and (self.uniform is not None or self.file is not None or "reference" in self.model_fields_set):
+            raise ValueError('from = "mesh" takes both temperatures from the mesh file; remove the others')
+        return self
+
+    @property
+    def zero(self) -> float:
+        """K of the temperature 0 in the mesh file."""
+        return 273.15 if self.scale == "C" else 0.0
+
+
+class Support(Model):
+    """A face, or a point set, whose displacement is held in the named body directions."""
+
+    face: FaceName
+    directions: Directions = "xyz"
+    rotations: bool = False
+
+
+class Cyclic(Model):
+    """The body is one of `sectors` alike round the rotation axis; right is left turned by 2 pi / sectors."""
+
+    sectors: Annotated[int, Field(ge=3, le=1000)]
+    left: FaceName = "cyclic_left"
+    right: FaceName = "cyclic_right"
+    nodal_diameters: NodalDiameters = "all"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Cyclic:
+        if self.left == self.right:
+            raise ValueError("left and right must be two faces")
+        if self.nodal_diameters != "all":
+            wanted = self.nodal_diameters
+            if not wanted or len(set(wanted)) < len(wanted):
+                raise ValueError('nodal_diameters must name each of them once, or be "all"')
+            if max(wanted) > self.sectors // 2:
+                raise ValueError(
+                    f"nodal_diameters: {max(wanted)} is more than {self.sectors} sectors can have "
+                    f"({self.sectors // 2}); higher orders alias onto these"
+                )
+        return self
+
+    @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Nodal diameters asked for, ascending."""
+        every = range(self.sectors // 2 + 1)
+        return tuple(every) if self.nodal_diameters == "all" else tuple(sorted(self.nodal_diameters))
+
+
+class Rotation(Model):
+    """Rotation about an axis and the speeds to analyse.
+
+    prestress: ``nonlinear`` (equilibrium at speed by Newton, then the tangent), ``linear`` (one linear solution),
+    ``none`` (K as the book prints it in Eq. (2.3-29), with the softening term only: frequencies fall with speed).
+    """
+
+    axis: Direction = (0.0, 1.0, 0.0)
+    point: Point = (0.0, 0.0, 0.0)
+    speeds_rpm: Numbers = (0.0,)
+    prestress: Literal["nonlinear", "linear", "none"] = "nonlinear"
+    spin_softening: bool = True
+    gyroscopic: bool = True
+    engine_orders: Annotated[tuple[EngineOrder, ...], BeforeValidator(_tuple)] = ()
+    range_rpm: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)] | None = None
+    range_points: Annotated[int, Field(ge=2, le=2000)] = 50
+    range_tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-8, le=1e-2)] = 1e-4
+    range_stress: bool = False
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Rotation:
+        if not self.speeds_rpm or min(self.speeds_rpm) < 0 or list(self.speeds_rpm) != sorted(set(self.speeds_rpm)):
+            raise ValueError("speeds_rpm must be one or more rising numbers, none negative")
+        if self.range_rpm is not None and self.range_rpm[0] >= self.range_rpm[1]:
+            raise ValueError("range_rpm must be two speeds, the second above the first; for one speed use speeds_rpm")
+        return self
+
+
+class Load(Model):
+    """A static load that acts at every speed: gravity (m/s2), pressure on a face (Pa), force on a face or point (N)."""
+
+    kind: Literal["gravity", "pressure", "force"]
+    face: FaceName | None = None
+    point: Point | None = None
+    value: Number | None = None
+    vector: Vector | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Load:
+        if self.kind == "pressure" and (self.face is None or self.value is None):
+            raise ValueError("a pressure needs face and value (Pa, positive pushes into the body)")
+        if self.kind == "gravity" and self.vector is None:
+            raise ValueError("gravity needs vector (m/s2)")
+        if self.kind == "force" and (self.vector is None or (self.face is None) == (self.point is None)):
+            raise ValueError("a force needs vector (N) and either face or point")
+        return self
+
+
+class Closure(Model):
+    """Two faces that may touch in the static state, without friction; Newton finds where they do and how hard.
+
+    against: the face on the other side, or ``ground``, a rigid plane (through `point` with `normal` towards the body;
+    if not given, through the middle of the face).
+    """
+
+    name: Name
+    face: FaceName
+    against: FaceName
+    sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    interference: Length = 0.0
+    point: Point | None = None
+    normal: Direction | None = None
+    modes: Literal["open", "closed"] = "open"
+    slide: PositiveLength | None = None
+    penalty: Positive | None = None
+
+    @model_validator(mode="after")
+    def _sides(self) -> Closure:
+        if self.against == GROUND and self.sector_shift:
+            raise ValueError("sector_shift: the ground has no sectors; write 0 or name a face in against")
+        if self.against != GROUND and (self.point or self.normal):
+            raise ValueError('point and normal describe the ground; write against = "ground" or leave them out')
+        if self.against == self.face and not self.sector_shift:
+            raise ValueError("face and against are the same face of the same body; correct one, or give sector_shift")
+        return self
+
+
+class Bolt(Model):
+    """A tensioned bolt: `preload` (N) presses a face (under its head) and the face against it (under its nut).
+
+    against: ``ground`` for a bolt into something rigid, or the other half of a symmetric joint.
+    """
+
+    name: Name
+    face: FaceName
+    against: FaceName = "ground"
+    preload: Positive
+
+
+class InterfaceSettings(Model):
+    """A contact patch with the frame n, t1, t2; n points outwards."""
+
+    name: Name
+    face: FaceName
+    role: Literal["left", "right", "ground", "bolt", "load"] = "ground"
+    partner: str = ""
+    sector_shift: Annotated[Literal[-1, 0, 1], BeforeValidator(_whole)] = 0
+    t2: Direction | None = None
+    normal: Direction | None = None
+    coordinates: Literal["rigid", "characteristic"] = "rigid"
+    count: Annotated[int, Field(ge=0, le=500)] = 0
+
+    @model_validator(mode="after")
+    def _counted(self) -> InterfaceSettings:
+        if self.coordinates == "characteristic" and (not self.count or self.role == "load"):
+            raise ValueError('coordinates = "characteristic" needs count, the number of shapes, and no role "load"')
+        if self.coordinates == "rigid" and self.count:
+            raise ValueError('count belongs to coordinates = "characteristic"; a rigid patch has six coordinates')
+        return self
+
+
+class Excitation(Model):
+    """Unit load: a force (N) at a point or over a face, `pressure` on a face (1 Pa), or `centrifugal` (1 rad2/s2)."""
+
+    name: Name
+    point: Point | None = None
+    node: NodeNumber | None = None
+    face: FaceName | None = None
+    direction: Direction | None = None
+    pressure: bool = False
+    centrifugal: bool = False
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Excitation:
+        if self.centrifugal:
+            if any(v is not None for v in (self.point, self.node, self.face, self.direction)) or self.pressure:
+                raise ValueError("centrifugal = true acts on the whole body, about [rotation]; remove the others")
+            return self
+        only_one(self, "point", "node", "face")
+        if self.pressure and (self.face is None or self.direction is not None):
+            raise ValueError("pressure = true needs a face and no direction")
+        if not self.pressure and self.direction is None:
+            raise ValueError("needs a direction (or pressure = true)")
+        return self
+
+
+class Monitor(Model):
+    """Displacement read-out along body directions at a point."""
+
+    name: Name
+    point: Point | None = None
+    node: NodeNumber | None = None
+    directions: Directions = "xyz"
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Monitor:
+        only_one(self, "point", "node")
+        return self
+
+
+class Gauge(Model):
+    """Strain gauge: normal strain along `direction` at a point."""
+
+    name: Name
+    point: Point
+    direction: Direction
+
+
+class Modes(Model):
+    """How many modes, or up to which frequency (Hz; count is then the upper limit)."""
+
+    count: Annotated[int, Field(ge=1, le=2000)] = 20
+    max_frequency: Positive | None = None
+    certify: bool = True
+    solver: Literal["auto", "pardiso", "superlu"] = "auto"
+
+
+class Damping(Model):
+    """Modal damping: one ratio, a table of ratios per mode, or Rayleigh D = alpha M + beta K (Sextro Eq. (2.4-3))."""
+
+    ratio: Ratio | None = None
+    table: Ratios | None = None
+    alpha: NotNegative | None = None
+    beta: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Damping:
+        given = [self.ratio is not None, self.table is not None, self.alpha is not None or self.beta is not None]
+        if sum(given) > 1:
+            raise ValueError("give one of ratio, table, or alpha and beta")
+        return self
+
+    @property
+    def source(self) -> str:
+        if self.table is not None:
+            return "table"
+        if self.alpha is not None or self.beta is not None:
+            return f"rayleigh alpha={self.alpha or 0.0:g} 1/s beta={self.beta or 0.0:g} s"
+        return "ratio"
+
+    def ratios(self, omega: Array) -> Array:
+        """(m,) damping ratios D_j of Sextro Eq. (2.4-13); rigid modes get 0."""
+        safe = np.where(omega > 0, omega, np.inf)
+        if self.table is not None:
+            tail = self.table[-1] if self.table else 0.0
+            padded = [*self.table, *[tail] * len(omega)][: len(omega)]
+            return np.where(omega > 0, padded, 0.0)
+        if self.alpha is not None or self.beta is not None:
+            return 0.5 * ((self.alpha or 0.0) / safe + (self.beta or 0.0) * omega)
+        return np.where(omega > 0, self.ratio or 0.0, 0.0)
+
+
+class Output(Model):
+    """What the modal file holds beside frequencies and rows."""
+
+    shapes: bool = True
+    patch_shapes: bool = True
+    gauss: bool = True
+    nodal_stress: bool = True
+    stiffening: bool = False
+    stress_nodal_diameters: NodalDiameters = "all"
+
+    @model_validator(mode="after")
+    def _possible(self) -> Output:
+        if self.stiffening and not self.shapes:
+            raise ValueError("stiffening needs shapes = true")
+        return self
+
+    def stress_at(self, harmonic: int) -> bool:
+        """Whether strain and stress modes are wanted of a nodal diameter."""
+        return self.stress_nodal_diameters == "all" or harmonic in self.stress_nodal_diameters
+
+
+class BodySettings(Model):
+    """A whole body.toml."""
+
+    name: Name
+    description: str = ""
+    length_unit: Literal["m", "cm", "mm", "um", "in", "ft"]
+    reduction: Literal["eigenmodes", "macneal", "rubin", "craig-bampton", "dual-craig-bampton", "massless-boundary"] = (
+        "eigenmodes"
+    )
+    free: bool = False
+    geometry: Geometry
+    mesh: Meshing = Field(default_factory=Meshing)
+    material: AnyMaterial
+    temperature: Temperature = Field(default_factory=Temperature)
+    supports: Annotated[tuple[Support, ...], BeforeValidator(_tuple)] = ()
+    cyclic: Cyclic | None = None
+    rotation: Rotation = Field(default_factory=Rotation)
+    loads: Annotated[tuple[Load, ...], BeforeValidator(_tuple)] = ()
+    closures: Annotated[tuple[Closure, ...], BeforeValidator(_tuple)] = ()
+    bolts: Annotated[tuple[Bolt, ...], BeforeValidator(_tuple)] = ()
+    interfaces: Annotated[tuple[InterfaceSettings, ...], BeforeValidator(_tuple)] = ()
+    excitations: Annotated[tuple[Excitation, ...], BeforeValidator(_tuple)] = ()
+    monitors: Annotated[tuple[Monitor, ...], BeforeValidator(_tuple)] = ()
+    gauges: Annotated[tuple[Gauge, ...], BeforeValidator(_tuple)] = ()
+    modes: Modes = Field(default_factory=Modes)
+    damping: Damping = Field(default_factory=Damping)
+    output: Output = Field(default_factory=Output)
+    note: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _matrices_hold_the_material(cls, raw: Any) -> Any:
+        """Matrices need no material; it may be left out."""
+        if isinstance(raw, dict) and isinstance(given := raw.get("geometry"), dict):
+            if given.get("matrices") is not None and "material" not in raw:
+                return {**raw, "material": {"from": "matrices"}}
+        return raw
+
+    @model_validator(mode="after")
+    def _names_once(self) -> BodySettings:
+        named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges")
+        if self.geometry.matrices is not None:
+            self._only_what_matrices_can()
+        elif isinstance(self.material, ForeignMaterial):
+            if self.material.source == "matrices" or self.geometry.mesh is None:
+                raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
+        if self.closures and self.rotation.prestress != "nonlinear":
+            raise ValueError('closures: contact is found by Newton only; set rotation.prestress = "nonlinear"')
+        beyond = self.output.stress_nodal_diameters
+        if beyond != "all" and max(beyond, default=0) > (self.cyclic.sectors // 2 if self.cyclic else 0):
+            raise ValueError(
+                f"output.stress_nodal_diameters: {max(beyond)} is more than "
+                f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; correct it"
+            )
+        if self.cyclic and self.free:
+            raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
+        return self
+
+    def _only_what_matrices_can(self) -> None:
+        """Refuse what needs finite elements of ours."""
+        if not isinstance(self.material, ForeignMaterial) or self.material.source != "matrices":
+            raise ValueError("material: the matrices hold the material already; remove [material]")
+        needs = {
+            "cyclic": self.cyclic, "closures": self.closures, "bolts": self.bolts, "loads": self.loads,
+            "gauges": self.gauges, "excitations.centrifugal": any(e.centrifugal for e in self.excitations),
+            "rotation.range_rpm": self.rotation.range_rpm, "temperature.file": self.temperature.file,
+            "temperature.uniform": self.temperature.uniform, "geometry.faces": self.geometry.faces,
+            "rotation.speeds_rpm": len(self.rotation.speeds_rpm) > 1,
+        }  # fmt: skip
+        if found := [key for key, value in needs.items() if value]:
+            raise ValueError(f"{found[0]}: matrices are of one state and bring no elements for this; remove it")
+
+
+def load_toml(path: Path | str) -> dict[str, Any]:
+    """Read a TOML file (UTF-8, with or without a byte-order mark).
+
+    Raises:
+        UserError: missing, unreadable or not TOML.
+    """
+    path = Path(path)
+    try:
+        return tomllib.loads(ordinary(path).read_bytes().decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: is not UTF-8 text (byte {error.start + 1}); save it as UTF-8") from error
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is not valid TOML ({_one_line(error)}); correct that place") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, brackets without end
+        raise UserError(f"{path}: cannot be read ({_one_line(error)}); is it a settings file?") from error
+
+
+def _one_line(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return text[:1].lower() + text[1:120]
+
+
+def override(table: dict[str, Any], assignments: list[str], path: Path) -> dict[str, Any]:
+    """Apply ``key.subkey=value`` texts (value in TOML's notation, or bare text) to a settings table."""
+    for text in assignments:
+        key, equals, value = text.partition("=")
+        key = " ".join(key.split())
+        steps = [step.strip() for step in key.split(".")]
+        if not equals or not all(steps):
+            raise UserError(f"--set {key + equals}: is no setting; write --set key.subkey=value")
+        place: Any = table
+        for number, step in enumerate(steps[:-1]):
+            if isinstance(place, list):
+                place = _entry(place, step, key, path)
+            else:
+                place = place.setdefault(step, {})
+            if not isinstance(place, dict | list):
+                above = ".".join(steps[: number + 1])
+                raise UserError(f"--set {key}: '{above}' in {path} is a value, not a table; correct the key")
+        if isinstance(place, list):
+            above = ".".join(steps[:-1])
+            raise UserError(f"--set {key}: name the entry and its key; write --set {above}.NAME.KEY=value")
+        place[steps[-1]] = _parsed(value)
+    return table
+
+
+def _parsed(value: str) -> Any:
+    """A value in TOML's notation, or the bare text."""
+    try:
+        table = tomllib.loads(f"v = {value}")
+    except (ValueError, RecursionError):
+        return value.strip()
+    return table["v"] if set(table) == {"v"} else value.strip()
+
+
+_NAMES = ("name", "face", "interface", "row", "monitor")
+"""Keys by which an entry of a list may be addressed, the first it has."""
+
+
+def _entry(items: list[Any], name: str, key: str, path: Path) -> Any:
+    for number, item in enumerate(items):
+        if isinstance(item, dict) and name in (*(item.get(k) for k in _NAMES), str(number)):
+            return item
+    tables = [(number, item) for number, item in enumerate(items) if isinstance(item, dict)]
+    known = [str(next((item[k] for k in _NAMES if item.get(k)), number)) for number, item in tables]
+    raise UserError(f"--set {key}: {path} has no entry '{name}' there; choose one of {', '.join(known) or 'none'}")
+
+
+def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[BodySettings, dict[str, Any]]:
+    """Read and check a body file.
+
+    Args:
+        path: of the body.toml. assignments: ``--set`` texts.
+
+    Returns:
+        The settings in SI (lengths in metres), and the file's own table (lengths in its own unit).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    path = Path(path)
+    raw = override(load_toml(path), assignments or [], path)
+    settings = validate(BodySettings, raw, path)
+    return _to_metres(settings, UNITS[settings.length_unit]), raw
+
+
+def _to_metres(model: Any, scale: float) -> Any:
+    """Multiply every number marked as a length, at any depth."""
+    if isinstance(model, tuple):
+        return tuple(_to_metres(m, scale) for m in model)
+    if not isinstance(model, BaseModel):
+        return model
+    update = {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if _is_length(field):
+            update[name] = _scaled(value, scale)
+        elif name == "local":
+            update[name] = {k: v * scale for k, v in value.items()}
+        else:
+            update[name] = _to_metres(value, scale)
+    return model.model_copy(update=update)
+
+
+def _is_length(field: Any) -> bool:
+    return _LENGTH in field.metadata or f"'{_LENGTH}'" in str(field.annotation)
+
+
+def _scaled(value: Any, scale: float) -> Any:
+    if value is None:
+        return None
+    return tuple(v * scale for v in value) if isinstance(value, tuple) else value * scale
+
+
+def implausible(settings: BodySettings, size: float) -> list[str]:
+    """Warnings about values that suggest a unit mistake (suppressed by material.unusual = true).
+
+    Args:
+        size: largest extent of the body, m.
+    """
+    found = []
+    m = settings.material
+    if isinstance(m, MaterialSettings) and not m.unusual:
+        if not 300 <= m.density <= 25000:
+            found.append(f"material.density = {m.density:g} kg/m3 is no solid's; SI is kg/m3 (steel 7850)")
+        stiff = max(m.young) if isinstance(m.young, tuple) else m.young
+        if not 1e8 <= stiff <= 1.3e12:
+            found.append(f"material.young = {stiff:g} Pa is no structural solid's; SI is Pa (steel 2.1e11)")
+    if not 1e-3 <= size <= 50:
+        found.append(
+            f'the body is {size:g} m long; is length_unit = "{settings.length_unit}" right? '
+            "(material.unusual = true silences warnings of this kind)"
+        )
+    if settings.mesh.size is not None and settings.mesh.size > size:
+        found.append(f"mesh.size = {settings.mesh.size:g} m is more than the body's {size:g} m; is it in length_unit?")
+    return [] if m.unusual else found

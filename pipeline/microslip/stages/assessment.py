@@ -1,0 +1,356 @@
+"""What a response means for a body: the stress at its resonances, where, and how far from breaking.
+
+From a response file and the body's modal file alone, whoever computed them and when.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..data import Array, Indices, ModalBasis, UserError
+from ..harmonic_balance.sweeps import prominent
+from ..operating.fatigue import Endurance, MaterialLimits, endurance
+from ..operating.motion import Motion, amplitude, read_out
+from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
+from ..results import Response, Series
+from ..results.files import unit_of
+from ..units import METRES, Quantity
+from .stage import Report
+
+if TYPE_CHECKING:
+    from ..operating.patches import ContactMap
+    from ..progress import Report
+
+ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
+"""Limits of a case that gives none: the worst place is then that of the largest amplitude."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A local maximum of a sweep, and the range about it, between the lowest points next to it.
+
+    Attributes:
+        normal_force: N. frequency: Hz. amplitude: m, of the read-out that is drawn. range: Hz. stressed: number, in its
+            series, of the point of that range at which the body's stress amplitude is largest, stressed_at: Hz there.
+            worst: place of the body whose vibration may grow least there (largest amplitude without limits).
+    """
+
+    normal_force: float
+    frequency: float
+    amplitude: float
+    range: tuple[float, float]
+    stressed: int
+    stressed_at: float
+    worst: Endurance
+
+    def holds(self, frequency: float) -> bool:
+        """Whether a frequency (Hz) lies in its range."""
+        return self.range[0] <= frequency <= self.range[1]
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Stresses of one body in a response.
+
+    Attributes:
+        member: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
+            places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
+            None. quantity: what the read-out measures.
+    """
+
+    member: str
+    sweeps: Mapping[float, tuple[Series, Motion, Array, StressPeaks]]
+    resonances: tuple[Resonance, ...]
+    limits: MaterialLimits | None
+    quantity: Quantity = METRES
+
+    @property
+    def highest(self) -> Resonance | None:
+        """The resonance with the least margin (without limits, the most stressed one)."""
+        key = (lambda r: r.worst.vibration) if self.limits else (lambda r: -r.worst.amplitude)
+        return min(self.resonances, key=key, default=None)
+
+    def at(self, r: Resonance) -> tuple[Motion, CycleStress]:
+        """Motion and stress where a resonance stresses the body most."""
+        motion = self.sweeps[r.normal_force][1].at(r.stressed)
+        return motion, cycle_stress(motion)
+
+    def table(self) -> list[dict[str, Any]]:
+        """Rows for the terminal and the report; lengths in m, stresses in Pa."""
+        return [self._row(r) for r in self.resonances]
+
+    def _row(self, r: Resonance) -> dict[str, Any]:
+        row: dict[str, Any] = {
+            "normal_force_N": r.normal_force,
+            "frequency_Hz": r.frequency,
+            self.quantity.column("amplitude"): r.amplitude,
+        }
+        row |= {"stress_amplitude_Pa": r.worst.amplitude, "frequency_of_stress_Hz": r.stressed_at}
+        row |= {"mean_stress_Pa": r.worst.mean}
+        if self.limits is not None:
+            row["reserve_factor"] = r.worst.vibration
+        return row | {"location_mm": " ".join(f"{1e3 * x:.1f}" for x in r.worst.point)}
+
+
+def assess(
+    response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
+    only: Array | None = None, report: Report = lambda _: None,
+) -> Assessment:  # fmt: skip
+    """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
+    where the read-out is largest: another mode may stress the body on its flank.
+
+    Args:
+        monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
+            where there is one body. only: numbers of the stress places that count, all if None.
+
+    Raises:
+        UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
+    """
+    name = member or next(iter(response.bodies))
+    sweeps, found = {}, list[Resonance]()
+    for series in response.series:
+        if not len(series.key):
+            continue
+        report(f"stresses of {name}: {series.name}")
+        motion = response.motion(series, basis, name)
+        normal = float(series.parameters.get("normal_force", 0.0))
+        size = abs(series.monitor(monitor)[:, 0, 1])
+        chosen, at = drawn_points(series), tops(series, size)
+        peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+        ranges = _ranges(peaks.amplitude, chosen, series.converged, at)
+        most = [_most_stressed(motion, r, chosen, peaks, only) for r in ranges]
+        if not np.isin(most, chosen).all():
+            chosen = np.union1d(chosen, most)
+            peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+        sweeps[normal] = (series, motion, chosen, peaks)
+        for i, r, j in zip(at, ranges, most, strict=True):
+            worst = endurance(cycle_stress(motion, j), limits or ENDLESS, only)
+            f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
+            found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst))
+    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
+
+
+def _quantity(response: Response, monitor: str) -> Quantity:
+    """What an array of read-outs measures."""
+    names = {name for series in response.series for name in series.arrays}
+    return Quantity(unit_of(f"gauges/{monitor}" if f"gauges/{monitor}" in names else f"monitors/{monitor}"))
+
+
+def _ranges(stress: Array, chosen: Array, known: Array, at: Indices) -> list[Indices]:
+    """Points about each of the resonances `at`, in order, that belong to it: between where the stress (Pa, at those
+    chosen) is lowest beside it. Where the read-out is lowest another mode may stress the body most."""
+    if not len(at):
+        return []
+    points, sure = np.flatnonzero(known), known[chosen]
+    seen, stress = chosen[sure], stress[sure]
+    ends = [points[0], *at, points[-1]]
+    lows = []
+    for a, b in zip(ends[:-1], ends[1:], strict=True):
+        between = (seen >= a) & (seen <= b)
+        lows.append(seen[between][stress[between].argmin()])
+    return [points[(points >= a) & (points <= b)] for a, b in zip(lows[:-1], lows[1:], strict=True)]
+
+
+def _most_stressed(
+    motion: Motion, around: Indices, chosen: Indices, peaks: StressPeaks, only: Array | None
+) -> int:  # fmt: skip
+    """The point of a range with the largest stress amplitude: of those chosen, whose peaks are known, then of all
+    beside it."""
+    inside = np.flatnonzero(np.isin(chosen, around))
+    if len(inside):
+        k = inside[peaks.amplitude[inside].argmax()]
+        low, high = chosen[max(k - 1, 0)], chosen[min(k + 1, len(chosen) - 1)]
+        around = around[(around >= low) & (around <= high)]
+    return int(around[stress_peaks(motion.at(around), only=only, largest=False).amplitude.argmax()])
+
+
+MOST_DRAWN, BESIDE_A_PEAK = 400, 20
+"""Points of a sweep that are drawn if it has more, and how many on either side of a resonance are drawn in any case."""
+
+
+def drawn_points(series: Series) -> Array:
+    """Numbers of the points of a sweep that a curve needs."""
+    count = len(series.key)
+    chosen = np.zeros(count, dtype=bool)
+    chosen[np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)] = True
+    for i in _searched(series):
+        chosen[max(i - BESIDE_A_PEAK, 0) : i + BESIDE_A_PEAK + 1] = True
+    return np.flatnonzero(chosen)
+
+
+def _searched(series: Series) -> Indices:
+    """Points of a series that were searched for between the others."""
+    flags = series.arrays.get("peak", np.zeros(len(series.key)))
+    return np.flatnonzero((np.asarray(flags) != 0) & series.converged)
+
+
+def tops(series: Series, size: Array) -> Indices:
+    """Points of a series that are resonances: those that were searched for between the others, and of those of one
+    plateau the highest, see `sweeps.prominent`. size: (f,) m, of the read-out."""
+    points = np.flatnonzero(series.converged)
+    at = np.flatnonzero(np.isin(points, _searched(series)))
+    return points[prominent(np.asarray(size)[points], at)]
+
+
+def over_engine_order(
+    responses: Mapping[int, Response], basis: ModalBasis, member: str = "", gauge: str = "", only: Array | None = None,
+    first_harmonic: bool = False,
+) -> dict[float, tuple[Array, Array]]:  # fmt: skip
+    """Largest alternating stress of a body over the engine order, for every normal force (Sextro Figs. 5.5-4, 5.5-5).
+
+    Args:
+        responses: engine order -> response, of sweeps over the resonance. gauge: the strain of a gauge instead. only,
+            first_harmonic: see `operating.stress.stress_peaks`.
+
+    Returns:
+        Normal force (N) -> engine orders and MPa (microstrain of a gauge): curves of
+        `pictures.operating.over_engine_order_plot`. Points that did not converge do not count.
+    """
+    found: dict[float, list[tuple[int, float]]] = {}
+    for order, response in sorted(responses.items()):
+        for series in response.series:
+            motion = response.motion(series, basis, member or next(iter(response.bodies)))
+            if gauge:
+                size = 1e6 * amplitude(read_out(motion, gauge, "gauges"))[:, 0]
+            else:
+                peaks = stress_peaks(motion, only=only, first_harmonic=first_harmonic, largest=False)
+                size = 1e-6 * peaks.amplitude
+            highest = float(np.max(size, where=series.converged, initial=0.0))
+            found.setdefault(float(series.parameters.get("normal_force", 0.0)), []).append((order, highest))
+    return {n: (np.array([o for o, _ in rows]), np.array([v for _, v in rows])) for n, rows in found.items()}
+
+
+def has_stresses(basis: ModalBasis, response: Response, member: str = "") -> bool:
+    """Whether every group that a response needs has stress modes at the nodes and shapes."""
+    body = response.bodies[member or next(iter(response.bodies))]
+    for k in {k for k, _ in body.harmonics}:
+        group = next((g for (s, h), g in basis.groups.items() if h == k and s in (body.speed, 0)), None)
+        if group is None or "nodes" not in group.stresses:
+            return False
+    return True
+
+
+# pictures and files ------------------------------------------------------------------------------------------------
+
+
+def draw(
+    found: Assessment, basis: ModalBasis, case: str, folder: Path, scenes: bool = True,
+    maps: Mapping[str, list[ContactMap]] | None = None,
+) -> dict[str, Path]:  # fmt: skip
+    """Stress over frequency and normal force, the most endangered body, its Haigh diagram, contact maps.
+
+    Args:
+        case: for titles. scenes: False leaves out what needs PyVista. maps: title -> patches.
+
+    Returns:
+        Name -> file; names are those under which the report shows them.
+    """
+    from ..pictures import operating
+
+    drawn: dict[str, Path] = {}
+    curves = {n: operating.stress_curve(s.frequency[i], p, s.converged[i]) for n, (s, _, i, p) in found.sweeps.items()}
+    if curves:
+        label, title = "largest stress amplitude of the body in MPa", f"{case}: largest stress of the body"
+        drawn["stress over frequency"] = operating.over_frequency_plot(
+            curves, label, title, folder / "stress_over_frequency.png"
+        )
+    if lines := over_force(found):
+        drawn["stress over normal force"] = operating.over_normal_force_plot(
+            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force",
+            folder / "stress_over_normal_force.png",
+        )  # fmt: skip
+    top = found.highest
+    if top is not None:
+        drawn |= _at_worst(found, top, basis, case, folder, scenes)
+    for title, patches in (maps or {}).items():
+        path = folder / f"{title.replace(' ', '_')}.png"
+        where = f", {top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
+        drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}", path)
+    return drawn
+
+
+def families(found: Assessment) -> dict[str, list[Resonance]]:
+    """Resonances followed over the normal force, from the largest down.
+
+    A resonance goes on in one that lies in its range, or in whose range it lies: none other of its sweep is meant by
+    that part of the band, however far the normal force has moved it. Of several the nearest in frequency; what is left
+    begins a line of its own.
+    """
+    lines: list[list[Resonance]] = []
+    for normal in sorted({r.normal_force for r in found.resonances}, reverse=True):
+        new = [r for r in found.resonances if r.normal_force == normal]
+        pairs = [
+            (abs(np.log(line[-1].frequency / r.frequency)), i, j)
+            for i, line in enumerate(lines)
+            for j, r in enumerate(new)
+            if line[-1].holds(r.frequency) or r.holds(line[-1].frequency)
+        ]
+        taken: dict[int, int] = {}
+        for _, i, j in sorted(pairs):
+            if i not in taken.values() and j not in taken:
+                taken[j] = i
+        for j, r in enumerate(new):
+            if j in taken:
+                lines[taken[j]].append(r)
+            else:
+                lines.append([r])
+    return {f"near {line[0].frequency:.4g} Hz": line for line in lines}
+
+
+def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
+    """Normal force, N, and stress amplitude, MPa, of families of resonances, none left out; nothing where there are
+    fewer than three normal forces to look over."""
+    lines = families(found)
+    if len({r.normal_force for line in lines.values() for r in line}) < 3:
+        return {}
+    return {name: [(r.normal_force, 1e-6 * r.worst.amplitude) for r in line] for name, line in lines.items()}
+
+
+def _at_worst(
+    found: Assessment, top: Resonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
+) -> dict[str, Path]:  # fmt: skip
+    from ..files.store import complete_or_absent
+    from ..pictures import operating
+
+    drawn: dict[str, Path] = {}
+    motion, cycle = found.at(top)
+    where = f"{top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N"
+    if found.limits is not None:
+        drawn["Haigh diagram"] = operating.haigh_plot(
+            cycle, found.limits, top.worst, f"{case}: {where}", folder / "haigh.png"
+        )
+    if scenes and basis.mesh.n_cells:
+        from ..pictures.scene import quiet_vtk
+        from ..pictures.views import open_studio
+
+        quiet_vtk()
+        studio = open_studio(basis)
+        try:
+            title = f"{case}: most stressed at {top.stressed_at:.5g} Hz under {top.normal_force:g} N"
+            image = operating.stress_picture(studio, motion, cycle, title, found.limits, top.worst.place)
+        finally:
+            studio.stage.close()
+        if image is not None:
+            drawn["stress at resonance"] = folder / "stress_at_resonance.png"
+            with complete_or_absent(drawn["stress at resonance"]) as temporary:
+                image.save(temporary, format="PNG", compress_level=6)
+    return drawn
+
+
+def write_shape(found: Assessment, basis: ModalBasis, path: Path) -> Path | None:
+    """The operating shape at the worst resonance as VTU; None without resonances, shapes or cells."""
+    from ..operating.shape import write_shape_vtu
+
+    top = found.highest
+    if top is None or not basis.mesh.n_cells:
+        return None
+    try:
+        write_shape_vtu(found.sweeps[top.normal_force][1].at(top.stressed), basis, path, found.limits)
+    except UserError:
+        return None
+    return path

@@ -1,0 +1,46 @@
+"""What a contact law does: tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..data import Array
+from ..files import store
+from .stage import Report
+
+
+def contact_stage(
+    path: Path, assignments: list[str], output: Path | None, report: Report = lambda _: None
+) -> list[str]:  # fmt: skip
+    """What a contact law does: tables (CSV) and pictures (PNG) in build/<name>/ or `output`.
+
+    Returns:
+        Lines to print: the short table, judgements, files.
+
+    Raises:
+        UserError, NotConverged: see `contact.study.study`; then nothing is written.
+    """
+    from ..contact.study import study
+    from ..pictures.contact import draw
+
+    path = path / "contact.toml" if path.is_dir() else path
+    report("laws and motions")
+    found = study(path, assignments)
+    folder = output or Path("build") / found.contact.settings.name
+    summary = folder / "summary.csv"
+    rows = [*found.told, *(("judgement", s) for s in found.sentences)]
+    report("pictures and tables")
+    with store.making(summary, report):
+        files = [*draw(found, folder), *(folder / f"{name}.csv" for name in found.tables), summary]
+        for name, columns in found.tables.items():
+            store.write_text(folder / f"{name}.csv", _columns_csv(columns))
+        store.write_text(summary, "\n".join(["what,value", *(f'"{a}","{b}"' for a, b in rows)]) + "\n")
+    width = max(len(what) for what, _ in found.told)
+    lines = [f"{what:{width}}  {value}" for what, value in found.told]
+    return [*lines, *found.sentences, *map(str, sorted(files))]
+
+
+def _columns_csv(columns: Mapping[str, Array]) -> str:
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{x:.10g}" for x in row) for row in rows)]) + "\n"

@@ -1,0 +1,341 @@
+"""What is followed from a case instead of swept: backbones, the optimum of a setting, and the stability of a response.
+
+Each is a table (CSV) and a picture in the case's folder, and sentences for the terminal.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import CaseSettings, checkpoint
+from ..case.assemble import Built, build
+from ..case.run import problem_of
+from ..continuation import NO_OPTIMUM
+from ..data import ModalBasis, UserError
+from ..files import store
+from ..harmonic_balance.readout import measured
+from ..results import read_response
+from ..results.checks import checked, largest
+from ..settings.body import load_toml, override
+from ..settings.mistakes import validate
+from ..units import METRES, Quantity
+from .stage import Report
+
+if TYPE_CHECKING:
+    from ..harmonic_balance.nonlinear_modes import Backbone
+    from ..harmonic_balance.peak import Optimum, Resonance
+    from ..harmonic_balance.problem import Problem
+    from ..harmonic_balance.stability import Stability
+
+OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughness")
+"""Keys of a contact that `optimum` may change in all of them at once."""
+
+NORMAL_FORCE = "normal_force"
+_SIGNED = ("turn", "phase", "place")
+"""Keys of angles, which may pass through 0; all others are followed in equal ratios."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case file and its modal files. Attributes: path. raw: its text as a table. bases: by body. folder: products."""
+
+    path: Path
+    raw: dict[str, Any]
+    bases: Mapping[str, ModalBasis]
+    folder: Path
+
+    @cached_property
+    def quantity(self) -> Quantity:
+        """What the first read-out measures."""
+        return measured(self.with_({}).assembly)
+
+    def with_(self, changes: Mapping[str, float]) -> Built:
+        """The assembly, some keys of the case changed."""
+        raw = copy.deepcopy(self.raw)
+        for key, value in changes.items():
+            if key in OF_CONTACTS:
+                for contact in raw.get("contacts", []):
+                    if key in contact:
+                        contact[key] = value
+            elif key != NORMAL_FORCE:
+                override(raw, [f"{key}={value!r}"], self.path)
+        return build(validate(CaseSettings, raw, self.path), self.bases, self.path)
+
+
+def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
+    """A case and its modal files."""
+    raw = override(load_toml(path), list(assignments), path)
+    asked = validate(CaseSettings, raw, path)
+    settings = checkpoint.as_found(asked, folder, path)
+    if asked.looks_for_harmonics:
+        raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
+        raw |= {"harmonics": settings.harmonics, "samples": settings.samples}
+    return Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
+
+
+def normal_forces(built: Built) -> tuple[float | None, ...]:
+    """Those of the sweep, N; None: every contact has its own."""
+    asked = built.settings.sweep.normal_forces
+    if isinstance(asked, str):
+        raise UserError(f'sweep.normal_forces: "{asked}" has one value; give numbers here')
+    return asked or (None,)
+
+
+# nonlinear modes -----------------------------------------------------------------------------------------------------
+
+
+def backbones(
+    case: Case, mode: int | None = None, low: float | None = None, high: float | None = None,
+    report: Report = lambda _: None,
+) -> dict[float, Backbone]:  # fmt: skip
+    """Frequency and damping over the amplitude of the first read-out, for every normal force (N) of the case.
+
+    Args:
+        mode: number of the mode with sticking contacts, 1 the lowest; the one that answers the excitation most in the
+            band of the sweep if not given.
+        low, high: amplitudes, m; from a thirtieth to thirty times where the contacts begin to slide if not given.
+    """
+    from ..harmonic_balance.nonlinear_modes import backbone, sliding_amplitude, strongest
+
+    found: dict[float, Backbone] = {}
+    built, of = case.with_({}), case.quantity
+    band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
+    forces = normal_forces(built)
+    for i, normal in enumerate(forces):
+        report(f"backbone at F_N = {normal or 0:g} N, {i + 1} of {len(forces)}")
+        problem = problem_of(built, normal, form="relative")
+        number = mode - 1 if mode is not None else strongest(problem, band[0], band[1])
+        begins = sliding_amplitude(problem, number)
+        found[normal or 0.0] = backbone(problem, low or begins / 30, high or begins * 30, number, report=report)
+        _backbone_table(found, case)
+        one = found[normal or 0.0]
+        said = f"mode {number + 1}, {one.stuck / 2 / np.pi:.6g} Hz stuck"
+        if len(one.amplitude):
+            i = int(np.argmax(one.damping))
+            said += (
+                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} {of.said}; damping at most "
+                f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} {of.said}"
+            )
+            said += f"; {checked(largest(one.checks))}"
+        report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
+    return found
+
+
+def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
+    """``backbone.csv`` and ``pictures/backbone.png``."""
+    from ..pictures.following import backbone_plot
+
+    picture = case.folder / "pictures" / "backbone.png"
+    return [_backbone_table(found, case), backbone_plot(found, _title(case, "nonlinear mode"), picture, case.quantity)]
+
+
+def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
+    rows = [f"normal_force_N,{case.quantity.column('amplitude')},frequency_Hz,damping_ratio"]
+    for normal, one in sorted(found.items()):
+        order = zip(one.amplitude, one.Omega / (2 * np.pi), one.damping, strict=True)
+        rows += [f"{normal:g},{a:.8g},{f:.10g},{d:.8g}" for a, f, d in order]
+    store.write_text(case.folder / "backbone.csv", "\n".join(rows) + "\n")
+    return case.folder / "backbone.csv"
+
+
+def _title(case: Case, what: str) -> str:
+    return f"{case.raw.get('name', case.path.stem)}: {what}"
+
+
+# the optimum of a setting --------------------------------------------------------------------------------------------
+
+
+def optimum_over(
+    case: Case, over: str = NORMAL_FORCE, low: float | None = None, high: float | None = None, points: int = 6,
+    report: Report = lambda _: None,
+) -> Optimum:  # fmt: skip
+    """The value of a setting at which the highest resonance of the sweep's band is lowest.
+
+    Args:
+        over: ``normal_force``; a key of the contacts, changed in all of them; or any key of the case, dotted.
+        low, high: of that value, above 0 if it is no angle; the sweep's normal forces if not given. points: values
+            from one to the other at which it is looked for. ``optimum.csv`` holds the resonances as they are found.
+
+    Raises:
+        UserError: no range, or contacts that the sweep does not press.
+    """
+    from ..harmonic_balance.peak import optimum
+
+    built = case.with_({})
+    forces = [n for n in normal_forces(built) if n is not None]
+    if over == NORMAL_FORCE and len(forces) > 1:
+        low, high = low or min(n for n in forces if n > 0), high or max(forces)
+    signed = over.rpartition(".")[2] in _SIGNED
+    if low is None or high is None or not low < high or not (low > 0 or signed):
+        kind = "numbers, the first one smaller" if signed else "positive numbers"
+        raise UserError(f"{over}: give --low and --high, two {kind}, between which its optimum is looked for")
+    if over == NORMAL_FORCE and not forces:
+        raise UserError(f"{case.path}: no contact is pressed by the sweep's normal forces; there is nothing to change")
+    between = float(np.sqrt(low * high)) if over == NORMAL_FORCE else forces[-1] if forces else None
+    length = problem_of(built, between).length
+
+    @lru_cache(maxsize=64)
+    def make(value: float) -> Problem:
+        normal = value if over == NORMAL_FORCE else forces[-1] if forces else None
+        return problem_of(built if over == NORMAL_FORCE else case.with_({over: value}), normal, length=length)
+
+    sweep = built.settings.sweep
+    band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
+
+    def keep(found: Mapping[float, Resonance]) -> None:
+        _optimum_table(found, over, case)
+
+    values = np.linspace(low, high, points) if signed else np.geomspace(low, high, points)
+    return optimum(make, [float(v) for v in values], band, report=report, keep=keep)
+
+
+def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
+    """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``."""
+    from ..pictures.following import optimum_plot
+
+    files = [_optimum_table(found.found, over, case, found)]
+    if any(one.status == "converged" for one in found.found.values()):
+        label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
+        picture = case.folder / "pictures" / "optimum.png"
+        title = _title(case, "highest resonance and optimum")
+        files.append(optimum_plot(found, label, title, picture, case.quantity))
+    return files
+
+
+def _optimum_table(found: Mapping[float, Resonance], over: str, case: Case, best: Optimum | None = None) -> Path:
+    rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
+    for value, one in found.items():
+        what = "highest resonance" if one.status == "converged" else one.status
+        rows.append(f"{value:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
+    if best is not None:
+        one = best.resonance
+        what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
+        rows.append(f"{best.parameter:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
+    store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
+    return case.folder / "optimum.csv"
+
+
+def told(found: Optimum, over: str, of: Quantity = METRES) -> str:
+    """The optimum of what is read in a sentence."""
+    best, unit = found.resonance, " N" if over == NORMAL_FORCE else ""
+    if best.status != "converged":
+        return f"{over}: no resonance was found at any value"
+    where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} {of.said} at "
+    lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
+    lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
+    return lines + _hardly(found) + _rising(found, unit)
+
+
+def _rising(found: Optimum, unit: str) -> str:
+    """Where the response is higher at an end of the band than any resonance in it."""
+    said = ""
+    for end in sorted(set(found.rising.values())):
+        values = ", ".join(f"{value:.4g}" for value, where in found.rising.items() if where == end)
+        said += (
+            f"; at {values}{unit} the response is higher still at {end / 2 / np.pi:.6g} Hz, an end of the band: a "
+            "resonance may lie beyond, widen the sweep"
+        )
+    return said
+
+
+HARDLY = 0.01
+"""Share by which a setting changes the highest resonance over its whole range, below which it is said to hardly matter:
+what two tops have to be apart to be two, `harmonic_balance.sweeps.DIP`."""
+
+
+def _hardly(found: Optimum) -> str:
+    """That the setting hardly matters, if it does not."""
+    if found.spread >= HARDLY:
+        return ""
+    return (
+        f"; the setting hardly matters: from {min(found.found):g} to {max(found.found):g} the highest resonance "
+        f"changes by {100 * found.spread:.2g} %"
+    )
+
+
+def is_optimum(found: Optimum) -> bool:
+    """Whether the lowest place lies between the ends."""
+    return found.status in ("converged", "kink", "two peaks")
+
+
+def missed(found: Optimum, over: str) -> str:
+    """Why there is no optimum, and where to look for it."""
+    low, high, unit = min(found.found), max(found.found), " N" if over == NORMAL_FORCE else ""
+    if found.status != NO_OPTIMUM or found.parameter not in (low, high):
+        return f"no optimum was found: {found.status}"
+    end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"
+    return (
+        f"no optimum between {low:g} and {high:g}{unit}: the resonance is lowest at {found.parameter:g}{unit}, an end; "
+        f"look beyond it with {end}"
+    )
+
+
+# stability -----------------------------------------------------------------------------------------------------------
+
+
+def stabilities(case: Case, report: Report = lambda _: None) -> dict[float, dict[float, Stability]]:
+    """Of every converged point of the case's ``response.h5``: normal force, N -> frequency, Hz -> its stability.
+
+    ``stability.csv`` holds the points as they are found.
+
+    Raises:
+        UserError: a sector that stands for a ring, whose sectors may part company.
+    """
+    from ..harmonic_balance.stability import Settings, orbit, stability
+
+    built, found = case.with_({}), dict[float, dict[float, Any]]()
+    if built.settings.ring is not None and built.settings.ring.model == "sector":
+        raise UserError(
+            f'{case.path}: ring.model: "sector" cannot tell whether the sectors stay alike; write model = "full"'
+        )
+    if built.settings.mode == "book":
+        raise UserError(f'{case.path}: mode: "book" has no motion in time to perturb; write mode = "aft"')
+    response = read_response(case.folder / "response.h5")
+    done, count = 0, sum(int(series.converged.sum()) for series in response.series)
+    for series in response.series:
+        normal = float(series.parameters["normal_force"])
+        problem = problem_of(built, normal if normal_forces(built) != (None,) else None)
+        rows = found.setdefault(normal, {})
+        for i in np.flatnonzero(series.converged):
+            f = float(series.frequency[i])
+            done += 1
+            report(f"{done} of {count} points' stability: {normal:g} N, {f:.6g} Hz")
+            rows[f] = stability(orbit(problem, series.arrays["x"][i], 2 * np.pi * f), Settings(steps=256))
+            _stability_table(found, case)
+    return found
+
+
+def write_stabilities(found: Mapping[float, Mapping[float, Stability]], case: Case) -> list[Path]:
+    """``stability.csv`` and ``pictures/stability.png``."""
+    from ..pictures.following import stability_plot
+
+    picture = case.folder / "pictures" / "stability.png"
+    return [_stability_table(found, case), stability_plot(found, _title(case, "stability"), picture)]
+
+
+def _stability_table(found: Mapping[float, Mapping[float, Stability]], case: Case) -> Path:
+    rows = ["normal_force_N,frequency_Hz,stable,growth,error,loss"]
+    for normal, points in found.items():
+        for f, one in sorted(points.items()):
+            error = one.error[0] if len(one.error) else 0.0
+            rows.append(f"{normal:g},{f:.10g},{one.stable:d},{one.growth:.6g},{error:.2g},{one.loss}")
+    store.write_text(case.folder / "stability.csv", "\n".join(rows) + "\n")
+    return case.folder / "stability.csv"
+
+
+def unstable(found: Mapping[float, Mapping[float, Stability]]) -> str:
+    """Which points are not stable, in a sentence."""
+    lost = [(n, f, one.loss) for n, points in found.items() for f, one in sorted(points.items()) if not one.stable]
+    count = sum(len(points) for points in found.values())
+    if not lost:
+        return f"all {count} points are stable"
+    normal, f, loss = lost[0]
+    return f"{len(lost)} of {count} points are not stable, the first at {normal:g} N, {f:.6g} Hz ({loss})"

@@ -1,0 +1,266 @@
+"""From a CAD file or another program's file to a body folder: a body.toml that runs as it stands."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..basis import write_basis
+from ..data import Mesh, UserError
+from ..exchange.measured import holds_modes, read_measured
+from ..files.store import ordinary, write_text
+from ..mesh import UNITS, mesh_problems, read_mesh
+from ..units import SYSTEMS, usual_system
+from .meshing import run_apart
+
+MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
+_NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
+_MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
+CAD = (".step", ".stp", ".brep", ".iges", ".igs")
+KINDS = {
+    **dict.fromkeys(CAD, "a CAD file"), **dict.fromkeys((s for s in MATRICES if s[1] != "h"), "a file of matrices"),
+    ".inp": "a deck of Abaqus or CalculiX", ".cdb": "a deck of Ansys", ".bdf": "a deck of Nastran",
+    ".msh": "a mesh of gmsh", ".unv": "a universal file", ".uff": "a universal file", ".toml": "a settings file",
+}  # fmt: skip
+"""What a file is by its suffix, where that is no modal file's."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The body file that was written, and what to say of it."""
+
+    path: Path
+    told: tuple[str, ...]
+
+
+def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
+    """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
+
+    Args:
+        file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
+            body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
+
+    Raises:
+        UserError: unreadable, or there is a body.toml already.
+    """
+    if unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    if not ordinary(file).is_file():
+        raise UserError(f"{file}: there is no such file; correct the path")
+    stem = (folder.resolve().name if folder else "") or file.stem
+    name = re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
+    if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
+        return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
+    target = (folder or Path(name)) / "body.toml"
+    if target.exists():
+        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    kind = file.suffix.lower()
+    made = _matrices if kind in MATRICES else _cad if kind in CAD else _mesh
+    lines, told = made(file, target.parent, unit)
+    head = [f'name = "{name}"', f'length_unit = "{unit}"']
+    write_text(target, "\n".join([*head, *lines]) + "\n")
+    missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
+    last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
+    return Imported(target, (*told, last))
+
+
+_UNIVERSAL = (".uff", ".uf", ".unv", ".u")
+
+
+def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
+    """Modes of a test become a modal file at once: nothing is left to solve."""
+    if target.exists():
+        raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
+    basis, told = read_measured(file, unit, name)
+    write_basis(target, basis)
+    group = basis.groups[0, 0]
+    first, last = group.frequency[[0, -1]]
+    size = f"{file}: {group.n_modes} modes from {first:.6g} to {last:.6g} Hz at {basis.mesh.n_points} measured points"
+    end = f"{target}: ready. Beside a computed one: microslip compare {target} OTHER.h5"
+    return Imported(target, (size, *told, end))
+
+
+def _beside(file: Path, folder: Path) -> str:
+    """The file's path from the folder, as TOML text."""
+    return json.dumps(Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix())
+
+
+def _sets(mesh: Mesh, held: bool = False) -> list[str]:
+    """Supports (unless those of the file are there) and interfaces to choose from, as comments."""
+    names = sorted(n for n in {*mesh.faces, *mesh.point_sets} if len(mesh.face_points(n)) < mesh.n_points)
+    if not names:
+        return ["# The file names no sets: give faces by box, see docs/body_toml.md."]
+    lines = ["", "# Sets of the file: " + ", ".join(names)]
+    first = json.dumps(next((n for n in names if n in mesh.faces), names[0]))
+    if not held:
+        lines += ["#[[supports]]             # then remove free = true at the top", f"#face = {first}"]
+    lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', f"#face = {first}"]
+    return lines
+
+
+def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
+    """The file's own supports, as comments where they do not hold the body, and what to say of them."""
+    told = [f"warning: not taken as a support: {text}" for text in mesh.not_held]
+    if not mesh.supports:
+        return [], told
+    lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
+    for name, directions in mesh.supports.items():
+        lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
+        lines += [f'{mark}directions = "{directions}"'] if directions != "xyz" else []
+    named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
+    if mark:
+        lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
+        return lines, [*told, f"warning: supports of the file: {named}; they do not hold the body: written as comments"]
+    return lines, [*told, f"supports of the file: {named}"]
+
+
+def _hold(mesh: Mesh) -> bool:
+    """Whether the file's supports leave no rigid motion."""
+    from ..modes.rigid import free_motions
+
+    fixed = [3 * mesh.point_sets[n] + "xyz".index(c) for n, directions in mesh.supports.items() for c in directions]
+    return free_motions(mesh.points, mesh.points.mean(axis=0), np.concatenate(fixed)).shape[1] == 0
+
+
+def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
+    """Solids and numbered surfaces of a CAD file, read in a process of its own.
+
+    Args:
+        picture: where to draw the surfaces with their numbers.
+
+    Returns:
+        The table, and why there is no picture if one was asked for and could not be drawn.
+
+    Raises:
+        UserError: what the CAD kernel says.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        triangles = Path(scratch) / "triangles.npz"
+        words = ["-m", "microslip.cad", "--list", str(file), unit]
+        done = run_apart([*words, str(triangles)] if picture else words, scratch)
+        if done.returncode:
+            raise UserError((done.stderr.strip().splitlines() or [f"{file}: cannot be read"])[-1])
+        return done.stdout.strip(), "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)
+
+
+def _draw(triangles: Path, title: str, picture: Path) -> str:
+    """Draw numbered surfaces; why not, if that fails."""
+    from ..pictures import can_draw
+
+    if reason := can_draw():
+        return reason
+    from ..pictures.numbered import surfaces_picture
+
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    with np.load(triangles) as data:
+        surfaces_picture(data["points"], data["triangles"], data["surface"], title, picture)
+    return ""
+
+
+def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    picture = folder / "surfaces.png"
+    text, reason = cad_table(file, unit, picture)
+    told = [text, f"warning: no picture of the surfaces: {reason}" if reason else f"{picture}: the surfaces, numbered"]
+    lines = ["free = true               # nothing is held yet", "", "[geometry]", f"cad = {_beside(file, folder)}", ""]
+    lines += ["# The surfaces of the file" + (":" if reason else f", shown in {picture.name}:")]
+    lines += [f"# {line}" for line in text.splitlines()[1:]]
+    lines += ["# Name those you need, each by one of surfaces, label, colour, box:"]
+    lines += ["#[[geometry.faces]]", '#name = "clamp"', "#surfaces = [1]"]
+    lines += ["#[[geometry.faces]]", '#name = "contact"', "#surfaces = [2]", ""]
+    lines += ["[mesh]", "#size = 5.0               # a fifteenth of the diagonal if not given", ""]
+    lines += ["[material]", 'name = "steel"', "density = 7850.0          # kg/m3", "young = 2.1e11            # Pa"]
+    lines += ["poisson = 0.3", "", "#[[supports]]             # then remove free = true at the top", '#face = "clamp"']
+    lines += ["#[[interfaces]]           # where it touches its neighbour", '#name = "contact"', '#face = "contact"']
+    lines += ["#[[excitations]]          # a force of 1 N", '#name = "shaker"', "#point = [0.0, 0.0, 0.0]"]
+    lines += ["#direction = [1.0, 0.0, 0.0]", "#[[monitors]]", '#name = "tip"', "#point = [0.0, 0.0, 0.0]"]
+    return [*lines, *_END], told
+
+
+_END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
+
+
+def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    system = usual_system(unit)
+    told = []
+    try:
+        mesh = read_mesh(file, unit, system)
+    except UserError as error:
+        mesh = read_mesh(file, unit)  # its materials alone may be at fault
+        told.append(f"warning: {error}")
+    kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
+    told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
+    told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    held, said = _supports(mesh)
+    told += said
+    lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
+    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}", "", "[material]"]
+    if mesh.materials:
+        lines.append('from = "mesh"')
+        lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]
+        told += [f"{m.name}: {m.density:.6g} kg/m3 in the units {system}" for m in mesh.materials]
+    else:
+        lines += ["density = 7850.0          # the file brings no material that can be used: this is steel"]
+        lines += ["young = 2.1e11", "poisson = 0.3"]
+        told.append("warning: no material was taken from the file; body.toml says steel")
+    if mesh.temperature is not None:
+        lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
+        told.append("temperatures: used only once [temperature] of body.toml is uncommented")
+    return [*lines, *held, *_sets(mesh, bool(held)), *_END], told
+
+
+def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+    from ..exchange.matrices import matrix_names
+
+    names = matrix_names(file)
+    told = [f"{file}: matrices {', '.join(names) or 'none'}"]
+    mass = _mass_of(file, names)
+    nodes = _nodes_of(file)
+    lines = ["free = true               # nothing is held yet", "", "[geometry.matrices]"]
+    lines.append(f"stiffness = {_beside(file, folder)}")
+    lines.append(f"mass = {_beside(mass, folder)}")
+    upper = {n.upper() for n in names}
+    for key, usual in (("damping", ("C", "BAA", "C_R")), ("gyroscopic", ("G", "G_R"))):
+        if upper & set(usual) and mass == file:
+            lines.append(f"#{key} = {_beside(file, folder)}")
+    if nodes is None:
+        lines.append('nodes = "nodes.csv"       # write it: number, x, y, z of every node')
+        told.append(f"warning: no file of nodes is beside {file.name}; write {folder / 'nodes.csv'}: number, x, y, z")
+    else:
+        lines.append(f"nodes = {_beside(nodes, folder)}")
+        told.append(f"nodes from {nodes}")
+    lines.append("#grounded = true          # the supports are in the matrices already (then remove free = true)")
+    if usual_system(unit) is None:
+        lines.append(f'units = "m-kg-s"          # of the matrices: {", ".join(SYSTEMS)}')
+    if nodes is not None and nodes.suffix in _MESHES:
+        return [*lines, *_sets(read_mesh(nodes, unit)), *_END], told
+    return [*lines, "", "#[geometry.matrices.sets]", "#tip = [1, 2, 3]", *_END], told
+
+
+def _mass_of(file: Path, names: list[str]) -> Path:
+    """The same file if it holds several matrices, else the partner beside it."""
+    if len(names) > 1:
+        return file
+    if file.suffix == ".sti":
+        return file.with_suffix(".mas")
+    for old, new in (("K", "M"), ("k", "m"), ("stiffness", "mass"), ("Stiffness", "Mass")):
+        at = file.stem.rfind(old)
+        partner = file.with_name(file.stem[:at] + new + file.stem[at + len(old) :] + file.suffix)
+        if at >= 0 and partner.is_file():
+            return partner
+    raise UserError(
+        f"{file}: no mass matrix is beside it; name the two K{file.suffix} and M{file.suffix}, or write a body.toml"
+    )
+
+
+def _nodes_of(file: Path) -> Path | None:
+    for place in [file.with_suffix(s) for s in _NODES] + [file.with_name(f"nodes{s}") for s in _NODES]:
+        if place.is_file() and place != file:
+            return place
+    return None

@@ -1,0 +1,257 @@
+"""The mesh of a body: drawn by gmsh in a process of its own, or brought; read, named, measured by its quality."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Indices, Material, Mesh, UserError
+from ..files import store
+from ..mesh import mesh_problems, part_numbers, read_mesh
+from ..settings.body import MaterialSettings, implausible
+from ..units import SYSTEMS, usual_system
+from .job import Job
+from .stage import PACKAGE, Made, Report, Stage
+
+
+def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report: Report = lambda _: None) -> Path:
+    """Build, or check that it is up to date, the mesh of a body. Returns its path.
+
+    gmsh runs in a process of its own, which leaves a file.
+
+    Raises:
+        UserError: what the mesher says, or a missing source.
+    """
+    geometry = job.settings.geometry
+    if geometry.matrices is not None:
+        raise UserError(f"{job.path}: geometry.matrices: there is nothing to mesh; type: microslip modes {job.folder}")
+    if geometry.mesh is not None:
+        if not store.ordinary(job.mesh_file).is_file():
+            raise UserError(f"{job.path}: geometry.mesh: there is no file {job.mesh_file}; correct the path")
+        return job.mesh_file
+    product = output or job.mesh_file
+    source = job.folder / (geometry.build or geometry.cad or "")
+    if not store.ordinary(source).is_file():
+        key = "build" if geometry.build else "cad"
+        raise UserError(f"{job.path}: geometry.{key}: there is no file {source}; correct the path")
+    if geometry.build and not source.resolve().is_relative_to(job.folder.resolve()):
+        raise UserError(
+            f"{job.path}: geometry.build: {source.resolve()} is outside the body's folder, and only what stands in it "
+            "is run; copy it there"
+        )
+    if geometry.cad:
+        _refuse_unnamed_faces(job)
+    inputs = {
+        "geometry": job.raw["geometry"],
+        "mesh": job.raw.get("mesh", {}),
+        "unit": job.settings.length_unit,
+        "source": store.hash_file(source),
+    }
+
+    def work() -> Made:
+        report(f"meshing {source.name}")
+        for line in _run_mesher(job, source, product):
+            report(line)
+        return Made()
+
+    Stage(product, ("cad",), force, report).make(inputs, work)
+    return product
+
+
+def _refuse_unnamed_faces(job: Job) -> None:
+    """A face of a CAD file has a name only by a rule: what asks for another is told before the mesher has worked."""
+    s = job.settings
+    names = sorted({rule.name for rule in s.geometry.faces})
+    asked = [("supports", i.face, i.face) for i in s.supports] + [("interfaces", i.name, i.face) for i in s.interfaces]
+    asked += [("excitations", i.name, i.face) for i in s.excitations if i.face is not None]
+    told = f"it names {', '.join(names) or 'none'}"
+    wrong = [
+        f"{job.path}: {table}.{label}.face: geometry.faces names no face '{face}'; {told}"
+        for table, label, face in asked if face not in names
+    ]  # fmt: skip
+    if wrong:
+        raise UserError("\n".join(wrong))
+
+
+def _run_mesher(job: Job, source: Path, product: Path) -> list[str]:
+    """Run gmsh in its own process; returns its warnings."""
+    settings = {**job.raw, "folder": str(job.folder.resolve())}
+    words = [str(source.resolve())] if job.settings.geometry.build else ["-m", "microslip.cad"]
+    with store.complete_or_absent(product) as temporary, tempfile.TemporaryDirectory() as scratch:
+        table = Path(scratch) / "settings.json"
+        table.write_text(json.dumps(settings))
+        made = Path(scratch) / "mesh.msh"
+        try:
+            done = run_apart([*words, str(table), str(made)], scratch)
+        except OSError as error:  # not to be told as the product's: it is Python that this user may not start
+            raise UserError(
+                f"{sys.executable}: cannot be started to draw the body ({error.strerror}); let this user read and "
+                "run it"
+            ) from error
+        if done.returncode or not made.is_file():
+            raise UserError(_mesher_failure(job, done))
+        temporary.write_bytes(made.read_bytes())
+    return [line for line in done.stderr.splitlines() if line.startswith("warning:")]
+
+
+def run_apart(words: list[str], scratch: str) -> subprocess.CompletedProcess[str]:
+    """Run a Python file, or -m and a module, in a process of its own, as gmsh is.
+
+    It ends when this process does, however that ends, and then removes the folder `scratch`.
+    """
+    paths = [str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
+    read, write = os.pipe()  # which nobody writes to: its end is the end of this process
+    try:
+        command = [sys.executable, "-c", _TO_THE_END, scratch, *words]
+        return subprocess.run(command, stdin=read, capture_output=True, text=True, env=environment)
+    finally:
+        os.close(read)
+        os.close(write)
+
+
+_TO_THE_END = """
+import os, runpy, shutil, sys, threading
+
+def end(scratch):
+    os.read(0, 1)
+    shutil.rmtree(scratch, ignore_errors=True)
+    os._exit(1)
+
+threading.Thread(target=end, args=[sys.argv[1]], daemon=True).start()
+module = sys.argv[2] == "-m"
+sys.argv = sys.argv[2 + module :]
+if module:
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+else:
+    sys.path[0] = os.path.dirname(sys.argv[0])
+    runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
+    text = done.stderr.strip()
+    if "No module named 'gmsh'" in text:
+        return "gmsh is not installed, so nothing can be meshed; pip install 'microslip[fem]'"
+    if "error while loading shared libraries" in text or "cannot open shared object file" in text:
+        library = next((w for w in text.replace(":", " ").split() if w.startswith("lib") and ".so" in w), "a library")
+        return (
+            f"gmsh needs the system library {library}; type: "
+            "sudo apt-get install -y libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1 libegl1"
+        )
+    if done.returncode < 0 and job.settings.geometry.cad:
+        return (
+            f"{job.path}: geometry.cad: the CAD kernel crashed on {job.settings.geometry.cad} "
+            f"(signal {-done.returncode}); the file is probably damaged, export it again"
+        )
+    if done.returncode < 0:
+        return f"{job.path}: gmsh stopped with signal {-done.returncode}; change mesh.size or simplify the geometry"
+    if done.returncode == 2 and text:
+        return text if str(job.path) in text else f"{job.path}: {text}"
+    last = text.splitlines()[-1] if text else "no message"
+    return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
+
+
+def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: None) -> tuple[Mesh, list[str]]:
+    """Read the mesh of a body, name its faces by the body's rules, and pass the quality gates.
+
+    Returns:
+        The mesh and warnings.
+
+    Raises:
+        UserError: everything that would spoil a solution.
+    """
+    path = path or job.mesh_file
+    mesh, told = _read_with_materials(job, path)
+    if job.settings.geometry.mesh is not None:
+        mesh = _faces_by_rule(job, mesh)
+    errors, warnings = mesh_problems(mesh)
+    if job.settings.cyclic is not None and part_numbers(mesh).max() > 0:
+        errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
+    if errors:
+        raise UserError("\n".join(f"{path}: {e}" for e in errors))
+    size = float(np.ptp(mesh.points, axis=0).max())
+    warnings = [f"{path}: {w}" for w in (*warnings, *told)]
+    warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
+    return mesh, warnings
+
+
+def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:
+    """The mesh, with the file's own materials if they are asked for, and what to say of them."""
+    unit, material, zero = job.settings.length_unit, job.settings.material, job.settings.temperature.zero
+    if job.settings.geometry.mesh is None:
+        return read_mesh(path, unit), []
+    usual = usual_system(unit)
+    if isinstance(material, MaterialSettings):
+        try:
+            mesh = read_mesh(path, unit, usual, zero)
+        except UserError:  # perhaps only its materials cannot be read, which nobody asked for
+            return read_mesh(path, unit), []
+        told = differing_materials(material.material(), mesh.materials)
+        return replace(mesh, materials=(), regions={}), told
+    system = material.units or usual
+    if system is None:
+        raise UserError(
+            f'{job.path}: material.units: with length_unit = "{unit}" it must be said; choose ' + ", ".join(SYSTEMS)
+        )
+    mesh = read_mesh(path, unit, system, zero)
+    if not mesh.materials:
+        raise UserError(f"{path}: brings no material; write density, young and poisson in [material]")
+    return mesh, [] if material.unusual else [text for m in mesh.materials if (text := strange_material(m, system))]
+
+
+def differing_materials(own: Material, others: tuple[Material, ...]) -> list[str]:
+    """A warning where the mesh file says another material than the settings, which rule."""
+    for m in others:
+        rho, C = abs(m.density / own.density - 1), np.abs(m.elasticity - own.elasticity).max() / own.elasticity.max()
+        if max(rho, C) > 1e-3:
+            return [
+                f"its material '{m.name}' ({m.density:.5g} kg/m3, C_xxxx {m.elasticity[0, 0]:.4g} Pa) is not that of "
+                f"[material] ({own.density:.5g} kg/m3, {own.elasticity[0, 0]:.4g} Pa), which is used for every cell; "
+                'write [material] from = "mesh" to use the file\'s'
+            ]
+    return []
+
+
+def strange_material(m: Material, system: str) -> str:
+    """A warning about numbers that suggest other units."""
+    if 300 <= m.density <= 25000 and 1e8 <= m.elasticity[0, 0] <= 2e12:
+        return ""
+    return (
+        f"its material '{m.name}' has {m.density:.4g} kg/m3 and C_xxxx = {m.elasticity[0, 0]:.4g} Pa in the units "
+        f"{system}, which is no structural solid's; correct material.units (material.unusual = true silences this)"
+    )
+
+
+def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
+    """Faces of a user's own mesh given by boxes, those of one name added up; named sets of the file are there already.
+
+    Raises:
+        UserError: a rule by anything but a box, nothing in its box, the name of a set of the file.
+    """
+    from ..mesh import boundary_facets, faces_from_points
+
+    made: dict[str, dict[str, Indices]] = {}
+    for rule in job.settings.geometry.faces:
+        place = f"{job.path}: geometry.faces.{rule.name}"
+        if rule.box is None:
+            raise UserError(f"{place}: a mesh file has no labels or colours; use box")
+        if rule.name in mesh.faces:
+            raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
+        low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
+        slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
+        inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
+        found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
+        if not found:
+            raise UserError(f"{place}: no facet of the surface is in the box; widen it")
+        face = made.setdefault(rule.name, {})
+        for kind, facets in found.items():
+            face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
+    return replace(mesh, faces={**mesh.faces, **made})

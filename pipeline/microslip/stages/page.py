@@ -1,0 +1,67 @@
+"""Pictures and the self-contained page of a body."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..basis import read_basis
+from ..files import store
+from ..ring.resonances import (
+    resonance_csv,
+    resonances,
+    speeds_of,
+)
+from .job import Job
+from .stage import Made, Report, Stage
+
+
+def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report: Report) -> Path:
+    """Pictures and the self-contained page of a body."""
+    from .. import pictures
+    from ..report import write_report
+
+    stage = Stage(job.build_folder / "report.html", ("stages.page",), force, report)
+    folder, remarks, shown = job.build_folder / "pictures", _remarks(job), dict[str, str]()
+    if response is not None:
+        remarks += response.get("remarks", [])
+        shown = dict(response.get("pictures", {}))
+        response = {k: v for k, v in response.items() if k not in ("remarks", "pictures")}
+    engine_orders = list(job.settings.rotation.engine_orders)
+
+    def work() -> Made:
+        basis = read_basis(job.basis_file)
+        stage.begin()
+        report("starting PyVista")
+        reason = pictures.can_draw()
+        if reason is not None:
+            report(f"warning: no pictures of the body: {reason}")
+            remarks.append(f"The pictures of the body are missing: {reason}")
+        drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
+        tables: list[Path] = []
+        if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
+            tables = [job.build_folder / "resonances.csv"]
+            store.write_text(tables[0], resonance_csv(resonances(basis, engine_orders)))
+        drawn |= {title: folder / name for title, name in shown.items()}
+        report("writing the report")
+        write_report(basis, drawn, stage.product, remarks, response)
+        return Made([*drawn.values(), *tables], whole=reason is None)
+
+    inputs = {
+        "basis": store.hash_file(job.basis_file),
+        "response": response,
+        "engine_orders": engine_orders,
+        "remarks": list(remarks),
+    }
+    stage.make(inputs, work)
+    return stage.product
+
+
+def _remarks(job: Job) -> list[str]:
+    remarks = [job.settings.note] if job.settings.note else []
+    try:
+        remarks += json.loads(store.sidecar_path(job.basis_file).read_text()).get("warnings", [])
+    except (OSError, ValueError):
+        pass
+    return remarks

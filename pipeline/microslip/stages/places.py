@@ -1,0 +1,151 @@
+"""Where the bodies and the modal files of a case are."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import shlex
+import stat
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from ..case import CaseSettings
+from ..case.settings import BodyOfCase
+from ..data import UserError
+from ..files import store
+from ..settings.body import load_toml
+from .job import open_job, system_file
+from .modal import modes_stage, system_stage
+from .stage import Report
+
+
+def is_case(path: Path) -> bool:
+    """True for a case file (it has a sweep), False for a body file."""
+    return path.is_file() and path.suffix == ".toml" and bool({"body", "sweep"} & set(load_toml(path)))
+
+
+def modal_files(
+    case: CaseSettings, path: Path, root: Path, report: Report, known: Mapping[str, Path] | None = None
+) -> dict[str, Path]:
+    """Body of a case -> its modal file, computed where that is not up to date.
+
+    Raises:
+        UserError: a body that is nowhere.
+    """
+    found = dict(known or {})
+    for b in case.members:
+        if b.name in found:
+            continue
+        body = b.body or b.name
+        if b.file is not None:
+            found[b.name] = _named(path, b)
+        elif (lumped := _lumped(path, body)) is not None:
+            found[b.name] = system_stage(lumped, report=report, root=root)
+        else:
+            job = open_job(find_body(path, body, root), root=root)
+            modes_stage(job, report=report)
+            found[b.name] = job.basis_file
+    return found
+
+
+def _lumped(case_path: Path, name: str) -> Path | None:
+    """The system.toml of a small system of that name beside a case, in its folder or in one of the system's name."""
+    for place in (case_path.parent / "system.toml", case_path.parent / name / "system.toml"):
+        file = system_file(place) if place.is_file() else None
+        if file is not None and load_toml(file).get("name") == name:
+            return file
+    return None
+
+
+def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root: Path) -> dict[str, Path]:
+    """Body of a case -> a modal file that exists."""
+    beside = path.with_name("basis.h5")
+    if len(case.members) == 1 and case.members[0].file is None and (basis_file is not None or beside.is_file()):
+        return {case.members[0].name: basis_file or beside}
+    if basis_file is not None:
+        raise UserError(f"{path}: has {len(case.members)} bodies; name their modal files in it (bodies.<name>.file)")
+    found = {}
+    for b in case.members:
+        found[b.name] = _named(path, b) if b.file else root / "build" / (b.body or b.name) / "basis.h5"
+        if not found[b.name].is_file():
+            own = [beside] if len(case.members) == 1 else []
+            raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
+    return found
+
+
+def _named(path: Path, b: BodyOfCase) -> Path:
+    """The modal file that a body of a case names.
+
+    Raises:
+        UserError: it is not there.
+    """
+    file = path.parent / (b.file or "")
+    if not store.ordinary(file).is_file():
+        raise UserError(
+            f"{path}: bodies.{b.name}.file: there is no file {file}; paths in a case start in the folder of the case: "
+            "correct it"
+        )
+    return file
+
+
+def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], root: Path) -> str:
+    """A modal file that is not there: where it was looked for, and what to type."""
+    name, said = b.body or b.name, " or ".join(map(str, looked))
+    begun = f"{path}: there is no modal file of '{name}': no {said} in {root.resolve()}"
+    with contextlib.suppress(UserError):
+        by_hand = _lumped(path, name)
+        if by_hand is None:
+            find_body(path, name, root)
+        return f"{begun}; microslip run {shlex.quote(str(by_hand.parent if by_hand else path))} makes it"
+    give = "give it after the case" if len(case.members) == 1 else f"name one in bodies.{b.name}.file"
+    return f"{begun}; {_elsewhere(path, name, root) or f'correct the name, or {give}'}"
+
+
+def _elsewhere(path: Path, name: str, root: Path) -> str:
+    """What to do about a body that is not here: go to the folder where it is, or write the name of one that is."""
+    here = root.resolve()
+    for folder in dict.fromkeys((*path.resolve().parents, *here.parents)):
+        there = (folder / "build" / name / "basis.h5", folder / "geometry" / name / "body.toml")
+        if folder != here and any(p.is_file() for p in there):
+            case = path.resolve()
+            case = case.relative_to(folder) if case.is_relative_to(folder) else case
+            return f"it is in {folder}: go there (cd {shlex.quote(str(folder))}) and give the case as {case}"
+    known = sorted({p.parent.name for p in (*root.glob("build/*/basis.h5"), *root.glob("geometry/*/body.toml"))})
+    close = difflib.get_close_matches(name, known, 1)
+    if close:
+        return f"is '{close[0]}' meant? Correct the name in the case"
+    return f"the bodies here are {', '.join(known)}: correct the name in the case" if known else ""
+
+
+def find_body(case_path: Path, name: str, root: Path) -> Path:
+    """The body file of a name that a case gives.
+
+    It stands beside the case, or in NAME/ or geometry/ of the case's folder, of one above it, or of `root`, the nearest
+    first, so that a case means the same body wherever it is run. In geometry/ it is geometry/NAME/body.toml, or any
+    file of geometry/*/ that says that name (a body's second arrangement, the other side of a rig).
+
+    Raises:
+        UserError: if there is none.
+    """
+    for number, folder in enumerate((*_above(case_path.parent, root), root)):
+        beside = [folder / "body.toml"] if number == 0 else []
+        usual = [*beside, folder / "geometry" / name / "body.toml", folder / name / "body.toml"]
+        for file in (*filter(Path.is_file, usual), *sorted((folder / "geometry").glob("*/*.toml"))):
+            if load_toml(file).get("name") == name:
+                return file
+    raise UserError(
+        f"{case_path}: body: no body.toml of a body '{name}' is beside it, nor in {name}/ or geometry/ of its folder, "
+        f"of one above it or of {root.resolve()}; "
+        + (_elsewhere(case_path, name, root) or "correct the name, or type this where geometry/ is")
+    )
+
+
+def _above(first: Path, root: Path) -> Iterator[Path]:
+    """A folder and those above it, seen from `root`, up to one in which anybody may write: what is found there may be
+    anybody's."""
+    yield first
+    here = root.resolve()
+    for folder in first.resolve().parents:
+        if folder.stat().st_mode & stat.S_IWOTH:
+            return
+        yield root / folder.relative_to(here) if folder.is_relative_to(here) else folder

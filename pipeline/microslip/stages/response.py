@@ -1,0 +1,283 @@
+"""The friction response of a case: from its files to tables, pictures and a page."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
+from ..case.assemble import build
+from ..case.settings import FIRST_HARMONICS
+from ..data import ModalBasis, UserError
+from ..files import store
+from ..report import response_page
+from ..results import Response, read_journal, read_response, response_of, write_response
+from ..results.checks import sentence
+from ..units import counted
+from . import assessment
+from .checkpoint import Checkpoint, hashes_of
+from .stage import Made, Report, Stage
+
+if TYPE_CHECKING:
+    from ..operating.patches import ContactMap
+
+
+def response_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, log: bool = False,
+) -> tuple[dict[str, Any], bool]:  # fmt: skip
+    """Friction frequency response of a case in `folder`: HDF5, CSV, pictures, files for ParaView, a summary (JSON).
+
+    Every finished point is kept in ``response.points``, from which an interrupted run goes on.
+
+    Args:
+        files: body of the case -> its modal file. log: write ``convergence.csv``.
+
+    Returns:
+        The summary, and whether every point converged.
+    """
+    stage = response_of_case(folder, force, report)
+    with stage.making():
+        settings, raw = load_case(case_path, assignments)
+        inputs = {
+            "case": checkpoint.without_defaults(raw),
+            "basis": hashes_of(files),
+            "files": hashes_of(checkpoint.files_of(settings, case_path)),
+        }
+        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files))
+        summary = json.loads(stage.product.read_text())
+        if log:
+            _write_log(read_response(folder / "response.h5"), folder)
+        _tell(summary, report)
+        return summary, summary["failed_points"] == 0
+
+
+def response_of_case(folder: Path, force: bool = False, report: Report = lambda _: None) -> Stage:
+    """The stage whose product is the summary of a response, known by ``response.json``."""
+    return Stage(folder / "response.json", ("stages.response",), force, report)
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path]
+) -> Made:  # fmt: skip
+    bases = {name: read_basis(file) for name, file in files.items()}
+    folder = stage.product.parent
+    points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, whole_sweep=True)
+    try:
+        begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
+        result = run_case(settings, bases, case_path, stage.report, points.journal, begin)
+    except KeyboardInterrupt:
+        _unfinished(points)
+        raise
+    summary = _finished(points, result, stage.report)
+    store.write_text(stage.product, json.dumps(summary, indent=1) + "\n")
+    pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
+    return Made([*pictures, *(folder / name for name in summary["files"])])
+
+
+def _harmonics(points: Checkpoint, settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path) -> int:
+    """With how many to begin where their number is looked for: those of the points that are kept."""
+    with contextlib.suppress(UserError, KeyError, ValueError, TypeError):
+        head, _ = read_journal(points.file)
+        kept = int(head["harmonics"])
+        built = build(settings.with_harmonics(kept), bases, path)
+        if not points.fresh and head["inputs"] == points.inputs(built):
+            return kept
+    return FIRST_HARMONICS
+
+
+def _unfinished(points: Checkpoint) -> None:
+    """``response.h5`` of what there is so far."""
+    points.begin()
+    if points.file.is_file():
+        with contextlib.suppress(UserError):
+            write_response(points.file.with_suffix(".h5"), read_response(points.file))
+
+
+def _tell(summary: Mapping[str, Any], report: Report) -> None:
+    """The stuck modes and what a reader must know."""
+    for i, mode in enumerate(summary.get("stuck_modes", ()), 1):
+        f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
+        report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
+    report(summary["checked"])
+    for remark in summary["remarks"]:
+        report(f"warning: {remark}")
+
+
+def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[str, Any]:
+    """Tables, pictures and files of a case that has run, and their summary."""
+    from ..harmonic_balance import response_table
+    from ..pictures.response import response_picture
+
+    folder, summary = points.file.parent, summarise(result)
+    points.begin()
+    store.write_text(folder / "response.csv", response_table(result.responses))
+    picture = folder / "pictures" / "response.png"
+    with store.complete_or_absent(picture) as temporary:
+        response_picture(result, temporary)
+    response = _response(points, result, summary)
+    write_response(folder / "response.h5", response)
+    drawn, files = {"friction response": picture}, [folder / "response.h5", folder / "response.csv"]
+    more = _assessed(result, response, folder, report)
+    if more is not None:
+        summary["resonances"] = more.rows or summary["resonances"]
+        drawn, files = drawn | more.drawn, files + more.files
+        summary["remarks"] += more.remarks
+    summary["checked"] = sentence(response, response.estimated)
+    if result.rising:
+        summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
+    summary["response_sha256"] = store.hash_file(folder / "response.h5")
+    summary["pictures"] = {title: path.name for title, path in drawn.items()}
+    summary["files"] = [path.name for path in [*files, folder / "response.html"]]
+    response_page(summary, drawn, folder / "response.html")
+    return summary
+
+
+def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]) -> Response:
+    """What goes into ``response.h5``: the journal's points of this case's sweep."""
+    names = {checkpoint.series_name(n): n for n in result.responses}
+    head, held = read_journal(points.file)
+    low, high = result.settings.sweep.start, result.settings.sweep.stop
+    found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
+    told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
+    told["estimated"] = result.truncation
+    told |= {key: summary[key] for key in ("resonances", "stuck_modes", "remarks")}
+    return response_of({**head, **told}, found)
+
+
+@dataclass(frozen=True)
+class _Assessed:
+    rows: list[dict[str, Any]]
+    drawn: dict[str, Path]
+    files: list[Path]
+    remarks: list[str]
+
+
+def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
+    """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
+    first = checkpoint.drawn_monitor(result.built)
+    basis = result.built.bodies[result.built.assembly.outputs[0].member].basis
+    if first is None or not assessment.has_stresses(basis, response, first[0]):
+        return None
+    member, monitor = first
+    limits = result.settings.material_limits
+    found = assessment.assess(response, basis, monitor, member, limits, report=report)
+    maps, remarks = ({}, []) if found.highest is None else _maps(result, found, report)
+    report("pictures of stresses")
+    scenes = _can_draw() is None
+    drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
+    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
+
+
+def _maps(
+    result: CaseResult, found: assessment.Assessment, report: Report
+) -> tuple[dict[str, list[ContactMap]], list[str]]:
+    """Title -> contacts at the worst resonance; nothing, and why, where they do not agree with the response."""
+    top = found.highest
+    assert top is not None
+    report(f"contacts at {top.stressed_at:.6g} Hz")
+    series = found.sweeps[top.normal_force][0]
+    at = top.stressed
+    row = {name: values[at] for name, values in series.arrays.items()} | {"status": series.status[at]}
+    try:
+        return {"contacts at resonance": checkpoint.maps_at(result.built, top.normal_force, row)}, []
+    except UserError as error:
+        report(f"warning: {error}")
+        return {}, [str(error)]
+
+
+def _for_paraview(
+    found: assessment.Assessment, basis: ModalBasis, maps: Mapping[str, list[ContactMap]], folder: Path
+) -> list[Path]:  # fmt: skip
+    """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
+    if not _is_there("meshio"):
+        return []
+    from ..operating.patches import write_contact_vtu
+
+    files = []
+    if assessment.write_shape(found, basis, folder / "operating_shape.vtu") is not None:
+        files.append(folder / "operating_shape.vtu")
+    for patch in [patch for patches in maps.values() for patch in patches]:
+        files.append(folder / f"contact_{re.sub(r'[^A-Za-z0-9_.-]', '_', patch.name)}.vtu")
+        write_contact_vtu(patch, files[-1])
+    return files
+
+
+def _can_draw() -> str | None:
+    """See `pictures.can_draw`."""
+    if not _is_there("pyvista"):
+        return "PyVista is not there"
+    from ..pictures import can_draw
+
+    return can_draw()
+
+
+def _is_there(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ImportError:  # an environment that hides it
+        return False
+
+
+def _write_log(response: Response, folder: Path) -> None:
+    """``convergence.csv``: what Newton's method did at every point."""
+    store.write_text(folder / "convergence.csv", convergence_table(response))
+
+
+def convergence_table(response: Response) -> str:
+    """CSV text: a row a point with its status, steps, and the error before every Newton step."""
+    rows = ["sweep,frequency_Hz,peak,status,iterations,error,errors before each step"]
+    for s in response.series:
+        columns = [s.arrays.get(n, np.full(len(s.key), np.nan)) for n in ("peak", "iterations", "error")]
+        history = s.arrays.get("history", np.zeros((len(s.key), 0)))
+        for f, status, peak, steps, error, errors in zip(s.frequency, s.status, *columns, history, strict=True):
+            each = " ".join(f"{e:.1e}" for e in errors if e)
+            said = status.replace(",", ";")
+            rows.append(f"{s.name},{f:.10g},{peak > 0:d},{said},{steps:.0f},{error:.1e},{each}")
+    return "\n".join(rows) + "\n"
+
+
+def summarise(result: CaseResult) -> dict[str, Any]:
+    """Numbers of a case for the report and the terminal."""
+    rows = []
+    name = result.quantity.column("amplitude")
+    for normal, peaks in result.resonances.items():
+        rows += [{"normal_force_N": normal, "frequency_Hz": f, name: a} for f, a in peaks]
+    failed = sum(int(np.sum(~r.converged)) for r in result.responses.values())
+    truncation = {} if result.truncation is None else {"estimated_error_of_harmonics": result.truncation}
+    return {
+        "case": result.settings.name,
+        "mode": result.settings.mode,
+        "harmonics": result.settings.balanced,
+        **truncation,
+        "description": result.settings.description,
+        "rotation_speed_rpm": result.speed * 30 / np.pi,
+        "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
+        "damping": result.settings.damping_as,
+        "stuck_modes": _stuck_modes(result),
+        **({"stuck_under_N": max(result.responses)} if result.responses else {}),
+        "resonances": rows,
+        "rising_at_the_edge": [
+            {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
+            for r in result.rising
+        ],
+        "failed_points": failed,
+        "remarks": list(result.remarks),
+    }
+
+
+def _stuck_modes(result: CaseResult) -> list[dict[str, float]]:
+    """Damping of every mode with sticking contacts that the excited harmonics reach, and of the first one beyond."""
+    most = result.settings.sweep.stop * result.settings.balanced
+    count = int(np.searchsorted(result.stuck, most)) + 1
+    pairs = zip(result.stuck[:count].tolist(), result.stuck_damping[:count].tolist(), strict=True)
+    return [{"frequency_Hz": f, "damping_ratio": D, "half_power_width_Hz": 2 * D * f} for f, D in pairs]

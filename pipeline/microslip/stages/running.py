@@ -1,0 +1,169 @@
+"""Bodies and cases from beginning to end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import checkpoint, load_case
+from ..case.comparison import Pair, comparison_table, paired
+from ..data import Array, UserError
+from ..files import store
+from ..results import read_response
+from ..results.files import unit_of
+from ..results.names import apart
+from ..units import Quantity, amplitude_of
+from .job import Job, open_job
+from .modal import modes_stage, system_stage
+from .page import report_stage
+from .places import existing_files, find_body, modal_files
+from .response import response_of_case, response_stage
+from .stage import Report
+
+
+def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> tuple[Path, bool]:
+    """The whole chain of a body, and of the case of the same name if there is one.
+
+    Returns:
+        The report's path, and whether every point of the response converged.
+    """
+    response, converged = None, True
+    if job.case_file is not None:
+        case, _ = load_case(job.case_file)
+        if job.settings.name not in {b.body or b.name for b in case.members}:
+            raise UserError(
+                f"{job.case_file}: body: it names '{case.members[0].name}', but the body beside it is "
+                f"'{job.settings.name}'; make them agree"
+            )
+    modes_stage(job, force=force, report=report)
+    if job.case_file is not None:
+        files = {b.name: job.basis_file for b in case.members if (b.body or b.name) == job.settings.name}
+        files |= modal_files(case, job.case_file, job.root, report, known=files)
+    with response_of_case(job.build_folder, report=report).making():
+        if job.case_file is not None:
+            response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
+        return report_stage(job, response, force, report), converged
+
+
+def run_case_file(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal files a case needs, and the case; the products of one not named like its body have their own folder.
+
+    Returns:
+        The report's path (the table's, for a case that has its own folder), and whether every point converged.
+    """
+    case, _ = load_case(path, assignments)
+    files = modal_files(case, path, Path("."), report)
+    if case.body is not None and case.body == case.name:
+        job = open_job(find_body(path, case.body, Path(".")))
+        with response_of_case(job.build_folder, report=report).making():
+            response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
+            return report_stage(job, response, force, report), converged
+    folder = Path(".") / "build" / case.name
+    _, converged = response_stage(path, files, folder, assignments, force, report)
+    return folder / "response.csv", converged
+
+
+def run_system(
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
+) -> tuple[Path, bool]:
+    """The modal file of a system, and the friction response of the case.toml beside it if there is one.
+
+    Returns:
+        The path of the last product, and whether every point of the response converged.
+    """
+    basis_file = system_stage(path, assignments, None, force, report)
+    case = path.parent / "case.toml"
+    return respond(case, basis_file, force=force, report=report) if case.is_file() else (basis_file, True)
+
+
+def respond(
+    case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."), log: bool = False,
+) -> tuple[Path, bool]:  # fmt: skip
+    """Friction response of a case on modal files that are there already: CSV, JSON, picture in build/<case>/.
+
+    Args:
+        basis_file: of the only body; None: basis.h5 beside the case, or build/<body>/basis.h5 of every body.
+
+    Returns:
+        The path of the table, and whether every point converged.
+
+    Raises:
+        UserError: the case is about another body, a modal file is missing.
+    """
+    case, _ = load_case(case_path, assignments)
+    files = existing_files(case, case_path, basis_file, root)
+    for b in case.members:
+        name = read_basis(files[b.name]).name
+        if (b.body or b.name) != name and b.file is None:
+            raise UserError(
+                f"{case_path}: body: it names '{b.body or b.name}', but {files[b.name]} holds '{name}'; make them agree"
+            )
+    folder = root / "build" / case.name
+    summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
+    rows = [*summary["resonances"], *summary["rising_at_the_edge"]]
+    for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
+        note = f" ({row['note']})" if row.get("note") else f"; add {row['add']}" if "add" in row else ""
+        report(f"F_N = {normal} N: {'still rising at ' if 'add' in row else ''}{_at(row)}{note}")
+    return folder / "response.csv", converged
+
+
+def _at(row: Mapping[str, Any]) -> str:
+    """Frequency and amplitude of a row of a table."""
+    amplitude, of = amplitude_of(row)
+    return f"{row['frequency_Hz']:.6g} Hz, {amplitude:.4g} {of.said}"
+
+
+def compare_book(
+    case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."), log: bool = False,
+) -> tuple[Path, list[Pair], bool]:  # fmt: skip
+    """The response of a case in both modes, and what the book's leaves out: a table and a picture beside the response.
+
+    The response in the case's own mode stands in build/<case>/, that in the other mode in a folder of its name there;
+    whichever is there already is not computed again. Arguments: see `respond`.
+
+    Returns:
+        The path of the table, the resonances of both, and whether every point of both converged.
+    """
+    from ..pictures.response import comparison_picture
+
+    given = list(assignments or [])
+    own, _ = load_case(case_path, given)
+    case, _ = load_case(case_path, [*given, 'mode="aft"', "strips=0"])
+    strips = load_case(case_path, [*given, 'mode="book"'])[0].strips
+    files = existing_files(case, case_path, basis_file, root)
+    folder = root / "build" / case.name
+    folders = {mode: folder if mode == own.mode else folder / mode for mode in ("aft", "book")}
+    ways = {
+        "aft": (folders["aft"], [*given, 'mode="aft"', "strips=0"]),
+        "book": (folders["book"], [*given, 'mode="book"', f"strips={strips}"]),
+    }
+    found = {m: response_stage(case_path, files, f, a, force, report, log) for m, (f, a) in ways.items()}
+    pairs = paired(*(summary["resonances"] for summary, _ in found.values()))
+    case = checkpoint.as_found(case, folder, case_path)
+    table, picture = folder / "book.csv", folder / "pictures" / "book.png"
+    of = Quantity(unit_of(next(iter(read_response(folder / "response.h5").labels))))
+    store.write_text(table, comparison_table(pairs, of))
+    marched, book = (_curves(f / "response.h5") for f, _ in ways.values())
+    with store.complete_or_absent(picture) as temporary:
+        comparison_picture(case, marched, book, temporary, of)
+    return table, pairs, all(converged for _, converged in found.values())
+
+
+def _curves(file: Path) -> dict[float, Array]:
+    """Normal force (N) -> (2, f) Hz and amplitude of the first read-out, in a response file."""
+    found, response = {}, read_response(file)
+    first = next(
+        iter(response.labels)
+    )  # whose first row is the first read-out, see `harmonic_balance.checkpoint.labels`
+    for s in response.series:
+        whole = np.stack([s.frequency, np.where(s.converged, np.abs(s.arrays[first][:, 0, 1]), np.nan)])
+        found[s.parameters["normal_force"]] = whole[:, np.argsort(s.frequency, kind="stable")]
+    return found

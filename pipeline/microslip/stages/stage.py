@@ -1,0 +1,104 @@
+"""A stage: the product it makes, what that depends on, and the one rule when there is work to do.
+
+`make` and ``microslip run`` share this rule, so editing a normal force never remeshes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ..files import store
+
+Report = Callable[[str], None]
+PACKAGE = Path(__file__).parents[1]
+
+
+@dataclass(frozen=True)
+class Made:
+    """What the work of a stage leaves.
+
+    Attributes:
+        files: written with the product, in its folder or below. note: volatile things for the sidecar. whole: whether
+            nothing was missing; else the next run tries again.
+    """
+
+    files: Iterable[Path] = ()
+    note: Mapping[str, Any] = field(default_factory=dict)
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One product, made by one process at a time, and only when what it depends on has changed.
+
+    Attributes:
+        product: the file by which it is known; its sidecar and its lock stand beside it.
+        code: modules that make it; the source of all that they import counts as an input.
+        force: work even if there is nothing to do. report: is told what is being done.
+    """
+
+    product: Path
+    code: tuple[str, ...]
+    force: bool = False
+    report: Report = lambda _: None
+
+    def make(self, inputs: Mapping[str, Any], work: Callable[[], Made]) -> bool:
+        """Do the work unless the product is up to date. Returns whether it was done.
+
+        Args:
+            inputs: settings, and hashes of files, that the product depends on.
+            work: writes the product. It calls `begin` before the first of several files.
+        """
+        with self.making():
+            all_inputs = {**inputs, "code": hash_of_code(self.code)}
+            if store.nothing_to_do(self.product, all_inputs, self.force, self.report):
+                return False
+            made = work()
+            if made.whole:
+                store.note_product(self.product, all_inputs, made.files, **made.note)
+            return True
+
+    def making(self) -> AbstractContextManager[None]:
+        """What else belongs to the product is made under its lock, see `store.making`."""
+        return store.making(self.product, self.report)
+
+    def begin(self) -> None:
+        """What stands there counts no more: a run that ends here is begun anew."""
+        store.unfinished(self.product)
+
+
+@cache
+def hash_of_code(modules: tuple[str, ...]) -> str:
+    """SHA-256 of the sources of modules and of all that they import; a package stands for all that is in it."""
+    todo, found = [f for m in modules for f in _files(m)], set[Path]()
+    while todo:
+        file = todo.pop()
+        if file not in found:
+            found.add(file)
+            todo += _imported(file)
+    named = sorted((str(f.relative_to(PACKAGE)), store.hash_file(f)) for f in found)
+    return store.hash_settings(named)
+
+
+def _files(module: str) -> list[Path]:
+    place = PACKAGE / module.replace(".", "/")
+    return sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
+
+
+_IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
+
+
+def _imported(file: Path) -> list[Path]:
+    """Files of the package that a file imports, anywhere in its text."""
+    found = []
+    for dots, module, names in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        place = file.parents[len(dots) - 1].joinpath(*filter(None, module.split(".")))
+        inside = [place / name for name in re.findall(r"(\w+)(?: as \w+)?", names)]
+        found += [p.with_suffix(".py") for p in (place, *inside)] + [p / "__init__.py" for p in (place, *inside)]
+    return [f for f in found if f.is_file()]

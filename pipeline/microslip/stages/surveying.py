@@ -1,0 +1,253 @@
+"""Surveys of a case from its files to tables and pictures: over engine orders, speeds, ranges; curves followed by
+arclength; identification."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import CaseSettings, checkpoint, load_case, surveys
+from ..case.curves import Followed, curves
+from ..data import Array, ModalBasis
+from ..files import store
+from ..report import survey_page
+from ..results import Response, read_journal, response_of, write_response
+from ..results.checks import sentence
+from .checkpoint import Checkpoint, hashes_of
+from .places import existing_files
+from .stage import Made, Report, Stage
+
+if TYPE_CHECKING:
+    from ..harmonic_balance.envelope import Envelope, OverOrders
+    from ..harmonic_balance.speed_line import SpeedResponse
+
+Bases = Mapping[str, ModalBasis]
+Tables = Mapping[str, Mapping[str, Array]]
+"""File name -> column -> values."""
+Write = Callable[[Tables], None]
+"""Writes what there is of the tables of a survey, which may be interrupted."""
+
+_BY_THE_BOOK = "Book mode (Sextro 5.2): one harmonic, constant normal forces, elliptic orbits."
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a survey leaves.
+
+    Attributes:
+        tables: file name -> (column -> values). draw: file name -> what draws it. sentences: for the reader. failed:
+            points that did not converge, or curves that end early. whole: nobody interrupted it.
+    """
+
+    tables: Tables
+    draw: Mapping[str, Callable[[Path], Path]]
+    sentences: list[str] = field(default_factory=list)
+    failed: int = 0
+    whole: bool = True
+
+
+def survey_stage(
+    case_path: Path, basis_file: Path | None, kind: str, assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."),
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """A survey of a case on modal files that are there already, in build/<case>/.
+
+    Args:
+        kind: a key of `KINDS`, or one of `curves.OVER`. basis_file: see `respond`.
+
+    Returns:
+        The files, sentences for the reader, and whether every point converged.
+
+    Raises:
+        UserError: the case does not ask for it, or asks for what cannot be.
+        KeyboardInterrupt: after what a curve has found until then is written.
+    """
+    settings, raw = load_case(case_path, assignments)
+    files = existing_files(settings, case_path, basis_file, root)
+    folder = root / "build" / settings.name
+    stage = Stage(folder / f"{kind}.txt", ("stages.surveying",), force, report)
+    with stage.making():
+        settings = settings if kind == "identification" else checkpoint.as_found(settings, folder, case_path)
+        if raw.get("harmonics") == "auto":
+            raw = raw | {"harmonics": settings.harmonics}
+        named = hashes_of(checkpoint.files_of(settings, case_path))
+        inputs = {"case": raw, "basis": hashes_of(files), "files": named}
+        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, kind))
+        return _told(stage.product)
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path], kind: str
+) -> Made:  # fmt: skip
+    said, folder = stage.product, stage.product.parent
+
+    def begin() -> None:
+        stage.begin()
+        said.unlink(missing_ok=True)
+
+    points = Checkpoint(folder / f"over_{kind}.points", raw, files, stage.force, begin)
+
+    def write(tables: Tables) -> None:
+        begin()
+        for name, columns in tables.items():
+            store.write_text(folder / name, table(columns))
+
+    survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
+    found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)
+    if settings.mode == "book" and kind != "identification":
+        found = replace(found, sentences=[*found.sentences, _BY_THE_BOOK])
+    write(found.tables)
+    names = [*found.tables, *found.draw, _shown(found, kind, settings.name, folder)]
+    if not found.whole:
+        raise KeyboardInterrupt
+    store.write_text(said, "\n".join([f"{', '.join(names)}: {found.failed}", *found.sentences]) + "\n")
+    beside = [points.file.with_suffix(".h5")] if kind not in KINDS else []
+    return Made([*(folder / name for name in names), *beside])
+
+
+def _told(said: Path) -> tuple[list[Path], list[str], bool]:
+    """What `survey_stage` returned when it wrote a file of sentences."""
+    first, *sentences = said.read_text().splitlines()
+    listed, failed = first.split(": ")
+    return [said.parent / name for name in listed.split(", ")], sentences, int(failed) == 0
+
+
+def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
+    """Pictures and the page of a survey; the name of the page."""
+    for name, draw in found.draw.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        draw(folder / name)
+    page, words = f"{kind}.html", kind
+    if kind not in KINDS:
+        page, words = f"over_{kind}.html", f"over the {kind.replace('_', ' ')}"
+    pictures = [folder / name for name in found.draw]
+    survey_page(f"{case}: {words}", found.sentences, found.tables, pictures, folder / page)
+    return page
+
+
+def table(columns: Mapping[str, Array]) -> str:
+    """CSV text of columns of equal length."""
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in rows)]) + "\n"
+
+
+def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+    from ..pictures.coupled import over_orders_picture
+
+    def tables(found: Mapping[str, OverOrders]) -> Tables:
+        first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
+        for label, r in found.items():
+            plain = label.replace("$", "").replace(" = ", "_").replace(" ", "_")
+            missing = np.full(len(first.order) - len(r.order), np.nan)
+            own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
+            columns |= {n: v for n, v in first.columns().items() if n in of_all} | own
+        return {"orders.csv": columns}
+
+    of_all = {"engine_order", "wave"}
+    found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
+    title = f"{settings.name}: resonances over the engine order"
+    failed = sum(int(r.failed.sum()) for r in found.values())
+    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)},
+                  failed=failed)  # fmt: skip
+
+
+def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+    from ..pictures.coupled import speed_line_picture
+
+    def tables(r: SpeedResponse) -> Tables:
+        return {"speeds.csv": {"frequency_Hz": r.frequency, **r.columns()}}
+
+    r = surveys.over_speeds(settings, bases, path, report, lambda some: write(tables(some)))
+    amplitude = np.where(r.converged, np.abs(r.monitor), np.nan)
+    title = f"{settings.name}: along engine order {r.order}"
+    top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
+    drawn = r.rpm, r.frequency, amplitude, r.normal
+    size = f"{amplitude[top]:.4g} {r.quantity.said}"
+    said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
+    if still := [b.name for b in settings.members if not bases[b.name].ranges]:
+        said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
+    return Survey(
+        tables(r),
+        {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
+        said, int((~r.converged).sum()),
+    )  # fmt: skip
+
+
+def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+    from ..pictures.coupled import envelope_picture
+
+    def tables(e: Envelope) -> Tables:
+        return {"ranges.csv": e.columns(), "ranges_combinations.csv": e.corners()}
+
+    e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
+    title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
+    most = f"{e.peaks.min():.4g} and {e.peaks.max():.4g} {e.quantity.said}"
+    said = [f"Largest amplitude between {most} on the grid of the sweep."]
+    return Survey(
+        tables(e),
+        {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)},
+        said, int((~e.converged).sum()),
+    )  # fmt: skip
+
+
+def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+    from ..pictures.coupled import nodal_diameter_picture
+
+    found, diagrams = surveys.identification(settings, bases, path)
+    title = f"{settings.name}: nodal diameters with sticking contacts, $c_T$ = {found.ratio:g} $c_N$"
+    at = next(d for d in diagrams if d.stiffness == found.stiffness)
+    return Survey(
+        {"identification.csv": found.columns(), "nodal_diameters.csv": at.columns()},
+        {"pictures/nodal_diameters_stuck.png": lambda p: nodal_diameter_picture(diagrams, p, title, found)},
+        found.sentences(),
+    )  # fmt: skip
+
+
+def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
+    from ..pictures.following import curve_plot
+
+    found, whole = curves(settings, bases, path, over, points.journal, report)
+    if not whole:
+        found = [one for one in found if one.rows]
+    if not found:
+        raise KeyboardInterrupt
+    columns = {name: np.concatenate([one.columns()[name] for one in found]) for name in found[0].columns()}
+    title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
+    response = _written(points, found, whole)
+    failed = sum(int((~s.converged).sum()) for s in response.series)
+    drawn = [one for one in found if len(one.rows) > 1]
+    return Survey(
+        {f"{name}.csv": columns},
+        {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
+        [*(words for one in found for words in one.sentences()), sentence(response, None)],
+        sum(not one.complete for one in found) + failed,
+        whole,
+    )
+
+
+def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response:
+    """The points as a response file, beside their journal."""
+    from ..harmonic_balance.checkpoint import OF_THE_WAY
+
+    head, _ = read_journal(points.file)
+    series = {
+        one.name: {
+            float(i): {n: v for n, v in row.items() if not n.startswith(OF_THE_WAY)} for i, row in enumerate(one.rows)
+        }
+        for one in found
+        if one.rows
+    }
+    response = response_of({**head, "finished": whole}, series)
+    write_response(points.file.with_suffix(".h5"), response)
+    return response
+
+
+KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Path, Report], Survey]] = {
+    "orders": _orders, "speeds": _speeds, "ranges": _ranges, "identification": _identification,
+}  # fmt: skip
