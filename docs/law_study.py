@@ -90,7 +90,7 @@ def microslip(fig: Any) -> Any:
 
 
 ELEMENTS = {
-    "point": '{kind="massless"}', "strips of the rough surface": '{kind="strips", count=64}',
+    "point": '{kind="rough"}', "strips of the rough surface": '{kind="strips", count=64}',
     "Iwan, uniform": '{kind="iwan", count=64}',
     "Segalman, chi = -0.5": '{kind="iwan", exponent=-0.5, ratio=0.2, count=64}',
 }  # fmt: skip
@@ -102,7 +102,7 @@ def elements(fig: Any, plain: Any) -> Any:
     left, right = fig.subplots(1, 2)
     for colour, (name, element) in zip(COLOURS, ELEMENTS.items(), strict=False):
         sizes = f"motion.amplitudes=[3.0, {', '.join(f'{a:.4g}' for a in AMPLITUDES)}]"
-        t = study(OWN / "contact.toml", [f"element={element}", sizes, "motion.samples=1024"]).tables["loops"]
+        t = study(OWN / "contact.toml", [f"law={element}", sizes, "motion.samples=1024"]).tables["loops"]
         chosen = np.isclose(t["amplitude_m"], 3e-6) & (t["cycle"] == 1)
         left.plot(1e6 * t["u_t1_m"][chosen], t["F_t1_N"][chosen], color=colour, label=name)
         size, first = np.unique(t["amplitude_m"], return_index=True)

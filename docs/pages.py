@@ -239,6 +239,8 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "name": ("", "names the folder of the products, `build/NAME/`"),
     "description": ("", ""),
     "length_unit": ("", "unit of every length in this file; areas are its square"),
+    "normal_stiffness": ("N/m", "c_N0, short for [stiffness] of kind given"),
+    "tangential_stiffness": ("N/m", "c_R0, likewise"),
     "stiffness.kind": ("", "its [source](contact_stiffness.md)"),
     "stiffness.normal": ("N/m", "c_N0"),
     "stiffness.tangential": ("N/m", "c_R0; or two, along t1 and t2"),
@@ -296,17 +298,18 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "friction.deviation": ("", "relative standard deviation in time"),
     "friction.memory": ("s", "correlation exp(-t/memory)"),
     "friction.seed": ("", "of the random numbers"),
-    "element.kind": ("", "contact element"),
-    "element.damping": ("s", "beta: force per rate of the springs (3.7-18)"),
-    "element.length": ("*", "l_0: the hyperbolic law of a short layer (3.4)"),
-    "element.preload": ("N", "a constant normal force in place of a normal law"),
-    "element.mass": ("kg", "m_D, reduced mass of the full area"),
-    "element.slope": ("s/m", "k_S of the smoothed friction (3.7-43)"),
-    "element.printed": ("", "the book's stretch of the springs, which may give energy"),
-    "element.count": ("", "of strips or sliders"),
-    "element.weakest": ("", "strength of the weakest slider over that of the strongest"),
-    "element.exponent": ("", "chi of Segalman's distribution"),
-    "element.ratio": ("", "beta: stiffness of its last slider over that of all others"),
+    "law.kind": ("", "what sticks, slips and opens"),
+    "law.slides_along": ("", "the tangent with the slider of Jenkins elements"),
+    "law.damping": ("s", "beta: force per rate of the springs (3.7-18)"),
+    "law.length": ("*", "l_0: the hyperbolic law of a short layer (3.4)"),
+    "law.preload": ("N", "a constant normal force in place of a normal law"),
+    "law.mass": ("kg", "m_D, reduced mass of the full area"),
+    "law.slope": ("s/m", "k_S of the smoothed friction (3.7-43)"),
+    "law.printed": ("", "the book's stretch of the springs, which may give energy"),
+    "law.count": ("", "of strips or sliders"),
+    "law.weakest": ("", "strength of the weakest slider over that of the strongest"),
+    "law.exponent": ("", "chi of Segalman's distribution"),
+    "law.ratio": ("", "beta: stiffness of its last slider over that of all others"),
     "motion.frequency": ("Hz", ""),
     "motion.normal": ("*", "u_n, positive closes: mean, cos, sin, cos 2, sin 2, ..."),
     "motion.t1": ("*", "u_t1, likewise"),
@@ -410,24 +413,23 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.interference": ("m", "or how far the faces overlap at rest; negative: a gap"),
     "contacts.file": ("", "a [contact.toml](contact_toml.md) instead of stiffnesses, friction, law and roughness"),
     "contacts.stiffness": ("", "as in a [contact.toml](contact_toml.md), lengths in m, instead of the two below"),
-    "contacts.element": ("", "likewise: what sticks and slips, of any kind, also of [another package](own_law.md)"),
     "contacts.temperature": ("", "likewise: heat of sliding"),
     "contacts.normal_stiffness": ("N/m", "c_N0 of the whole patch; **required** without stiffness, file or young"),
     "contacts.tangential_stiffness": ("N/m", "c_R0, likewise"),
     "contacts.width": ("m", "b_0 along t1; the patch's own if not given"),
     "contacts.height": ("m", "h_0 along t2, likewise"),
     "contacts.friction": ("", "coefficient, or a table as in a contact.toml; **required** without file"),
-    "contacts.slides_along": ("", "law jenkins: the tangent along which it slides"),
     "contacts.includes": ("", "which [compliance](contact.md) the stiffnesses count"),
-    "contacts.law": ("", "points that stick, slide and open (`smooth` if not given), Hertz' own law, or Jenkins "
-                     "elements that never open"),
-    "contacts.roughness": ("m", "R_Z, of law rough, or a table as in a contact.toml"),
+    "contacts.law": ("", "name or table of a law, as in a contact.toml, also of [another package](own_law.md); `rough` "
+                     "with roughness, `smooth` without if not given"),
+    "contacts.roughness": ("m", "R_Z, or a table as in a contact.toml"),
     "contacts.points": ("", "how many along t1 and t2"),
     "contacts.patch": ("", "six coordinates, or points that move as the shapes of the bodies say"),
     "contacts.curvature": ("m", "relative radii along t1 and t2, inf where it is flat"),
     "contacts.young": ("Pa", "E of both bodies, for a curved patch, instead of the stiffnesses"),
     "contacts.poisson": ("", "nu of both bodies"),
-    "contacts.fit": ("", "in what the springs of a curved patch agree with Hertz"),
+    "contacts.fit": ("", "in what the springs of a curved patch agree with Hertz; `exact`: his own law, in pieces of a "
+                     "line"),
     "contacts.fitted_at": ("N", "at which load; if not given the force that presses it: its own, or each of the sweep"),
     "contacts.isotropic": ("", "geometric mean of both tangential stiffnesses of a curved patch, as the book's mode "
                            "needs it"),
@@ -512,8 +514,9 @@ def _sections(model: Any, prefix: str, title: str) -> Iterator[tuple[str, str, s
 
 
 def _fields(model: Any) -> dict[str, Any]:
-    """Keys as they are written -> fields."""
-    return {field.alias or name: field for name, field in model.model_fields.items()}
+    """Keys as they are written -> fields, its own before those that it shares with others."""
+    named = {field.alias or name: field for name, field in model.model_fields.items()}
+    return dict(sorted(named.items(), key=lambda item: item[0] not in model.__annotations__))
 
 
 def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:

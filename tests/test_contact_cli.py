@@ -262,10 +262,10 @@ def test_stiffness_of_a_modal_file(tmp_path: Path) -> None:
 
 
 ELEMENTS = {
-    "strips": '[element]\nkind = "strips"\ncount = 24\n',
-    "iwan": '[element]\nkind = "iwan"\n',
-    "segalman": '[element]\nkind = "iwan"\nexponent = -0.5\nratio = 0.5\n',
-    "mindlin": '[element]\nkind = "mindlin"\n',
+    "strips": '[law]\nkind = "strips"\ncount = 24\n',
+    "iwan": '[law]\nkind = "iwan"\n',
+    "segalman": '[law]\nkind = "iwan"\nexponent = -0.5\nratio = 0.5\n',
+    "mindlin": '[law]\nkind = "mindlin"\n',
 }
 
 
@@ -335,8 +335,8 @@ MISTAKES = {
     "NaN": ("mu = 0.3", "mu = nan", "friction.mu: must be a finite number (it is nan)"),
     "friction in percent": ("mu = 0.3", "mu = 30.0", "friction.mu: a friction coefficient of 30"),
     "slope 0": (
-        "[motion]", '[element]\nkind = "with-mass"\nmass = 0.1\nslope = 0.0\n[motion]',
-        "element.slope: must be greater than 0 (it is 0.0)",
+        "[motion]", '[law]\nkind = "with-mass"\nmass = 0.1\nslope = 0.0\n[motion]',
+        "law.slope: must be greater than 0 (it is 0.0)",
     ),
     "text": ("poisson = 0.3", 'poisson = "0.3"', 'stiffness.poisson: must be a number (it is "0.3")'),
     "incompressible": (
@@ -365,8 +365,8 @@ MISTAKES = {
         "microslip.mu: is missing, and there is no friction",
     ),
     "strips that fall": (
-        FRICTION, 'kind = "falling"\nmu_0 = 0.3\np_v = 1.0\n[element]\nkind = "strips"',
-        'element: kind = "strips" slides by Coulomb; write [friction] kind = "coulomb"',
+        FRICTION, 'kind = "falling"\nmu_0 = 0.3\np_v = 1.0\n[law]\nkind = "strips"',
+        'law: "strips" slides by Coulomb; write [friction] kind = "coulomb"',
     ),
     "no TOML": ("[friction]", "[friction", "is not valid TOML"),
 }  # fmt: skip

@@ -499,8 +499,8 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('law = "smooth"', 'law = "rough"', "roughness (R_Z in m) belongs to"),
-        ('law = "smooth"', 'law = "smooth"\nroughness = 1e-5', "roughness (R_Z in m) belongs to"),
+        ('law = "smooth"', 'law = "rough"', "roughness (R_Z, or a table) belongs to"),
+        ('law = "smooth"', 'law = "smooth"\nroughness = 1e-5', "roughness (R_Z, or a table) belongs to"),
         ("samples = 32", "samples = 8\n", "are too few for"),
         ("harmonics = 2", "harmonics = 9", "are too few for 9 harmonics; take at least 36"),
         ("points = [4, 2]", "points = [4, 0]", "points"),

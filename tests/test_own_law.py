@@ -101,10 +101,10 @@ def test_a_law_of_another_package_is_named_in_a_case(tmp_path: Path, package: di
     law.write_text(law.read_text().replace("return self.mu * pressed", "return 0.5 * self.mu * pressed"))
     assert "up to date" not in microslip(tmp_path, package, "respond", "case.toml").stderr
     assert table.read_text() != before
-    typed = microslip(tmp_path, package, "respond", "case.toml", "--set", "contacts.rub.element.kind=mad")
+    typed = microslip(tmp_path, package, "respond", "case.toml", "--set", "contacts.rub.law.kind=mad")
     assert typed.returncode == 2 and '"pad"' in typed.stderr
     alone = microslip(tmp_path, {k: v for k, v in package.items() if k != "PYTHONPATH"}, "respond", "case.toml")
-    assert alone.returncode == 2 and 'element.kind: "pad" is unknown; choose one of' in alone.stderr
+    assert alone.returncode == 2 and 'law.kind: "pad" is unknown; choose one of' in alone.stderr
 
 
 @pytest.mark.slow

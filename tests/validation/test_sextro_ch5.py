@@ -18,10 +18,7 @@ from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 
 ROOT = Path(__file__).parents[2]
-JENKINS = ["harmonics=1"] + [
-    f"contacts.{side}.{key}" for side in ("right", "left")
-    for key in ('law="jenkins"', 'slides_along="t2"')
-]  # fmt: skip
+JENKINS = ["harmonics=1", *(f'contacts.{side}.law={{kind="jenkins", slides_along="t2"}}' for side in ("right", "left"))]
 
 
 @pytest.fixture(scope="module")

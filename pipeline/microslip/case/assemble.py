@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from ..contact.settings import ContactLaw
 from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserError
 from ..files.store import ordinary
 from ..frames import rotation
@@ -25,13 +26,16 @@ from .patches import (
     nodal_patch,
     number_of_points,
     patch_of,
+    pieces,
     resolved,
     waves,
 )
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
+    from ..contact.composed import Contact as Composed
     from ..contact.law import Law
+    from ..contact.stiffness import Given
     from ..system.assembly import Assembly, Contact, Load, Member, Output, Side
     from ..system.nodal import Nodal
     from ..system.pairing import Pairing, Place
@@ -214,6 +218,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     """
     from ..system.assembly import Assembly, Ring
 
+    settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
     members = {name: _member(settings, b) for name, b in bodies.items()}
     contacts, springs, made, remarks = [], [], [], list[str]()
@@ -251,7 +256,7 @@ def _member(settings: CaseSettings, b: Loaded) -> Member:
 
 def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:
     faces = {
-        i: SURFACE if c.young else c.includes
+        i: SURFACE if c.is_curved else c.includes
         for c in settings.contacts
         for body, i in _ends(settings, c)
         if body == name
@@ -276,17 +281,11 @@ def _stiffness(
 ) -> tuple[ContactSettings, Springs, list[str]]:
     """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and remarks."""
     loaded, faces = _sides(settings, bodies, c, path)
-    c = _described(c, path)[0] if c.described else c
     own = sized(c, faces[0], path)
-    if c.young is not None:
+    if c.is_curved:
         springs, remark = _told(path, c, lambda: curved_springs(own, load))
     else:
-        springs, remark = counted_once(c, _faces(settings, c, loaded), path)
-    if c.described and springs[0] != c.normal_stiffness:
-        raise UserError(
-            f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of a law in tables; give there the "
-            'stiffness of the surface alone, and includes = "surface" here'
-        )
+        springs, remark = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
     return own, springs, [remark] if remark else []
 
 
@@ -310,13 +309,12 @@ def _contact(
     """A contact for any load, and remarks. springs: of one that is not curved."""
     from ..system.assembly import Side, preloaded_contact
 
-    ends, law = _ends(settings, c), c.law_name
+    ends = _ends(settings, c)
     loaded, faces = _sides(settings, bodies, c, path)
     first, second, met = Side(*ends[0]), None, None
     if len(ends) == 2:
         met = _told(path, c, lambda: _met(settings, c, loaded, faces))
         second = Side(*ends[1], met.frame, c.against_sector)
-    whole = _described(c, path)[1] if c.described else None
     said, found, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None, None
     if c.patch == "nodal":
         found, first, second, compliance = _told(path, c, lambda: _nodal(settings, members, c, (first, second), met))
@@ -326,11 +324,13 @@ def _contact(
     @lru_cache(maxsize=64)
     def at(load: float | None) -> tuple[Contact, list[str]]:
         _told(path, c, lambda: _refuse_too_many(settings, c, load, found))
-        k, words = (springs, "") if c.young is None else _told(path, c, lambda: curved_springs(c, load))
-        if found is not None:
-            patch = nodal_patch(c, k, law, found, whole)
+        k, words = _told(path, c, lambda: curved_springs(c, load)) if c.is_curved else (springs, "")
+        if c.fit == "exact":
+            patch = _told(path, c, lambda: pieces(c, load))
+        elif found is not None:
+            patch = nodal_patch(c, _law(c, path, k, load), found)
         else:
-            patch = _told(path, c, lambda: patch_of(c, k, law, faces[0], load, whole))
+            patch = _told(path, c, lambda: patch_of(c, _law(c, path, k, load), c.what, faces[0], load))
         more = [words] * bool(words) + _told(path, c, lambda: resolved(c, patch, load))
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
         return _told(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
@@ -433,32 +433,80 @@ def _place(b: Loaded) -> Place:
     return Place(R, centre - R @ centre + np.asarray(b.settings.shift))
 
 
-def _described(c: ContactSettings, path: Path | str) -> tuple[ContactSettings, Law]:
-    """A contact whose stiffnesses are those of its tables, here or in its file, and the law that they make.
+def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
+    """A contact with what its file says it is, where it has one.
 
     Raises:
-        UserError: no such file, or tables that make no law for point contacts.
+        UserError: no such file, a law that cannot stand here.
     """
-    from ..contact.composed import compose
-    from ..contact.settings import load_contact
-
-    where, file = f"contacts.{c.interface}", Path(path).parent / str(c.file)
-    if c.file is None:
+    where, (said, file) = f"contacts.{c.interface}", _source(c, path)
+    if c.file is not None:
+        c = c.model_copy(update={key: getattr(said, key) for key in ContactLaw.model_fields})
         try:
-            found = compose(c.tables, Path(path))
-        except UserError as error:
-            raise UserError(str(error).replace(f"{path}: ", f"{path}: {where}.", 1)) from error
-    elif not ordinary(file).is_file():
-        raise UserError(f"{path}: {where}.file: there is no file {file}; correct the path")
-    else:
-        found = compose(load_contact(file), file)
+            c.what.fits(c)
+        except ValueError as error:
+            raise UserError(f"{path}: {where}.file: {file}: {error}") from error
+    if c.is_curved:
+        return c
+    found = _composed(c, path)
     if found.law is None or found.stiffness is None:
         told = f"file: {file} needs" if c.file is not None else "stiffness: it needs"
         raise UserError(f"{path}: {where}.{told} friction and a tangential stiffness to make a law; add them")
-    includes = c.includes or ("surface" if found.stiffness.includes == "surface" else None)
-    first, _ = found.stiffness.tangential
-    own = {"normal_stiffness": found.normal_0, "tangential_stiffness": first, "includes": includes}
-    return c.model_copy(update=own), found.law
+    if c.includes is None and found.stiffness.includes == SURFACE:
+        c = c.model_copy(update={"includes": SURFACE})
+    return c
+
+
+def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
+    """Who says what a contact is, and its file: its contact.toml, or the case."""
+    from ..contact.settings import load_contact
+
+    file = Path(path).parent / str(c.file)
+    if c.file is None:
+        return c, Path(path)
+    if not ordinary(file).is_file():
+        raise UserError(f"{path}: contacts.{c.interface}.file: there is no file {file}; correct the path")
+    return load_contact(file), file
+
+
+def _composed(c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None) -> Composed:
+    """The laws of a whole contact under a load, N. given: stiffnesses instead of its own."""
+    from ..contact.composed import compose
+
+    said, file = _source(c, path)
+    if given is not None:
+        said = said.model_copy(update={"stiffness": given, "normal_stiffness": None, "tangential_stiffness": None})
+    try:
+        return compose(said, file, load or 0.0)
+    except UserError as error:
+        raise UserError(str(error).replace(f"{path}: ", f"{path}: contacts.{c.interface}.", 1)) from error
+
+
+def _given(found: Composed) -> Springs:
+    """Stiffnesses along n, t1, t2, N/m."""
+    assert found.stiffness is not None
+    return (found.normal_0, *found.stiffness.tangential)
+
+
+def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | None) -> Law:
+    """The law of a whole contact with these stiffnesses.
+
+    Raises:
+        UserError: they are not its own, and its own are more than numbers.
+    """
+    from ..contact.stiffness import Given
+
+    found = None if c.is_curved else _composed(c, path, load)
+    if found is None or _given(found) != springs:
+        if not isinstance(c.stiffness, Given | None):
+            raise UserError(
+                f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of a stiffness of kind = "
+                f'"{c.stiffness.kind}"; give that of the surface alone, and includes = "surface" here'
+            )
+        area = None if c.stiffness is None else c.stiffness.area
+        found = _composed(c, path, load, Given(kind="given", normal=springs[0], tangential=springs[1:], area=area))
+    assert found.law is not None
+    return found.law
 
 
 def sized(c: ContactSettings, face: Interface, path: Path | str) -> ContactSettings:

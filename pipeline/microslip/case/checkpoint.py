@@ -54,7 +54,7 @@ def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     from ..contact.kinds import sources_of_others
 
     found = {name: path.parent / name for name in settings.files}
-    found |= sources_of_others() if any(c.described for c in settings.contacts) else {}
+    found |= sources_of_others()
     for name in [c.file for c in settings.contacts if c.file is not None]:
         found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
     return found

@@ -37,15 +37,17 @@ class Face:
 
 
 def counted_once(
-    c: ContactSettings, faces: Sequence[Face], path: Path | str
+    c: ContactSettings, given: Springs, faces: Sequence[Face], path: Path | str
 ) -> tuple[Springs, str]:  # fmt: skip
     """The springs of a contact without the bulk that the bodies hold on both of its sides, and a remark or nothing.
+
+    Args:
+        given: as the contact has them.
 
     Raises:
         UserError: a stiffness that is said to count the bulk, but is stiffer than the bulk alone.
     """
     shares = [_sum([f.share(row) for f in faces]) for row in ("u_n", "u_t1", "u_t2")]
-    given = (c.normal_stiffness, c.tangential_stiffness, c.tangential_stiffness)
     kept = _taken_out(c, given, shares, path) if c.includes == BULK_AND_SURFACE else given
     reduction = ", ".join(dict.fromkeys(f.reduction for f in faces))
     return kept, _what_is_counted(c, given, kept, shares, reduction)
@@ -93,7 +95,7 @@ def _what_is_counted(
     if c.includes is None:
         return (
             f"Compliance may be counted twice: {held}, a spring of {s.contacts / s.beyond:.3g} N/m at each contact. If "
-            f"normal_stiffness = {c.normal_stiffness:.3g} N/m counts it too, as E A / l0 of the book does, write "
+            f"normal_stiffness = {given[0]:.3g} N/m counts it too, as E A / l0 of the book does, write "
             f'includes = "{BULK_AND_SURFACE}"; if it is that of the surface alone, write includes = "{SURFACE}".'
         )
     return ""

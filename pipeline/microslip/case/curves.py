@@ -187,9 +187,11 @@ def _ends(built: Built, asked: CurveOfCase, over: str, path: Path | str) -> tupl
     if not any(swept(c) for c in built.contacts):
         raise UserError(f"{path}: curve: the sweep's normal forces press no contact; there is nothing to change")
     for c in (built.contacts[i] for i in built.fitted):
-        if c.law == "jenkins":
-            raise UserError(f'{path}: contacts.{c.interface}.law: "jenkins" holds a force given beforehand; write '
-                            '"smooth" for a curve over the force')  # fmt: skip
+        if c.what.of_the_force:
+            raise UserError(
+                f'{path}: contacts.{c.interface}.law: "{c.what.kind}" holds a force given beforehand; write "smooth" '
+                "for a curve over the force"
+            )
         raise UserError(
             f"{path}: contacts.{c.interface}.fitted_at: is missing; along a curve over its force a curved contact has "
             "one law, so give the force (N) at which it is fitted"

@@ -8,54 +8,48 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array, Interface, UserError
-from ..reduced.compliance import BULK_AND_SURFACE
 from .counting import Springs
 from .settings import CaseSettings, ContactSettings
 
 if TYPE_CHECKING:
     from ..contact.curved import Foundation, Line
     from ..contact.hertz import Hertz
+    from ..contact.kinds import LawKind
     from ..contact.law import Law
     from ..contact.patch import Patch
     from ..system.nodal import Nodal
 
 
-def patch_of(
-    c: ContactSettings, springs: Springs, law: str, face: Interface, load: float | None, whole: Law | None = None
-) -> Patch:  # fmt: skip
+def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, load: float | None) -> Patch:
     """The points of a patch that moves as a rigid body (Sextro Eqs. (5.2-1), (5.2-34)).
 
     Args:
-        springs: of the whole patch, N/m. face: of the first side. load: N that the contact is about pressed by.
-            whole: law of the full area, where it stands in a file of its own.
+        whole: law of the full area. what: its settings. face: of the first side. load: N that the contact is about
+            pressed by.
     """
     from ..contact.patch import Patch
 
-    if law == "hertz":
-        return _resultants(c, load)
-    if law == "jenkins":
-        return _jenkins(c, springs, face, load)
-    points, areas = _points(c, face, _counts(c, load))
-    return Patch(c.interface, points, areas, _curved(c, _law(c, springs, law, areas, whole), points))
+    own = None if c.points else what.places(c.width or 0.0, c.height or 0.0)
+    points, areas = own or _points(c, face, _counts(c, load))
+    return Patch(c.interface, points, areas, _curved(c, _shared(whole, areas), points))
 
 
-def nodal_patch(c: ContactSettings, springs: Springs, law: str, found: Nodal, whole: Law | None = None) -> Patch:
-    """The points of a patch that deforms."""
+def nodal_patch(c: ContactSettings, whole: Law, found: Nodal) -> Patch:
+    """The points of a patch that deforms. whole: law of the full area."""
     from ..contact.patch import Patch
 
-    law_of_points = _curved(c, _law(c, springs, law, found.areas, whole), found.points)
+    law_of_points = _curved(c, _shared(whole, found.areas), found.points)
     return Patch(c.interface, found.points, found.areas, law_of_points, found.shapes)
 
 
-def _jenkins(c: ContactSettings, springs: Springs, face: Interface, load: float | None) -> Patch:
-    """Jenkins elements; a contact that nothing presses has no stiffness."""
-    from ..contact.jenkins import four_places, shared
-    from ..contact.patch import Patch
+def _shared(whole: Law, areas: Array) -> Law:
+    """The law of points that share out a contact by their areas."""
+    import jax.numpy as jnp
 
-    places, areas = _points(c, face, c.points) if c.points else four_places(c.width or 0.0, c.height or 0.0)
-    stiff = springs if load is None or load > 0 else (0.0, 0.0, 0.0)
-    law = shared(stiff, c.coefficient * (load or 0.0), 1 if c.slides_along == "t1" else 2, len(places))
-    return Patch(c.interface, places, areas, law)
+    from ..contact.portion import portion
+
+    even = not areas.any() or bool(np.ptp(areas) <= 1e-12 * areas.max())
+    return portion(whole, jnp.asarray(1 / len(areas) if even else areas / areas.sum()))
 
 
 FEWEST, ENOUGH = 3, 6
@@ -70,7 +64,7 @@ def resolved(c: ContactSettings, patch: Patch, load: float | None) -> list[str]:
     """
     from ..contact.patch import equilibrium, pressure
 
-    if c.curvature is None or not load or len(patch.points) == 1 or c.law == "hertz":
+    if c.curvature is None or not load or len(patch.points) == 1 or c.fit == "exact":
         return []
     pressed = patch.points[pressure(patch, equilibrium(patch, load)) > 0]
     across = [len(np.unique(np.round(pressed[:, i], 9))) for i in (0, 1) if np.isfinite(c.curvature[i])]
@@ -79,7 +73,7 @@ def resolved(c: ContactSettings, patch: Patch, load: float | None) -> list[str]:
         return []
     words = f"{least} points in a row are pressed at {load:g} N"
     if least < FEWEST:
-        raise UserError(f'points: {words}; take more points, a narrower face, or law = "hertz"')
+        raise UserError(f'points: {words}; take more points, a narrower face, or fit = "exact"')
     return [f"{c.interface}: {words}; at least {ENOUGH} give its pressure: take more points, or a narrower face."]
 
 
@@ -117,35 +111,13 @@ def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tupl
     return grid(width, height, counts)
 
 
-def _law(c: ContactSettings, springs: Springs, law: str, areas: Array, whole: Law | None) -> Law:
-    """The law of points that share out the stiffness of a patch, or its law, by their areas."""
-    import jax.numpy as jnp
-
-    from ..contact.friction import Coulomb
-    from ..contact.heights import Polynomial
-    from ..contact.normal import Normal, Penalty, Rough
-    from ..contact.point import PointContact
-    from ..contact.portion import Portion
-
-    even = not areas.any() or bool(np.ptp(areas) <= 1e-12 * areas.max())
-    share = 1 / len(areas) if even else areas / areas.sum()
-    if whole is not None:
-        return Portion(whole, jnp.asarray(share))
-    n, t1, t2 = (jnp.asarray(k * share) for k in springs)
-    normal: Normal = Penalty(n)
-    if law == "rough":
-        normal = Rough(n, jnp.asarray(c.roughness), Polynomial())
-    friction, second = Coulomb(jnp.asarray(c.coefficient)), None if springs[1] == springs[2] else t2
-    return PointContact(normal, friction, t1, second, includes=c.includes or BULK_AND_SURFACE)
-
-
 # curved faces -------------------------------------------------------------------------------------------------------
 
 
 def follows_the_force(c: ContactSettings) -> bool:
     """Whether the law of a contact depends on the very force of the sweep that presses it: a curved one is fitted at
     it, of a Jenkins element it is the friction limit."""
-    made_for_it = c.law == "jenkins" or (c.young is not None and c.fitted_at is None)
+    made_for_it = c.what.of_the_force or (c.young is not None and c.fitted_at is None)
     return made_for_it and c.normal_force is None and c.interference is None
 
 
@@ -167,7 +139,7 @@ def curved_springs(c: ContactSettings, load: float | None) -> tuple[Springs, str
     found, around, along = _foundation(c, _fitted(c, load))
     n = found.stiffness * (c.width or 0.0) * (c.height or 0.0)
     t1, t2 = _tangential(c, around, along)
-    words = "" if c.law == "hertz" else f"{c.interface}: {found.sentence}"
+    words = "" if c.fit == "exact" else f"{c.interface}: {found.sentence}"
     return (n, t1 * n, t2 * n), words
 
 
@@ -182,14 +154,15 @@ def _foundation(c: ContactSettings, load: float) -> tuple[Foundation, float, flo
     """The foundation, and tangential over normal stiffness around and along the line."""
     from ..contact.curved import foundation_of_line, foundation_of_point
 
+    fit = "approach" if c.fit == "exact" else c.fit
     if (line := _line(c)) is not None:
-        return foundation_of_line(line, load, _strip(c), c.fit), *line.tangential_ratio
+        return foundation_of_line(line, load, _strip(c), fit), *line.tangential_ratio
     ball = _ellipse(c)
     x, y = ball.tangential_ratio
-    return foundation_of_point(ball, load, c.fit), *((y, x) if _lies_along(c) == "t1" else (x, y))
+    return foundation_of_point(ball, load, fit), *((y, x) if _lies_along(c) == "t1" else (x, y))
 
 
-def _resultants(c: ContactSettings, load: float | None) -> Patch:
+def pieces(c: ContactSettings, load: float | None) -> Patch:
     """Pieces of a line of contact, or one round contact, each a point with Hertz' own law."""
     import jax.numpy as jnp
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..contact.settings import AnyElement, AnyFriction, AnyRoughness, AnyStiffness, ContactFile, Temperature
+from ..contact.settings import ContactLaw
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.body import (
-    Coefficient,
     Model,
     Name,
     NotNegative,
@@ -102,32 +101,24 @@ class RingSettings(Model):
     model: Literal["sector", "full"] = "sector"
 
 
-class ContactSettings(Model):
+class ContactSettings(ContactLaw):
     """A contact of an interface with the ground, a rigid neighbour, or with another body's interface.
 
-    Stiffnesses in N/m for the whole patch (book: c_N0, c_R0). against: ``ground``, or an interface, ``body:interface``;
-    against_sector: of a ring, how many sectors further that body stands. normal_force: N, or interference: m, negative
-    a gap, where the sweep's normal forces are not this contact's.
+    against: ``ground``, or an interface, ``body:interface``; against_sector: of a ring, how many sectors further that
+    body stands. normal_force: N, or interference: m, negative a gap, where the sweep's normal forces are not this
+    contact's. width (along t1) and height (along t2) in m are the patch's own if not given; points: of it along t1 and
+    t2 (four of Jenkins elements if not given).
 
-    width (along t1) and height (along t2) in m are the patch's own if not given. includes: which compliance the
-    stiffnesses count, that of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
-
-    law: point contacts that stick, slide in any direction and open, ``smooth`` (a spring that cannot pull) or ``rough``
-    (3.3, with `roughness` R_Z in m), points of them along t1 and t2; or ``jenkins``, Jenkins elements (four if
-    `points` are not given): linear springs that do not open and slide along `slides_along`, where friction holds its
-    share of the normal force that presses the contact, however that one swings. Not given: ``smooth``.
-
-    stiffness, roughness, friction, element, temperature: the tables of a contact.toml (`docs/contact_toml.md`), for any
-    law of the contact room or of another package; every point carries its share of it. normal_stiffness and
-    tangential_stiffness are short for a stiffness of kind ``given``, a number as friction for Coulomb's, one as
-    roughness for the R_Z of polynomial heights. file: a contact.toml beside the case instead of all of these.
+    What it is: the keys of a contact.toml (`docs/contact_toml.md`), of the whole patch in SI, of which every point
+    carries its share; or file: a contact.toml beside the case. includes: which compliance the stiffnesses count, that
+    of the surface alone or of bulk and surface (the book's E A / l0); see `compliance`.
 
     patch: ``rigid``, six coordinates, or ``nodal``, points that move as the shapes of the bodies say. curvature:
     relative radii (m) along t1 and t2, inf where it is flat (a pin of radius r in a hole of radius R: r R / (R - r)).
     young (Pa) and poisson of both bodies take the place of the two stiffnesses there: springs that agree with Hertz in
-    `fit`, at the load `fitted_at` (N; if not given the force that presses it: its own, or each of the sweep); or
-    law = ``hertz``: a line of contact in pieces, or one round contact, with its exact approach. isotropic: of both
-    tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
+    their ``approach`` or ``width`` (fit), at the load `fitted_at` (N; if not given the force that presses it: its own,
+    or each of the sweep); or fit = ``exact``: a line of contact in pieces, or one round contact, with Hertz' own law.
+    isotropic: of both tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
     """
 
     interface: Address
@@ -136,81 +127,30 @@ class ContactSettings(Model):
     normal_force: NotNegative | None = None
     interference: Number | None = None
     file: str | None = None
-    stiffness: AnyStiffness | None = None
-    element: AnyElement | None = None
-    temperature: Temperature | None = None
-    normal_stiffness: Positive = 0.0  # of the tables or the file, if there are some
-    tangential_stiffness: Positive = 0.0
     width: Positive | None = None
     height: Positive | None = None
-    friction: Coefficient | AnyFriction = 0.0
-    slides_along: Literal["t1", "t2"] = "t1"
     includes: Literal["surface", "bulk+surface"] | None = None
-    law: Literal["jenkins", "smooth", "rough", "hertz"] | None = None
-    roughness: Positive | AnyRoughness | None = None
     points: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] | None = None
     patch: Literal["rigid", "nodal"] = "rigid"
     curvature: Annotated[tuple[Radius, Radius], BeforeValidator(_tuple)] | None = None
     young: Positive | None = None
     poisson: Annotated[Number, Field(gt=-1, le=0.5)] = 0.3
-    fit: Literal["approach", "width"] = "approach"
+    fit: Literal["approach", "width", "exact"] = "approach"
     fitted_at: Positive | None = None
     isotropic: bool = False
 
-    @model_validator(mode="after")
-    def _says_what_it_is(self) -> ContactSettings:
-        own = ("normal_stiffness", "tangential_stiffness", "friction")
-        tables = ("stiffness", "element", "temperature")
-        given = [key for key in (*own, "law", "roughness", *tables) if key in self.model_fields_set]
-        if self.file is not None and given:
-            raise ValueError(f"{given[0]}: stands in the contact file already; give file or {given[0]}")
-        short = [key for key in ("normal_stiffness", "tangential_stiffness") if key in self.model_fields_set]
-        if self.stiffness is not None and short:
-            raise ValueError(f"{short[0]}: is short for a table of stiffness; give one of the two")
-        if self.in_tables and (self.law is not None or self.young is not None):
-            key = "law" if self.law is not None else "young"
-            raise ValueError(f"{key}: cannot stand beside tables of stiffness, roughness, friction or element; write "
-                             "all of it in tables")  # fmt: skip
-        needed = own if self.young is None else ("friction",)
-        needed = ("friction",) if self.stiffness is not None else needed
-        missing = [key for key in needed if key not in self.model_fields_set]
-        if self.file is None and missing:
-            raise ValueError(f"{missing[0]}: is missing; give it, or a contact file (file)")
-        if self.in_tables:
-            _ = self.tables
-        return self
+    @property
+    def is_pressed(self) -> bool:
+        return self.interference is None
 
     @property
-    def in_tables(self) -> bool:
-        """Whether tables of a contact.toml say what it is."""
-        some = (self.stiffness, self.element, self.temperature, self.friction, self.roughness)
-        return any(isinstance(one, Model) for one in some)
+    def is_elsewhere(self) -> bool:
+        return self.file is not None or self.young is not None
 
     @property
-    def described(self) -> bool:
-        """Whether tables say what it is, here or in a file."""
-        return self.file is not None or self.in_tables
-
-    @property
-    def tables(self) -> ContactFile:
-        """The tables, short keys written out.
-
-        Raises:
-            ValueError: some that do not go together.
-        """
-        given = {"kind": "given", "normal": self.normal_stiffness, "tangential": self.tangential_stiffness}
-        rough = {"kind": "polynomial", "R_Z": self.roughness}
-        return ContactFile.model_validate({
-            "name": "contact", "stiffness": given if self.stiffness is None else self.stiffness,
-            "roughness": rough if isinstance(self.roughness, float) else self.roughness,
-            "friction": self.friction, "temperature": self.temperature,
-            **({} if self.element is None else {"element": self.element}),
-        })  # fmt: skip
-
-    @property
-    def coefficient(self) -> float:
-        """Coulomb's, 0 where that is no single number."""
-        return self.friction if isinstance(self.friction, float) else getattr(self.friction, "mu", 0.0)
+    def is_curved(self) -> bool:
+        """Whether its stiffnesses are those of Hertz' contact."""
+        return self.young is not None
 
     @property
     def files(self) -> list[str]:
@@ -218,32 +158,30 @@ class ContactSettings(Model):
         some = (self, self.stiffness, self.roughness, self.friction)
         return [file for one in some if isinstance(file := getattr(one, "file", None), str)]
 
-    @property
-    def law_name(self) -> str:
-        """``jenkins``, ``smooth``, ``rough``, ``hertz`` or ``tables``."""
-        return "tables" if self.described else self.law or "smooth"
-
     @model_validator(mode="after")
-    def _belongs_to_the_law(self) -> ContactSettings:
-        if (self.law == "rough") != (self.roughness is not None) and not self.in_tables:
-            raise ValueError('roughness (R_Z in m) belongs to law = "rough": give both or neither')
+    def _says_what_it_is(self) -> ContactSettings:
+        given = [key for key in ContactLaw.model_fields if key in self.model_fields_set]
+        if self.file is not None and given:
+            raise ValueError(f"{given[0]}: stands in the contact file already; give file or {given[0]}")
+        if self.file is None and self.friction is None:
+            raise ValueError("friction: is missing; give it, or a contact file (file)")
+        if not self.is_elsewhere and getattr(self.springs, "tangential", 1.0) is None:
+            key = "stiffness.tangential" if self.stiffness is not None else "tangential_stiffness"
+            raise ValueError(f"{key}: is missing; add it")
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
-        if self.law == "jenkins" and self.interference is not None:
-            raise ValueError('interference: law = "jenkins" holds mu F_N of a given force; give a normal_force')
-        if self.law == "jenkins" and (self.patch == "nodal" or self.curvature is not None):
+        if not self.what.opens and (self.patch == "nodal" or self.curvature is not None):
             key = "curvature" if self.curvature is not None else "patch"
-            raise ValueError(f'{key}: law = "jenkins" belongs to flat, rigid patches; write law = "smooth"')
-        if self.law != "jenkins" and "slides_along" in self.model_fields_set:
-            raise ValueError('slides_along: belongs to law = "jenkins"; points of the others slide in any direction')
+            raise ValueError(f'{key}: law = "{self.what.kind}" belongs to flat, rigid patches; write law = "smooth"')
         return self._curved()
 
     def _curved(self) -> ContactSettings:
-        given = {"normal_stiffness", "tangential_stiffness", "file"} & self.model_fields_set
-        if self.young is not None and (self.curvature is None or given):
+        if self.is_curved and (self.curvature is None or self.file or self.stiffness or self.normal_stiffness):
             raise ValueError("young stands for both stiffnesses where a curvature is given; give one or the other")
-        if self.law == "hertz" and (self.young is None or self.patch == "nodal"):
-            raise ValueError('law = "hertz" needs curvature and young, and a rigid patch')
+        if self.is_curved and self.what.kind != "smooth":
+            raise ValueError(f'law: "{self.what.kind}" does not go with young; write law = "smooth"')
+        if self.fit == "exact" and (self.young is None or self.patch == "nodal"):
+            raise ValueError('fit: "exact" needs curvature and young, and a rigid patch')
         if self.curvature is not None and min(self.curvature) == math.inf:
             raise ValueError("curvature: inf, inf is flat; leave it out, or give the radius of the curved direction")
         if self.patch == "nodal" and self.points is not None:
@@ -290,8 +228,8 @@ class CaseSettings(Model):
     many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
     a cycle), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
     force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
-    before they begin, the machine's if not given. mode: ``marched``, their laws in time, or ``book``
-    (Sextro 5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
+    before they begin, the machine's if not given. mode: ``aft``, their laws in time, or ``book`` (Sextro
+    5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
     touching part of a rough surface, for microslip (5.2-33), 0 for none. damping: ``modal``, each body's own modes as
     Sextro Eq. (2.4-13) has it; ``structural``, the bodies' ratios as loss factors, so that elastic deformation damps in
     every motion; or ``stuck``, the modes with sticking contacts. Not given: modal for one body, structural for several.
@@ -406,7 +344,7 @@ class CaseSettings(Model):
         return ""
 
     def _book(self) -> CaseSettings:
-        if self.mode == "book" and (not self.contacts or any(c.law == "jenkins" for c in self.contacts)):
+        if self.mode == "book" and (not self.contacts or not all(c.what.opens for c in self.contacts)):
             raise ValueError('mode: "book" needs point contacts; write law = "smooth" or "rough" in every contact')
         if self.strips and self.mode != "book":
             raise ValueError('strips: belong to mode = "book"; a marched law brings its own microslip (contacts.file)')

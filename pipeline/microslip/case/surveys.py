@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..contact.friction import OfCoulomb
 from ..data import Array, ModalBasis, UserError
 from ..results.names import apart
 from ..settings.body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
@@ -283,7 +284,7 @@ def over_ranges(
     from .run import problem_of
 
     asked = _asked(settings, "ranges", path)
-    told = [c.interface for c in settings.contacts if c.file is not None or not isinstance(c.friction, float)]
+    told = [c.interface for c in settings.contacts if not isinstance(c.friction, OfCoulomb)]
     if asked.friction and told:
         raise UserError(f"{path}: ranges.friction: the friction of contact '{told[0]}' is no number, or in its file")
 
@@ -297,7 +298,9 @@ def over_ranges(
             else:
                 changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.members)
         if friction is not None:
-            changed["contacts"] = tuple(c.model_copy(update={"friction": friction}) for c in settings.contacts)
+            changed["contacts"] = tuple(
+                c.model_copy(update={"friction": OfCoulomb(kind="coulomb", mu=friction)}) for c in settings.contacts
+            )
         return build(settings.model_copy(update=changed), bases, path)
 
     forces = () if asked.normal_force else (_one_force(at(None, None), path, "ranges"),)

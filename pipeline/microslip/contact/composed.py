@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 
 from ..data import UserError
-from ..mesh import UNITS
 from .friction import Friction, OfCoulomb
 from .heights import Heights
 from .hertz import Hertz
@@ -15,21 +14,21 @@ from .law import Array, Law, value
 from .layer import Layer
 from .normal import Normal, Rough
 from .series import ContactStiffness
-from .settings import ContactFile
+from .settings import ContactFile, ContactLaw
 
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact file describes.
+    """What the settings of a contact describe.
 
     Attributes:
-        settings: in SI. path: of the file. normal_0: c_N0, N/m. stiffness: of the full area; None without a tangential
-            one. area: nominal, m2, or None. heights, roughness: distribution and R_Z in m, or None. normal: normal law.
-            friction: characteristic, or None. layer, hertz: where the stiffness comes from one. law: the element, or
-            None without friction or tangential stiffness.
+        settings: in SI. path: of their file. normal_0: c_N0, N/m. stiffness: of the full area; None without a
+            tangential one. area: nominal, m2, or None. heights, roughness: distribution and R_Z in m, or None. normal:
+            normal law. friction: characteristic, or None. pressed: by which force, N, where that is given. layer,
+            hertz: where the stiffness comes from one. law: None without friction or tangential stiffness.
     """
 
-    settings: ContactFile
+    settings: ContactLaw
     path: Path
     normal_0: float
     stiffness: ContactStiffness | None
@@ -38,9 +37,16 @@ class Contact:
     roughness: float | None
     normal: Normal
     friction: Friction | None
+    pressed: float = 0.0
     layer: Layer | None = None
     hertz: Hertz | None = None
     law: Law | None = None
+
+    @property
+    def file(self) -> ContactFile:
+        """The settings of a contact that has a file of its own."""
+        assert isinstance(self.settings, ContactFile)
+        return self.settings
 
     @property
     def sliding(self) -> Friction:
@@ -52,7 +58,7 @@ class Contact:
     def mu(self) -> float:
         """Coulomb's coefficient, of an element that needs one."""
         assert isinstance(self.settings.friction, OfCoulomb)
-        return self.settings.friction.mu
+        return self.settings.coefficient
 
     @property
     def springs(self) -> tuple[Array, Array | None]:
@@ -72,7 +78,7 @@ class Contact:
     def deepest(self) -> float:
         """Approach up to which strips of a curved contact are laid, m: a quarter beyond the motion's."""
         assert self.hertz is not None
-        motion = self.settings.motion
+        motion = getattr(self.settings, "motion", None)
         if motion is None:
             return 1e-5
         pressed = motion.normal_force
@@ -83,16 +89,17 @@ class Contact:
         return deepest
 
 
-def compose(settings: ContactFile, path: Path) -> Contact:
-    """The laws of a contact file.
+def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> Contact:
+    """The laws of a contact.
 
     Args:
-        settings: in SI, of `settings.load_contact`. path: of the file, beside which others are sought.
+        settings: in SI. path: of their file, beside which others are sought. pressed: by which force, N, for laws whose
+            numbers are that force's.
 
     Raises:
         UserError: a file that is missing or cannot be read, numbers that make no law; each with its key.
     """
-    given = settings.stiffness
+    given = settings.springs
     try:
         source = given.source(path)
     except UserError as error:
@@ -101,23 +108,23 @@ def compose(settings: ContactFile, path: Path) -> Contact:
     heights = roughness = friction = None
     law = source.law
     if settings.roughness is not None:
-        heights, roughness = settings.roughness.heights(path, UNITS[settings.length_unit])
+        heights, roughness = settings.roughness.heights(path, settings.unit)
         law = Rough(value(source.normal), value(roughness), heights)
     if settings.friction is not None:
         friction = settings.friction.friction(path, settings.temperature, source.area)
     found = Contact(
-        settings, path, source.normal, source.stiffness, source.area, heights, roughness, law, friction, source.layer,
-        source.hertz,
+        settings, path, source.normal, source.stiffness, source.area, heights, roughness, law, friction, pressed,
+        source.layer, source.hertz,
     )  # fmt: skip
-    found = replace(found, normal=settings.element.normal(found) or law)
-    return replace(found, law=_element(found))
+    found = replace(found, normal=settings.what.normal(found) or law)
+    return replace(found, law=_law(found))
 
 
-def _element(c: Contact) -> Law | None:
+def _law(c: Contact) -> Law | None:
     if c.friction is None or c.stiffness is None:
         return None
     try:
-        law: Law = c.settings.element.law(c)
+        law: Law = c.settings.what.law(c)
     except UserError as error:
-        raise UserError(f"{c.path}: element: {error}") from error
+        raise UserError(f"{c.path}: law: {error}") from error
     return law

@@ -6,12 +6,20 @@ of the normal force that it was pressed by, however this one swings.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
+from .friction import OfCoulomb
+from .kinds import LawKind
 from .law import Array, Law, Step, number, ratio, settings, static, value
+from .stiffness import Given
+
+if TYPE_CHECKING:
+    from .composed import Contact
+    from .settings import ContactLaw
 
 
 class JenkinsState(NamedTuple):
@@ -37,6 +45,10 @@ class Jenkins(Law):
     across: Array = number(ge=0)
     held: Array = number(ge=0)
     slider: int = static(default=1)
+
+    def scaled(self, share: Array) -> Jenkins:
+        own = {name: getattr(self, name) * share for name in ("normal", "along", "across", "held")}
+        return replace(self, **own)
 
     def init(self, n: int) -> JenkinsState:
         return JenkinsState(jnp.zeros(n), jnp.zeros((2, n)), jnp.zeros(n))
@@ -74,19 +86,39 @@ class Jenkins(Law):
         return self.held * jnp.abs(step.after.slipped - step.before.slipped)
 
 
-def shared(springs: tuple[float, float, float], held: float, slider: int, count: int) -> Jenkins:
-    """The law of one of `count` elements of a contact.
-
-    Args:
-        springs: of the whole contact along n, t1, t2, N/m. held: by friction, mu F_N of the whole contact, N.
-            slider: see `Jenkins`.
-    """
-    n, along, across, limit = (value(v / count) for v in (springs[0], springs[slider], springs[3 - slider], held))
-    return Jenkins(n, along, across, limit, slider)
-
-
 def four_places(width: float, height: float) -> tuple[np.ndarray, np.ndarray]:
     """(4, 2) places and (4,) areas of elements that are as stiff against rotations as springs spread evenly over
     b0 x h0 (m; Sextro Eqs. (5.2-39) to (5.2-41))."""
     corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
     return corners * np.array([width, height]) / np.sqrt(12), np.full(4, 0.25 * width * height)
+
+
+class OfJenkins(LawKind):
+    """Jenkins elements, linear springs that never open: one of the tangents, `slides_along`, behind a slider that holds
+    mu F_N of the force that presses the contact, however this one swings."""
+
+    kind: Literal["jenkins"]
+    slides_along: Literal["t1", "t2"] = "t1"
+
+    opens: ClassVar[bool] = False
+    of_the_force: ClassVar[bool] = True
+
+    def fits(self, contact: ContactLaw) -> None:
+        if contact.roughness is not None or not isinstance(contact.stiffness, Given | None):
+            raise ValueError('law: "jenkins" has two linear springs; give their stiffnesses alone')
+        if not isinstance(contact.friction, OfCoulomb) or contact.friction.deviation:
+            raise ValueError('law: "jenkins" slides by one coefficient; write a number as friction')
+        if not contact.is_pressed:
+            raise ValueError('law: "jenkins" holds mu F_N of a given force; give a normal_force')
+
+    def law(self, contact: Contact) -> Law:
+        """A contact that nothing presses has no stiffness."""
+        t1, t2 = contact.springs
+        both = (t1, t1 if t2 is None else t2)
+        slider = 1 if self.slides_along == "t1" else 2
+        numbers = (value(contact.normal_0), both[slider - 1], both[2 - slider])
+        n, along, across = (k if contact.pressed else jnp.zeros_like(k) for k in numbers)
+        return Jenkins(n, along, across, value(contact.mu * contact.pressed), slider)
+
+    def places(self, width: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+        return four_places(width, height)

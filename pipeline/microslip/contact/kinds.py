@@ -1,10 +1,10 @@
-"""The sections of a contact's settings that come in kinds: stiffness, roughness, friction and element.
+"""The sections of a contact's settings that come in kinds: stiffness, roughness, friction and law.
 
 A kind is a class of settings with ``kind: Literal["its name"]`` that makes its own arithmetic, beside which it stands:
-`stiffness.Stiffness`, `roughness.Roughness`, `friction.FrictionKind` and `Element` say what. It is named where
+`stiffness.Stiffness`, `roughness.Roughness`, `friction.FrictionKind` and `LawKind` say what. It is named where
 `settings` lists the kinds, or, in a package of one's own, by an entry point:
 
-    [project.entry-points."microslip.element"]
+    [project.entry-points."microslip.law"]
     pad = "pads:Pad"
 """
 
@@ -15,6 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union
 
+import numpy as np
 from pydantic import Field
 
 from ..data import UserError
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from .normal import Normal
     from .settings import ContactLaw
 
-SECTIONS = ("stiffness", "roughness", "friction", "element")
+SECTIONS = ("stiffness", "roughness", "friction", "law")
 
 
 class Kind(Model):
@@ -52,14 +53,17 @@ def sources_of_others() -> dict[str, Path]:
     return {name: Path(found.origin) for name in sorted(modules) if (found := find_spec(name)) and found.origin}
 
 
-class Element(Kind):
-    """What sticks and slips.
+class LawKind(Kind):
+    """What sticks, slips and opens.
 
     Attributes:
-        partly: whether some of it may slip while the rest sticks.
+        partly: whether some of it may slip while the rest sticks. opens: whether it carries no pull. of_the_force:
+            whether its numbers are those of the very force that presses it, `Contact.pressed`.
     """
 
     partly: ClassVar[bool] = False
+    opens: ClassVar[bool] = True
+    of_the_force: ClassVar[bool] = False
 
     def fits(self, contact: ContactLaw) -> None:
         """Refuse settings of the other sections that it cannot use.
@@ -70,6 +74,10 @@ class Element(Kind):
 
     def normal(self, contact: Contact) -> Normal | None:
         """A normal law of its own, in place of the one that stiffness and roughness make."""
+        return None
+
+    def places(self, width: float, height: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """(n, 2) m and areas (n,) m2 of its points on a patch of width x height, where it is particular about them."""
         return None
 
     def law(self, contact: Contact) -> Law:

@@ -195,6 +195,11 @@ class Law:
         """
         return None
 
+    def scaled(self, share: Array) -> Law | None:
+        """The law of points that carry shares of the whole contact, in numbers of its own; None, the default: it is
+        shared out by `portion.Portion`, as any law can be."""
+        return None
+
     def limit(self, force: Array, state: State) -> Array:
         """(n,) largest tangential force in N that goes with a normal force; ``force`` (n, 3) N."""
         raise NotImplementedError

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -30,6 +32,10 @@ class Normal:
         """(n,) elastic energy, J: the integral of the force."""
         raise NotImplementedError
 
+    def scaled(self, share: Array) -> Normal | None:
+        """The law of shares of the area, None where it has no number for that."""
+        return None
+
 
 @settings
 class Penalty(Normal):
@@ -49,6 +55,9 @@ class Penalty(Normal):
 
     def stored(self, u: Array) -> Array:
         return 0.5 * self.stiffness_0 * jnp.maximum(u - self.gap, 0.0) ** 2
+
+    def scaled(self, share: Array) -> Penalty:
+        return replace(self, stiffness_0=self.stiffness_0 * share)
 
 
 @settings
@@ -93,6 +102,9 @@ class Rough(Normal):
 
     def stored(self, u: Array) -> Array:
         return self.stiffness_0 * self.roughness**2 * self.heights.energy(u / self.roughness)
+
+    def scaled(self, share: Array) -> Rough:
+        return replace(self, stiffness_0=self.stiffness_0 * share)
 
 
 @settings

@@ -7,6 +7,7 @@ normal law and two tangential springs (with dampers, if wanted); P sticks to the
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import jax
@@ -15,7 +16,7 @@ import jax.numpy as jnp
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.body import NotNegative, Positive, PositiveLength
 from .friction import Friction
-from .kinds import Element
+from .kinds import LawKind
 from .law import Array, Law, Step, norm, number, ratio, root, settings, static, value
 from .normal import Hyperbolic, Normal, Preload
 
@@ -62,6 +63,12 @@ class PointContact(Law):
     stiffness_2: Array | None = number(ge=0, default=None)
     damping: Array | None = number(ge=0, default=None)
     includes: str = static(default=BULK_AND_SURFACE)
+
+    def scaled(self, share: Array) -> PointContact | None:
+        if (normal := self.normal.scaled(share)) is None:
+            return None
+        second = None if self.stiffness_2 is None else self.stiffness_2 * share
+        return replace(self, normal=normal, stiffness_1=self.stiffness_1 * share, stiffness_2=second)
 
     def init(self, n: int) -> PointState:
         pair, one = jnp.zeros((2, n)), jnp.zeros(n)
@@ -335,17 +342,17 @@ def _halved(excess: Callable[[Array], Array], count: int) -> Array:
     return 0.5 * (low + high)
 
 
-# the element of a contact file ---------------------------------------------------------------------------------------
+# the laws of a contact file ------------------------------------------------------------------------------------------
 
 
-class OwnNormal(Element):
-    """An element with a normal law of its own."""
+class OwnNormal(LawKind):
+    """A law that may have a normal law of its own."""
 
     length: PositiveLength | None = None
 
     def fits(self, contact: ContactLaw) -> None:
         if self.length is not None and contact.roughness is None:
-            raise ValueError("element.length: the hyperbolic law needs a rough surface; add [roughness]")
+            raise ValueError("law.length: the hyperbolic law needs a rough surface; add [roughness]")
 
     def normal(self, contact: Contact) -> Normal | None:
         if self.length is None or contact.heights is None or contact.roughness is None:
@@ -353,19 +360,22 @@ class OwnNormal(Element):
         return Hyperbolic(value(contact.normal_0), value(contact.roughness), contact.heights, value(self.length))
 
 
-class Massless(OwnNormal):
-    """The point contact element without mass (3.7): a return map with exact stick."""
+class OfPoint(OwnNormal):
+    """Point contacts that stick, slide in any direction and open, without mass (3.7): ``rough`` ones (3.3) need
+    [roughness], ``smooth`` ones have none."""
 
-    kind: Literal["massless"] = "massless"
+    kind: Literal["smooth", "rough"]
     damping: NotNegative = 0.0
     preload: Positive | None = None
 
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)
+        if (self.kind == "rough") != (contact.roughness is not None):
+            raise ValueError('roughness (R_Z, or a table) belongs to law = "rough"; give both or neither')
         if self.preload is not None and (contact.roughness is not None or contact.is_pressed):
             raise ValueError(
-                "element.preload: a constant force has neither roughness nor another force beside it; remove "
-                "[roughness] and motion.normal_force"
+                "law.preload: a constant force has neither roughness nor another force beside it; remove [roughness] "
+                "and the other force"
             )
 
     def normal(self, contact: Contact) -> Normal | None:

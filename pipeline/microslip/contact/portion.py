@@ -5,6 +5,12 @@ from __future__ import annotations
 from .law import Array, Law, State, Step, number, settings
 
 
+def portion(whole: Law, share: Array) -> Law:
+    """The law of points that share out a whole contact: with numbers of their own where it can have them."""
+    own = whole.scaled(share)
+    return Portion(whole, share) if own is None else own
+
+
 @settings
 class Portion(Law):
     """A law of a whole contact, of which each point carries a share (Sextro Eq. (5.2-34)).

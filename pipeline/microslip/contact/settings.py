@@ -38,9 +38,10 @@ from .friction import (
     OfStaticSliding,
     OfTable,
 )
+from .jenkins import OfJenkins
 from .keys import Boundary, Lengths, PositiveLengths
-from .kinds import Element, kinds
-from .point import Massless
+from .kinds import LawKind, kinds
+from .point import OfPoint
 from .regularised import WithMass
 from .roughness import ExponentialHeights, GaussianHeights, ProfileHeights, Roughness, Shape, TableHeights
 from .sliders import OfIwan, OfMindlin, OfStrips
@@ -50,14 +51,14 @@ if TYPE_CHECKING:  # what all kinds of a section are
     AnyStiffness = Stiffness
     AnyRoughness = Roughness
     AnyFriction = FrictionKind
-    AnyElement = Element
+    AnyLaw = LawKind
 else:
     AnyStiffness = kinds("stiffness", Given, OfLayer, OfHertz, OfCurve, OfBasis)
     AnyRoughness = kinds("roughness", Shape, ExponentialHeights, GaussianHeights, TableHeights, ProfileHeights)
     AnyFriction = kinds(
         "friction", OfCoulomb, OfStaticSliding, OfFalling, OfExponential, OfHeated, OfTable, OfLubricated
     )  # fmt: skip
-    AnyElement = kinds("element", Massless, WithMass, OfStrips, OfIwan, OfMindlin)
+    AnyLaw = kinds("law", OfPoint, OfJenkins, WithMass, OfStrips, OfIwan, OfMindlin)
 
 
 class Motion(Model):
@@ -137,22 +138,42 @@ class Limits(Model):
     boundary: Boundary = "stress-free"
 
 
-def _coulomb(value: Any) -> Any:
-    """A number as Coulomb's friction."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return {"kind": "coulomb", "mu": float(value)} if number else value
+def _short(kind: str, key: str, tables: Any) -> BeforeValidator:
+    """A number is short for a table of one kind with that number."""
+
+    def written_out(value: Any) -> Any:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return {"kind": kind, key: float(value)}
+        if value is None or isinstance(value, dict | Model):
+            return value
+        raise ValueError("must be a number or a table; correct it")
+
+    return BeforeValidator(written_out, json_schema_input_type=NotNegative | tables)
+
+
+def _named(value: Any) -> Any:
+    """A name is short for a table of that kind."""
+    if value is None or isinstance(value, dict | Model):
+        return value
+    if isinstance(value, str):
+        return {"kind": value}
+    raise ValueError("must be the name of a law, or a table; correct it")
 
 
 class ContactLaw(Model):
-    """What a contact is, wherever it stands.
+    """What a contact is, wherever it stands: the same keys in contact.toml and in a contact of case.toml.
 
-    friction: a table of one of its kinds, or a number, Coulomb's coefficient.
+    stiffness: a table of one of its kinds; or normal_stiffness and tangential_stiffness, N/m of the full area.
+    roughness: a table, or a number, R_Z of polynomial heights. friction: a table, or a number, Coulomb's coefficient.
+    law: a table of one of its kinds, or its name; if not given ``rough`` with roughness, ``smooth`` without.
     """
 
-    stiffness: AnyStiffness
-    roughness: AnyRoughness | None = None
-    friction: Annotated[AnyFriction | None, BeforeValidator(_coulomb)] = None
-    element: AnyElement = Massless()
+    stiffness: AnyStiffness | None = None
+    normal_stiffness: Positive | None = None
+    tangential_stiffness: Positive | None = None
+    roughness: Annotated[AnyRoughness | None, _short("polynomial", "R_Z", AnyRoughness)] = None
+    friction: Annotated[AnyFriction | None, _short("coulomb", "mu", AnyFriction)] = None
+    law: Annotated[AnyLaw | None, BeforeValidator(_named, json_schema_input_type=str | AnyLaw)] = None
     temperature: Temperature | None = None
 
     @property
@@ -160,18 +181,52 @@ class ContactLaw(Model):
         """Whether a normal force is given beside the sections."""
         return False
 
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether something else says what the contact is."""
+        return False
+
+    @property
+    def unit(self) -> float:
+        """m that lengths are given in by files without a unit of their own."""
+        return 1.0
+
+    @property
+    def springs(self) -> Stiffness:
+        """Where the stiffness comes from."""
+        if self.stiffness is not None or self.normal_stiffness is None:
+            assert self.stiffness is not None
+            return self.stiffness
+        return Given(kind="given", normal=self.normal_stiffness, tangential=self.tangential_stiffness)
+
+    @property
+    def what(self) -> LawKind:
+        """The law that is given, or follows from the surface."""
+        return self.law or OfPoint(kind="smooth" if self.roughness is None else "rough")
+
+    @property
+    def coefficient(self) -> float:
+        """Coulomb's, 0 where friction is no single number."""
+        return self.friction.mu if isinstance(self.friction, OfCoulomb) else 0.0
+
     @model_validator(mode="after")
     def _fits(self) -> ContactLaw:
-        kind = self.stiffness.kind
-        if self.stiffness.is_law and self.roughness is not None:
-            raise ValueError(f'roughness: stiffness.kind = "{kind}" is a normal law already; remove [roughness]')
+        short = [key for key in ("normal_stiffness", "tangential_stiffness") if getattr(self, key) is not None]
+        if self.stiffness is not None and short:
+            raise ValueError(f"{short[0]}: is short for a table of stiffness; give one of the two")
+        if self.is_elsewhere:
+            return self
+        if self.stiffness is None and self.normal_stiffness is None:
+            raise ValueError("normal_stiffness: is missing; add it, or a table of stiffness")
+        if self.springs.is_law and self.roughness is not None:
+            raise ValueError(f'roughness: stiffness.kind = "{self.springs.kind}" is a normal law already; remove it')
         if self.friction is not None and self.heated and self.temperature is None:
             raise ValueError(f'friction: kind = "{self.friction.kind}" needs the heat of sliding; add [temperature]')
         if self.heated and not self.has_area:
             raise ValueError("stiffness.area: is missing, and [friction] needs the nominal area; add it")
         if isinstance(self.friction, OfLubricated) and self.roughness is None:
             raise ValueError("friction: a lubricated surface needs its heights; add [roughness]")
-        self.element.fits(self)
+        self.what.fits(self)
         return self
 
     @property
@@ -200,6 +255,10 @@ class ContactFile(ContactLaw):
     def is_pressed(self) -> bool:
         return self.motion is not None and self.motion.normal_force is not None
 
+    @property
+    def unit(self) -> float:
+        return UNITS[self.length_unit]
+
     @model_validator(mode="after")
     def _whole(self) -> ContactFile:
         for key in ("wear", "microslip"):
@@ -211,7 +270,7 @@ class ContactFile(ContactLaw):
         if self.motion is not None and self.friction is None:
             raise ValueError("motion: a contact that moves needs its friction; add [friction]")
         for key in ("motion", "microslip"):
-            if getattr(self, key) is not None and getattr(self.stiffness, "tangential", 1.0) is None:
+            if getattr(self, key) is not None and getattr(self.springs, "tangential", 1.0) is None:
                 raise ValueError(f"stiffness.tangential: is missing, and [{key}] needs it; add it")
         if self.microslip is not None and self.microslip.mu is None and not isinstance(self.friction, OfCoulomb):
             raise ValueError('microslip.mu: is missing, and there is no friction of kind = "coulomb"; add it')
@@ -235,7 +294,7 @@ def load_contact(path: Path | str, assignments: list[str] | None = None) -> Cont
     path = Path(path)
     raw = override(load_toml(path), assignments or [], path)
     settings = validate(ContactFile, raw, path)
-    return _to_metres(settings, UNITS[settings.length_unit])
+    return _to_metres(settings, settings.unit)
 
 
 def _to_metres(model: Any, scale: float) -> Any:

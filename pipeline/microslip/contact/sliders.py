@@ -20,7 +20,7 @@ from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.body import NotNegative, Number
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
-from .kinds import Element
+from .kinds import LawKind
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
@@ -414,19 +414,19 @@ def _positive(**settings: float) -> None:
             raise UserError(f"{name}: {given:g}; it must be greater than 0")
 
 
-# the elements of a contact file --------------------------------------------------------------------------------------
+# the laws of a contact file ------------------------------------------------------------------------------------------
 
 
-class _Parallel(Element):
+class _Parallel(LawKind):
     """Sliders in parallel, under Coulomb's friction."""
 
     partly: ClassVar[bool] = True
 
     def fits(self, contact: ContactLaw) -> None:
         if not isinstance(contact.friction, OfCoulomb):
-            raise ValueError(f'element: kind = "{self.kind}" slides by Coulomb; write [friction] kind = "coulomb"')
+            raise ValueError(f'law: "{self.kind}" slides by Coulomb; write [friction] kind = "coulomb"')
         if contact.friction.deviation:
-            raise ValueError(f'element: "{self.kind}" takes no friction that scatters; remove friction.deviation')
+            raise ValueError(f'law: "{self.kind}" takes no friction that scatters; remove friction.deviation')
 
 
 class OfStrips(_Parallel):
@@ -438,7 +438,7 @@ class OfStrips(_Parallel):
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)
         if contact.roughness is None:
-            raise ValueError("element: strips are those of a rough surface; add [roughness]")
+            raise ValueError("law: strips are those of a rough surface; add [roughness]")
 
     def law(self, contact: Contact) -> Law:
         assert contact.heights is not None and contact.roughness is not None and contact.stiffness is not None
@@ -472,7 +472,7 @@ class OfMindlin(_Parallel):
     def fits(self, contact: ContactLaw) -> None:
         super().fits(contact)
         if not isinstance(contact.stiffness, OfHertz):
-            raise ValueError('element: "mindlin" is the partial slip of curved bodies; write stiffness.kind = "hertz"')
+            raise ValueError('law: "mindlin" is the partial slip of curved bodies; write stiffness.kind = "hertz"')
 
     def law(self, contact: Contact) -> Law:
         given = contact.settings.stiffness

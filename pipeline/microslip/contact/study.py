@@ -18,6 +18,7 @@ from . import microslip
 from . import settings as S
 from .composed import Contact, compose
 from .friction import FASTEST, OfLubricated, lubricated, smoothed
+from .jenkins import Jenkins
 from .law import history
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
@@ -65,16 +66,18 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
         UserError: every mistake, with file and key. NotConverged: an element that could not be integrated.
     """
     path = Path(path)
-    contact = compose(S.load_contact(path, assignments), path)
+    settings = S.load_contact(path, assignments)
+    pressed = settings.motion.normal_force if settings.motion else None
+    contact = compose(settings, path, pressed or 0.0)
     found, working = _Findings(), _working(contact)
     _normal(contact, working, found)
     if contact.friction is not None:
         _characteristic(contact, working, found)
-    if contact.settings.motion is not None and contact.law is not None:
+    if contact.file.motion is not None and contact.law is not None:
         _motion(contact, working, found)
-    if contact.settings.microslip is not None:
-        _first_loading(contact, contact.settings.microslip, found)
-    if contact.settings.wear is not None:
+    if contact.file.microslip is not None:
+        _first_loading(contact, contact.file.microslip, found)
+    if contact.file.wear is not None:
         _wear(contact, found)
     _limits(contact, found)
     return Study(contact, found.tables, found.told, found.sentences, working)
@@ -85,7 +88,7 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
 
 def _working(c: Contact) -> tuple[float, float] | None:
     """Approach and force of the static state."""
-    motion = c.settings.motion
+    motion = c.file.motion
     if motion is None:
         return None
     if motion.normal_force is not None and isinstance(c.law, Strips):  # a little away from the smooth law
@@ -156,7 +159,7 @@ def _area(c: Contact, u: np.ndarray) -> np.ndarray:
 
 def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, float]:
     """Approaches that show the law: a little open, and beyond the full area or the motion."""
-    motion = c.settings.motion
+    motion = c.file.motion
     top = 0.0 if c.roughness is None else 1.4 * c.roughness
     if motion is not None and working is not None:
         top = max(top, 1.1 * (working[0] + sum(map(abs, motion.normal[1:]))))
@@ -201,7 +204,7 @@ def _lubricated(c: Contact, given: OfLubricated, found: _Findings) -> None:
 
 
 def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -> None:
-    motion = c.settings.motion
+    motion = c.file.motion
     assert motion is not None and working is not None and c.friction is not None and c.law is not None
     time = np.arange(motion.cycles * motion.samples + 1) / (motion.samples * motion.frequency)
     path = _path(motion, working[0])
@@ -217,7 +220,8 @@ def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -
         done = history(c.law, jnp.asarray(np.concatenate([u[:, None], loops], axis=1)), time[1])
         force, slip, loop_force = np.asarray(done.force[:, 0]), np.array(done.slip[:, 0]), np.asarray(done.force[:, 1:])
         slips, speed = _slips(c, force, slip, time), np.gradient(slip, time, axis=0)
-    state = np.where(force[:, 0] <= 0, OPEN, np.where(slips, SLIP, STICK))
+    apart = (force[:, 0] <= 0) & c.settings.what.opens
+    state = np.where(apart, OPEN, np.where(slips, SLIP, STICK))
     table = {"time_s": time}
     for i, name in enumerate(("n", "t1", "t2")):
         table[f"u_{name}_m"] = u[:, i]
@@ -271,7 +275,7 @@ def _path(motion: S.Motion, mean: float) -> Callable[[jax.Array], jax.Array]:
 
 def _amplitudes(c: Contact, working: tuple[float, float]) -> tuple[float, ...]:
     """Of the hysteresis loops: those of the file, or about the displacement at which a stuck contact slides."""
-    motion = c.settings.motion
+    motion = c.file.motion
     assert motion is not None and c.friction is not None and c.stiffness is not None
     if motion.amplitudes or motion.drift:
         return motion.amplitudes
@@ -312,7 +316,7 @@ def _work(u: np.ndarray, force: np.ndarray) -> float:
 def _slips(c: Contact, force: np.ndarray, slip: np.ndarray, time: np.ndarray) -> np.ndarray:
     """(s,) whether P slides: of sliders in parallel, whether all of them do."""
     assert c.friction is not None
-    if isinstance(c.law, PointContact):
+    if isinstance(c.law, PointContact | Jenkins):
         moved = np.linalg.norm(np.diff(slip, axis=0, prepend=slip[:1]), axis=1)
         return moved > 1e-9 * max(float(np.ptp(slip, axis=0).max()), 1e-300)
     held = np.asarray(c.friction.coefficient(jnp.zeros(len(force)), jnp.asarray(force[:, 0]))) * force[:, 0]
@@ -330,7 +334,7 @@ def _of_a_cycle(
     what = "energy dissipated in the last cycle" if not motion.drift else "work of friction in the last period"
     found.told.append((what, _engineering(_work(u[last], force[last]), "J")))
     shares = [100 * float(np.mean(state[last][1:] == s)) for s in (STICK, SLIP, OPEN)]
-    words = "stick or partly slip / slip / open" if c.settings.element.partly else "stick / slip / open"
+    words = "stick or partly slip / slip / open" if c.settings.what.partly else "stick / slip / open"
     found.told.append((f"{words}, of the last cycle", " / ".join(f"{s:.3g} %" for s in shares)))
     if shares[2] == 100:
         found.sentences.append("The contact never closes in the last cycle: raise the mean of motion.normal.")
@@ -378,7 +382,7 @@ SHOWN = 6
 
 
 def _wear(c: Contact, found: _Findings) -> None:
-    given = c.settings.wear
+    given = c.file.wear
     assert given is not None and c.heights is not None and c.roughness is not None and c.area is not None
     mu = given.mu if given.mu is not None else _sliding_friction(c, given)
     law = Rough(c.normal_0, c.roughness, c.heights)  # type: ignore[arg-type]
@@ -423,7 +427,7 @@ def _wear_coefficient(given: S.Wear, mu: float) -> float:
 
 
 def _limits(c: Contact, found: _Findings) -> None:
-    motion, limits = c.settings.motion, c.settings.limits
+    motion, limits = c.file.motion, c.file.limits
     if motion is not None:
         if c.layer is not None and c.layer.density is not None:
             found.sentences.append(c.layer.quasi_static(motion.frequency, limits.tolerance).sentence())
@@ -446,14 +450,14 @@ def _element_margin(law: MassContact, frequency: float, tolerance: float) -> str
 
 def _yields(c: Contact, yield_shear: float, found: _Findings) -> None:
     """Tresca at the mean pressure and shear of the area in contact, at every sample of the last cycle."""
-    table, motion = found.tables["motion"], c.settings.motion
+    table, motion = found.tables["motion"], c.file.motion
     assert motion is not None and c.area is not None
     last = slice(len(table["time_s"]) - motion.samples - 1, None)
     share = _area(c, table["u_n_m"][last])
     area = c.area * np.maximum(share, 1e-12)
     force = [np.where(share > 0, table[f"F_{name}_N"][last], 0.0) / area for name in ("n", "t1", "t2")]
     pressure, shear = np.maximum(force[0], 0.0), np.stack(force[1:], axis=1)
-    layer = c.layer or Layer(Solid(2.1e11, 0.3), 1.0, c.settings.limits.boundary)
+    layer = c.layer or Layer(Solid(2.1e11, 0.3), 1.0, c.file.limits.boundary)
     time = table["time_s"][last]
     names = [f"t = {t:.4g} s of the cycle" for t in time - time[0]]
     check = layer.check_yield(pressure, shear, yield_shear, names=names)

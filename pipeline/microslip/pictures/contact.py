@@ -24,7 +24,7 @@ def draw(study: Study, folder: Path) -> list[Path]:
 
 
 def _title(study: Study, what: str) -> str:
-    return f"{study.contact.settings.name}: {what}"
+    return f"{study.contact.file.name}: {what}"
 
 
 Steps = tuple[tuple[float, float, str], ...]
@@ -153,7 +153,7 @@ _NAMES, _TINTS = ("n", "t1", "t2"), (COLOURS[2], COLOURS[0], COLOURS[1])
 
 def motion_figure(study: Study) -> Any:
     """As the book's Fig. 3.7-7: orbits of M and P, displacements, forces, and the force over each displacement."""
-    t, motion = study.tables["motion"], study.contact.settings.motion
+    t, motion = study.tables["motion"], study.contact.file.motion
     assert motion is not None
     last = slice(None) if motion.drift else slice(len(t["time_s"]) - motion.samples - 1, None)
     t = {name: column[last] for name, column in t.items()}
@@ -174,7 +174,7 @@ def motion_figure(study: Study) -> Any:
         if np.ptp(forces[i]) > 0 or i == 0:
             panels[1].plot(time, forces[i], color=_TINTS[i], linewidth=1.5, label=f"$F_{{{_NAMES[i]}}}$")
     panels[1].set(xlabel=f"time in {second}", ylabel=f"force in {newton}")
-    partly = study.contact.settings.element.partly
+    partly = study.contact.settings.what.partly
     _shade(panels[1], time, t["state"], "stick, partly slip" if partly else "stick")
     for axes in panels[:2]:
         _legend_above(axes)
@@ -308,7 +308,7 @@ def microslip_figure(study: Study) -> Any:
 
 def microslip_panel(study: Study, axes: Axes) -> None:
     """One curve an approach or a normal force."""
-    t, given = study.tables["microslip"], study.contact.settings.microslip
+    t, given = study.tables["microslip"], study.contact.file.microslip
     pressed = given is not None and bool(given.normal_forces)
     _plain(axes)
     (w,), unit = _metres(t["displacement_m"])

@@ -205,7 +205,8 @@ def _kind_mistake(where: str, value: Any, error: Any) -> str:
     known = ", ".join(_shown(tag.strip(" '")) for tag in error.get("ctx", {}).get("expected_tags", "").split(","))
     if error["type"] == "union_tag_not_found":
         return f"{where}.kind: is missing; add it"
-    return f"{where}.kind: {_shown(value['kind'])} is unknown; choose one of {known}"
+    said = f"{where}.kind: {_shown(value['kind'])}" if isinstance(value, dict) else f"{where}: {_shown(value)}"
+    return f"{said} is unknown; choose one of {known}"
 
 
 def _table_mistake(key: tuple[Any, ...], place: tuple[Any, ...], value: Any, kinds: set[str]) -> str:

@@ -27,7 +27,7 @@ def contact_stage(
     path = path / "contact.toml" if path.is_dir() else path
     report("laws and motions")
     found = study(path, assignments)
-    folder = output or Path("build") / found.contact.settings.name
+    folder = output or Path("build") / found.contact.file.name
     summary = folder / "summary.csv"
     rows = [*found.told, *(("judgement", s) for s in found.sentences)]
     report("pictures and tables")
