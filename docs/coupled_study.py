@@ -10,7 +10,7 @@ import numpy as np
 from damper_study import Bases, opened
 from ring_study import Highest, frf, highest
 
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.sweeps import brackets

@@ -9,7 +9,7 @@ import numpy as np
 
 from microslip.case import checkpoint, load_case, run_case
 from microslip.case.assemble import build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.checkpoint import labels, record
 from microslip.harmonic_balance.response import operating

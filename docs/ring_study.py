@@ -12,7 +12,7 @@ import scipy.optimize
 
 from microslip.case import CaseSettings, load_case
 from microslip.case.assemble import build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.data import Array, ModalBasis
 from microslip.frames import rotation
 from microslip.harmonic_balance import response

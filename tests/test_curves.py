@@ -12,7 +12,7 @@ import pytest
 from microslip.basis import write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.families import over_frequency, over_load

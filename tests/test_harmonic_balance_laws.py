@@ -15,7 +15,8 @@ import pytest
 from microslip import continuation
 from microslip.case import CaseResult, CaseSettings, load_case, run_case
 from microslip.case.assemble import build
-from microslip.case.run import _not_periodic, problem_of
+from microslip.case.problem import problem_of
+from microslip.case.run import _not_periodic
 from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import Law

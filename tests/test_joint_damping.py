@@ -12,7 +12,7 @@ from test_case_driving import built as ring_of
 
 from microslip.case import load_case
 from microslip.case.assemble import Built, build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.data import Array, UserError
 from microslip.harmonic_balance import response

@@ -13,7 +13,7 @@ from test_speed_range import ranged
 from microslip.basis import write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.harmonic_balance import identification, response
 from microslip.stages.surveying import survey_stage

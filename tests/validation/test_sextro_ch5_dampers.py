@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve

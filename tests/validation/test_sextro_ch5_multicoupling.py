@@ -14,7 +14,7 @@ import pytest
 from microslip.basis import read_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
-from microslip.case.run import problem_of
+from microslip.case.problem import problem_of
 from microslip.data import ModalBasis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage

@@ -6,17 +6,26 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..contact.settings import ContactLaw
+from ..contact.composed import Contact as Composed
+from ..contact.composed import compose
+from ..contact.law import Law
+from ..contact.settings import ContactLaw, load_contact
+from ..contact.stiffness import Given
 from ..data import CENTRIFUGAL, Array, Interface, ModalBasis, ModalGroup, UserError
 from ..files.store import ordinary
 from ..frames import rotation
+from ..harmonic_balance.accuracy import more
+from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
 from ..modes.speed_range import basis_at
 from ..reduced.compliance import SURFACE, statics_beside
 from ..reduced.coordinates import first_modes, in_modes, of_density
+from ..system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, preloaded_contact
+from ..system.nodal import Nodal, nodal, static_compliance
+from ..system.pairing import Pairing, Place, facing, in_ring
 from .counting import Face, Springs, brought, counted_once
 from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
 from .patches import (
@@ -31,14 +40,6 @@ from .patches import (
     waves,
 )
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
-
-if TYPE_CHECKING:
-    from ..contact.composed import Contact as Composed
-    from ..contact.law import Law
-    from ..contact.stiffness import Given
-    from ..system.assembly import Assembly, Contact, Load, Member, Output, Side
-    from ..system.nodal import Nodal
-    from ..system.pairing import Pairing, Place
 
 T = TypeVar("T")
 
@@ -216,7 +217,6 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
             twice.
     """
-    from ..system.assembly import Assembly, Ring
 
     settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
@@ -247,7 +247,6 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
 
 
 def _member(settings: CaseSettings, b: Loaded) -> Member:
-    from ..system.assembly import Member
 
     name, groups = b.settings.name, dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
     member = Member(name, groups, b.basis.sectors, _brings(settings, name, b))
@@ -307,7 +306,6 @@ def _contact(
     springs: Springs, path: Path | str,
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and remarks. springs: of one that is not curved."""
-    from ..system.assembly import Side, preloaded_contact
 
     ends = _ends(settings, c)
     loaded, faces = _sides(settings, bodies, c, path)
@@ -341,8 +339,6 @@ def _contact(
 def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
     """Bytes that a response with a patch of so many points and coordinates takes, the finer balance that tells its
     error included; none in the book's mode, which has tables."""
-    from ..harmonic_balance.accuracy import more
-    from ..harmonic_balance.cost import aft_bytes
 
     contacts = settings.ring.blades if settings.ring and settings.ring.model == "full" else 1
     finer = more(settings.balanced), 2 * settings.samples
@@ -351,7 +347,6 @@ def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
 
 def _refuse_too_many(settings: CaseSettings, c: ContactSettings, load: float | None, found: Nodal | None) -> None:
     """Raise `UserError` for points, harmonics and samples that would not fit into the memory."""
-    from ..harmonic_balance.cost import GIB, of_this_machine
 
     points, coordinates = (number_of_points(c, load), 6) if found is None else (len(found.points), found.count)
     needed, given = memory_of(settings, points, coordinates) / GIB, settings.memory_limit
@@ -373,7 +368,6 @@ def _nodal(
     met: Pairing | None,
 ) -> tuple[Nodal, Side, Side | None, Array]:  # fmt: skip
     """A patch that deforms, its sides, and the compliance of the bodies along its coordinates."""
-    from ..system.nodal import nodal, static_compliance
 
     faces = [(members[s.member], s.interface) for s in sides if s]
     for member, name in faces:
@@ -413,7 +407,6 @@ def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> 
 
 def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Pairing:
     """How the two faces of a contact meet."""
-    from ..system.pairing import facing, in_ring
 
     names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
     seen = two.seen_from(one)
@@ -426,7 +419,6 @@ def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces
 
 def _place(b: Loaded) -> Place:
     """Where a body stands in the axes of the case."""
-    from ..system.pairing import Place
 
     R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))
     centre = b.basis.rotation_point
@@ -459,7 +451,6 @@ def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
 
 def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
     """Who says what a contact is, and its file: its contact.toml, or the case."""
-    from ..contact.settings import load_contact
 
     file = Path(path).parent / str(c.file)
     if c.file is None:
@@ -471,7 +462,6 @@ def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
 
 def _composed(c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None) -> Composed:
     """The laws of a whole contact under a load, N. given: stiffnesses instead of its own."""
-    from ..contact.composed import compose
 
     said, file = _source(c, path)
     if given is not None:
@@ -494,7 +484,6 @@ def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | N
     Raises:
         UserError: they are not its own, and its own are more than numbers.
     """
-    from ..contact.stiffness import Given
 
     found = None if c.is_curved else _composed(c, path, load)
     if found is None or _given(found) != springs:
@@ -564,7 +553,6 @@ def _loads(
 
 
 def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Output, ...]:
-    from ..system.assembly import Output
 
     found = []
     for m in settings.outputs:

@@ -6,19 +6,22 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..contact.kinds import files_of as of_contact
+from ..contact.kinds import sources_of_others
 from ..data import UserError
 from ..files.store import fingerprint
+from ..harmonic_balance.checkpoint import restored
+from ..harmonic_balance.response import traced
+from ..operating.patches import ContactMap, contact_map
 from ..results import Body
 from ..results.names import exact
 from .assemble import Built, Loaded
+from .problem import problem_of
 from .settings import CaseSettings
-
-if TYPE_CHECKING:
-    from ..operating.patches import ContactMap
 
 MOST_MAPS = 4
 """Patches that are drawn."""
@@ -36,7 +39,6 @@ def of_points(built: Built) -> str:
     That is the balance itself, down to the last bit of its matrices, rows, loads and laws; what else the bodies hold is
     told by their files. For a contact that is fitted at the force of each sweep stands what fits it.
     """
-    from .run import problem_of
 
     a, own = built.assembly, built.fitted
     as_they_are = [i for i in range(len(a.contacts)) if i not in own]
@@ -50,8 +52,6 @@ def of_points(built: Built) -> str:
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
-    from ..contact.kinds import files_of as of_contact
-    from ..contact.kinds import sources_of_others
 
     found = {name: path.parent / name for name in settings.files}
     found |= sources_of_others()
@@ -154,10 +154,6 @@ def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[Contact
     Raises:
         UserError: a map whose energy is not the one kept.
     """
-    from ..harmonic_balance.checkpoint import restored
-    from ..harmonic_balance.response import traced
-    from ..operating.patches import contact_map
-    from .run import problem_of
 
     problem = problem_of(built, normal)
     _, found = restored(problem, dict(row))

@@ -7,23 +7,26 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..continuation import Settings
 from ..data import Array, UserError
+from ..harmonic_balance import families
+from ..harmonic_balance.checkpoint import kept_curve, labels, points_of_curve
+from ..harmonic_balance.envelope import largest
+from ..harmonic_balance.families import Family
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.readout import measured
+from ..results import Journal
 from ..results.names import exact
 from ..units import METRES, Quantity
 from .assemble import Built, build, swept
-from .run import normal_forces, problem_of
-from .surveys import CurveOfCase
-
-if TYPE_CHECKING:
-    from ..harmonic_balance.families import Family
-    from ..harmonic_balance.problem import Problem
-    from ..results import Journal
-    from .settings import CaseSettings
-    from .surveys import Bases, Report
+from .problem import normal_forces, problem_of
+from .questions import CurveOfCase
+from .settings import CaseSettings
+from .surveys import Bases, Report
 
 Keep = Callable[[Built], AbstractContextManager["Journal"]]
 
@@ -145,8 +148,6 @@ def curves(
     Raises:
         UserError: ends that are missing, no resonance to begin at.
     """
-    from ..harmonic_balance.checkpoint import kept_curve, labels, points_of_curve
-    from ..harmonic_balance.readout import measured
 
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
     of = measured(built.assembly)
@@ -173,7 +174,6 @@ def curves(
 
 
 def _settings(asked: CurveOfCase) -> Any:
-    from ..continuation import Settings
 
     return Settings(points=asked.points, branch_points=False)
 
@@ -211,7 +211,6 @@ def _resonance(
     built: Built, problem: Problem, normal: float | None, journal: Journal, path: Path | str, report: Report
 ) -> float:  # fmt: skip
     """Hz of the highest resonance in the sweep's band, kept before or searched for now."""
-    from ..harmonic_balance.envelope import largest
 
     known = dict(journal.head.get("at", {}))
     s = built.settings.sweep
@@ -227,7 +226,6 @@ def _resonance(
 
 
 def _family(built: Built, problem: Problem, one: Followed) -> Family:
-    from ..harmonic_balance import families
 
     a, b = one.ends
     if one.over == "frequency":

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ..data import ModalGroup, UserError
 from ..settings.body import Model, NotNegative, Number, Numbers, Positive
+from ..system.assembly import Load, Member, Ring
+from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
+from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
+from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure
 from .keys import Address, Order
-
-if TYPE_CHECKING:
-    from ..system.assembly import Load, Member
-    from ..system.excitation import Turning
 
 ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
 
@@ -123,7 +123,6 @@ class ExcitationOfCase(Model):
 
 def pattern_of(m: MagnetsOfCase):  # type: ignore[no-untyped-def]  # noqa: ANN201 - its room needs jax
     """The pattern of magnets around the rotor."""
-    from ..system.excitation import magnets
 
     return magnets(np.radians(m.angles), np.array(m.force), float(np.radians(m.width)), m.highest, m.pulse)
 
@@ -137,7 +136,6 @@ def base_of(excitations: Sequence[ExcitationOfCase], given: int | None, turning:
     Raises:
         UserError: orders that run both ways.
     """
-    from ..system.excitation import base_order
 
     named = [e for x in excitations for e in x.orders]
     if given is not None or not named:
@@ -157,9 +155,6 @@ def loads_of(
     Raises:
         UserError: an engine order that is no multiple of the base, or runs the other way round.
     """
-    from ..system.assembly import Load, Ring
-    from ..system.excitation import harmonic_of, pattern_loads
-    from ..system.pressure import field_loads
 
     wave = Ring(blades, base) if blades else abs(base)
     if x.magnets is not None:
@@ -178,7 +173,6 @@ def with_field(
     Raises:
         UserError: a file, a face or a unit that does not fit.
     """
-    from ..system.pressure import load_face, on_face, read_field, with_pressure
 
     file = Path(path).parent / str(x.field)
     try:
@@ -195,7 +189,6 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
     Raises:
         UserError: no ratio.
     """
-    from ..system.damping import with_ratios
 
     try:
         return {k: with_ratios(g, ratios) for k, g in groups.items()}
@@ -209,7 +202,6 @@ def as_asked(member: Member, kind: str, viscous: bool) -> Member:
     Args:
         viscous: its damping is that of dampers or Rayleigh's, which make no loss factor.
     """
-    from ..system.damping import structural
 
     if kind == "stuck":
         return replace(member, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in member.groups.items()})
@@ -222,7 +214,6 @@ def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, 
     Raises:
         UserError: a file that does not fit the ring.
     """
-    from ..system.damping import read_aerodynamics
 
     try:
         return read_aerodynamics(file, blades, turning)
@@ -234,7 +225,5 @@ def remarks_of(
     members: Iterable[Member], loads: Sequence[Load], harmonics: int, blades: int, turning: Turning
 ) -> list[str]:
     """Modes that the flow feeds, and loads beyond the harmonics that are balanced."""
-    from ..system.damping import unstable
-    from ..system.excitation import unheard
 
     return [s for m in members if m.aerodynamic for s in unstable(m, blades, turning)] + unheard(loads, harmonics)

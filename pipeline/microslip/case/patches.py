@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..contact.curved import WIDEST, Foundation, Line, apart, foundation_of_line, foundation_of_point, gap, point_curve
+from ..contact.friction import Coulomb
+from ..contact.hertz import Hertz
+from ..contact.kinds import LawKind
+from ..contact.law import Law
+from ..contact.patch import Patch, equilibrium, grid, pressure
+from ..contact.point_laws import curve_point
+from ..contact.portion import portion
+from ..contact.solids import Solid
 from ..data import Array, Interface, UserError
+from ..system.nodal import Nodal
+from ..system.pairing import rigid_points
 from .counting import Springs
 from .settings import CaseSettings, ContactSettings
-
-if TYPE_CHECKING:
-    from ..contact.curved import Foundation, Line
-    from ..contact.hertz import Hertz
-    from ..contact.kinds import LawKind
-    from ..contact.law import Law
-    from ..contact.patch import Patch
-    from ..system.nodal import Nodal
 
 
 def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, load: float | None) -> Patch:
@@ -27,7 +29,6 @@ def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, loa
         whole: law of the full area. what: its settings. face: of the first side. load: N that the contact is about
             pressed by.
     """
-    from ..contact.patch import Patch
 
     own = None if c.points else what.places(c.width or 0.0, c.height or 0.0)
     points, areas = own or _points(c, face, _counts(c, load))
@@ -36,7 +37,6 @@ def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, loa
 
 def nodal_patch(c: ContactSettings, whole: Law, found: Nodal) -> Patch:
     """The points of a patch that deforms. whole: law of the full area."""
-    from ..contact.patch import Patch
 
     law_of_points = _curved(c, _shared(whole, found.areas), found.points)
     return Patch(c.interface, found.points, found.areas, law_of_points, found.shapes)
@@ -45,8 +45,6 @@ def nodal_patch(c: ContactSettings, whole: Law, found: Nodal) -> Patch:
 def _shared(whole: Law, areas: Array) -> Law:
     """The law of points that share out a contact by their areas."""
     import jax.numpy as jnp
-
-    from ..contact.portion import portion
 
     even = not areas.any() or bool(np.ptp(areas) <= 1e-12 * areas.max())
     return portion(whole, jnp.asarray(1 / len(areas) if even else areas / areas.sum()))
@@ -62,7 +60,6 @@ def resolved(c: ContactSettings, patch: Patch, load: float | None) -> list[str]:
     Raises:
         UserError: so few that the contact falls between them.
     """
-    from ..contact.patch import equilibrium, pressure
 
     if c.curvature is None or not load or len(patch.points) == 1 or c.fit == "exact":
         return []
@@ -99,8 +96,6 @@ def number_of_points(c: ContactSettings, load: float | None) -> int:
 
 def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tuple[Array, Array]:
     """Places and areas: a rectangle as the settings have it, or what the outline leaves of it."""
-    from ..contact.patch import grid
-    from ..system.pairing import rigid_points
 
     width, height = c.width or 0.0, c.height or 0.0
     counts = (asked[0] if width else 1, asked[1] if height else 1)
@@ -152,7 +147,6 @@ def _tangential(c: ContactSettings, around: float, along: float) -> tuple[float,
 
 def _foundation(c: ContactSettings, load: float) -> tuple[Foundation, float, float]:
     """The foundation, and tangential over normal stiffness around and along the line."""
-    from ..contact.curved import foundation_of_line, foundation_of_point
 
     fit = "approach" if c.fit == "exact" else c.fit
     if (line := _line(c)) is not None:
@@ -165,11 +159,6 @@ def _foundation(c: ContactSettings, load: float) -> tuple[Foundation, float, flo
 def pieces(c: ContactSettings, load: float | None) -> Patch:
     """Pieces of a line of contact, or one round contact, each a point with Hertz' own law."""
     import jax.numpy as jnp
-
-    from ..contact.curved import WIDEST, point_curve
-    from ..contact.friction import Coulomb
-    from ..contact.patch import Patch, grid
-    from ..contact.point_laws import curve_point
 
     friction, most = Coulomb(jnp.asarray(c.coefficient, dtype=float)), 4 * _fitted(c, load)
     width, height = c.width or 0.0, c.height or 0.0
@@ -195,7 +184,6 @@ def pieces(c: ContactSettings, load: float | None) -> Patch:
 
 
 def _curved(c: ContactSettings, law: Law, points: Array) -> Law:
-    from ..contact.curved import apart, gap
 
     return law if c.curvature is None else apart(law, gap(points, c.curvature))
 
@@ -222,8 +210,6 @@ def _strip(c: ContactSettings) -> float:
 
 def _line(c: ContactSettings) -> Line | None:
     """The line of contact, or None where both directions are curved."""
-    from ..contact.curved import Line
-    from ..contact.solids import Solid
 
     assert c.curvature is not None and c.young is not None
     if np.isfinite(max(c.curvature)):
@@ -234,8 +220,6 @@ def _line(c: ContactSettings) -> Line | None:
 
 
 def _ellipse(c: ContactSettings) -> Hertz:
-    from ..contact.hertz import Hertz
-    from ..contact.solids import Solid
 
     assert c.curvature is not None and c.young is not None
     solid = Solid(c.young, c.poisson)

@@ -6,31 +6,33 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
+from ..data import Array, ComplexArray, ModalBasis, UserError
 from ..harmonic_balance import FrequencyResponse
+from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
+from ..harmonic_balance.book import normal_law
+from ..harmonic_balance.checkpoint import kept_response, labels
+from ..harmonic_balance.cost import GIB
+from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
+from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
+from ..harmonic_balance.refinement import filled_response
+from ..harmonic_balance.response import HarmonicResponse, refined_peaks
+from ..harmonic_balance.solver import Point
 from ..harmonic_balance.sweeps import overhanging
 from ..results import Journal
 from ..results.checks import cause
+from ..system.assembly import Assembly, Linear
 from ..units import Quantity, counted, percent
 from . import edges
 from .assemble import Built, build, memory_of, swept
 from .checkpoint import series_name
 from .edges import Rising
-from .settings import FIRST_HARMONICS, CaseSettings, ContactSettings
-
-if TYPE_CHECKING:
-    from ..harmonic_balance.accuracy import Error
-    from ..harmonic_balance.book import BookPatch
-    from ..harmonic_balance.problem import Forces, Problem
-    from ..harmonic_balance.response import HarmonicResponse
-    from ..harmonic_balance.solver import Point
-    from ..system.assembly import Assembly, Linear
+from .problem import book_models, normal_forces, pressed_by, problem_of
+from .settings import FIRST_HARMONICS, CaseSettings
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
 Answer = tuple[dict[float, "HarmonicResponse"], dict[float, list[tuple[float, float]]], tuple[Array, Array], list[str]]
@@ -200,7 +202,6 @@ def _answered(
 
 def _say_what_it_takes(built: Built, report: Callable[[str], None]) -> None:
     """The memory of the contacts' points, where it is more than a GiB."""
-    from ..harmonic_balance.cost import GIB
 
     s, patches = built.settings, [c.patch for c in built.assembly.contacts]
     needed = max((memory_of(s, len(p.points), p.count) for p in patches), default=0.0) / GIB
@@ -211,7 +212,6 @@ def _say_what_it_takes(built: Built, report: Callable[[str], None]) -> None:
 
 def _stuck(assembly: Assembly) -> tuple[Array, Array]:
     """(m,) eigenfrequencies in Hz with sticking contacts, and their damping ratios."""
-    from ..harmonic_balance.reduced import stuck, stuck_damping
 
     part = assembly.joined(1)
     return stuck(part, assembly.stiffness), stuck_damping(part, assembly.stiffness)
@@ -222,40 +222,14 @@ def _swept(
     normal: float,
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
     """One sweep and its peaks, from what a journal holds of it and what is computed now."""
-    from ..harmonic_balance import checkpoint, refinement, response
 
     if journal is None:
-        found = refinement.filled_response(problem, frequency, limits, report)
-        return found, response.refined_peaks(problem, found)
+        found = filled_response(problem, frequency, limits, report)
+        return found, refined_peaks(problem, found)
     name = series_name(normal)
     parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
-    journal.say({**journal.head, "parameters": parameters, "labels": checkpoint.labels(problem)})
-    return checkpoint.kept_response(problem, frequency, limits, journal, name, report)
-
-
-def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
-    """The balance of a case whose swept contacts a normal force (N) presses. finer: other settings of `problem.of`."""
-    from ..harmonic_balance import problem as balance
-
-    s, assembly = built.settings, built.pressed(normal)
-    asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching, "models": models_of(s, assembly)}
-    return balance.of(assembly, **{**asked, **finer})
-
-
-def models_of(settings: CaseSettings, assembly: Assembly) -> dict[int, Forces] | None:
-    """What stands for the laws of the contacts: the book's contact in its mode, else nothing."""
-    return dict(_book_models(assembly, settings.strips)) if settings.mode == "book" else None
-
-
-def _book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
-    """The book's contact for every contact; equal patches share one."""
-    from ..harmonic_balance.book import book_patch
-
-    made: dict[int, BookPatch] = {}
-    for c in assembly.contacts:
-        if id(c.patch) not in made:
-            made[id(c.patch)] = book_patch(c.patch, strips)
-    return {i: made[id(c.patch)] for i, c in enumerate(assembly.contacts)}
+    journal.say({**journal.head, "parameters": parameters, "labels": labels(problem)})
+    return kept_response(problem, frequency, limits, journal, name, report)
 
 
 def _can_be_pressed(built: Built, forces: Sequence[float | None], path: Path | str) -> None:
@@ -279,7 +253,6 @@ def _book_can(built: Built, path: Path | str) -> None:
     """
     if built.settings.mode != "book":
         return
-    from ..harmonic_balance.book import normal_law
 
     for c in built.assembly.contacts:
         try:
@@ -293,7 +266,7 @@ def _by_the_book(built: Built) -> list[str]:
     """That it is the book's mode, and how far its tables are off."""
     if built.settings.mode != "book":
         return []
-    models = _book_models(built.assembly, built.settings.strips)
+    models = book_models(built.assembly, built.settings.strips)
     errors: dict[str, str] = {}  # of every table, by the hash of its law
     for i, c in enumerate(built.assembly.contacts):
         for table in models[i].tables:
@@ -304,19 +277,6 @@ def _by_the_book(built: Built) -> list[str]:
         f"orbits; its tables are off by at most {' and '.join(errors.values())}. microslip respond CASE --compare-book "
         "shows what the mode leaves out."
     ]
-
-
-def pressed_by(built: Built, problem: Problem) -> float:
-    """Normal force (N) in the first contact of the resting assembly, which names a response that no sweep presses."""
-    from ..harmonic_balance.solver import newton
-
-    given = [c.normal_force for c in built.contacts if c.normal_force is not None]
-    if given or not built.contacts:
-        return float(given[0]) if given else 0.0
-    still = problem.loaded(0.0)
-    point = newton(still.at(2 * np.pi * built.settings.sweep.start), np.zeros(still.size))
-    group = still.groups[0]
-    return float(group.force(group.relative(still.displacement(point.x)), 1.0)[0, 0, 0])
 
 
 def free_response(built: Built, frequency: Array) -> FrequencyResponse:
@@ -384,7 +344,6 @@ class _Left:
         Raises:
             _TooFew: more of them are enough, where their number is looked for.
         """
-        from ..harmonic_balance.accuracy import judged
 
         settings = self.built.settings
         whole = settings.ring is not None and settings.ring.model == "full"
@@ -415,7 +374,6 @@ class _Left:
         self, problem: Problem, found: HarmonicResponse, point: Point, estimate: Error, share: float, normal: float
     ) -> None:
         """Raise `_TooFew` where more harmonics are enough for a point."""
-        from ..harmonic_balance.accuracy import FLOOR, enough
 
         floor = FLOOR * float(np.abs(found.monitor[found.converged]).max(initial=0.0))
         e = enough(problem, point, self.tolerance or TRUNCATION, floor=floor, first=estimate)
@@ -466,50 +424,8 @@ def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> lis
     ]
 
 
-def normal_forces(built: Built, path: Path | str, asked: Any = None) -> tuple[float, ...]:
-    """The forces asked for, or the one that the static state at speed has in every contact that the sweep presses.
-
-    Args:
-        asked: ``static``, or the sweep's own if None.
-
-    Raises:
-        UserError: a static force that no closure tells, or that differs from contact to contact.
-    """
-    settings = built.settings
-    asked = settings.sweep.normal_forces if asked is None else asked
-    contacts = [c for c in settings.contacts if swept(c)]
-    if not isinstance(asked, str):
-        return asked or ()
-    found = [_static_force(*_first_face(built, c)) for c in contacts]
-    missing = [c.interface for c, force in zip(contacts, found, strict=True) if force is None]
-    if missing:
-        raise UserError(
-            f'{path}: sweep.normal_forces: "static", but the modal file has no closure on interface '
-            f"'{missing[0]}' or its partner; add [[closures]] to the body or give numbers"
-        )
-    forces = [force for force in found if force is not None]
-    if not forces or max(forces) - min(forces) > 0.01 * max(forces):
-        raise UserError(
-            f'{path}: sweep.normal_forces: "static" needs contacts that are pressed alike; they have '
-            f"{', '.join(f'{force:.4g}' for force in forces) or 'none'} N; give numbers"
-        )
-    return (forces[0],)
-
-
-def _first_face(built: Built, c: ContactSettings) -> tuple[str, ModalGroup]:
-    body, interface = built.settings.address(c.interface)
-    return interface, built.bodies[body].group
-
-
-def _static_force(interface: str, group: ModalGroup) -> float | None:
-    """Normal force of the closure on an interface, or on the one it faces, N."""
-    partner = group.interfaces[interface].partner
-    return next((c.normal_force for c in group.contacts.values() if c.interface in {interface, partner} - {""}), None)
-
-
 def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
     """How much more damping of the stuck modes takes where contacts slide or open. normal: N, see `Built.pressed`."""
-    from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 
     asked = built.settings.stuck_ratios
     if asked is None or not built.settings.contacts:

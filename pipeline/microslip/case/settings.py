@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -28,13 +28,11 @@ from ..settings.body import (
     override,
     validate,
 )
+from ..system.excitation import Turning
 from .driving import ROTATION, ExcitationOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
-from .surveys import CurveOfCase, IdentificationOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
-
-if TYPE_CHECKING:
-    from ..system.excitation import Turning
+from .questions import CurveOfCase, IdentificationOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
 
 FIRST_HARMONICS = 3
 """With which ``harmonics = "auto"`` begins."""

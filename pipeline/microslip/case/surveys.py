@@ -5,144 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
 
 from ..contact.friction import OfCoulomb
 from ..data import Array, ModalBasis, UserError
+from ..harmonic_balance import envelope, speed_line
+from ..harmonic_balance.envelope import Envelope, OverOrders
+from ..harmonic_balance.identification import Identified, Measured, NodalDiagram, identify, nodal_diagram
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.speed_line import SpeedResponse
 from ..results.names import apart
-from ..settings.body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
-from .keys import Orders, Positives
-
-if TYPE_CHECKING:
-    from ..harmonic_balance.envelope import Envelope, OverOrders
-    from ..harmonic_balance.identification import Identified, NodalDiagram
-    from ..harmonic_balance.problem import Problem
-    from ..harmonic_balance.speed_line import SpeedResponse
-    from ..system.assembly import Assembly
-    from .assemble import Built
-    from .settings import CaseSettings
+from ..system.assembly import Assembly
+from .assemble import Built, build
+from .problem import models_of, normal_forces, problem_of
+from .settings import CaseSettings
 
 Report = Callable[[str], None]
 Bases = Mapping[str, ModalBasis]
-NotNegatives = Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)]
-Pair = Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)]
-Ends = Annotated[tuple[Positive, Positive], BeforeValidator(_finite_vector)]
-
-
-class OrdersOfCase(Model):
-    """The largest resonance in the sweep's band for each engine order (Sextro Fig. 5.5-2), by `respond --over orders`.
-
-    engine_orders: ``all`` from 1 to half the number of blades, or a list. points: of the sweep that looks for them, the
-    case's own if not given.
-    """
-
-    engine_orders: Literal["all"] | Orders = "all"
-    points: Annotated[int, Field(ge=5, le=10000)] | None = None
-
-    @model_validator(mode="after")
-    def _some(self) -> OrdersOfCase:
-        if self.engine_orders == () or 0 in self.engine_orders:
-            raise ValueError('engine_orders: give one or more whole numbers other than 0, or "all"')
-        return self
-
-
-class SpeedsOfCase(Model):
-    """Response along an engine-order line, f = e n / 60, by `respond --over speeds`.
-
-    Bodies whose modal files have a speed range take part in the speed, others stay as they are; centrifugal excitations
-    (speed_rpm) follow it.
-    normal_force: of the contacts that the sweep presses, ``static`` (the closures of the modal file), a number (N), or
-    [[rpm, N], ...], straight lines in the square of the speed; if not given, the sweep's one.
-    """
-
-    start_rpm: Positive
-    stop_rpm: Positive
-    points: Annotated[int, Field(ge=2, le=100000)] = 101
-    normal_force: Literal["static"] | NotNegative | Annotated[tuple[Pair, ...], BeforeValidator(_tuple)] | None = None
-
-    @model_validator(mode="after")
-    def _rising(self) -> SpeedsOfCase:
-        if self.stop_rpm == self.start_rpm:
-            raise ValueError("stop_rpm and start_rpm: give two different speeds")
-        if isinstance(self.normal_force, tuple):
-            rpm = [n for n, _ in self.normal_force]
-            if len(rpm) < 2 or rpm != sorted(set(rpm)):
-                raise ValueError("normal_force: give two or more pairs [rpm, N], the speeds rising")
-        return self
-
-
-class RangesOfCase(Model):
-    """Envelope of the responses over all combinations of these values (Sextro Fig. 5.4-2), by `respond --over ranges`.
-
-    damping_ratio: of all modes of all bodies, or of the stuck modes where damping = ``stuck``. load: factors on the
-    loads that are not steady. friction: of all contacts. normal_force: N, of the contacts that the sweep presses. Two
-    values are the ends of a range; give more where the smallest amplitude matters, which may lie between them.
-    """
-
-    damping_ratio: Ratios = ()
-    load: NotNegatives = ()
-    friction: Annotated[tuple[Coefficient, ...], BeforeValidator(_finite_vector)] = ()
-    normal_force: NotNegatives = ()
-
-    @model_validator(mode="after")
-    def _some(self) -> RangesOfCase:
-        if not self.given:
-            raise ValueError("give values of damping_ratio, load, friction or normal_force")
-        return self
-
-    @property
-    def given(self) -> dict[str, tuple[float, ...]]:
-        """Name -> values of what varies."""
-        return {name: values for name, values in self if values}
-
-
-class CurveOfCase(Model):
-    """Responses followed through folds and lift-off, by `respond --over frequency`, `load` and `normal-force`.
-
-    band: Hz, first and last frequency; the sweep's start and stop if not given. load: first and last factor on the
-    loads that are not steady. normal_force: N, first and last; the smallest and the largest of the sweep if not given.
-    The first may be the larger one. frequency: Hz, at which load and normal force vary; the highest resonance in the
-    sweep's band if not given, for the normal force that at its first value. points: of a curve at most.
-    """
-
-    band: Ends | None = None
-    load: Ends = (0.01, 1.0)
-    normal_force: Pair | None = None
-    frequency: Positive | None = None
-    points: Annotated[int, Field(ge=2, le=1000000)] = 3000
-
-    @model_validator(mode="after")
-    def _apart(self) -> CurveOfCase:
-        for key in ("band", "load", "normal_force"):
-            ends = getattr(self, key)
-            if ends is not None and ends[0] == ends[1]:
-                raise ValueError(f"{key}: give two different values, first and last")
-        return self
-
-
-class MeasuredOfCase(Model):
-    """A measured frequency (Hz) of a mode, counted from 1, of a nodal diameter."""
-
-    nodal_diameter: Annotated[int, Field(ge=0, le=500)]
-    mode: Annotated[int, Field(ge=1, le=500)] = 1
-    frequency: Positive
-
-
-class IdentificationOfCase(Model):
-    """Contact stiffness from one measured frequency, others predicted (Sextro Fig. 5.4-1), by `microslip identify`.
-
-    fit: the frequency that is met. measured: others that are predicted. ratio: tangential over normal stiffness, kept.
-    stiffnesses: N/m, of further curves in the diagram. modes: how many of them are drawn.
-    """
-
-    fit: MeasuredOfCase
-    measured: Annotated[tuple[MeasuredOfCase, ...], BeforeValidator(_tuple)] = ()
-    ratio: Positive = 0.5
-    stiffnesses: Positives = ()
-    modes: Annotated[int, Field(ge=1, le=100)] = 3
 
 
 # --- from settings to answers ----------------------------------------------------------------------------------------
@@ -157,7 +38,6 @@ def _asked(settings: CaseSettings, key: str, path: Path | str) -> Any:
 
 def _one_force(built: Built, path: Path | str, key: str) -> float | None:
     """The one normal force of the sweep; None where it presses nothing."""
-    from .run import normal_forces
 
     forces = normal_forces(built, path)
     if len(forces) > 1:
@@ -179,9 +59,6 @@ def over_orders(
     Raises:
         UserError: no ring, or excitations that name their own engine orders.
     """
-    from ..harmonic_balance import envelope
-    from .assemble import build
-    from .run import normal_forces, problem_of
 
     asked, ring = _asked(settings, "orders", path), settings.ring
     if ring is None:
@@ -229,9 +106,6 @@ def over_speeds(
     Raises:
         UserError: no engine order, or a speed outside of a body's range.
     """
-    from ..harmonic_balance import speed_line
-    from .assemble import build
-    from .run import models_of
 
     asked = _asked(settings, "speeds", path)
     named = settings.ring is not None and settings.ring.engine_order is not None
@@ -256,7 +130,6 @@ def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSet
 
 
 def _force_at(built: Built, asked: Any, rpm: float, path: Path | str) -> float | None:
-    from .run import normal_forces
 
     if asked is None:
         return _one_force(built, path, "speeds")
@@ -279,9 +152,6 @@ def over_ranges(
     Raises:
         UserError: friction of a contact whose tables say it.
     """
-    from ..harmonic_balance import envelope
-    from .assemble import build
-    from .run import problem_of
 
     asked = _asked(settings, "ranges", path)
     told = [c.interface for c in settings.contacts if not isinstance(c.friction, OfCoulomb)]
@@ -324,8 +194,6 @@ def identification(settings: CaseSettings, bases: Bases, path: Path | str) -> tu
     Raises:
         UserError: a frequency that no stiffness gives, a nodal diameter that the ring or the modal file does not have.
     """
-    from ..harmonic_balance.identification import Measured, identify, nodal_diagram
-    from .assemble import build
 
     asked = _asked(settings, "identification", path)
     a = build(settings, bases, path).assembly

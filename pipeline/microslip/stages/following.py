@@ -17,7 +17,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint
 from ..case.assemble import Built, build
-from ..case.run import problem_of
+from ..case.problem import problem_of
 from ..continuation import NO_OPTIMUM
 from ..data import ModalBasis, UserError
 from ..files import store
