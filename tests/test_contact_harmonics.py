@@ -13,7 +13,7 @@ from microslip.contact.harmonics import force_alone, force_harmonics, waves
 from microslip.contact.heights import Polynomial, tabulated
 from microslip.contact.law import march
 from microslip.contact.normal import Preload, Rough
-from microslip.contact.periodic import RECALL, cycles, periodic
+from microslip.contact.periodic import RECALL, periodic
 from microslip.contact.point import PointContact
 from microslip.contact.wear import worn_law
 
@@ -116,7 +116,7 @@ def test_tables_are_not_taken_for_values_per_point() -> None:
 def test_harmonics_are_those_of_the_marched_cycle() -> None:
     u = some(4)
     values, transform = waves(3, 64)
-    force, _ = cycles(ROUGH.law, jnp.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)
+    force, _ = periodic(ROUGH.law, jnp.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)[:2]
     expected = jnp.einsum("hs,snk->nkh", transform, force)
     found = force_harmonics(ROUGH.law, u, ROUGH.period)[0]
     assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(force).max())
@@ -222,7 +222,7 @@ def test_a_contact_that_is_open_where_cycles_end_takes_two() -> None:
     motion = jnp.asarray(1e-6 * np.stack([np.sin(t + 0.05), 2 + np.cos(t), 0 * t], axis=1))[:, None]
     assert motion[-1, 0, 0] < 0 < motion[0, 0, 0]
     long = march(law, jnp.concatenate([motion] * 3), 1 / 64, law.init(1))[0][-64:]
-    ended = cycles(law, motion, 1.0, 50, 1e-10)[0]
+    ended = periodic(law, motion, 1.0, 50, 1e-10).force
     assert np.abs(ended - long).max() < 1e-12 * np.abs(long).max()
 
 

@@ -15,7 +15,7 @@ from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb, Scattered
 from microslip.contact.harmonics import force_alone, force_harmonics
 from microslip.contact.law import Step, history, march
-from microslip.contact.periodic import cycles
+from microslip.contact.periodic import periodic
 from microslip.errors import UserError
 
 SAMPLES = 256
@@ -32,7 +32,7 @@ LAWS = pytest.mark.parametrize(
     [pytest.param(e, marks=pytest.mark.slow if name in SISTERS else ()) for name, e in EXAMPLES.items()],
     ids=EXAMPLES.keys(),
 )
-FORCES = jax.jit(cycles, static_argnums=3)
+FORCES = jax.jit(periodic, static_argnums=3)
 
 
 def _limits(law, u, dt):

@@ -18,7 +18,7 @@ from microslip.contact.law import history, march
 from microslip.contact.microslip import MonotoneSlip, of
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.partial_slip import PartialSlip
-from microslip.contact.periodic import cycles
+from microslip.contact.periodic import periodic
 from microslip.contact.sliders import Iwan, Strips, jenkins, mindlin, rough_strips, segalman, uniform
 from microslip.contact.solids import Solid
 from microslip.errors import UserError
@@ -106,7 +106,7 @@ def test_a_circular_orbit_dissipates_its_closed_form(law):
     for samples in (1500, 3000):
         t = 2 * np.pi * np.arange(samples) / samples
         u = jnp.asarray(A * np.stack([0 * t, np.cos(t), np.sin(t)], axis=-1)[:, None])
-        f = np.array(cycles(law, u, 1.0, 6)[0])
+        f = np.array(periodic(law, u, 1.0, 6).force)
         work.append((0.5 * (f + np.roll(f, 1, axis=0)) * (u - np.roll(u, 1, axis=0))).sum())
     _, k, limit = (np.array(part) for part in law.local(jnp.zeros(1)))
     slides = k * A > limit

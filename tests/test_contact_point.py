@@ -17,14 +17,14 @@ from microslip.contact.friction import Coulomb, Exponential, Falling, Heated, St
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import history
 from microslip.contact.normal import Penalty, Preload, Rough
-from microslip.contact.periodic import cycles
+from microslip.contact.periodic import periodic
 from microslip.contact.point import PointContact, PointState, dragged
 from microslip.harmonic_balance.orbits import exact
 
 MU, N0, K = 0.4, 100.0, 2e7
 LIMIT = MU * N0
 TRIES = hypothesis_settings(max_examples=15)
-CYCLES = jax.jit(cycles, static_argnums=3)
+CYCLES = jax.jit(periodic, static_argnums=3)
 STEP = jax.jit(lambda law, u, v, dt, state: law.step(u, v, dt, state))
 
 

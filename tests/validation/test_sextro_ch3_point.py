@@ -21,7 +21,7 @@ from microslip.contact.friction import (
 )
 from microslip.contact.heights import Polynomial
 from microslip.contact.normal import Rough
-from microslip.contact.periodic import cycles
+from microslip.contact.periodic import periodic
 from microslip.contact.point import PointContact
 from microslip.contact.regularised import MassContact, integrate
 
@@ -32,7 +32,7 @@ def value(number):
 
 ROUGH = Rough(value(1), value(1), Polynomial())  # c_N0 = R_Z = 1
 MASS, BETA, STIFFNESS, SLOPE = 1e-3, 0.2, 1.0, 1e6  # "if not defined else"
-CYCLES = jax.jit(cycles, static_argnums=3)
+CYCLES = jax.jit(periodic, static_argnums=3)
 T = 2 * np.pi * np.arange(2000) / 2000
 
 # 3.6 -----------------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .law import Array, Law, point_axes
-from .periodic import cycles, with_slopes
+from .periodic import periodic, with_slopes
 
 CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
@@ -73,7 +73,7 @@ def force_alone(
 
     def one(law: Law, u: Array) -> tuple[Array]:
         path = jnp.einsum("sh,nkh->snk", values, u)
-        return (jnp.einsum("hs,snk->nkh", transform, cycles(law, path, period, count, periodicity)[0]),)
+        return (jnp.einsum("hs,snk->nkh", transform, periodic(law, path, period, count, periodicity).force),)
 
     return _chunked(one, law, u, chunk)[0]
 

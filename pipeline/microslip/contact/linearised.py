@@ -16,6 +16,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from .cycle import blank, stepped, units
 from .law import Array, Law, State
 
 BLOCK = 2048
@@ -96,12 +97,6 @@ def linearised(
     return Linearised(*found)
 
 
-@jax.jit
-def stepped(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> tuple[Array, State]:
-    """`Law.step`, which python reads once for all its uses."""
-    return law.step(u, v, dt, state)
-
-
 def sliders(memory: Array, lead: int) -> Array:
     """(..., m, 2, n) of a memory (..., 2, n) of one slider a point or (..., m, 2, n), after so many leading axes."""
     return memory.reshape(*memory.shape[:lead], -1, *memory.shape[-2:])
@@ -159,17 +154,6 @@ def _held(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> Stat
 def _ways(n: int) -> Array:
     """(3, n, 3) along n, t1 and t2, all points alike."""
     return jnp.broadcast_to(jnp.eye(3)[:, None], (3, n, 3))
-
-
-def blank(state: State, count: int) -> State:
-    """No tangents, so many."""
-    return jax.tree_util.tree_map(lambda leaf: jnp.zeros((count, *leaf.shape)), state)
-
-
-def units(law: Law, state: State, memory: Array) -> State:
-    """Tangents of a state along both directions of its memory (..., 2, n)."""
-    each = jnp.stack([jnp.zeros_like(memory).at[..., k, :].set(1.0) for k in range(2)])
-    return jax.vmap(law.recalled)(blank(state, 2), each)
 
 
 def _recursion(

@@ -25,8 +25,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from .cycle import blank, march, push, rates, units
 from .law import Array, Law, State
-from .linearised import Linearised, blank, linearised, stepped, units
+from .linearised import Linearised, linearised
 
 PLAIN = 2
 """Cycles that are marched before slow sliders are solved for."""
@@ -117,14 +118,6 @@ def with_slopes(
     return loop.periodic_slopes(signals, weights) if loop.solves else loop.marched_slopes(signals, weights)
 
 
-def cycles(
-    law: Law, u: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
-) -> tuple[Array, State]:
-    """Forces (s, n, 3) over the last cycle of a periodic path u (s, n, 3), and the state at its end: `periodic`."""
-    found = periodic(law, u, period, count, periodicity)
-    return found.force, found.state
-
-
 class _Loop:
     """A path through a law, again and again; arguments as in `periodic`."""
 
@@ -148,7 +141,7 @@ class _Loop:
 
     def marching(self, at: _At) -> _At:
         """One cycle more, and the next begins where it ends."""
-        force, state = self._march(at.start)
+        force, state = march(self.law, self.path, self.dt, at.start)
         return self._marched(at, force, state)
 
     def solved(self, at: _At) -> _At:
@@ -162,7 +155,7 @@ class _Loop:
 
         def cycle(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
             at, tangents, _ = carried
-            (force, after), (slope, changed) = self._push(at.start, tangents, moves)
+            (force, after), (slope, changed) = push(self.law, self.path, self.dt, at.start, tangents, moves)
             return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
 
         moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
@@ -175,7 +168,7 @@ class _Loop:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
         rest = self.rest()
         at = self.solved(jax.lax.while_loop(self.unfinished, self.marching, rest))  # as `periodic` does
-        rate = self._rate(self.path)
+        rate = rates(self.path, self.dt)
         starts = jax.tree_util.tree_map(lambda *both: jnp.stack(both), rest.start, at.begun)
         found = jax.lax.map(
             lambda one: linearised(self.law, self.path, rate, self.dt, one[0], one[1], signals, weights),
@@ -188,7 +181,9 @@ class _Loop:
     def _solving(self, at: _At) -> _At:
         """One cycle more, and the next begins where Newton's method expects the solution."""
         still = jnp.zeros((len(self.path), 2, 3))
-        (force, after), (_, changed) = self._push(at.start, units(self.law, at.start, at.memory), still)
+        (force, after), (_, changed) = push(
+            self.law, self.path, self.dt, at.start, units(self.law, at.start, at.memory), still
+        )
         memory, size = self.law.memory(force[-1], after), jnp.abs(force).max()
         newton = _Newton(self._remembered(changed))
         missing = memory - at.memory + RECALL * (at.first - at.memory)
@@ -234,41 +229,6 @@ class _Loop:
             return change, change <= jnp.minimum(self.periodicity, _STILL) * size
         rounding = change <= jnp.minimum(self.periodicity, 1e-15) * size
         return change, rounding | (jnp.maximum(change, left) <= self.periodicity * size)
-
-    def _march(self, state: State) -> tuple[Array, State]:
-        """One cycle."""
-
-        def one(state: State, row: tuple[Array, Array]) -> tuple[State, Array]:
-            force, after = stepped(self.law, *row, self.dt, state)
-            return after, force
-
-        after, force = jax.lax.scan(one, state, (self.path, self._rate(self.path)))
-        return force, after
-
-    def _push(self, state: State, tangents: State, moves: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
-        """One cycle with the tangents of force and state along every parameter.
-
-        A parameter moves all points alike: only (p, 3) numbers a sample, and not those of every point, are handed to
-        the tangents of `Law.step`.
-        """
-        rows = (self.path, self._rate(self.path), moves, self._rate(moves))
-
-        def one(carried: tuple[State, State], row: tuple[Array, ...]) -> tuple[tuple[State, State], tuple[Array, ...]]:
-            state, tangents = carried
-            u, v, *moved = row
-
-            def push(along: State, *moved: Array) -> tuple[tuple[Array, State], tuple[Array, State]]:
-                whole = tuple(jnp.broadcast_to(m, u.shape) for m in moved)
-                return jax.jvp(lambda x, v, s: stepped(self.law, x, v, self.dt, s), (u, v, state), (*whole, along))
-
-            (force, after), (slope, changed) = jax.vmap(push, out_axes=((None, None), (0, 0)))(tangents, *moved)
-            return (after, changed), (force, slope)
-
-        (after, changed), (force, slope) = jax.lax.scan(one, (state, tangents), rows)
-        return (force, after), (slope, changed)
-
-    def _rate(self, path: Array) -> Array:
-        return (path - jnp.roll(path, 1, axis=0)) / self.dt
 
 
 def _length(memory: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..contact.harmonics import waves
 from ..contact.law import Law, State, Step, program
-from ..contact.periodic import cycles
+from ..contact.periodic import periodic
 from ..contact.point import PointContact
 from ..data import Array
 
@@ -86,7 +86,7 @@ def _point_cycles(
 ) -> tuple[jax.Array, ...]:  # fmt: skip
     values, _ = waves(u.shape[1] // 2, samples)
     path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, values @ derivative(u.shape[1])))
-    before, state = cycles(law, path, period, count, periodicity)
+    before, state = periodic(law, path, period, count, periodicity)[:2]
     moved = path - jnp.roll(path, 1, axis=0)
     dt = period / samples
 

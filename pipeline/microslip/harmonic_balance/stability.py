@@ -27,7 +27,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.law import Law, State
-from ..contact.periodic import cycles
+from ..contact.periodic import periodic
 from ..data import Array, ComplexArray, UserError
 from .problem import Problem
 
@@ -318,7 +318,7 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
         both = (jnp.einsum("nia,nij,njb->ab", G, k, G) for k in (by_place, by_speed))
         return law.step(*sample, dt, state)[1], (state, *both)
 
-    state = cycles(law, u, period, count, SETTLED)[1]
+    state = periodic(law, u, period, count, SETTLED)[:2][1]
     _, (states, slope, drag) = jax.lax.scan(one, state, (u, v))
     return u, v, states, slope, drag
 
