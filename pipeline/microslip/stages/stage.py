@@ -86,7 +86,8 @@ def hash_of_code(modules: tuple[str, ...]) -> str:
             found.add(file)
             todo += _imported(file)
     folders = {f.parent for f in found} - {PACKAGE}
-    found |= {f for folder in folders for f in folder.rglob("*") if f.is_file() and f.suffix not in (".py", ".pyc")}
+    beside = {f for folder in folders for f in folder.rglob("*") if f.is_file() and f.suffix != ".py"}
+    found |= {f for f in beside if f.parent.name != "__pycache__"}
     named = sorted((str(f.relative_to(PACKAGE)), store.hash_file(f)) for f in found)
     return store.hash_settings(named)
 
