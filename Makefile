@@ -8,7 +8,7 @@ PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
 PYTEST   := $(PYTHON) -m pytest -n 2 --dist loadfile
 READY    := .venv/.ready
-SOURCES  := $(shell find pipeline/microslip -name '*.py')
+SOURCES  := $(shell find pipeline/microslip -type f -not -path '*/__pycache__/*')
 
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)

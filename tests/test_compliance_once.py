@@ -23,7 +23,7 @@ from microslip.reduced.compliance import contact_share, facing, law_stiffness, s
 from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS
 from microslip.reference.half_space import mean_inverse_distance, rectangle_compliance
-from microslip.report import report_html
+from microslip.report.body import report_html
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 from microslip.stages.modal import modes_stage

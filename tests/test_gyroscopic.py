@@ -31,7 +31,7 @@ from microslip.modes.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes
 from microslip.reference.rings import ring_at_rest, spinning_ring
 from microslip.reference.shafts import spinning_mass
-from microslip.report import report_html
+from microslip.report.body import report_html
 
 ROOT = {"supports": [{"face": "z0"}]}
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # n x u in the plane of the rotation

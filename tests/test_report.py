@@ -13,8 +13,10 @@ import small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from microslip.data import ModalBasis, UserError
-from microslip.report import certificate, fit_sentence, number_list, report_html, text, write_report
+from microslip.data import ModalBasis
+from microslip.report.body import report_html
+from microslip.report.page import text
+from microslip.report.words import certificate, fit_sentence, number_list
 
 PNG = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c4944415408d763f8ffff3f0005fe02fe"
@@ -71,8 +73,7 @@ def album(tmp_path: Path, *names: str) -> dict[str, Path]:
 
 def test_the_page_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     names = ["mesh", "interfaces", "modes_0rpm", "mode_01_0rpm", "animation_01", "compliance", "friction response"]
-    write_report(small.basis(), album(tmp_path, *names), tmp_path / "report.html", ["Only a beam."])
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = report_html(small.basis(), album(tmp_path, *names), ["Only a beam."])
     tags = parsed(page)
     pictures = [v for v in tags.loads if v.startswith("data:image/")]
     links = [v for v in tags.loads if not v.startswith("data:image/")]
@@ -279,10 +280,3 @@ def test_load_faces_are_no_contacts() -> None:
     words = said(report_html(small.basis(), {}))
     assert "contact_left load" in words or "contact_leftload" in words
     assert "contact_left moves" not in words and "contact_left deforms" not in words
-
-
-def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written"):
-        write_report(small.basis(), {}, tmp_path / "file" / "report.html")
-    assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -498,7 +498,7 @@ def said(page: str) -> str:
 
 
 def test_the_report_of_a_cyclic_sector() -> None:
-    from microslip.report import report_html
+    from microslip.report.body import report_html
 
     basis = sector.basis(6, rpm=(0.0, 60000.0))
     words = said(report_html(basis, {}))
@@ -515,7 +515,7 @@ def test_the_report_of_a_cyclic_sector() -> None:
 
 
 def test_the_report_names_engine_orders_that_the_file_cannot_answer() -> None:
-    from microslip.report import report_html
+    from microslip.report.body import report_html
 
     words = said(report_html(sector.basis(6, rpm=(0.0, 60000.0), harmonics=(0, 1)), {}))
     assert "lacks the nodal diameters of the engine orders 2" in words
@@ -583,7 +583,8 @@ def test_gyroscopic_coupling_splits_the_speeds_of_forward_and_backward_waves() -
 def test_both_waves_are_printed_and_stand_in_the_report() -> None:
     """Every frequency with gyroscopic coupling is shown with its nodal diameter and its direction of travel."""
     from microslip.data import GyroscopicModes
-    from microslip.report import _ring_whirl
+    from microslip.report.page import page
+    from microslip.report.ring import whirl
     from microslip.ring.resonances import waves_of
     from microslip.stages.summary import basis_summary
 
@@ -602,9 +603,9 @@ def test_both_waves_are_printed_and_stand_in_the_report() -> None:
     lines = basis_summary(basis)
     assert f"  k =   3  {0.9 * f:10.5g}  Hz backward" in lines and f"  k =   3  {1.1 * f:10.5g}  Hz forward" in lines
     assert sum(line == "  at most           2  % too high" for line in lines) == 1  # one speed has coupling
-    page = _ring_whirl([g for (s, _), g in sorted(basis.groups.items()) if s])
-    assert "k = 3<br>backward" in page and f"{1.1 * f:#.6g}" in page
-    assert "k = 6<br>standing" in page and "2&nbsp;%" in page
+    shown = page("ring", whirl([g for (s, _), g in sorted(basis.groups.items()) if s]))
+    assert "k = 3\nbackward" in shown and f"{1.1 * f:#.6g}" in shown
+    assert "k = 6\nstanding" in shown and "2&nbsp;%" in shown
     growing = replace(groups[1, 3].gyroscopic, growth=np.array([1.0, 0.0]))
     lost = replace(basis, groups=groups | {(1, 3): replace(groups[1, 3], gyroscopic=growing)})
     assert any("nodal diameter 3: The rotating body is UNSTABLE" in line for line in basis_summary(lost))

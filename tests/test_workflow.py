@@ -288,10 +288,20 @@ def test_every_module_behind_a_product_counts_as_its_input() -> None:
 
 
 def test_a_change_of_code_is_another_input(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The step of a law counts for responses, not for modal files; the solver behind modes counts for both."""
+    """The step of a law counts for responses, not for modal files; the solver behind modes counts for both.
+
+    What is no module counts with those beside it: how a page looks, a table that a closed form reads.
+    """
     first = {m: hash_of_code.__wrapped__((m,)) for m in ("modes.compute", "stages.response")}
     own = store.hash_file
-    for changed, differing in (("contact/point.py", {"stages.response"}), ("linalg/eigen.py", set(first))):
+    for changed, differing in (
+        ("contact/point.py", {"stages.response"}),
+        ("linalg/eigen.py", set(first)),
+        ("report/templates/page.html", {"stages.response"}),
+        ("report/templates/style.css", {"stages.response"}),
+        ("harmonic_balance/ellipse.npz", {"stages.response"}),
+        ("templates/own.toml", set()),
+    ):
         monkeypatch.setattr(store, "hash_file", lambda f, c=changed: "other" if f == PACKAGE / c else own(f))
         assert {m for m in first if hash_of_code.__wrapped__((m,)) != first[m]} == differing
 

@@ -606,9 +606,9 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     """
     from . import pictures
     from .basis import read_basis
-    from .files.store import making
+    from .files.store import making, write_text
     from .modes.campbell import engine_orders
-    from .report import write_report
+    from .report.body import report_html
 
     file = _modal_file(file)
     basis = read_basis(file)
@@ -617,7 +617,7 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
         reason = pictures.can_draw()
         orders = engine_orders(basis)
         drawn = {} if reason else pictures.draw_all(basis, page.parent / "pictures", tell, orders)
-        write_report(basis, drawn, page, [f"The pictures are missing: {reason}"] if reason else [])
+        write_text(page, report_html(basis, drawn, [f"The pictures are missing: {reason}"] if reason else []))
     _say(page, quiet)
 
 

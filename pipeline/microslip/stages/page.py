@@ -20,7 +20,7 @@ from .stage import Made, Report, Stage
 def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report: Report) -> Path:
     """Pictures and the self-contained page of a body."""
     from .. import pictures
-    from ..report import write_report
+    from ..report.body import report_html
 
     stage = Stage(job.build_folder / "report.html", ("stages.page",), force, report)
     folder, remarks, shown = job.build_folder / "pictures", _remarks(job), dict[str, str]()
@@ -45,7 +45,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
             store.write_text(tables[0], resonance_csv(resonances(basis, engine_orders)))
         drawn |= {title: folder / name for title, name in shown.items()}
         report("writing the report")
-        write_report(basis, drawn, stage.product, remarks, response)
+        store.write_text(stage.product, report_html(basis, drawn, remarks, response))
         return Made([*drawn.values(), *tables], whole=reason is None)
 
     inputs = {

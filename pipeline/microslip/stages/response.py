@@ -19,7 +19,7 @@ from ..case.assemble import build
 from ..case.settings import FIRST_HARMONICS
 from ..data import ModalBasis, UserError
 from ..files import store
-from ..report import response_page
+from ..report.response import response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
 from ..units import counted
@@ -138,7 +138,7 @@ def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[st
     summary["response_sha256"] = store.hash_file(folder / "response.h5")
     summary["pictures"] = {title: path.name for title, path in drawn.items()}
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
-    response_page(summary, drawn, folder / "response.html")
+    store.write_text(folder / "response.html", response_html(summary, drawn))
     return summary
 
 

@@ -75,13 +75,19 @@ class Stage:
 
 @cache
 def hash_of_code(modules: tuple[str, ...]) -> str:
-    """SHA-256 of the sources of modules and of all that they import; a package stands for all that is in it."""
+    """SHA-256 of the sources of modules and of all that they import; a package stands for all that is in it.
+
+    What is no module counts with the modules of its folder and of the folders above it.
+    """
     todo, found = [f for m in modules for f in _files(m)], set[Path]()
     while todo:
         file = todo.pop()
         if file not in found:
             found.add(file)
             todo += _imported(file)
+    folders = {f.parent for f in found} - {PACKAGE}
+    beside = {f for folder in folders for f in folder.rglob("*") if f.is_file() and f.suffix != ".py"}
+    found |= {f for f in beside if f.parent.name != "__pycache__"}
     named = sorted((str(f.relative_to(PACKAGE)), store.hash_file(f)) for f in found)
     return store.hash_settings(named)
 

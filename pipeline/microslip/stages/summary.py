@@ -9,7 +9,7 @@ from ..linalg.gyroscopic import stability_sentence
 from ..reduced.compliance import sentence
 from ..reduced.coordinates import own_kind
 from ..reduced.quality import sentences
-from ..report import contact_sentence
+from ..report.words import contact_sentence
 from ..ring.expansion import certificate_words, certify_ring
 from ..ring.resonances import (
     eigenmodes,

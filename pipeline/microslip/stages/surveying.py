@@ -16,7 +16,7 @@ from ..case import CaseSettings, checkpoint, load_case, surveys
 from ..case.curves import Followed, curves
 from ..data import Array, ModalBasis
 from ..files import store
-from ..report import survey_page
+from ..report.response import survey_html
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
 from .checkpoint import Checkpoint, hashes_of
@@ -127,7 +127,7 @@ def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
     if kind not in KINDS:
         page, words = f"over_{kind}.html", f"over the {kind.replace('_', ' ')}"
     pictures = [folder / name for name in found.draw]
-    survey_page(f"{case}: {words}", found.sentences, found.tables, pictures, folder / page)
+    store.write_text(folder / page, survey_html(f"{case}: {words}", found.sentences, found.tables, pictures))
     return page
 
 

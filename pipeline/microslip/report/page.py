@@ -1,0 +1,100 @@
+"""What a page is made of, as plain data, and its HTML by the templates beside this file."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Something on a page, shown by the macro of its kind; a piece with nothing inside is left out.
+
+    Attributes:
+        inside: sentences, rows of cells, pieces, a text, or the data of a picture. title: of a fold, the caption of a
+            picture. head: of a table. tone: of sentences ("lead", "note", "warn", "bad") or of a picture ("wide").
+        name: of a picture; `fixed.html` has captions.
+    """
+
+    kind: str
+    inside: Sequence[Any]
+    title: str = ""
+    head: Sequence[str] = ()
+    tone: str = ""
+    name: str = ""
+
+    def __bool__(self) -> bool:
+        return any(self.inside)
+
+
+def say(*sentences: str, tone: str = "") -> Piece:
+    """Paragraphs."""
+    return Piece("words", sentences, tone=tone)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> Piece:
+    """Columns of numbers; without a head, facts and their names."""
+    return Piece("table", rows, head=head)
+
+
+def fold(title: str, *inside: Piece) -> Piece:
+    """What unfolds under its title."""
+    return Piece("fold", inside, title)
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number of so many digits."""
+    return f"{value:.{digits}g}"
+
+
+class Album:
+    """Pictures by name; each is shown once, what is left at the end was not asked for."""
+
+    def __init__(self, pictures: Mapping[str, Path]) -> None:
+        self.left = dict(pictures)
+
+    def take(self, name: str, caption: str = "", tone: str = "") -> Piece:
+        """A picture, with nothing inside if there is none of this name."""
+        path, data = self.left.pop(name, None), ""
+        if path is not None and path.is_file():
+            kind = "gif" if path.suffix.lower() == ".gif" else "png"
+            data = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+        return Piece("figure", data, caption, tone=tone, name=name)
+
+    def begun(self, prefix: str, suffix: str = "", tone: str = "") -> list[Piece]:
+        """All pictures whose names begin and end so."""
+        return [self.take(n, tone=tone) for n in list(self.left) if n.startswith(prefix) and n.endswith(suffix)]
+
+
+def page(title: str, pieces: Iterable[Piece], sections: Mapping[str, Sequence[Piece]] | None = None) -> str:
+    """The HTML of a page: pieces, then sections with links to them; sections with nothing inside are left out."""
+    told = {name: inside for name, inside in (sections or {}).items() if any(inside)}
+    return _templates().get_template("page.html").render(title=title, pieces=pieces, sections=told)
+
+
+@cache
+def _templates() -> Any:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    found = Environment(
+        loader=FileSystemLoader(Path(__file__).with_name("templates")), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    found.filters["text"] = text
+    return found
+
+
+_POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-])0*(\d+)(?![\w.])")
+
+
+def text(value: object) -> str:
+    """Escaped HTML; powers of ten of numbers in it are set as such."""
+    from markupsafe import Markup, escape
+
+    safe = escape(str(value)).replace(" %", Markup("&nbsp;%"))
+    return Markup(_POWER.sub(lambda m: f"{m[1]}·10<sup>{m[2].strip('+').replace('-', '−')}{m[3]}</sup>", safe))

@@ -1,0 +1,102 @@
+"""Sentences about what a modal file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..data import Array, ContactState, Interface, ModalGroup, SpeedRange
+from ..reduced.truncation import percent
+from ..settings.body import GROUND
+
+RIGID_ENOUGH = 0.05
+"""A patch whose fit residual is below this moves as a rigid patch for most purposes."""
+
+
+def rpm(speed: float) -> str:
+    """The speed (rad/s) with its unit."""
+    return f"{speed * 30 / np.pi:.6g} rpm"
+
+
+def hertz(frequency: Array, j: int) -> str:
+    """A frequency of mode j (0-based), nothing if there is no such mode."""
+    return f"{frequency[j]:#.6g}" if j < len(frequency) else ""
+
+
+def number_list(numbers: Sequence[int]) -> str:
+    """``1 to 4, 7 and 9``."""
+    runs: list[list[int]] = []
+    for n in sorted(numbers):
+        if runs and n == runs[-1][-1] + 1:
+            runs[-1].append(n)
+        else:
+            runs.append([n])
+    words = [w for r in runs for w in ([f"{r[0]} to {r[-1]}"] if len(r) > 2 else map(str, r))]
+    return ", ".join(words[:-1]) + f" and {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def certificate(group: ModalGroup) -> str:
+    """What the inertia count proves, in one sentence."""
+    if not group.checks.get("certified"):
+        return "Nothing proves that no mode is missing: the spectrum was not certified (modes.certify)."
+    if "upper_shift_hz" not in group.checks:
+        return f"These are all {group.n_modes} modes of the system."
+    count = int(group.checks.get("count_below_upper_shift", group.n_modes))
+    kept = f"; the first {group.n_modes} are kept" if count > group.n_modes else ""
+    limit = group.checks["upper_shift_hz"]
+    return f"The inertia count proves that these are all {count} modes below {limit:.6g} Hz{kept}."
+
+
+def range_sentence(harmonic: int, r: SpeedRange) -> str:
+    """How a speed range was made and how good it is."""
+    low, high = r.speeds[[0, -1]] * 30 / np.pi
+    held = " and ".join(f"{v:.0f}" for v in r.held_out * 30 / np.pi)
+    which = f"Nodal diameter {harmonic}: between" if harmonic else "Between"
+    return (
+        f"{which} {low:.6g} and {high:.6g} rpm one basis of {r.samples[0].n_modes} coordinates serves at every speed: "
+        f"modes from {int(r.solved.sum())} speeds, stiffness from {int((~r.held).sum())}; at {held} rpm, "
+        f"which were held out, its frequencies err by {r.total_error.max():.1e} at most."
+    )
+
+
+def contact_sentence(name: str, c: ContactState) -> str:
+    """What a closure does in the static state, in words."""
+    other = "the ground" if c.against == GROUND else c.against + (" of the neighbour" if c.sector_shift else "")
+    if not c.normal_force:
+        return f"contact {name}: {c.face} is open against {other}, the gap {1e6 * c.gap.min():.4g} µm or wider."
+    kept = "the modes leave it open" if c.modes == "open" else "the modes keep it closed"
+    return (
+        f"contact {name}: {c.face} presses {other} with {c.normal_force:.5g} N on {percent(c.closed_share)} of its "
+        f"area, at most {1e-6 * c.pressure.max():.4g} MPa (penetration left {1e6 * c.penetration:.2g} µm); {kept}."
+    )
+
+
+def fit_summary(contacts: Mapping[str, Interface]) -> str:
+    """How well six components describe the motion of all patches, in one sentence."""
+    worst = {name: float(i.fit_residual.max()) for name, i in contacts.items()}
+    loose = [name for name, value in worst.items() if value > RIGID_ENOUGH]
+    if not loose:
+        return f"All {len(worst)} patches move as rigid ones (to {100 * RIGID_ENOUGH:g} %) in all modes."
+    name = max(loose, key=lambda n: worst[n])
+    mode = int(contacts[name].fit_residual.argmax()) + 1
+    return (
+        f"Of {len(worst)} patches {len(loose)} deform in some modes, most of all {name} in mode {mode}: "
+        f"{percent(worst[name])} of its motion is not rigid."
+    )
+
+
+def fit_sentence(name: str, interface: Interface, group: ModalGroup) -> str:
+    """How well six components describe the motion of a patch, in words."""
+    residual = interface.fit_residual[: group.n_modes]
+    worst, loose = int(residual.argmax()) + 1, [j + 1 for j, r in enumerate(residual) if r > RIGID_ENOUGH]
+    most = percent(float(residual.max()))
+    if not loose:
+        return f"{name} moves as a rigid patch in all modes (at most {most} of its motion is deformation)."
+    firm = [j + 1 for j in range(group.n_modes) if j + 1 not in loose]
+    limit = f"{100 * RIGID_ENOUGH:g} %"
+    begins = f"{name} moves as a rigid patch (to {limit}) in modes {number_list(firm)}; it" if firm else name
+    return (
+        f"{begins} deforms in modes {number_list(loose)} (most in mode {worst}: {most} of its motion is not rigid), "
+        "which six components do not see."
+    )
