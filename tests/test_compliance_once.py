@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small
+from closed_forms.indentation import rectangle_compliance
 from meshes import STEEL, body, brick
 from scipy.integrate import dblquad
 from test_reduction import block
@@ -22,7 +23,7 @@ from microslip.modes.patches import patch_bounds
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS
-from microslip.reference.half_space import mean_inverse_distance, rectangle_compliance
+from microslip.reference.half_space import mean_inverse_distance
 from microslip.report import report_html
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 import small
+from closed_forms.rings import ring_at_rest, spinning_ring
+from closed_forms.shafts import spinning_mass
 from meshes import STEEL, body, brick, nearest, pipe, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
@@ -29,8 +31,6 @@ from microslip.modes.campbell import gyroscopic_change, track_gyroscopic
 from microslip.modes.equilibrium import equilibrium, make_model
 from microslip.modes.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes
-from microslip.reference.rings import ring_at_rest, spinning_ring
-from microslip.reference.shafts import spinning_mass
 from microslip.report import report_html
 
 ROOT = {"supports": [{"face": "z0"}]}

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms.bars import box_frequencies
 from meshes import STEEL, body, brick, nearest, roller_box, shaken, twisted_blade, with_sets
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
@@ -24,7 +25,6 @@ from microslip.modes.equilibrium import (
     stiffness_slope,
     stress_of,
 )
-from microslip.reference.bars import box_frequencies
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 LAME, SHEAR = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
