@@ -300,7 +300,7 @@ class Grip:
     Attributes:
         pair, cut: see there. at: (n, 3) positions. multiplier: (v,) Pa, lambda. gap: (v,) m, mean gaps of the
             nodes, interference counted (infinite where a node meets nothing). area: (v,) m2. pressure: (v,) Pa,
-            >= 0. touching: (v,) whether a node is closed. point_gap, point_pressure, point_weight: (p,) at the
+            >= 0. touching: (v,) whether a node is closed. point_pressure, point_weight: (p,) at the
             quadrature points.
         on_slave, on_master: (p, 3n) derivative of the gaps with respect to the displacements, by body.
         hats: (v, p). projections: per block of the cut.
@@ -314,7 +314,6 @@ class Grip:
     area: Array
     pressure: Array
     touching: Array
-    point_gap: Array
     point_pressure: Array
     point_weight: Array
     on_slave: sp.csr_matrix
@@ -331,11 +330,6 @@ class Grip:
     def slave_force(self) -> Array:
         """(n, 3) the part that acts on the slave face, N."""
         return self._forces(self.on_slave)
-
-    @property
-    def master_force(self) -> Array:
-        """(n, 3) the part that acts on the master face, N, as it stands in the body's own place."""
-        return self._forces(self.on_master)
 
     def _forces(self, rows: sp.csr_matrix) -> Array:
         return np.asarray(rows.T @ (self.point_weight * self.point_pressure)).reshape(-1, 3)
@@ -381,7 +375,7 @@ def grip(
     # faces that touch without force count as closed
     touching = held | meets & (trial > -1e-9 * pair.penalty * pair.size)
     return Grip(
-        pair, made, x, multiplier, gap, np.where(meets, area, 0.0), pressure, touching, point_gap, hats.T @ pressure,
+        pair, made, x, multiplier, gap, np.where(meets, area, 0.0), pressure, touching, hats.T @ pressure,
         weight, on_slave, on_master, hats, found,
     )  # fmt: skip
 

@@ -14,7 +14,6 @@ import numpy as np
 from ..continuation import CONVERGED
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Indices, UserError
-from ..system.assembly import Assembly, Ring
 from ..units import METRES, Quantity
 from . import response
 from .peak import checked, resonance
@@ -56,17 +55,6 @@ class OverOrders:
             "stuck_Hz": self.stuck,
             "failed_points": self.failed.astype(float),
         }
-
-
-def at_order(assembly: Assembly, order: int) -> Assembly:
-    """A ring driven by another base engine order.
-
-    Raises:
-        UserError: bodies that stand in no ring.
-    """
-    if assembly.ring is None:
-        raise UserError("engine orders: the bodies stand in no ring; add [ring] with its blades")
-    return replace(assembly, ring=Ring(assembly.ring.blades, order))
 
 
 def over_orders(

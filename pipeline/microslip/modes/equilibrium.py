@@ -27,7 +27,6 @@ from ..fem.operators import (
     per_block,
     spin_projector,
     stiffness,
-    stress_stiffness,
     tangent,
     tangent_tensor,
     tangent_tensor_slope,
@@ -380,11 +379,6 @@ def _no_equilibrium(speed: float) -> str:
         f"no static equilibrium was found at {speed * 30 / np.pi:.6g} rpm; lower the speed or the loads, or use "
         'rotation.prestress = "linear" to see whether the state is plausible'
     )
-
-
-def linear_stiffness(model: BodyModel, state: StaticState) -> Array:
-    """(p, 3, 3) K0 + K_sigma: the textbook's linear prestress without the displaced geometry, for comparison."""
-    return model.K0 + stress_stiffness(model.d, state.stress)[:, None, None] * np.eye(3)
 
 
 def cauchy(state: StaticState, block: int) -> Array:

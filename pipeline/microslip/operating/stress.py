@@ -98,8 +98,7 @@ class StressPeaks:
 
     Attributes:
         amplitude, mean, largest: (f,) see `CycleStress`; mean is that of the place of the largest amplitude. place:
-            (f,) number of the place of the largest amplitude. points: (f, 3) where it is. largest_place: (f,) where
-            `largest` is.
+            (f,) number of the place of the largest amplitude. points: (f, 3) where it is.
     """
 
     amplitude: Array
@@ -107,7 +106,6 @@ class StressPeaks:
     largest: Array
     place: Array
     points: Array
-    largest_place: Array
 
 
 def stress_peaks(
@@ -131,7 +129,7 @@ def stress_peaks(
         kept = [k.with_places(s, chosen[block]) for k in kept]
     swing, most = kept[0], kept[-1] if largest else _Highest.none(f, False, False)
     mean = np.array([_mean(stress_at(motion.at(i), [swing.place[i]], location)[0, 0, 0].real) for i in range(f)])
-    return StressPeaks(swing.value, mean, most.value, swing.place, at[swing.place], most.place)
+    return StressPeaks(swing.value, mean, most.value, swing.place, at[swing.place])
 
 
 @dataclass(frozen=True)

@@ -36,18 +36,6 @@ def mac(A: Array, B: Array) -> Array:
     return np.divide(cross, own, out=np.zeros_like(own), where=own > 0)
 
 
-def share_in(A: Array, B: Array) -> Array:
-    """(a,) share of each column of A that the columns of B span together, 1: wholly.
-
-    What MAC is for one shape, this is for the members of a repeated frequency, which no two programs choose alike.
-    """
-    U, s, _ = np.linalg.svd(B, full_matrices=False)
-    Q = U[:, s > 1e-9 * s.max(initial=0.0)]
-    own = (np.abs(A) ** 2).sum(axis=0)
-    held = (np.abs(Q.conj().T @ A) ** 2).sum(axis=0)
-    return np.divide(held, own, out=np.zeros_like(own), where=own > 0)
-
-
 @dataclass(frozen=True)
 class Pair:
     """A mode of one body and the mode of another that is most like it.
