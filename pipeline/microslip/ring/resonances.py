@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..files.tables import rows_csv
 from ..linalg.gyroscopic import stability_sentence
 from ..modes.campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from ..reduced.coordinates import in_modes
@@ -306,7 +307,7 @@ def rows(found: Sequence[Resonance]) -> list[tuple[str, ...]]:
 
 def resonance_csv(found: Sequence[Resonance]) -> str:
     """The table as comma-separated text, with a head."""
-    return "\n".join(",".join(row) for row in [HEAD, *rows(found)]) + "\n"
+    return rows_csv(HEAD, rows(found))
 
 
 def family_ranges(found: Families) -> Mapping[int, tuple[float, float]]:

@@ -16,6 +16,7 @@ from ..case import CaseSettings, checkpoint, load_case, surveys
 from ..case.curves import Followed, curves
 from ..data import Array, ModalBasis
 from ..files import store
+from ..files.tables import columns_csv
 from ..report import survey_page
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
@@ -96,7 +97,7 @@ def _work(
     def write(tables: Tables) -> None:
         begin()
         for name, columns in tables.items():
-            store.write_text(folder / name, table(columns))
+            store.write_text(folder / name, columns_csv(columns, 12))
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)
@@ -129,12 +130,6 @@ def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
     pictures = [folder / name for name in found.draw]
     survey_page(f"{case}: {words}", found.sentences, found.tables, pictures, folder / page)
     return page
-
-
-def table(columns: Mapping[str, Array]) -> str:
-    """CSV text of columns of equal length."""
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in rows)]) + "\n"
 
 
 def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
