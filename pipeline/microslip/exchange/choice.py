@@ -11,6 +11,7 @@ import numpy as np
 from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
 from ..reduced.coordinates import in_modes
 from ..ring.resonances import speeds_of
+from ..units import rpm_text
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
         raise UserError(f"{basis.name}: export --to {form}: a cyclic sector is no whole body; mesh the whole body")
     if group.speed:
         raise UserError(
-            f"{basis.name}: export --to {form}: the modes at {group.speed * 30 / np.pi:.6g} rpm hold the stiffness "
+            f"{basis.name}: export --to {form}: the modes at {rpm_text(group.speed)} hold the stiffness "
             "of that speed, which a multibody program adds itself; export a group at rest (speeds_rpm = [0])"
         )
     if group.invariants is None:

@@ -27,6 +27,7 @@ from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from ..settings.body import BodySettings
+from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows, with_centrifugal
 from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
@@ -148,7 +149,7 @@ def _at_speeds(
     state: StaticState | None = None
     before = 0.0
     for number, rpm in enumerate(speeds):
-        speed = rpm * np.pi / 30
+        speed = from_rpm(rpm)
         if len(speeds) > 1 or speed:
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if floats:

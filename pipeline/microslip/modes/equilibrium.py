@@ -32,6 +32,7 @@ from ..fem.operators import (
     tangent_tensor_slope,
 )
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..units import rpm_text
 from .closing import Closing
 
 Report = Callable[[str], None]
@@ -360,7 +361,7 @@ def _factors_serve(steps: list[float]) -> bool:
 def _unstable(model: BodyModel, speed: float, count: int) -> str:
     why = "buckling or centrifugal divergence); lower the speed or the loads" if speed else "buckling); lower them"
     return (
-        f"{what_loads(model, speed)}: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} "
+        f"{what_loads(model, speed)}: at {rpm_text(speed)} the body is unstable (its stiffness has {count} "
         f"negative directions: {why}"
     )
 
@@ -376,7 +377,7 @@ def what_loads(model: BodyModel, speed: float) -> str:
 
 def _no_equilibrium(speed: float) -> str:
     return (
-        f"no static equilibrium was found at {speed * 30 / np.pi:.6g} rpm; lower the speed or the loads, or use "
+        f"no static equilibrium was found at {rpm_text(speed)}; lower the speed or the loads, or use "
         'rotation.prestress = "linear" to see whether the state is plausible'
     )
 

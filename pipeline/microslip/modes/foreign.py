@@ -15,6 +15,7 @@ from ..frames import skew
 from ..linalg import canonical, eigen
 from ..reduction import Reduced, stuck
 from ..settings.body import BodySettings
+from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from .boundary import AXES, check_held, require_face
@@ -369,7 +370,7 @@ def _group(
     reduced, n = s.reduced, body.mesh.n_points
     whole = s.unknowns.expand(reduced.vectors, n)
     shapes = whole.reshape(layout.width // 3, 3, -1)
-    m, speed = whole.shape[1], settings.rotation.speeds_rpm[0] * np.pi / 30
+    m, speed = whole.shape[1], from_rpm(settings.rotation.speeds_rpm[0])
     B, labels = rows.stacked(settings)
     T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, m))
     C, ratios = _damping(body, settings, reduced, free)

@@ -28,6 +28,7 @@ from ..ring.resonances import (
     wave_tracks,
     zigzag,
 )
+from ..units import from_rpm, rpm_text, to_rpm
 from .plots import COLOURS, _end_labels, _figure, _order_label, _per_minute, _per_second, _plain, _save
 
 if TYPE_CHECKING:
@@ -47,10 +48,6 @@ def _colour(family: int) -> str:
 
 def _hertz(omega: Array) -> Array:
     return omega / (2 * np.pi)
-
-
-def _rpm_text(speed: float) -> str:
-    return f"{speed * 30 / np.pi:.6g} rpm"
 
 
 def _note(axes: Axes, text: str, below: float) -> None:
@@ -78,7 +75,7 @@ def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     axes.set_title(f"{basis.name}: nodal diameters of {basis.sectors} sectors", fontweight="bold")
     note = "lines join modes of the same shape (MAC)"
     if len(shown) > 1:
-        note = f"filled: at {_rpm_text(shown[0].speed)}; hollow: at {_rpm_text(shown[1].speed)}; {note}"
+        note = f"filled: at {rpm_text(shown[0].speed)}; hollow: at {rpm_text(shown[1].speed)}; {note}"
     _note(axes, note, -0.11)
     return _save(figure, path)
 
@@ -148,7 +145,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes.set_ylabel("frequency in Hz")
     kept = any(c.modes == "closed" and c.sector_shift for c in basis.groups[speed, harmonics[0]].contacts.values())
     apart, state = ("sliding", "closed along their normal") if kept else ("apart", "open")
-    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {_rpm_text(found.speed)}", fontweight="bold")
+    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(found.speed)}", fontweight="bold")
     note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     _note(axes, note, -0.11)
     return _save(figure, path)
@@ -198,7 +195,7 @@ def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]
     _close_ones(axes, margins(basis, speed, orders, CLOSE), top)
     _nodal_axis(axes, basis)
     axes.set_ylabel("frequency in Hz")
-    axes.set_title(_rpm_text(found.speed), fontsize=11)
+    axes.set_title(rpm_text(found.speed), fontsize=11)
 
 
 def _safe_ceiling(found: Families, orders: Sequence[int], turns: float) -> float:
@@ -264,7 +261,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     _plain(axes)
     orders = sorted({e for e in orders if e > 0})
     speeds = next(iter(curves.values())).speeds
-    rpm = np.linspace(speeds[0], speeds[-1], 201) * 30 / np.pi
+    rpm = to_rpm(np.linspace(speeds[0], speeds[-1], 201))
     top = _campbell_ceiling(curves, orders, speeds[-1])
     joined = families(basis)
     found = [r for r in resonances(basis, orders) if r.frequency <= top]
@@ -306,7 +303,7 @@ def _waves(
     top: float,
 ) -> tuple[int, list[Array]]:  # fmt: skip
     """Draw every curve, faint unless its wave is excited; how many families lie above, and the strong curves."""
-    speeds, labels, hidden, drawn = rpm * np.pi / 30, [], 0, []
+    speeds, labels, hidden, drawn = from_rpm(rpm), [], 0, []
     for c, row in enumerate(joined.modes):
         members = {int(k): int(j) for k, j in zip(joined.harmonics, row, strict=True) if j >= 0}
         lines = {k: f for k, j in members.items() if (f := _line(curves[k], j, speeds)) is not None}
@@ -334,7 +331,7 @@ def _free_place(order: int, rpm: Array, top: float, curves: Sequence[Array], rin
         x = part * last
         y = order * x / 60
         here = [abs(float(np.interp(x, rpm, f)) - y) / top for f in curves]
-        marks = [max(abs(r.speed * 30 / np.pi - x) / rpm[-1] - 0.03, 0) + abs(r.frequency - y) / top for r in rings]
+        marks = [max(abs(to_rpm(r.speed) - x) / rpm[-1] - 0.03, 0) + abs(r.frequency - y) / top for r in rings]
         room = min([f for f in [*here, *marks] if np.isfinite(f)], default=1.0)
         if room > 0.028:
             return float(x)
@@ -350,5 +347,5 @@ def _line(t: Tracks, mode: int, speeds: Array) -> Array | None:
 
 def _rings(axes: Axes, found: Sequence[Resonance]) -> None:
     """A circle at each true resonance."""
-    x, y = [r.speed * 30 / np.pi for r in found], [r.frequency for r in found]
+    x, y = [to_rpm(r.speed) for r in found], [r.frequency for r in found]
     axes.plot(x, y, "o", mfc="white", mec=INK, markersize=6, zorder=4, linestyle="none")

@@ -13,6 +13,7 @@ from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
 from ..modes.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
 from ..reduced.truncation import Coordinate, coordinates, percent
+from ..units import from_rpm, rpm_text, to_rpm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +137,7 @@ def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path
     _plain(axes)
     orders = sorted({k for k in orders if k > 0})
     top = _ceiling(tracks, orders)
-    rpm = np.linspace(tracks.speeds[0], tracks.speeds[-1], 201) * 30 / np.pi
+    rpm = to_rpm(np.linspace(tracks.speeds[0], tracks.speeds[-1], 201))
     split = track_gyroscopic(basis) if gyroscopic_change(basis) > VISIBLE else None
     _curves(axes, tracks, rpm, top)
     if split is not None:
@@ -160,12 +161,12 @@ def _split(axes: Axes, basis: ModalBasis, split: Tracks, rpm: Array, top: float)
     ink = "#30343c"
     for omega in split.omega:  # the split grows with Omega, not with its square
         known = np.isfinite(omega)
-        at = split.speeds[known] * 30 / np.pi
+        at = to_rpm(split.speeds[known])
         f = np.interp(rpm, at, omega[known], left=np.nan, right=np.nan) / (2 * np.pi)
         axes.plot(rpm, np.where(f <= top, f, np.nan), color=ink, linewidth=0.9, linestyle=(0, (4, 1.5)), zorder=2.5)
     for way, mark in _WHIRL.items():
         at = [
-            (g.speed * 30 / np.pi, f)
+            (to_rpm(g.speed), f)
             for (_, h), g in sorted(basis.groups.items())
             if g.gyroscopic is not None and h == 0
             for f, direction in zip(g.gyroscopic.frequency, g.gyroscopic.direction, strict=True)
@@ -188,7 +189,7 @@ def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
 
 
 def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
-    speeds = rpm * np.pi / 30
+    speeds = from_rpm(rpm)
     labels = []
     for c in range(len(tracks.modes)):
         f = tracks.frequency(c, speeds)
@@ -200,7 +201,7 @@ def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
         at = tracks.speeds[known] if tracks.solved is None else tracks.solved
         stations = tracks.frequency(c, at)
         shown = stations <= top
-        axes.plot(at[shown] * 30 / np.pi, stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
+        axes.plot(to_rpm(at[shown]), stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
         for step in np.flatnonzero(tracks.mac[c] < SURE):
             part = (speeds >= tracks.speeds[step]) & (speeds <= tracks.speeds[step + 1])
             axes.plot(rpm[part], f[part], color="white", linewidth=2.4, linestyle=(0, (2, 3)))
@@ -234,7 +235,7 @@ def _order_label(axes: Axes, order: int, last: float, top: float, text: str = ""
 
 
 def _mark(axes: Axes, found: Sequence[Crossing]) -> None:
-    x = [c.speed * 30 / np.pi for c in found]
+    x = [to_rpm(c.speed) for c in found]
     axes.plot(
         x, [c.frequency for c in found], "o", mfc="white", mec="#111111", markersize=6, zorder=4, linestyle="none"
     )
@@ -286,7 +287,7 @@ def closure_plot(basis: ModalBasis, path: Path) -> Path | None:
     draw = _closures_beside if len(names) <= CURVES_BESIDE else _closures_tiled
     figure = draw(states, names[:MOST_CLOSURES])
     more = f" (first {MOST_CLOSURES} of {len(names)})" if len(names) > MOST_CLOSURES else ""
-    figure.suptitle(f"{basis.name}: contact at {max(states) * 30 / np.pi:.6g} rpm{more}", fontweight="bold")
+    figure.suptitle(f"{basis.name}: contact at {rpm_text(max(states))}{more}", fontweight="bold")
     return _save(figure, path)
 
 
@@ -325,7 +326,7 @@ def _closures_tiled(states: States, names: Sequence[str], columns: int = 4) -> F
 def _force_curves(axes: Axes, states: States, names: Sequence[str]) -> None:
     """Normal forces over the speeds that were solved for."""
     _plain(axes)
-    rpm = [speed * 30 / np.pi for speed in states]
+    rpm = [to_rpm(speed) for speed in states]
     for i, name in enumerate(names):
         force = [contacts[name].normal_force for contacts in states.values()]
         axes.plot(rpm, force, "o-", color=COLOURS[i % len(COLOURS)], label=name)

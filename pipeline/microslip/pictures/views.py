@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Array, Indices, Interface, ModalBasis, ModalGroup
 from ..modes.stress import von_mises
+from ..units import rpm_text
 from .lettering import (
     INK,
     Colour,
@@ -91,7 +92,7 @@ def open_studio(basis: ModalBasis) -> Studio:
 
 def at_speed(group: ModalGroup) -> str:
     """`` at 1500 rpm``."""
-    return f" at {group.speed * 30 / np.pi:.6g} rpm"
+    return f" at {rpm_text(group.speed)}"
 
 
 def hertz(frequency: float) -> str:

@@ -19,6 +19,7 @@ from ..files.tables import rows_csv
 from ..linalg.gyroscopic import stability_sentence
 from ..modes.campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from ..reduced.coordinates import in_modes
+from ..units import to_rpm
 from .expansion import BACKWARD, FORWARD, STANDING, aliased
 
 
@@ -298,7 +299,7 @@ def rows(found: Sequence[Resonance]) -> list[tuple[str, ...]]:
     """Cells under `HEAD`."""
     return [
         (
-            f"{r.speed * 30 / np.pi:.1f}", f"{r.frequency:.2f}", str(r.order), str(r.nodal_diameter), r.direction,
+            f"{to_rpm(r.speed):.1f}", f"{r.frequency:.2f}", str(r.order), str(r.nodal_diameter), r.direction,
             str(r.family or ""), str(r.mode),
         )
         for r in found

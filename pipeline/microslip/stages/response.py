@@ -22,7 +22,7 @@ from ..files import store
 from ..report import response_page
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
-from ..units import counted
+from ..units import counted, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, hashes_of
 from .stage import Made, Report, Stage
@@ -260,7 +260,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "harmonics": result.settings.balanced,
         **truncation,
         "description": result.settings.description,
-        "rotation_speed_rpm": result.speed * 30 / np.pi,
+        "rotation_speed_rpm": to_rpm(result.speed),
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
         "damping": result.settings.damping_as,
         "stuck_modes": _stuck_modes(result),
