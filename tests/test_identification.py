@@ -219,6 +219,6 @@ def test_pictures_are_drawn(tmp_path, basis: ModalBasis) -> None:
     ok[:, 2] = False
     many = envelope.Envelope(f, ("load",), np.array([[1.0], [2.0]]), a + 0j, ok, np.ones((2, 5)))
     assert np.isnan(many.low[2]) and many.high[1] == 4e-6
-    assert coupled.envelope_picture(many, tmp_path / "c.png", "c", (f, a[0])).stat().st_size > 10000
+    assert coupled.envelope_picture(many, tmp_path / "c.png", "c").stat().st_size > 10000
     line = coupled.speed_line_picture(f, 2 * f, a[0], np.outer(f, [1, 2]), tmp_path / "d.png", "d")
     assert line.stat().st_size > 10000

@@ -221,7 +221,7 @@ SAME = 5e-3
 
 def lowest(
     highest: Callable[[float], Peak], values: Sequence[float], tolerance: float = 1e-4, most: int = 12
-) -> Lowest:  # fmt: skip
+) -> Lowest:
     """The value of a parameter at which the highest peak is lowest.
 
     It is found at all values; then between the lowest one and its neighbour on the side to which it falls, in turn

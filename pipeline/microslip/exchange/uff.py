@@ -51,8 +51,7 @@ def _header(basis: ModalBasis) -> str:
     program = f"microslip {__version__}"
     date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
     said = "modal basis; SI; frame of the mesh, x y z of each node; phi^H M phi = 1"
-    return _set(151, [_line(basis.name), said, program,
-                      date + f"{0:10d}{0:10d}{0:10d}", date, program, date])  # fmt: skip
+    return _set(151, [_line(basis.name), said, program, date + f"{0:10d}{0:10d}{0:10d}", date, program, date])
 
 
 def _line(text: str) -> str:

@@ -354,9 +354,9 @@ def grip(
     """
     n = len(x)
     found = tuple(project(pair, p, x) for p in made.points)
-    on_slave = sp.vstack([
-        _sparse(p.slave, p.N[..., None] * f.normal[:, None], n) for p, f in zip(made.points, found, strict=True)
-    ]).tocsr()  # fmt: skip
+    on_slave = sp.vstack(
+        [_sparse(p.slave, p.N[..., None] * f.normal[:, None], n) for p, f in zip(made.points, found, strict=True)]
+    ).tocsr()
     on_master = sp.vstack([
         _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
         for p, f in zip(made.points, found, strict=True)
@@ -393,13 +393,13 @@ def _hats(made: Cut, nodes: int) -> sp.csr_matrix:
     return sp.csr_matrix(entries, shape=(nodes, start))
 
 
-def contact_stiffness(g: Grip, pattern: Pattern, bent: bool = True, phase: complex = 1.0) -> Array:
+def contact_stiffness(g: Grip, pattern: Pattern, bent: bool = True) -> Array:
     """(p, 3, 3) stiffness of a contact over the pattern, N/m; arguments as those of `contact_matrix`.
 
     Raises:
         UserError: points that the pattern does not couple: the faces have slid too far.
     """
-    return _on_pattern(contact_matrix(g, bent, phase).tocoo(), pattern, g.pair)
+    return _on_pattern(contact_matrix(g, bent).tocoo(), pattern, g.pair)
 
 
 def contact_matrix(g: Grip, bent: bool = True, phase: complex = 1.0) -> sp.csr_matrix:

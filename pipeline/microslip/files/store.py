@@ -310,7 +310,7 @@ def sidecar_path(product: Path | str) -> Path:
 
 def nothing_to_do(
     product: Path | str, inputs: Mapping[str, Any], force: bool = False, report: Callable[[str], None] = lambda _: None
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether a stage has no work to do: `product` and all that was written with it is up to date. Said to `report`.
 
     Make is told that the product is as new as what it was made from.

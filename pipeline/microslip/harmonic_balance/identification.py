@@ -161,7 +161,7 @@ def coupling(assembly: Assembly, index: int, ratio: float) -> Coupling:
 
 def nodal_diagram(
     assembly: Assembly, stiffness: float, ratio: float, indices: Sequence[int] | None = None, modes: int = 6
-) -> NodalDiagram:  # fmt: skip
+) -> NodalDiagram:
     """Frequencies of the coupled system over the nodal diameter, from 0 to N/2 if not told which.
 
     Raises:
@@ -172,9 +172,7 @@ def nodal_diagram(
     return NodalDiagram(np.array(waves), np.array(found), stiffness, ratio)
 
 
-def identify(
-    assembly: Assembly, fit: Measured, ratio: float, measured: Sequence[Measured] = ()
-) -> Identified:  # fmt: skip
+def identify(assembly: Assembly, fit: Measured, ratio: float, measured: Sequence[Measured] = ()) -> Identified:
     """The contact stiffness that gives one measured frequency, and what it predicts for others.
 
     Args:

@@ -31,9 +31,8 @@ NOT_RIGID = 1e-6
 
 
 def foreign_basis(
-    body: Matrices, settings: BodySettings, report: Report = lambda _: None,
-    provenance: Mapping[str, str] | None = None,
-) -> tuple[ModalBasis, list[str]]:  # fmt: skip
+    body: Matrices, settings: BodySettings, report: Report = lambda _: None, provenance: Mapping[str, str] | None = None
+) -> tuple[ModalBasis, list[str]]:
     """The modal basis of a body given by its matrices (Sextro section 2.4), and what a person should know of it.
 
     Raises:
@@ -126,9 +125,7 @@ def _wide(B: sp.csr_matrix, width: int) -> sp.csr_matrix:
     return sp.csr_matrix((B.data, B.indices, B.indptr), shape=(B.shape[0], width))
 
 
-def _padded(
-    rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout
-) -> tuple[BodyRows, list[str]]:  # fmt: skip
+def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout) -> tuple[BodyRows, list[str]]:
     """Rows over the whole layout, and what is odd about them; an interface on a single node has that node's own."""
 
     def wide(p: Patch) -> Patch:

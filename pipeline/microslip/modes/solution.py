@@ -177,9 +177,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
     T = np.asarray(s.B @ reduced.vectors)
     held = held_compliance(T, reduced, s.labels)
-    quality = stuck.indicators(
-        settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero
-    )  # fmt: skip
+    quality = stuck.indicators(settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero)
     return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
 
 

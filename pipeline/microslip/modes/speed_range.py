@@ -102,13 +102,13 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
     return omega, modes
 
 
-def waves_over(r: SpeedRange, speeds: Array, forward: bool, count: int | None = None) -> tuple[Array, list[Array]]:
+def waves_over(r: SpeedRange, speeds: Array, forward: bool) -> tuple[Array, list[Array]]:
     """`frequencies_over` with gyroscopic coupling, for the waves that run forward or the others.
 
     Raises:
         numpy.linalg.LinAlgError: the body is unstable at one of the speeds.
     """
-    count, run_up = count or r.count, r.samples[0].run_up
+    count, run_up = r.count, r.samples[0].run_up
     if run_up is None:
         return frequencies_over(r, speeds, count)
     parts, N = interpolant(r), run_up.N

@@ -69,7 +69,7 @@ class Motion:
 
     def of(
         self, read: Callable[[ModalGroup], Array], beside: Callable[[Residual], Array] | None = None
-    ) -> ComplexArray:  # fmt: skip
+    ) -> ComplexArray:
         """(f, H + 1, ...) harmonics of what rows read; read(group) -> (..., m), beside(residual) -> (..., r)."""
         found = []
         for p in self.parts:

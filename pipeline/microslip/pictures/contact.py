@@ -345,8 +345,9 @@ def wear_figure(study: Study) -> Any:
     for colour, at in zip(_shades(len(np.unique(times))), np.unique(times), strict=True):
         chosen = times == at
         panels[0].plot(100 * h["area_share"][chosen], depth[chosen], color=colour, linewidth=1.5)
-        panels[1].plot(100 * h["area_share"][chosen], pressure[chosen], color=colour, linewidth=1.5,
-                       label=_number(at, second))  # fmt: skip
+        panels[1].plot(
+            100 * h["area_share"][chosen], pressure[chosen], color=colour, linewidth=1.5, label=_number(at, second)
+        )
     panels[0].invert_yaxis()
     panels[0].set(xlabel="share of the area in %", ylabel=f"depth in {unit}")
     panels[1].set(xlabel="share of the area in %", ylabel=f"pressure in {pascal}")
@@ -362,9 +363,10 @@ def _wear_histories(panels: list[Axes], t: Columns) -> None:
     (approach, height), unit = _metres(t["approach_m"], t["peak_to_valley_m"])
     pressure, pascal = _pascals(t["largest_pressure_Pa"])
     shown = (
-        (100 * t["area_share"], "area in contact in %"), (stiffness, f"normal stiffness in {stiff}"),
+        (100 * t["area_share"], "area in contact in %"),
+        (stiffness, f"normal stiffness in {stiff}"),
         (pressure, f"largest pressure in {pascal}"),
-    )  # fmt: skip
+    )
     for axes, (values, name) in zip(panels, shown, strict=False):
         axes.plot(time, values, color=COLOURS[0], linewidth=1.7)
         axes.set_ylabel(name)

@@ -40,7 +40,7 @@ def _whole(axes: Axes) -> None:
 
 def nodal_diameter_picture(
     diagrams: Sequence[NodalDiagram], path: Path, title: str, found: Identified | None = None
-) -> Path:  # fmt: skip
+) -> Path:
     """Frequencies over the nodal diameter for several contact stiffnesses, with what was measured (Sextro Fig. 5.4-1).
 
     Args:
@@ -94,14 +94,8 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     return _save(figure, path)
 
 
-def envelope_picture(
-    found: Envelope, path: Path, title: str, measured: tuple[Array, Array] | None = None
-) -> Path:  # fmt: skip
-    """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2).
-
-    Args:
-        measured: (f,) Hz and (f,) amplitudes.
-    """
+def envelope_picture(found: Envelope, path: Path, title: str) -> Path:
+    """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2)."""
     figure = _figure(9.0, 6.0)
     axes = figure.subplots()
     _plain(axes)
@@ -110,8 +104,6 @@ def envelope_picture(
     for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
         label = f"each of {len(found.monitor)} combinations" if i == 0 else None
         axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
-    if measured is not None:
-        axes.plot(measured[0], 1e6 * measured[1], ".", color="#b3261e", label="measured")
     _in_millionths(axes, found.quantity)
     axes.set_xlim(found.frequency[0], found.frequency[-1])
     axes.set_xlabel("excitation frequency in Hz")
@@ -122,7 +114,7 @@ def envelope_picture(
 
 def speed_line_picture(
     rpm: Array, frequency: Array, amplitude: Array, normal: Array, path: Path, title: str, of: Quantity = METRES
-) -> Path:  # fmt: skip
+) -> Path:
     """Amplitude and normal forces along an engine-order line.
 
     Args:

@@ -35,40 +35,27 @@ def shades(count: int) -> list[tuple[float, ...]]:
 # over frequency, over normal force ---------------------------------------------------------------------------------
 
 
-def over_frequency_plot(
-    curves: Curves, quantity: str, title: str, path: Path, lines: Sequence[float] = (),
-    free: tuple[Array, Array] | None = None, note: str = "",
-) -> Path:  # fmt: skip
+def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -> Path:
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
-        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit. lines: frequencies
-            (Hz) to mark, those with sticking contacts. free: the response without contacts.
+        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit.
     """
     figure = _figure(9.0, 6.0)
     axes = figure.subplots()
     _plain(axes)
-    if free is not None:
-        axes.semilogy(*free, color="0.6", linewidth=1, label="no contact")
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     for colour, (normal, (x, y)) in reversed(pairs):  # the light ones on top
         axes.semilogy(x, y, color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
-    for f in [f for f in lines if low < f < high]:
-        axes.axvline(f, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
-        axes.annotate(
-            f"{f:.0f}", (f, 0.0), xycoords=("data", "axes fraction"), xytext=(2, 3), textcoords="offset points",
-            fontsize=8, color="0.45",
-        )  # fmt: skip
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
-    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 6, "fontsize": 9}
-    figure.legend(**where, title=note or None, title_fontsize=8)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=9)
     return _save(figure, path)
 
 
 def over_normal_force_plot(
     peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path
-) -> Path:  # fmt: skip
+) -> Path:
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
@@ -135,19 +122,16 @@ def over_engine_order_plot(curves: Curves, quantity: str, title: str, path: Path
 # fatigue -----------------------------------------------------------------------------------------------------------
 
 
-def haigh_plot(
-    cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, path: Path, only: Array | None = None
-) -> Path:  # fmt: skip
+def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, path: Path) -> Path:
     """All places in the Haigh diagram: amplitude over mean, with the Goodman line and the line of yielding.
 
     Args:
-        worst: the place to mark. only: numbers of the places shown.
+        worst: the place to mark.
     """
     figure = _figure(8.0, 5.4)
     axes = figure.subplots()
     _plain(axes)
-    chosen = np.arange(len(cycle.points)) if only is None else np.asarray(only)
-    mean, amplitude = 1e-6 * cycle.mean[chosen], 1e-6 * cycle.amplitude[chosen]
+    mean, amplitude = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude
     left = min(float(mean.min()), -0.15e-6 * limits.tensile_strength)
     x = np.linspace(left, 1e-6 * limits.tensile_strength, 201)
     axes.plot(x, 1e-6 * allowed_amplitude(limits, 1e6 * x), color=COLOURS[1], linewidth=1.8, label="Goodman")
@@ -237,7 +221,7 @@ def _energy(joules: float) -> str:
 
 def _map_panel(
     axes: Axes, m: ContactMap, name: str, label: str, scale: float, unit: str, colours: str, lies: bool, between: str
-) -> None:  # fmt: skip
+) -> None:
     from matplotlib.ticker import MaxNLocator
 
     from ..operating.patches import grid_of, on_grid

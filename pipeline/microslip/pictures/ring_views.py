@@ -137,7 +137,7 @@ def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
 
 def ring_sheet(
     ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera, across: int | None = None
-) -> Picture:  # fmt: skip
+) -> Picture:
     """The first modes of nodal diameters as standing shapes.
 
     Args:

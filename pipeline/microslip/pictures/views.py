@@ -388,10 +388,7 @@ def contact_sheet(studio: Studio, group: ModalGroup, images: Sequence[Picture]) 
         captioned(scaled(image, min(factor, 1.0)), mode_title(group, j), size=17) for j, image in enumerate(images)
     ]
     left = f" The other {group.n_modes - len(images)} modes are not drawn." if group.n_modes > len(images) else ""
-    page = sheet(
-        tiles, f"{studio.basis.name}: modes{at_speed(group)}",
-        f"Amplified; grey lines: at rest.{left}",
-    )  # fmt: skip
+    page = sheet(tiles, f"{studio.basis.name}: modes{at_speed(group)}", f"Amplified; grey lines: at rest.{left}")
     return stacked([page, colour_bar(_map(DISPLACEMENT_MAP), "0", "1", "displacement over its largest value", 700)], 4)
 
 

@@ -139,9 +139,8 @@ class Comparison:
 
 
 def compare_groups(
-    first: ModalBasis, second: ModalBasis, key: tuple[int, int] = (0, 0), limit: float | None = None,
-    least: float = 0.5,
-) -> Comparison:  # fmt: skip
+    first: ModalBasis, second: ModalBasis, key: tuple[int, int] = (0, 0), limit: float | None = None, least: float = 0.5
+) -> Comparison:
     """MAC and pairs of two bodies in one frame, at the points of the one that has fewer.
 
     Args:

@@ -159,9 +159,7 @@ def ring_of(basis: ModalBasis, shared: bool = False, named: bool = False) -> Rin
     return replicate(basis.mesh, basis.rotation_axis, basis.rotation_point, basis.sectors, faces, named)
 
 
-def tied_points(
-    mesh: Mesh, axis: Array, point: Array, sectors: int, faces: tuple[str, str]
-) -> tuple[Indices, Indices]:  # fmt: skip
+def tied_points(mesh: Mesh, axis: Array, point: Array, sectors: int, faces: tuple[str, str]) -> tuple[Indices, Indices]:
     """Points of the left cyclic face, and those of the right one onto which the sector's turn carries them.
 
     Raises:

@@ -205,13 +205,9 @@ def _carried(curves: Tracks, modes: Indices, at: int) -> Indices:
     return table[modes]
 
 
-def tracks(basis: ModalBasis, direction: str = "") -> dict[int, Tracks]:
-    """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds.
-
-    Args:
-        direction: of the waves, with gyroscopic coupling where the file holds it; empty: without it.
-    """
-    return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, direction)) is not None}
+def tracks(basis: ModalBasis) -> dict[int, Tracks]:
+    """Curves over the speed of each nodal diameter, without gyroscopic coupling; empty with fewer than two speeds."""
+    return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, "")) is not None}
 
 
 def wave_tracks(basis: ModalBasis, nodal_diameter: int, direction: str) -> Tracks | None:

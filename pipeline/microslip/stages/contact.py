@@ -11,7 +11,7 @@ from .stage import Report
 
 def contact_stage(
     path: Path, assignments: list[str], output: Path | None, report: Report = lambda _: None
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """What a contact law does: tables (CSV) and pictures (PNG) in build/<name>/ or `output`.
 
     Returns:

@@ -74,8 +74,9 @@ def _refuse_unnamed_faces(job: Job) -> None:
     told = f"it names {', '.join(names) or 'none'}"
     wrong = [
         f"{job.path}: {table}.{label}.face: geometry.faces names no face '{face}'; {told}"
-        for table, label, face in asked if face not in names
-    ]  # fmt: skip
+        for table, label, face in asked
+        if face not in names
+    ]
     if wrong:
         raise UserError("\n".join(wrong))
 

@@ -68,7 +68,7 @@ def response_of_case(folder: Path, force: bool = False, report: Report = lambda 
 
 def _work(
     stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path]
-) -> Made:  # fmt: skip
+) -> Made:
     bases = {name: read_basis(file) for name, file in files.items()}
     folder = stage.product.parent
     points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, whole_sweep=True)
@@ -197,7 +197,7 @@ def _maps(
 
 def _for_paraview(
     found: assessment.Assessment, basis: ModalBasis, maps: Mapping[str, list[ContactMap]], folder: Path
-) -> list[Path]:  # fmt: skip
+) -> list[Path]:
     """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
     if not _is_there("meshio"):
         return []

@@ -85,7 +85,7 @@ def survey_stage(
 
 def _work(
     stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path], kind: str
-) -> Made:  # fmt: skip
+) -> Made:
     said, folder = stage.product, stage.product.parent
 
     def begin() -> None:
@@ -148,8 +148,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = sum(int(r.failed.sum()) for r in found.values())
-    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)},
-                  failed=failed)  # fmt: skip
+    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}, failed=failed)
 
 
 def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -170,8 +169,9 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     return Survey(
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
-        said, int((~r.converged).sum()),
-    )  # fmt: skip
+        said,
+        int((~r.converged).sum()),
+    )
 
 
 def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -185,10 +185,8 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     most = f"{e.peaks.min():.4g} and {e.peaks.max():.4g} {e.quantity.said}"
     said = [f"Largest amplitude between {most} on the grid of the sweep."]
     return Survey(
-        tables(e),
-        {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)},
-        said, int((~e.converged).sum()),
-    )  # fmt: skip
+        tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, said, int((~e.converged).sum())
+    )
 
 
 def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -201,7 +199,7 @@ def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Pa
         {"identification.csv": found.columns(), "nodal_diameters.csv": at.columns()},
         {"pictures/nodal_diameters_stuck.png": lambda p: nodal_diameter_picture(diagrams, p, title, found)},
         found.sentences(),
-    )  # fmt: skip
+    )
 
 
 def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:

@@ -401,8 +401,9 @@ class Assembly:
         own = [w.member == member.name for w in self.outputs]
         seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.outputs, own, strict=True)]
         zero = np.zeros(m)
-        output = np.array([at.monitor(w.monitor, w.label) if mine else zero
-                          for w, mine in zip(self.outputs, own, strict=True)]).reshape(-1, m)  # fmt: skip
+        output = np.array(
+            [at.monitor(w.monitor, w.label) if mine else zero for w, mine in zip(self.outputs, own, strict=True)]
+        ).reshape(-1, m)
         B = A @ at.residual(labels, labels) @ A.conj().T
         lost = (at.loss, member.residual_loss * B) if harmonic and at.loss is not None else (None, None)
         return Linear(

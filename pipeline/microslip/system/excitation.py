@@ -201,17 +201,15 @@ def engine_order(
 
 
 def pattern_loads(
-    member: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1,
-    orders: Sequence[int] | None = None,
-) -> tuple[Load, ...]:  # fmt: skip
+    member: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1
+) -> tuple[Load, ...]:
     """The engine orders of a pattern on a row of a member, its mean as a steady load.
 
     Args:
-        place: angle at which the loaded spot of the first sector stands at t = 0, rad. orders: to take; all that the
-            pattern has if None.
+        place: angle at which the loaded spot of the first sector stands at t = 0, rad.
     """
     found = []
-    for e in pattern.orders() if orders is None else orders:
+    for e in pattern.orders():
         P = complex(pattern.amplitudes[e] * np.exp(1j * e * place))
         found.append(Load(member, row, P if turning > 0 else P.conjugate(), harmonic_of(e, base, turning)))
     mean = float(pattern.amplitudes[0].real)

@@ -66,7 +66,7 @@ class Place:
 
 def facing(
     first: Interface, second: Interface, place: Place | None = None, names: tuple[str, str] = ("first", "second")
-) -> Pairing:  # fmt: skip
+) -> Pairing:
     """The pairing of a face with another body's.
 
     Args:
