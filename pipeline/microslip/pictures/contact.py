@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plots import COLOURS, _figure, _length, _plain, _save
+from .plots import COLOURS, empty_figure, length_unit, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +20,7 @@ GREY = "#5b6270"
 
 def draw(study: Study, folder: Path) -> list[Path]:
     """A PNG for every table that has a picture."""
-    return [_save(_DRAWN[name](study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
+    return [save_figure(_DRAWN[name](study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
 
 
 def _title(study: Study, what: str) -> str:
@@ -62,7 +62,7 @@ def _seconds(values: np.ndarray) -> tuple[np.ndarray, str]:
 
 def _metres(*values: np.ndarray) -> tuple[list[np.ndarray], str]:
     """Several lengths in one unit."""
-    scaled, unit = _length(np.concatenate([np.ravel(v) for v in values]))
+    scaled, unit = length_unit(np.concatenate([np.ravel(v) for v in values]))
     ends = np.cumsum([np.size(v) for v in values])[:-1]
     return [part.reshape(v.shape) for part, v in zip(np.split(scaled, ends), values, strict=True)], unit
 
@@ -78,12 +78,12 @@ def normal_figure(study: Study) -> Any:
     """Force over the approach, stiffness over the force, area in contact."""
     t, working = study.tables["normal"], study.working
     rough = study.contact.roughness is not None
-    figure = _figure(10.5 if rough else 8.0, 3.6)
+    figure = empty_figure(10.5 if rough else 8.0, 3.6)
     panels = figure.subplots(1, 3 if rough else 2)
     (u,), unit = _metres(t["approach_m"])
     force, newton = _newtons(t["force_N"])
     for axes in panels:
-        _plain(axes)
+        plain_axes(axes)
     panels[0].plot(u, force, color=COLOURS[0], linewidth=1.8)
     panels[0].set(xlabel=f"approach $u_n$ in {unit}", ylabel=f"normal force in {newton}")
     if working is not None and working[1] > 0:
@@ -120,7 +120,7 @@ def _stiffness_panel(axes: Axes, t: Columns, force: np.ndarray, newton: str) -> 
 def loops_figure(study: Study) -> Any:
     """Tangential force over displacement for several amplitudes, and the energy of a cycle over the amplitude."""
     t = study.tables["loops"]
-    figure = _figure(9.6, 4.2)
+    figure = empty_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     (u, amplitude), unit = _metres(t["u_t1_m"], t["amplitude_m"])
     force, newton = _newtons(t["F_t1_N"])
@@ -140,7 +140,7 @@ def loops_figure(study: Study) -> Any:
     right.set_xlim(left=0)
     right.set_ylim(bottom=0)
     for axes in (left, right):
-        _plain(axes)
+        plain_axes(axes)
     figure.suptitle(_title(study, "hysteresis at the working point"), fontweight="bold")
     return figure
 
@@ -190,9 +190,9 @@ def _panels(count: int) -> list[Any]:
     """Axes in rows of three, of four in two rows of two."""
     columns = 2 if count == 4 else min(count, 3)
     rows = -(-count // columns)
-    found = list(_figure(3.67 * columns, 3.3 * rows).subplots(rows, columns, squeeze=False).ravel())
+    found = list(empty_figure(3.67 * columns, 3.3 * rows).subplots(rows, columns, squeeze=False).ravel())
     for axes in found:
-        _plain(axes)
+        plain_axes(axes)
     for axes in found[count:]:
         axes.set_visible(False)
     return found[:count]
@@ -250,9 +250,7 @@ def _legend_above(axes: Axes) -> None:
 def friction_figure(study: Study) -> Any:
     """The coefficient over the speed of sliding."""
     t = study.tables["friction"]
-    figure = _figure(6.4, 4.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(6.4, 4.0)
     speed = t["speed_m/s"]
     if "approach_m" in t:
         _fluid(axes, t)
@@ -300,7 +298,7 @@ def _fluid(axes: Axes, t: Columns) -> None:
 
 def microslip_figure(study: Study) -> Any:
     """First loading: tangential force (friction coefficient, under given normal forces) over displacement."""
-    figure = _figure(7.4, 4.2)
+    figure = empty_figure(7.4, 4.2)
     microslip_panel(study, figure.subplots())
     figure.suptitle(_title(study, "microslip, first loading"), fontweight="bold")
     return figure
@@ -310,7 +308,7 @@ def microslip_panel(study: Study, axes: Axes) -> None:
     """One curve an approach or a normal force."""
     t, given = study.tables["microslip"], study.contact.settings.microslip
     pressed = given is not None and bool(given.normal_forces)
-    _plain(axes)
+    plain_axes(axes)
     (w,), unit = _metres(t["displacement_m"])
     (u,), length = _metres(t["approach_m"])
     (force, newton), (loads, load_unit) = _newtons(t["F_t_N"]), _newtons(t["normal_force_N"])
@@ -335,10 +333,10 @@ def _shades(count: int) -> list[Any]:
 def wear_figure(study: Study) -> Any:
     """Heights and pressure at several times; area, stiffness, pressure and roughness over the time."""
     t, h = study.tables["wear"], study.tables["wear_heights"]
-    figure = _figure(11.0, 6.4)
+    figure = empty_figure(11.0, 6.4)
     panels = figure.subplots(2, 3).ravel()
     for axes in panels:
-        _plain(axes)
+        plain_axes(axes)
     (depth,), unit = _metres(h["depth_m"])
     pressure, pascal = _pascals(h["pressure_Pa"])
     times, second = _seconds(h["time_s"])
@@ -383,9 +381,7 @@ def _wear_histories(panels: list[Axes], t: Columns) -> None:
 def yield_figure(study: Study) -> Any:
     """Mean pressure and shear of the area in contact, and the largest shear stress against the yield limit."""
     t = study.tables["yield"]
-    figure = _figure(6.8, 4.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(6.8, 4.0)
     time, second = _seconds(t["time_s"] - t["time_s"][0])
     shear = np.hypot(t["shear_t1_Pa"], t["shear_t2_Pa"])
     both, pascal = _pascals(np.stack([t["pressure_Pa"], shear]))

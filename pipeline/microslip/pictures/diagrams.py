@@ -29,7 +29,18 @@ from ..ring.resonances import (
     zigzag,
 )
 from ..units import from_rpm, rpm_text, to_rpm
-from .plots import COLOURS, _end_labels, _figure, _order_label, _per_minute, _per_second, _plain, _save
+from .plots import (
+    COLOURS,
+    _end_labels,
+    _order_label,
+    _per_minute,
+    _per_second,
+    empty_figure,
+    plain_axes,
+    said_beside,
+    save_figure,
+    single_panel,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,9 +70,7 @@ def _note(axes: Axes, text: str, below: float) -> None:
 
 def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     """Frequency over nodal diameter at the lowest and the highest speed, one line a family."""
-    figure = _figure(8.6, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.6, 6.0)
     ends = dict.fromkeys((speeds_of(basis)[0], speeds_of(basis)[-1]))
     shown = [families(basis, s) for s in ends]
     top = 1.05 * max(float(eigenmodes(basis.groups[s, k]).frequency.max()) for s in ends for k in harmonics_of(basis))
@@ -77,7 +86,7 @@ def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     if len(shown) > 1:
         note = f"filled: at {rpm_text(shown[0].speed)}; hollow: at {rpm_text(shown[1].speed)}; {note}"
     _note(axes, note, -0.11)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _family_lines(axes: Axes, found: Families, top: float, solid: bool = True, width: float = 1.4) -> None:
@@ -133,9 +142,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     shut = {k: _hertz(stuck(basis, basis.groups[speed, k], name)[0]) for k in harmonics}
     shown = max(2, len(found.omega) // 2)
     top = 1.05 * max(float(f[:shown].max()) for f in shut.values())
-    figure = _figure(8.6, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.6, 6.0)
     _family_lines(axes, found, top, width=0.8)
     _family_labels(axes, found, top)
     for k, f in shut.items():
@@ -148,7 +155,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(found.speed)}", fontweight="bold")
     note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     _note(axes, note, -0.11)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 # --- interference --------------------------------------------------------------------------------------------------
@@ -162,7 +169,7 @@ def safe_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -> Path | No
     turning = [turning[i] for i in np.unique(np.linspace(0, len(turning) - 1, MOST_PANELS).round().astype(int))]
     columns = 1 if len(turning) == 1 else 2
     rows = math.ceil(len(turning) / columns)
-    figure = _figure(8.0 if columns == 1 else 6.4 * columns, 1.3 + 5.2 * rows)
+    figure = empty_figure(8.0 if columns == 1 else 6.4 * columns, 1.3 + 5.2 * rows)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, speed in zip(panels, turning, strict=False):
         _safe_panel(axes, basis, speed, sorted({e for e in orders if e > 0}))
@@ -173,7 +180,7 @@ def safe_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -> Path | No
         panels[-1].text(0.5, 0.5, note, ha="center", va="center", color=FAINT)
     else:
         figure.supxlabel(note, fontsize=8.5, color=FAINT)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 _SAFE_NOTE = (
@@ -183,7 +190,7 @@ _SAFE_NOTE = (
 
 
 def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]) -> None:
-    _plain(axes)
+    plain_axes(axes)
     found = families(basis, speed)
     turns = found.speed / (2 * np.pi)
     top = _safe_ceiling(found, orders, turns)
@@ -231,10 +238,9 @@ def _on_line(axes: Axes, text: str, k: int, hertz: float, direction: str, at_edg
 
     right = not at_edge
     shift = {FORWARD: (7, 6), STANDING: (8, -2)}.get(direction, (7, -6)) if right else (-8, 0)
-    axes.annotate(
-        text, (k, hertz), xytext=shift, textcoords="offset points", fontsize=8, color="#3c424e", zorder=5,
-        ha="left" if right else "right", va="center", path_effects=[withStroke(linewidth=3, foreground="white")],
-    )  # fmt: skip
+    how = {"ha": "left" if right else "right", "va": "center", "fontsize": 8, "color": "#3c424e", "zorder": 5}
+    behind = [withStroke(linewidth=3, foreground="white")]
+    said_beside(axes, text, (k, hertz), shift, path_effects=behind, **how)
 
 
 def _close_ones(axes: Axes, found: Sequence[Margin], top: float) -> None:
@@ -256,9 +262,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     curves = tracks(basis)
     if not curves:
         return None
-    figure = _figure(9.2, 6.8)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(9.2, 6.8)
     orders = sorted({e for e in orders if e > 0})
     speeds = next(iter(curves.values())).speeds
     rpm = to_rpm(np.linspace(speeds[0], speeds[-1], 201))
@@ -285,7 +289,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
         note += "circles: true resonances (same frequency, same k)"
     above = f"; {hidden} {'family lies' if hidden == 1 else 'families lie'} above" if hidden else ""
     _note(axes, note + above, -0.13)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _campbell_ceiling(curves: dict[int, Tracks], orders: Sequence[int], fastest: float) -> float:
