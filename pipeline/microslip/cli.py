@@ -697,8 +697,8 @@ def _modal_file(path: Path) -> Path:
     if (path / "basis.h5").is_file():
         return path / "basis.h5"
     if (path / "body.toml").is_file():
-        raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which "
-                        f"microslip modes {shlex.quote(str(path))} makes")  # fmt: skip
+        made = f"microslip modes {shlex.quote(str(path))} makes"
+        raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which {made}")
     raise UserError(f"{path}: is a folder without a modal file basis.h5; correct the path")
 
 

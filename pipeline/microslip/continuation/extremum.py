@@ -125,9 +125,12 @@ NARROW = 1e-6
 
 def _reversed(state: State) -> State:
     return replace(
-        state, tangent=-state.tangent, orientation=-state.orientation, sense=-state.sense,
+        state,
+        tangent=-state.tangent,
+        orientation=-state.orientation,
+        sense=-state.sense,
         origin_tangent=-state.origin_tangent,
-    )  # fmt: skip
+    )
 
 
 class _Place(NamedTuple):

@@ -139,9 +139,12 @@ def elastic(g: ModalGroup, form: str) -> ModalGroup:
     some, v = np.ix_(keep, keep), g.invariants
     assert v is not None
     cut = replace(
-        v, shape=v.shape[:, keep], position_shape=v.position_shape[:, :, keep],
-        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep], stiffening=v.stiffening[:, keep][:, :, keep],
-    )  # fmt: skip
+        v,
+        shape=v.shape[:, keep],
+        position_shape=v.position_shape[:, :, keep],
+        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep],
+        stiffening=v.stiffening[:, keep][:, :, keep],
+    )
     return replace(
         g, omega=g.omega[keep], kind=tuple(g.kind[j] for j in keep), damping_ratio=g.damping_ratio[keep],
         M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some], phi=_columns(g.phi, keep),

@@ -357,10 +357,12 @@ def grip(
     on_slave = sp.vstack(
         [_sparse(p.slave, p.N[..., None] * f.normal[:, None], n) for p, f in zip(made.points, found, strict=True)]
     ).tocsr()
-    on_master = sp.vstack([
-        _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
-        for p, f in zip(made.points, found, strict=True)
-    ]).tocsr()  # fmt: skip
+    on_master = sp.vstack(
+        [
+            _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
+            for p, f in zip(made.points, found, strict=True)
+        ]
+    ).tocsr()
     hats = _hats(made, len(pair.nodes))
     weight = np.concatenate([p.weight for p in made.points])
     inside = level * pair.interference if pair.interference > 0 else pair.interference

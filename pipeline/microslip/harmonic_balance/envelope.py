@@ -149,8 +149,10 @@ class Envelope:
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
         name = self.quantity.column
-        each = {name(f"combination_{i + 1}"): np.where(ok, np.abs(a), np.nan)
-                for i, (a, ok) in enumerate(zip(self.monitor, self.converged, strict=True))}  # fmt: skip
+        each = {
+            name(f"combination_{i + 1}"): np.where(ok, np.abs(a), np.nan)
+            for i, (a, ok) in enumerate(zip(self.monitor, self.converged, strict=True))
+        }
         return {"frequency_Hz": self.frequency, name("low"): self.low, name("high"): self.high, **each}
 
     def corners(self) -> dict[str, Array]:
@@ -166,9 +168,12 @@ class Envelope:
 
 
 def envelope(
-    build: Callable[..., Problem], ranges: Mapping[str, Sequence[float]], frequency: Array,
-    report: Report = lambda _: None, keep: Callable[[Envelope], None] = lambda _: None,
-) -> Envelope:  # fmt: skip
+    build: Callable[..., Problem],
+    ranges: Mapping[str, Sequence[float]],
+    frequency: Array,
+    report: Report = lambda _: None,
+    keep: Callable[[Envelope], None] = lambda _: None,
+) -> Envelope:
     """Responses at all combinations of given values, and what encloses them.
 
     The combinations are run through so that neighbours differ in one value; each begins where the last one began. A

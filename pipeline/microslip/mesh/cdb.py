@@ -22,10 +22,8 @@ from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
 """Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
-_OTHERS = {
-    14, 21, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 177, 178, 179, 180, 181, 184, 188, 189, 200,
-    208, 209, 214, 281, 290,
-}  # fmt: skip
+_OTHERS = {14, 21, 156, 184, 188, 189, 200, 208, 209, 214, 281, 290}
+_OTHERS |= {*range(151, 155), *range(169, 176), *range(177, 182)}
 # corners I J K L M N O P are 0-7; mid-sides Q R S T U V W X Y Z A B are 8-19
 _FORMS: dict[int, dict[str, Sequence[int]]] = {
     8: {"hexahedron": range(8), "wedge": (0, 1, 2, 4, 5, 6), "pyramid": range(5), "tetra": (0, 1, 2, 4)},

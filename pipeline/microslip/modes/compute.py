@@ -47,9 +47,12 @@ Report = Callable[[str], None]
 
 
 def modal_basis(
-    mesh: Mesh, settings: BodySettings, temperature: Array | None = None, report: Report = lambda _: None,
+    mesh: Mesh,
+    settings: BodySettings,
+    temperature: Array | None = None,
+    report: Report = lambda _: None,
     provenance: Mapping[str, str] | None = None,
-) -> ModalBasis:  # fmt: skip
+) -> ModalBasis:
     """The modal basis of a body at each of its rotation speeds (Sextro section 2.4).
 
     Args:
@@ -174,9 +177,12 @@ def _at_speeds(
 
 
 def _stiffened(
-    b: Prepared, settings: BodySettings, groups: dict[tuple[int, int], ModalGroup], solver: eigen.DirectSolver,
+    b: Prepared,
+    settings: BodySettings,
+    groups: dict[tuple[int, int], ModalGroup],
+    solver: eigen.DirectSolver,
     report: Report,
-) -> dict[tuple[int, int], ModalGroup]:  # fmt: skip
+) -> dict[tuple[int, int], ModalGroup]:
     """The groups with the stiffening by inertia forces, where it is asked for."""
     if not settings.output.stiffening or b.sector is not None:
         return groups

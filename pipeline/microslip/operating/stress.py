@@ -15,13 +15,15 @@ import numpy as np
 from ..data import Array, ComplexArray, ModalGroup, StressSet, UserError
 from .motion import Motion, Part, longest
 
-DEVIATOR = np.array([
-    [1.0, -0.5, -0.5, 0.0, 0.0, 0.0],
-    [0.0, np.sqrt(0.75), -np.sqrt(0.75), 0.0, 0.0, 0.0],
-    [0.0, 0.0, 0.0, np.sqrt(3.0), 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, np.sqrt(3.0), 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(3.0)],
-])  # fmt: skip
+DEVIATOR = np.array(
+    [
+        [1.0, -0.5, -0.5, 0.0, 0.0, 0.0],
+        [0.0, np.sqrt(0.75), -np.sqrt(0.75), 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, np.sqrt(3.0), 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, np.sqrt(3.0), 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(3.0)],
+    ]
+)
 """(5, 6) D: von Mises stress = |D sigma|, sigma in the order `VOIGT`."""
 
 SAMPLES = 16
@@ -109,9 +111,12 @@ class StressPeaks:
 
 
 def stress_peaks(
-    motion: Motion, location: str = "nodes", only: Array | None = None, first_harmonic: bool = False,
+    motion: Motion,
+    location: str = "nodes",
+    only: Array | None = None,
+    first_harmonic: bool = False,
     largest: bool = True,
-) -> StressPeaks:  # fmt: skip
+) -> StressPeaks:
     """The most stressed place of every point of a sweep, block by block of places.
 
     Args:

@@ -78,9 +78,12 @@ def _tried(python: str) -> str | None:
 
 
 def draw_all(
-    basis: ModalBasis, folder: Path | str, report: Report = lambda _: None, engine_orders: Sequence[int] = (),
+    basis: ModalBasis,
+    folder: Path | str,
+    report: Report = lambda _: None,
+    engine_orders: Sequence[int] = (),
     scenes: bool = True,
-) -> dict[str, Path]:  # fmt: skip
+) -> dict[str, Path]:
     """Draw everything a modal file can show.
 
     Args:

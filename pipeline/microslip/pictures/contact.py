@@ -99,8 +99,11 @@ def normal_figure(study: Study) -> Any:
 
 
 def _stiffness_panel(axes: Axes, t: Columns, force: np.ndarray, newton: str) -> None:
-    names = {"normal_stiffness_N/m": "normal", "tangential_stiffness_t1_N/m": "tangential, t1",
-             "tangential_stiffness_t2_N/m": "tangential, t2"}  # fmt: skip
+    names = {
+        "normal_stiffness_N/m": "normal",
+        "tangential_stiffness_t1_N/m": "tangential, t1",
+        "tangential_stiffness_t2_N/m": "tangential, t2",
+    }
     found = {label: t[name] for name, label in names.items() if name in t}
     same = "tangential, t2" in found and np.array_equal(found["tangential, t1"], found["tangential, t2"])
     if same:
@@ -131,8 +134,8 @@ def loops_figure(study: Study) -> Any:
             label = _number(size, unit) if part else None
             left.plot(u[chosen], force[chosen], line, color=colour, linewidth=1.5, label=label)
     left.set(xlabel=f"displacement $u_{{t1}}$ in {unit}", ylabel=f"tangential force $F_{{t1}}$ in {newton}")
-    left.legend(title="amplitude\n(dotted: first loading)", fontsize=8, title_fontsize=8, loc="center left",
-                bbox_to_anchor=(1.0, 0.5), frameon=False)  # fmt: skip
+    where = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
+    left.legend(title="amplitude\n(dotted: first loading)", fontsize=8, title_fontsize=8, **where)
     energy = np.array([t["dissipated_J"][amplitude == size][0] for size in sizes])
     scaled, joule = _amount(energy, "J", _JOULE)
     right.plot(sizes, scaled, "-o", color=COLOURS[0], linewidth=1.5, markersize=4.5)
@@ -240,8 +243,8 @@ def _shade(axes: Any, time: np.ndarray, state: np.ndarray, stick: str) -> None:
 def _legend_above(axes: Axes) -> None:
     handles, _ = axes.get_legend_handles_labels()
     columns = min(len(handles), 5)
-    axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns,
-                columnspacing=1.0, handlelength=1.4)  # fmt: skip
+    where = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
+    axes.legend(frameon=False, fontsize=8, columnspacing=1.0, handlelength=1.4, **where)
 
 
 # --- friction ------------------------------------------------------------------------------------------------------
@@ -257,8 +260,8 @@ def friction_figure(study: Study) -> Any:
     else:
         axes.plot(speed, t["coefficient"], color=COLOURS[0], linewidth=1.8, label="coefficient")
         if "mean_less_deviation" in t:
-            axes.fill_between(speed, t["mean_less_deviation"], t["mean_plus_deviation"], color=COLOURS[0], alpha=0.18,
-                              linewidth=0, label="one standard deviation")  # fmt: skip
+            low, high, label = t["mean_less_deviation"], t["mean_plus_deviation"], "one standard deviation"
+            axes.fill_between(speed, low, high, color=COLOURS[0], alpha=0.18, linewidth=0, label=label)
         if "smoothed" in t:
             axes.plot(speed, t["smoothed"], "--", color=COLOURS[1], linewidth=1.5, label="smoothed")
         _warm(axes, t)
@@ -287,8 +290,8 @@ def _fluid(axes: Axes, t: Columns) -> None:
     (approach,), unit = _metres(t["approach_m"])
     for colour, value in zip(COLOURS, np.unique(approach), strict=False):
         chosen = approach == value
-        axes.plot(t["speed_m/s"][chosen], t["coefficient"][chosen], color=colour, linewidth=1.6,
-                  label=f"$u_n$ = {_number(value, unit)}")  # fmt: skip
+        x, y, label = t["speed_m/s"][chosen], t["coefficient"][chosen], f"$u_n$ = {_number(value, unit)}"
+        axes.plot(x, y, color=colour, linewidth=1.6, label=label)
         axes.plot(t["speed_m/s"][chosen], t["dry_part"][chosen], ":", color=colour, linewidth=1.2)
     axes.plot([], [], ":", color=GREY, label="dry part alone")
 

@@ -42,9 +42,8 @@ def nodal_diameter_picture(
             axes.plot(d.index, f, "o-", color=colour, markersize=3.5, linewidth=1.3, label=label)
     if found is not None:
         for m in found.measured:
-            fitted = m == found.fitted
-            axes.plot(m.index, m.frequency, "^", color="#b3261e", markersize=9, zorder=5,
-                      markerfacecolor="#b3261e" if fitted else "none")  # fmt: skip
+            fill = "#b3261e" if m == found.fitted else "none"
+            axes.plot(m.index, m.frequency, "^", color="#b3261e", markersize=9, zorder=5, markerfacecolor=fill)
         axes.plot([], [], "^", color="#b3261e", label="measured, fitted")
         if len(found.measured) > 1:
             axes.plot([], [], "^", color="#b3261e", markerfacecolor="none", label="measured, predicted")
@@ -84,8 +83,8 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
 def envelope_picture(found: Envelope, path: Path, title: str) -> Path:
     """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2)."""
     figure, axes = single_panel(9.0, 6.0)
-    axes.fill_between(found.frequency, 1e6 * found.low, 1e6 * found.high, color="#9ec5e8", alpha=0.6, linewidth=0,
-                      label="between the smallest and the largest")  # fmt: skip
+    low, high, between = 1e6 * found.low, 1e6 * found.high, "between the smallest and the largest"
+    axes.fill_between(found.frequency, low, high, color="#9ec5e8", alpha=0.6, linewidth=0, label=between)
     for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
         label = f"each of {len(found.monitor)} combinations" if i == 0 else None
         axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)

@@ -31,8 +31,8 @@ def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
         x, y = one.parameter, scale * one.amplitude
         ends = [0, *np.flatnonzero(one.fold), len(x) - 1]
         for leg, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
-            axes.plot(x[a : b + 1], y[a : b + 1], color=colour, linewidth=1.6, linestyle="--" if leg % 2 else "-",
-                      label=one.label.replace("F_N", "$F_N$") if leg == 0 else None)  # fmt: skip
+            line, label = "--" if leg % 2 else "-", one.label.replace("F_N", "$F_N$") if leg == 0 else None
+            axes.plot(x[a : b + 1], y[a : b + 1], line, color=colour, linewidth=1.6, label=label)
         size = 6 if one.fold.sum() < 8 else 3.5
         axes.plot(x[one.fold], y[one.fold], "o", color=colour, markersize=size, markerfacecolor="white", zorder=4)
         if not one.complete:

@@ -138,9 +138,12 @@ def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, tit
     )
     top = max(1.15e-6 * limits.fatigue_strength, 1.1 * float(amplitude.max()))
     axes.set(
-        xlabel="mean stress in MPa (static and mean, compression negative)", ylabel="stress amplitude in MPa",
-        title=title, ylim=(0, top), xlim=(left, 1.03e-6 * limits.tensile_strength),
-    )  # fmt: skip
+        xlabel="mean stress in MPa (static and mean, compression negative)",
+        ylabel="stress amplitude in MPa",
+        title=title,
+        ylim=(0, top),
+        xlim=(left, 1.03e-6 * limits.tensile_strength),
+    )
     axes.legend(fontsize=9, loc="upper right")
     _close_up(axes, mean, amplitude)
     return save_figure(figure, path)

@@ -110,9 +110,12 @@ def eigenmodes(group: ModalGroup) -> ModalGroup:
     if count == group.n_modes:
         return group
     return replace(
-        group, omega=group.omega[:count], kind=group.kind[:count], damping_ratio=group.damping_ratio[:count],
+        group,
+        omega=group.omega[:count],
+        kind=group.kind[:count],
+        damping_ratio=group.damping_ratio[:count],
         phi=group.phi[:, :, :count],
-    )  # fmt: skip
+    )
 
 
 def travelling(group: ModalGroup, direction: str) -> ModalGroup:

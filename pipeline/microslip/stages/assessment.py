@@ -259,9 +259,11 @@ def draw(
         )
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
-            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force",
+            lines,
+            "largest stress amplitude of the body in MPa",
+            f"{case}: resonances over the normal force",
             folder / "stress_over_normal_force.png",
-        )  # fmt: skip
+        )
     top = found.highest
     if top is not None:
         drawn |= _at_worst(found, top, basis, case, folder, scenes)

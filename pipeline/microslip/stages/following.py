@@ -99,9 +99,12 @@ def normal_forces(built: Built) -> tuple[float | None, ...]:
 
 
 def backbones(
-    case: Case, mode: int | None = None, low: float | None = None, high: float | None = None,
+    case: Case,
+    mode: int | None = None,
+    low: float | None = None,
+    high: float | None = None,
     report: Report = lambda _: None,
-) -> dict[float, Backbone]:  # fmt: skip
+) -> dict[float, Backbone]:
     """Frequency and damping over the amplitude of the first read-out, for every normal force (N) of the case.
 
     Args:

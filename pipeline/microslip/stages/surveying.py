@@ -242,5 +242,8 @@ def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response
 
 
 KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Path, Report], Survey]] = {
-    "orders": _orders, "speeds": _speeds, "ranges": _ranges, "identification": _identification,
-}  # fmt: skip
+    "orders": _orders,
+    "speeds": _speeds,
+    "ranges": _ranges,
+    "identification": _identification,
+}

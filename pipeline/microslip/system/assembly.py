@@ -393,8 +393,10 @@ class Assembly:
         rows = np.vstack(T) if T else np.zeros((0, m))
         amplitudes = np.array([x.amplitude for x in loads], dtype=complex)
         f = sum((np.conj(at.excitation(x.row)) * x.amplitude for x in loads), np.zeros(m, dtype=complex))
-        frames = [s.frame * s.phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
-                  for s, t in zip(sides, T, strict=True)]  # fmt: skip
+        frames = [
+            s.frame * s.phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
+            for s, t in zip(sides, T, strict=True)
+        ]
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]
         forced = [_load_label(at.group.excitations[x.row], x.row) for x in loads]

@@ -62,9 +62,12 @@ Face = tuple[Member, str]
 
 
 def nodal(
-    first: Face, second: Face | None = None, met: Pairing | None = None, indices: Sequence[int] = (0,),
+    first: Face,
+    second: Face | None = None,
+    met: Pairing | None = None,
+    indices: Sequence[int] = (0,),
     tolerance: float = COMPLIANT,
-) -> Nodal:  # fmt: skip
+) -> Nodal:
     """Common coordinates of two faces that deform, or of one against a rigid wall.
 
     Args:
