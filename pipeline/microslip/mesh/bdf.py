@@ -163,14 +163,7 @@ def _elements(cards: Cards, raw: RawMesh, numbering: Numbering) -> list[int]:
             number, region = _whole(card, 1), properties.setdefault(_whole(card, 2), len(properties))
             kind, nodes = _cell(name, number, card)
             blocks.setdefault(kind, []).append((number, region, nodes))
-    for kind, found in blocks.items():
-        cells = np.array([nodes for _, _, nodes in found], dtype=np.int64)
-        raw.blocks.append((kind, numbering.positions(cells, "an element names")))
-        raw.cell_id.append(np.array([n for n, _, _ in found], dtype=np.int64))
-        raw.regions.append(np.array([r for _, r, _ in found]))
-    ids, count = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *raw.cell_id]), return_counts=True)
-    if (count > 1).any():
-        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
+    raw.add_solids(blocks, numbering, "an element names")
     return list(properties)
 
 
