@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
+from ..data import Indices, ModalBasis, ModalGroup, UserError
 from ..reduced.coordinates import in_modes
 from ..ring.resonances import speeds_of
 from ..units import rpm_text
@@ -79,16 +79,13 @@ def real(group: ModalGroup, form: str) -> ModalGroup:
     Raises:
         UserError: a sector at a nodal diameter between 0 and N/2.
     """
-    if np.iscomplexobj(group.M_r) or np.iscomplexobj(group.phi) or np.iscomplexobj(group.K_r) or _complex_rows(group):
+    numbers = [group.M_r, group.K_r, group.phi, *(i.rows for i in group.interfaces.values())]
+    if any(np.iscomplexobj(a) for a in numbers):
         raise UserError(
             f"export --to {form}: nodal diameter {group.harmonic} has complex shapes, which the format cannot hold; "
             "choose --nodal-diameter 0 or N/2, or --to mat, mtx or uff"
         )
     return group
-
-
-def _complex_rows(group: ModalGroup) -> bool:
-    return any(np.iscomplexobj(i.rows) for i in group.interfaces.values())
 
 
 def with_shapes(basis: ModalBasis, group: ModalGroup, form: str) -> ModalGroup:
@@ -147,15 +144,12 @@ def elastic(g: ModalGroup, form: str) -> ModalGroup:
     )
     return replace(
         g, omega=g.omega[keep], kind=tuple(g.kind[j] for j in keep), damping_ratio=g.damping_ratio[keep],
-        M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some], phi=_columns(g.phi, keep),
+        M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some],
+        phi=g.phi[:, :, keep] if len(g.phi) else g.phi,
         interfaces={n: replace(i, rows=i.rows[:, keep]) for n, i in g.interfaces.items()},
         monitors={n: replace(r, rows=r.rows[:, keep]) for n, r in g.monitors.items()},
         invariants=cut,
     )  # fmt: skip
-
-
-def _columns(phi: Array, keep: Indices) -> Array:
-    return phi[:, :, keep] if len(phi) else phi
 
 
 def one_line(text: str) -> str:

@@ -110,11 +110,6 @@ def springs(patch: Patch, normal: float, tangential: float) -> Array:
     return np.einsum("n,nia,i,nib->ab", share, G, np.array([normal, tangential, tangential]), G)
 
 
-def _at_index(assembly: Assembly, index: int) -> Assembly:
-    bare = replace(assembly, loads=(), outputs=())
-    return replace(bare, ring=Ring(assembly.ring.blades, index)) if assembly.ring else bare
-
-
 @dataclass(frozen=True, eq=False)
 class Coupling:
     """An assembly in one wave whose contacts are springs: its frequencies over the springs' stiffness.
@@ -154,7 +149,8 @@ def _eigenvalues(K: Array, M: Array) -> Array:
 
 def coupling(assembly: Assembly, index: int, ratio: float) -> Coupling:
     """The assembly in the wave of an index, all contacts alike in c_N and in c_T / c_N = ratio."""
-    part = _at_index(assembly, index).joined(1)
+    bare = replace(assembly, loads=(), outputs=())
+    part = (replace(bare, ring=Ring(assembly.ring.blades, index)) if assembly.ring else bare).joined(1)
     unit = [springs(c.patch, 1.0, ratio) for c in assembly.contacts]
     return Coupling(part.M, part.K, part.rows, part.residual, scipy.linalg.block_diag(*unit))
 

@@ -282,13 +282,10 @@ def _read_surface(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
 def _table(lines: list[str], what: str) -> list[list[float]]:
     """Numbers of the data lines; an empty place counts as 0."""
     try:
-        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in _words(s)] for s in lines]
+        rows = [line.rstrip().rstrip(",").split(",") for line in lines]
+        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
     except ValueError as error:
         raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None
-
-
-def _words(line: str) -> list[str]:
-    return line.rstrip().rstrip(",").split(",")
 
 
 def _read_material(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:

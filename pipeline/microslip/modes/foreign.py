@@ -68,7 +68,7 @@ def foreign_basis(
         solved = reduced_on(place, layout.width // 3, settings, s, rows)
     finally:
         solver.close()
-    group = _group(body, settings, solved, rows, layout, free, motions)
+    group = _group(body, settings, solved, rows, layout, free)
     damping = "matrix" if body.damping is not None else settings.damping.source
     axis = np.array(settings.rotation.axis)
     basis = ModalBasis(
@@ -362,7 +362,7 @@ def _search(
 
 
 def _group(
-    body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices, motions: Array
+    body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices
 ) -> ModalGroup:
     reduced, n = s.reduced, body.mesh.n_points
     whole = s.unknowns.expand(reduced.vectors, n)

@@ -276,7 +276,8 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
         axes.plot(rpm, order * rpm / 60, color=FAINT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
         at = _free_place(order, rpm, top, strong, found)
         _order_label(axes, order, at, top, f"EO {order}, k={aliased(order, basis.sectors)[0]}")
-    _rings(axes, found)
+    x, y = [to_rpm(r.speed) for r in found], [r.frequency for r in found]
+    axes.plot(x, y, "o", mfc="white", mec=INK, markersize=6, zorder=4, linestyle="none")
     axes.set_xlim(rpm[0], rpm[-1])
     axes.set_ylim(0, top)
     axes.set_xlabel("rotation speed in rpm")
@@ -347,9 +348,3 @@ def _line(t: Tracks, mode: int, speeds: Array) -> Array | None:
     """Frequencies of the curve that begins as `mode` at the lowest speed."""
     curve = np.flatnonzero(t.modes[:, 0] == mode)
     return t.frequency(int(curve[0]), speeds) if len(curve) else None
-
-
-def _rings(axes: Axes, found: Sequence[Resonance]) -> None:
-    """A circle at each true resonance."""
-    x, y = [to_rpm(r.speed) for r in found], [r.frequency for r in found]
-    axes.plot(x, y, "o", mfc="white", mec=INK, markersize=6, zorder=4, linestyle="none")

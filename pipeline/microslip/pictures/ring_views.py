@@ -77,13 +77,9 @@ def open_ring(basis: ModalBasis, stage: Stage) -> RingStudio:
 
 def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
     """(N v, 3) complex displacement of the ring's vertices in one mode."""
-    one = _one_mode(group, mode)
+    one = replace(group, phi=group.phi[:, :, mode : mode + 1])
     source = ring.outside.source
     return np.concatenate([expand(one, ring.basis, j)[source, :, 0] for j in range(ring.basis.sectors)])
-
-
-def _one_mode(group: ModalGroup, mode: int) -> ModalGroup:
-    return replace(group, phi=group.phi[:, :, mode : mode + 1])
 
 
 def _scale(ring: RingStudio, shape: Array) -> float:
@@ -126,7 +122,7 @@ def ring_camera(ring: RingStudio, area: float = 0.45 * AREA) -> Camera:
     return fit(ring.points() * (1 + 1.2 * SWING), ring.axes, area)
 
 
-def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
+def _skin(ring: RingStudio) -> tuple[object, Indices]:
     count, stage = len(ring.outside.source), ring.stage
     triangles = ring.every(ring.triangles, count)
     points = ring.points()
@@ -143,7 +139,7 @@ def ring_sheet(
     Args:
         across: how many pictures a row has; the modes of one nodal diameter if not given.
     """
-    data, triangles = _skin(ring, camera)
+    data, triangles = _skin(ring)
     still, tiles = ring.points(), []
     for group in groups:
         for j in range(min(modes, eigenmodes(group).n_modes)):
@@ -162,7 +158,7 @@ def ring_sheet(
 
 def ring_wave(ring: RingStudio, group: ModalGroup, mode: int, camera: Camera, steps: int = 20) -> list[Picture]:
     """Frames of one period of a mode: u = Re(phi exp(i omega t)); for 0 < k < N/2 a wave that runs backward."""
-    data, triangles = _skin(ring, camera)
+    data, triangles = _skin(ring)
     still, shown = ring.points(), _prepare(ring, group, mode)
     kind = "standing" if multiplicity(group.harmonic, ring.basis.sectors) == 1 else "backward wave"
     title = f"Nodal diameter {group.harmonic}, {kind}: {hertz(group.frequency[mode])}{at_speed(group)}"

@@ -87,8 +87,9 @@ def nearest_points(asked: Array, points: Array, limit: float, names: Indices | N
     numbers = np.arange(1, len(asked) + 1) if names is None else names
     if (far := distance > limit).any():
         worst = int(distance.argmax())
+        place = ", ".join(f"{v:.4g}" for v in asked[worst])
         raise UserError(
-            f"point {numbers[worst]} at ({_place(asked[worst])}) m is {distance[worst]:.3g} m from the nearest node of "
+            f"point {numbers[worst]} at ({place}) m is {distance[worst]:.3g} m from the nearest node of "
             f"the other body, {int(far.sum())} of {len(far)} points are beyond {limit:.3g} m; are both in one frame "
             "and one unit of length? Move the points, or allow a larger distance"
         )
@@ -100,10 +101,6 @@ def nearest_points(asked: Array, points: Array, limit: float, names: Indices | N
             "coarse there, or the points are in another unit of length"
         )
     return at, distance
-
-
-def _place(point: Array) -> str:
-    return ", ".join(f"{v:.4g}" for v in point)
 
 
 def measured_directions(basis: ModalBasis, group: ModalGroup) -> Array:

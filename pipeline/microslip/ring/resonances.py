@@ -172,10 +172,6 @@ def whirl_bounds(groups: Sequence[ModalGroup]) -> Array:
     return np.where(worst < 0, np.nan, worst)
 
 
-def _groups(basis: ModalBasis) -> dict[tuple[int, int], ModalGroup]:
-    return {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
-
-
 def families(basis: ModalBasis, speed: int = 0) -> Families:
     """Join the modes of neighbouring nodal diameters by the MAC of their shapes.
 
@@ -185,7 +181,7 @@ def families(basis: ModalBasis, speed: int = 0) -> Families:
     """
     harmonics = np.array(harmonics_of(basis))
     first = speeds_of(basis)[0]
-    groups = _groups(basis)
+    groups = {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
     modes, omega, mac = follow([groups[first, k] for k in harmonics.tolist()], point_weights(basis))
     at = speeds_of(basis).index(speed)
     if at:

@@ -160,7 +160,7 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
     return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
 
 
-def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: None) -> tuple[Mesh, list[str]]:
+def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     """Read the mesh of a body, name its faces by the body's rules, and pass the quality gates.
 
     Returns:

@@ -56,7 +56,7 @@ def response_stage(
         stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files))
         summary = json.loads(stage.product.read_text())
         if log:
-            _write_log(read_response(folder / "response.h5"), folder)
+            store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
         _tell(summary, report)
         return summary, summary["failed_points"] == 0
 
@@ -226,11 +226,6 @@ def _is_there(package: str) -> bool:
         return importlib.util.find_spec(package) is not None
     except ImportError:  # an environment that hides it
         return False
-
-
-def _write_log(response: Response, folder: Path) -> None:
-    """``convergence.csv``: what Newton's method did at every point."""
-    store.write_text(folder / "convergence.csv", convergence_table(response))
 
 
 def convergence_table(response: Response) -> str:
