@@ -13,7 +13,7 @@ from ..ring.expansion import expand, multiplicity, sector_rotation
 from ..ring.resonances import eigenmodes
 from .lettering import captioned, colour_bar, sheet, stacked
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
-from .views import AREA, STEEPEST, _map, at_speed, hertz
+from .views import AREA, _map, at_speed, hertz, mode_scale
 
 if TYPE_CHECKING:
     from .lettering import Picture
@@ -82,15 +82,6 @@ def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
     return np.concatenate([expand(one, ring.basis, j)[source, :, 0] for j in range(ring.basis.sectors)])
 
 
-def _scale(ring: RingStudio, shape: Array) -> float:
-    """Factor that gives a shape (n, 3) of the sector the drawn amplitude, or less where it would bend too steeply."""
-    a, b = ring.outside.sides.T
-    points = ring.basis.mesh.points
-    turn = np.linalg.norm(shape[a] - shape[b], axis=1) / np.linalg.norm(points[a] - points[b], axis=1)
-    largest = float(np.linalg.norm(shape, axis=1).max())
-    return min(SWING * ring.extent / max(largest, 1e-300), STEEPEST / max(float(np.quantile(turn, 0.98)), 1e-300))
-
-
 def _directions(ring: RingStudio) -> Array:
     """(N v, 3, 3) unit vectors along the axis, the circumference and the radius at each vertex (rows)."""
     arm = ring.points() - ring.basis.rotation_point
@@ -110,7 +101,7 @@ class _Shown:
 
 
 def _prepare(ring: RingStudio, group: ModalGroup, mode: int) -> _Shown:
-    moved = _scale(ring, group.phi[:, :, mode]) * wave(ring, group, mode)
+    moved = mode_scale(ring, group.phi[:, :, mode], SWING) * wave(ring, group, mode)
     parts = np.einsum("vdi,vi->dv", _directions(ring), moved)
     strongest = int((np.abs(parts) ** 2).sum(axis=1).argmax())
     value = parts[strongest]

@@ -46,6 +46,7 @@ from .scene import (
 
 if TYPE_CHECKING:
     from .lettering import Picture
+    from .ring_views import RingStudio
 
 AREA = 420_000
 """Pixels of one picture of the body."""
@@ -323,14 +324,14 @@ def _cross(a: Array, b: Array) -> Array:
 # --- modes ---------------------------------------------------------------------------------------------------------
 
 
-def mode_scale(studio: Studio, shape: Array) -> float:
+def mode_scale(studio: Studio | RingStudio, shape: Array, amplitude: float = AMPLITUDE) -> float:
     """Factor that gives a shape (n, 3) the drawn amplitude, or less where element sides would turn too far."""
     a, b = studio.outside.sides.T
     points = studio.basis.mesh.points
     turn = np.linalg.norm(shape[a] - shape[b], axis=1) / np.linalg.norm(points[a] - points[b], axis=1)
     largest = float(np.linalg.norm(shape, axis=1).max())
     steepest = float(np.quantile(turn, 0.98))
-    return min(AMPLITUDE * studio.extent / max(largest, 1e-300), STEEPEST / max(steepest, 1e-300))
+    return min(amplitude * studio.extent / max(largest, 1e-300), STEEPEST / max(steepest, 1e-300))
 
 
 def mode_camera(studio: Studio, groups: Sequence[ModalGroup], count: int, area: float = AREA) -> Camera:
