@@ -25,7 +25,6 @@ from microslip.case.settings import ContactSettings
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
 from microslip.modes import modal_basis
 from microslip.modes.campbell import track_basis
-from microslip.modes.patches import patch_bounds
 from microslip.modes.speed_range import frequencies_over
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.points import points_sheet
@@ -858,6 +857,9 @@ def squeezed_plate(size: float) -> tuple[int, float, float]:
     """Degrees of freedom, and compliance of the squeezed plate (m/N): uniform pressure and rigid stamps."""
     job = open_job(ROOT / "geometry" / "blade", [f'name="plate-{size:g}"', f"mesh.size={size}"], BUILD)
     mesh, _ = load_mesh(job, mesh_stage(job))
+    sys.path.append(str(ROOT / "tests"))
+    from patch_bounds import patch_bounds
+
     return 3 * mesh.n_points, *patch_bounds(mesh, job.settings).squeezed("right", "left")
 
 

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small
+from closed_forms.indentation import rectangle_compliance
 from meshes import STEEL, body, brick
+from patch_bounds import patch_bounds
 from scipy.integrate import dblquad
 from test_reduction import block
 from test_truncation import chain
@@ -18,11 +20,10 @@ from microslip.basis import read_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import Compliance, ModalBasis, ModalGroup, UserError
 from microslip.modes import modal_basis
-from microslip.modes.patches import patch_bounds
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS
-from microslip.reference.half_space import mean_inverse_distance, rectangle_compliance
+from microslip.reference.half_space import mean_inverse_distance
 from microslip.report.body import report_html
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

@@ -8,6 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.linalg
+from closed_forms import indentation
+from closed_forms.bars import rod_frequencies
+from closed_forms.beams import euler_bernoulli
+from closed_forms.joined_beams import hinge_spring, shear_spring
 from meshes import STEEL, body, brick
 from scipy.special import ellipe, ellipk, gamma
 
@@ -21,9 +25,8 @@ from microslip.contact.solids import Solid, mismatch, normal_modulus, tangential
 from microslip.data import UserError
 from microslip.modes import modal_basis
 from microslip.reduced.compliance import BULK_AND_SURFACE, SURFACE, contact_share
-from microslip.reference import indentation, joined_beams
-from microslip.reference.bars import rod_frequencies
-from microslip.reference.beams import euler_bernoulli, rectangle
+from microslip.reference import joined_beams
+from microslip.reference.beams import rectangle
 from microslip.system import Body, Contact, Link, Spring, System
 
 IRON, BRASS = Solid(2.1e11, 0.3), Solid(1.0e11, 0.35)
@@ -653,8 +656,8 @@ def test_stiffnesses_of_the_rig_come_back_and_agree_with_the_explicit_inverse():
     f = RIG(k)
     found = identify(RIG, [Resonance(f[0], 0.1, 1), Resonance(f[1], 0.1, 2)])
     assert found.stiffness == pytest.approx(k, rel=1e-8)
-    assert joined_beams.hinge_spring(BEAM, 2 * np.pi * f[0]) * 12 / 0.01**2 == pytest.approx(k[0], rel=1e-10)
-    assert joined_beams.shear_spring(BEAM, 2 * np.pi * f[1]) == pytest.approx(k[1], rel=1e-10)
+    assert hinge_spring(BEAM, 2 * np.pi * f[0]) * 12 / 0.01**2 == pytest.approx(k[0], rel=1e-10)
+    assert shear_spring(BEAM, 2 * np.pi * f[1]) == pytest.approx(k[1], rel=1e-10)
     assert found.sensitivity[0, 1] == found.sensitivity[1, 0] == 0  # each mode tells one of them
     assert found.correlation == pytest.approx(np.eye(2))
     assert "normal 8.25e+07 N/m" in found.sentence() and "within their uncertainty" in found.sentence()
@@ -667,8 +670,8 @@ def test_stated_uncertainty_is_the_scatter_of_repeated_measurements():
     found = identify(RIG, [Resonance(f[0], sigma, 1), Resonance(f[1], sigma, 2)])
     rng = np.random.default_rng(1)
     draws = f + sigma * rng.normal(size=(400, 2))
-    normal = [np.log(joined_beams.hinge_spring(BEAM, 2 * np.pi * a)) for a in draws[:, 0]]
-    shear = [np.log(joined_beams.shear_spring(BEAM, 2 * np.pi * a)) for a in draws[:, 1]]
+    normal = [np.log(hinge_spring(BEAM, 2 * np.pi * a)) for a in draws[:, 0]]
+    shear = [np.log(shear_spring(BEAM, 2 * np.pi * a)) for a in draws[:, 1]]
     assert [np.std(normal), np.std(shear)] == pytest.approx(found.deviation, rel=0.11)
 
 

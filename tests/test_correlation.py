@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from microslip.data import ModalBasis, UserError
-from microslip.reduced.correlation import compare_groups, mac, nearest_points, pair_table, pairs, share_in
+from microslip.reduced.correlation import compare_groups, mac, nearest_points, pair_table, pairs
 
 
 def shapes(seed: int, count: int, d: int = 12) -> np.ndarray:
@@ -32,15 +32,6 @@ def test_mac_of_orthogonal_and_vanishing_shapes_is_zero() -> None:
     Q = np.linalg.qr(shapes(1, 4))[0]
     np.testing.assert_allclose(mac(Q, Q), np.eye(4), atol=1e-12)
     assert (mac(np.zeros((12, 1)), Q) == 0).all()
-
-
-def test_members_of_a_repeated_frequency_are_compared_as_a_space() -> None:
-    """Turned inside their plane the MAC of members is anything, their share in the plane is 1."""
-    Q = np.linalg.qr(shapes(2, 3).real)[0]
-    turned = Q[:, :2] @ np.array([[1, -1], [1, 1]]) / np.sqrt(2)
-    assert mac(turned, Q)[0, 0] == pytest.approx(0.5)
-    np.testing.assert_allclose(share_in(turned, Q[:, :2]), 1, rtol=1e-12)
-    np.testing.assert_allclose(share_in(Q[:, 2:], Q[:, :2]), 0, atol=1e-12)
 
 
 def test_pairs_are_the_best_matching_not_the_greedy_one() -> None:

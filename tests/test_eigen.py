@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
+from closed_forms.bars import box_frequencies
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from meshes import STEEL, body, brick, moved, renumbered, roller_box, rotation_matrix, shaken
@@ -22,7 +23,6 @@ from microslip.modes import modal_basis
 from microslip.modes.boundary import fixed_dofs
 from microslip.modes.equilibrium import make_model
 from microslip.modes.spectrum import make_pencil
-from microslip.reference.bars import box_frequencies
 
 BACKENDS = eigen.available_backends()
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]

@@ -96,13 +96,6 @@ def test_a_sampled_pattern_is_what_it_was_sampled_from() -> None:
         excitation.sampled(pattern.at(theta)[:18], 9)
 
 
-def test_gas_load_is_the_stimulus_of_the_steady_load() -> None:
-    ring = Ring(24, 2)
-    load = excitation.gas_load("blade", "gas", 5e4, 0.02, 6, ring, phase=0.5)
-    assert load == Load("blade", "gas", load.amplitude, 3)
-    assert load.amplitude == pytest.approx(1000 * np.exp(0.5j))
-
-
 @pytest.mark.slow
 def test_several_orders_at_once_on_a_sector_are_those_on_the_ring() -> None:
     """Engine orders 2, 4 and 6 with phases of their own on blades that rub: every blade of the whole ring moves as the
@@ -133,15 +126,13 @@ def test_a_centrifugal_load_moves_a_loose_body_by_its_statics() -> None:
     rows = [{"name": "spin", "centrifugal": True}]
     changes = {"excitations": rows, "reduction": "rubin", **axis}
     g = modal_basis(small.beam(), small.BodySettings.model_validate(small.table(**changes))).groups[0, 0]
-    load = excitation.centrifugal_load("beam", "spin", g, 100.0)
+    load = Load("beam", "spin", 100.0**2, 0)
     one = Assembly((Member("beam", {0: g}),), (), (load,), (Output("beam", "tip-probe", "u_z"),))
     part = one.part(one.members[0], 0)
     tip = part.output @ np.linalg.solve(part.K, part.load)
     E, rho, L, r0 = 2.1e11, 7850.0, small.SIZE[2], 0.2
     bar = 100.0**2 * rho / E * (r0 * L**2 / 2 + L**3 / 3)  # integral of the force outside, over E A
     assert tip[0] == pytest.approx(bar, rel=0.02)  # the clamp holds the root's contraction
-    with pytest.raises(UserError, match="no centrifugal load"):
-        excitation.centrifugal_load("beam", "gas", small.basis().groups[0, 0], 100.0)
 
 
 def test_mistakes_are_told() -> None:
@@ -151,7 +142,6 @@ def test_mistakes_are_told() -> None:
         ("no multiple of the base order 4", lambda: excitation.harmonic_of(6, Ring(24, 4))),
         ("the other way round", lambda: excitation.harmonic_of(-4, Ring(24, 4))),
         ("24 blades have 0 to 12", lambda: excitation.index_of(13, "forward", 24)),
-        ("is negative", lambda: excitation.gas_load("b", "gas", 1.0, -0.1, 1, 1)),
         ("at most a whole turn", lambda: excitation.magnets(np.zeros(1), 1.0, 7.0, 3)),
     ):
         with pytest.raises(UserError, match=words):

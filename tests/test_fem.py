@@ -8,6 +8,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 import skfem
+from closed_forms.bars import box_frequencies
 from meshes import CELLS, QUADRATIC, STEEL, body, brick, pipe, rotation_matrix, shaken
 from numpy.polynomial.legendre import Legendre, leggauss
 from scipy.spatial import cKDTree
@@ -34,7 +35,6 @@ from microslip.fem.loads import body_force, thermal, traction
 from microslip.fem.operators import engineering, from_tensor, tangent_tensor, to_symmetric, to_tensor
 from microslip.modes.compute import inertia_of
 from microslip.modes.rigid import rigid_fields
-from microslip.reference.bars import box_frequencies
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 LAME, SHEAR = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 import small
+from closed_forms.rings import ring_at_rest, spinning_ring
+from closed_forms.shafts import spinning_mass
 from meshes import STEEL, body, brick, nearest, pipe, twisted_blade
 
 from microslip.basis import check_basis, read_basis, write_basis
@@ -18,7 +20,6 @@ from microslip.fem.discretise import free_upper
 from microslip.frames import skew
 from microslip.linalg import eigen
 from microslip.linalg.gyroscopic import (
-    damped_modes,
     general_modes,
     gyroscopic_modes,
     hermitian_modes,
@@ -29,8 +30,6 @@ from microslip.modes.campbell import gyroscopic_change, track_gyroscopic
 from microslip.modes.equilibrium import equilibrium, make_model
 from microslip.modes.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes
-from microslip.reference.rings import ring_at_rest, spinning_ring
-from microslip.reference.shafts import spinning_mass
 from microslip.report.body import report_html
 
 ROOT = {"supports": [{"face": "z0"}]}
@@ -109,27 +108,6 @@ def test_flutter_is_told_with_its_frequency():
     s = np.sqrt(np.roots([1.0, 4 * speed**2 - 2 * a, a**2]).astype(complex))
     assert modes.growth.max() == pytest.approx(np.abs(s.real).max(), rel=1e-6)
     assert "flutter at" in stability_sentence(modes)
-
-
-def test_damped_modes():
-    """One spring-damper has D = c / (2 omega_0); light damping of a gyroscopic pair follows x^H C x / (2 x^H M x)."""
-    one = np.ones((1, 1))
-    omega, damping, _ = damped_modes(one, 2 * 0.1 * 5.0 * one, 0 * one, 25.0 * one)
-    assert damping == pytest.approx([0.1]) and omega == pytest.approx([5 * np.sqrt(0.99)])
-    omega, damping, _ = damped_modes(one, 2 * 2.0 * 5.0 * one, 0 * one, 25.0 * one)
-    np.testing.assert_allclose(omega, 0, atol=1e-9)  # creeps twice
-    assert len(damping) == 2
-    speed, K = 30.0, (100.0**2 - 30.0**2) * np.eye(2)
-    omega, damping, x = damped_modes(np.eye(2), 0.2 * np.eye(2), 2 * speed * QUARTER, K)
-    np.testing.assert_allclose(omega, [70.0, 130.0], rtol=1e-5)
-    # s^2 + (0.2 -+ 2 i W) s + K = 0 for the two circular motions
-    exact = [np.roots([1, 0.2 + w * 2j * speed, K[0, 0]]) for w in (1, -1)]
-    both = np.concatenate(exact)
-    for w, d in zip(omega, damping, strict=True):
-        s = both[np.argmin(np.abs(both.imag - w))]
-        assert d == pytest.approx(-s.real / abs(s), rel=1e-9)
-    _, minus, _ = damped_modes(np.eye(2), -0.2 * np.eye(2), 2 * speed * QUARTER, K)
-    assert (minus < 0).all()
 
 
 # ---------------------------------------------------------------- bodies

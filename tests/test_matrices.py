@@ -708,18 +708,17 @@ ROWS_OF = "".join(f"{i}.{c}\n" for i in range(1, 5) for c in (1, 2, 3))
 def test_flipped_bytes_of_tables_are_read_or_refused(tmp_path, name, text):
     from test_fuzz import flipped
 
-    from microslip.data import Mesh
     from microslip.exchange.matrices.found import Unreadable
     from microslip.exchange.matrices.nodes import read_dofs, read_nodes
 
-    mesh, refused = Mesh(np.zeros((4, 3)), {}, {}, {}, np.arange(1, 5)), 0
+    refused = 0
     for seed in range(300):
         (tmp_path / name).write_bytes(flipped(text.encode(), random.Random(seed)))
         try:
             if name == "nodes.csv":
                 assert np.isfinite(read_nodes(tmp_path / name, "", "mm").points).all()
             else:
-                assert read_dofs(tmp_path / name, mesh).shape[1] == 2
+                assert read_dofs(tmp_path / name).shape[1] == 2
         except (UserError, Unreadable) as error:
             refused += bool(str(error).strip())
     assert 50 < refused < 300

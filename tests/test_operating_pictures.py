@@ -38,7 +38,7 @@ def test_curves(tmp_path):
     curves = {n: (f, np.where(f > 190, np.nan, n / (1 + (f - 150) ** 2))) for n in (1.0, 10.0, 100.0)}
     peaks = {"first": [(0.0, 9.0), (1.0, 3.0), (10.0, 1.0), (99.0, 5.0)]}
     shown = [
-        operating.over_frequency_plot(curves, "amplitude in µm", "t", tmp_path / "a.png", [120.0, 900.0], (f, f)),
+        operating.over_frequency_plot(curves, "amplitude in µm", "t", tmp_path / "a.png"),
         operating.over_normal_force_plot(peaks, "y", "t", tmp_path / "b.png"),
         operating.over_engine_order_plot({1.0: (np.arange(4), f[:4])}, "stress in MPa", "t", tmp_path / "c.png"),
     ]  # fmt: skip
@@ -50,7 +50,7 @@ def test_haigh_diagram(tmp_path):
     worst = endurance(cycle, LIMITS)
     assert 0.01 < dark(operating.haigh_plot(cycle, LIMITS, worst, "t", tmp_path / "h.png")) < 0.6
     still = replace(cycle, amplitude=0 * cycle.amplitude)
-    operating.haigh_plot(still, LIMITS, endurance(still, LIMITS), "t", tmp_path / "h.png", np.arange(9))
+    operating.haigh_plot(still, LIMITS, endurance(still, LIMITS), "t", tmp_path / "h.png")
 
 
 @pytest.mark.parametrize("harmonics", [1, 3])

@@ -19,13 +19,11 @@ from microslip.ring.expansion import (
     certify_ring,
     exciting,
     expand,
-    expand_tensor,
     multiplicity,
     replicate,
     ring_checks,
     ring_of,
     rotation,
-    sector_rotation,
     standing,
     tied_points,
 )
@@ -166,19 +164,6 @@ def test_a_wedge_that_reaches_the_axis_shares_its_points_there_with_all_sectors(
     ring = replicate(quarter, np.array([-1.0, 0, 0]), np.zeros(3), 4, ("cyclic_right", "cyclic_left"))
     assert ring.mesh.n_points == 2 * 25  # the lattice of a plate of 4 x 4 squares
     assert len(np.unique(np.round(ring.mesh.points, 9), axis=0)) == 50
-
-
-def test_stress_turns_with_the_sector() -> None:
-    """sigma' = R sigma R^T: a uniaxial stress along a radius stays along the radius of every sector."""
-    basis = sector.basis()
-    g = basis.groups[0, 2]
-    pull = np.zeros((1, 6, 1))
-    pull[0, 2] = 1.0  # zz
-    for j in range(6):
-        radius = sector_rotation(basis, j) @ [0.0, 0.0, 1.0]
-        xx, yy, zz, xy, yz, xz = expand_tensor(pull, g, basis, j)[0, :, 0] / np.exp(2j * np.pi * 2 * j / 6)
-        found = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        np.testing.assert_allclose(found, np.outer(radius, radius), atol=1e-14)
 
 
 def test_the_turn_is_right_handed() -> None:

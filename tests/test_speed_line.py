@@ -7,17 +7,18 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_speed_range import TOP, ranged, solved
+from test_speed_range import TOP, ranged
 
 from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch, grid
 from microslip.contact.point import PointContact
-from microslip.data import Rows, UserError
+from microslip.data import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
 from microslip.modes.campbell import crossings, track_basis
+from microslip.modes.speed_range import basis_at
 from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
@@ -39,7 +40,14 @@ def pressed(rpm: float) -> float:
 
 
 def at_speed(rpm: float) -> Assembly:
-    return speed_line.assembly_at(rubbing(), {"blade": ranged()}, rpm, {"wall": pressed(rpm)})
+    """The blade of the range at a speed, and the wall as it is pressed there."""
+    still = rubbing()
+    (wall,) = still.contacts
+    return replace(still, members=(turning(rpm),), contacts=(wall.pressed(pressed(rpm)),))
+
+
+def turning(rpm: float) -> Member:
+    return Member("blade", {0: basis_at(ranged(), rpm).groups[0, 0]})
 
 
 def speeds(count: int = 12) -> np.ndarray:
@@ -73,28 +81,13 @@ def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
     near = meets.speed * 30 / np.pi * (1 + np.linspace(-0.01, 0.01, 41))
     amplitude = []
     for n in near:
-        at = speed_line.assembly_at(free, {"blade": ranged()}, float(n))
+        at = replace(free, members=(turning(float(n)),))
         part = at.part(at.members[0], 1)
         w = 2 * np.pi * float(speed_line.frequency(ORDER, n))
         amplitude.append(abs((part.output @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
     assert near[int(np.argmax(amplitude))] == pytest.approx(meets.speed * 30 / np.pi, rel=5e-4)
     at_rest = ranged().groups[0, 0].frequency[0] * 60 / ORDER
     assert abs(at_rest / near[20] - 1) > 0.05
-
-
-def test_the_stored_speeds_of_the_file_are_taken_as_they_are() -> None:
-    """At a speed of the range the member is the body solved for there: frequencies to the range's tolerance, 1e-4."""
-    member = speed_line.member_at(Member("blade", {}), ranged(), 9000.0)
-    np.testing.assert_allclose(member.groups[0].omega[:6], solved(9000.0).omega[:6], rtol=1e-4)
-
-
-def test_centrifugal_loads_grow_with_the_square_of_the_speed() -> None:
-    g = ranged().groups[0, 0]
-    rows = {**g.excitations, "spin": Rows(np.ones((1, g.n_modes)), ("centrifugal",), "rad2/s2", np.zeros(3))}
-    member = Member("damper", {0: replace(g, excitations=rows)})
-    loads = (Load("damper", "spin", 1.0, 0), Load("damper", "gas", 3.0, 1))
-    spun = speed_line.loads_at(loads, (member,), 3000.0)
-    assert spun[0].amplitude == pytest.approx((100 * np.pi) ** 2) and spun[1] == loads[1]
 
 
 def test_mistakes_are_told() -> None:
@@ -104,7 +97,6 @@ def test_mistakes_are_told() -> None:
         ("stand in no ring", lambda: speed_line.along(at_speed, np.array([8000.0]))),
         ("0 is steady", lambda: speed_line.along(at_speed, np.array([8000.0]), 0)),
         ("outside the speed range", lambda: speed_line.along(at_speed, np.array([2 * TOP]), 4)),
-        ("no closure", lambda: speed_line.static_normal_force(ranged().groups[0, 0], "tip")),
     ):
         with pytest.raises(UserError, match=words):
             call()

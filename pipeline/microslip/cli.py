@@ -111,9 +111,10 @@ def init(name: str, folder: Path | None = None, /) -> None:
 
 
 _MADE = {
-    "three-masses": ("system.toml", "run"), "sample": ("case.toml", "respond"),
+    "three-masses": ("system.toml", "run"),
+    "sample": ("case.toml", "respond"),
     "contact": ("contact.toml", "contact"),
-}  # fmt: skip
+}
 """Folders to start from that hold no body.toml: the file to look at and the verb that takes it from there."""
 
 
@@ -324,7 +325,7 @@ def respond(
 @app.command
 def identify(
     case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:  # fmt: skip
+) -> None:
     """Contact stiffness from one measured frequency of a coupled ring; the other nodal diameters are predicted.
 
     Args:
@@ -696,8 +697,8 @@ def _modal_file(path: Path) -> Path:
     if (path / "basis.h5").is_file():
         return path / "basis.h5"
     if (path / "body.toml").is_file():
-        raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which "
-                        f"microslip modes {shlex.quote(str(path))} makes")  # fmt: skip
+        made = f"microslip modes {shlex.quote(str(path))} makes"
+        raise UserError(f"{path}: holds a body, not its modal file; give build/NAME/basis.h5, which {made}")
     raise UserError(f"{path}: is a folder without a modal file basis.h5; correct the path")
 
 

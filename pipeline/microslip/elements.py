@@ -76,16 +76,12 @@ def _pyramid_terms(at: Array, quadratic: bool) -> tuple[Array, Array]:
     s = np.maximum(1 - z, _TIP)
     one, none = np.ones_like(a), np.zeros_like(a)
     r = a * b / s
-    terms = [
-        (one, (none, none, none)), (a, (one, none, none)), (b, (none, one, none)), (z, (none, none, one)),
-        (r, (b / s, a / s, r / s)),
-    ]  # fmt: skip
+    flat = [(one, (none, none, none)), (a, (one, none, none)), (b, (none, one, none)), (z, (none, none, one))]
+    terms = [*flat, (r, (b / s, a / s, r / s))]
     if quadratic:
-        terms += [
-            (a * a, (2 * a, none, none)), (b * b, (none, 2 * b, none)), (z * z, (none, none, 2 * z)),
-            (a * b, (b, a, none)), (a * z, (z, none, a)), (b * z, (none, z, b)),
-            (a * r, (2 * r, a * a / s, a * r / s)), (b * r, (b * b / s, 2 * r, b * r / s)),
-        ]  # fmt: skip
+        terms += [(a * a, (2 * a, none, none)), (b * b, (none, 2 * b, none)), (z * z, (none, none, 2 * z))]
+        terms += [(a * b, (b, a, none)), (a * z, (z, none, a)), (b * z, (none, z, b))]
+        terms += [(a * r, (2 * r, a * a / s, a * r / s)), (b * r, (b * b / s, 2 * r, b * r / s))]
     values = np.stack([v for v, _ in terms], axis=1)
     slopes = np.stack([np.stack(g, axis=1) for _, g in terms], axis=2)
     return values, slopes * np.array([2.0, 2.0, 1.0])[:, None]

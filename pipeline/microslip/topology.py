@@ -50,17 +50,14 @@ class CellType:
 _FACET_OF = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"}
 
 
-def _edge_number(edges: tuple[tuple[int, int], ...], a: int, b: int) -> int:
-    return next(i for i, e in enumerate(edges) if set(e) == {a, b})
-
-
 def _quadratic_facets(
     facets: tuple[tuple[int, ...], ...], edges: tuple[tuple[int, int], ...], corners: int, centres: bool
 ) -> tuple[tuple[int, ...], ...]:
     result = []
     for number, facet in enumerate(facets):
         ring = [*facet, facet[0]]
-        middle = tuple(corners + _edge_number(edges, a, b) for a, b in zip(ring[:-1], ring[1:], strict=True))
+        sides = [{a, b} for a, b in zip(ring[:-1], ring[1:], strict=True)]
+        middle = tuple(corners + [set(e) for e in edges].index(side) for side in sides)
         centre = (corners + len(edges) + number,) if centres else ()
         result.append((*facet, *middle, *centre))
     return tuple(result)

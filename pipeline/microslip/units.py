@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+from .data import Array
+
+Speed = TypeVar("Speed", float, Array)
 
 SYSTEMS: dict[str, tuple[float, float, float]] = {
     "m-kg-s": (1.0, 1.0, 1.0),
@@ -30,6 +35,21 @@ def density(system: str) -> float:
     """kg/m3 of the system's unit of density."""
     length, mass, _ = SYSTEMS[system]
     return mass / length**3
+
+
+def to_rpm(speed: Speed) -> Speed:
+    """Revolutions per minute of an angular speed, rad/s."""
+    return speed * 30 / math.pi
+
+
+def from_rpm(rpm: Speed) -> Speed:
+    """rad/s."""
+    return rpm * math.pi / 30
+
+
+def rpm_text(speed: float) -> str:
+    """An angular speed (rad/s) for people: "4500 rpm"."""
+    return f"{to_rpm(speed):.6g} rpm"
 
 
 def counted(number: int, thing: str) -> str:

@@ -8,16 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 import rings
-from meshes import body
-
-from microslip.modes import modal_basis
-from microslip.reference.discs import (
+from closed_forms.discs import (
     Disc,
     centrifugal_stress,
     disc_frequencies,
     membrane_frequencies,
     thin_plate_frequencies,
 )
+from meshes import body
+
+from microslip.modes import modal_basis
 
 PLATE = Disc(inner=0.5, outer=1.0, thickness=0.01, young=2.1e11, poisson=0.3, density=7850.0)
 

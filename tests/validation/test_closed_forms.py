@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import bars, beams, shafts
 from meshes import STEEL, body, brick, nearest, with_sets
 
 from microslip.data import UserError
 from microslip.modes import modal_basis
-from microslip.reference import bars, beams, shafts
+from microslip.reference.beams import rectangle
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 LAME, SHEAR = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
@@ -45,7 +46,7 @@ def test_slender_timoshenko_beams_are_euler_bernoulli_beams(ends):
     exact = beams.euler_bernoulli(3, ends)
     gaps = []
     for height in (0.04, 0.02):
-        s = beams.rectangle(1.0, height, height, E, NU, RHO)
+        s = rectangle(1.0, height, height, E, NU, RHO)
         gaps.append(1 - beams.timoshenko(s, 3, ends) / s.unit / exact)
     assert (gaps[1] > 0).all() and (gaps[1] < 0.02).all()
     np.testing.assert_allclose(np.log2(gaps[0] / gaps[1]), 2, atol=0.1)
@@ -84,12 +85,12 @@ def test_spinning_mass_and_shaft_agree_at_their_limits():
     np.testing.assert_allclose(shafts.spinning_mass(100.0, 100.0, 30.0), [70, 130], rtol=1e-12)
     # slow spin of unequal springs changes nothing in first order
     np.testing.assert_allclose(shafts.spinning_mass(100.0, 150.0, 1e-4), [100, 150], rtol=1e-9)
-    s = beams.rectangle(1.0, 0.01, 0.01, E, NU, RHO)
+    s = rectangle(1.0, 0.01, 0.01, E, NU, RHO)
     back, forth = shafts.spinning_shaft(s, 2, 0.0)
     assert -back == pytest.approx(forth, rel=1e-9)
     assert forth == pytest.approx(beams.euler_bernoulli(2, "pinned-pinned")[1] * s.unit, rel=2e-3)
     # Rayleigh's rotor: the splitting is 2 Omega k^2 I / A to first order
-    s = beams.rectangle(1.0, 0.02, 0.02, E, NU, RHO)
+    s = rectangle(1.0, 0.02, 0.02, E, NU, RHO)
     back, forth = shafts.spinning_shaft(s, 1, 50.0)
     assert forth + back == pytest.approx(2 * 50 * np.pi**2 * s.inertia / s.area, rel=5e-3)
 
@@ -102,7 +103,7 @@ def test_rods():
     with pytest.raises(ValueError, match="ends"):
         bars.rod_frequencies(1.0, 1.0, 1.0, 1, "pinned")
     with pytest.raises(ValueError, match="ends"):
-        beams.timoshenko(beams.rectangle(1, 1, 1, 1, 0, 1), 1, "pinned")
+        beams.timoshenko(rectangle(1, 1, 1, 1, 0, 1), 1, "pinned")
 
 
 # ---------------------------------------------------------------- bars and beams as solids
@@ -145,7 +146,7 @@ def test_free_beam(cell_type):
     n = (12, 2, 2) if cell_type == "tetra10" else (20, 3, 3)
     group = the_modes(brick(cell_type, n, (length, b, h)), free=True, modes={"count": 16})
     for direction, height, width in ((2, h, b), (1, b, h)):
-        exact = beams.timoshenko(beams.rectangle(length, width, height, E, NU, RHO), 3, "free-free")
+        exact = beams.timoshenko(rectangle(length, width, height, E, NU, RHO), 3, "free-free")
         # the beam theory itself errs with (k h)^4, 0.1 % in mode 3; coarse tetrahedra are up to 1 % stiffer
         allowed = [1.5e-3, 5e-3, 1e-2] if cell_type == "tetra10" else [3e-4, 8e-4, 1.6e-3]
         assert (np.abs(bending(group, direction)[:3] / exact - 1) < allowed).all()
@@ -156,7 +157,7 @@ def test_clamped_beam():
     length, b, h = 1.0, 0.04, 0.05
     group = the_modes(brick("hexahedron20", (40, 2, 2), (length, b, h)), material=NO_POISSON, supports=[{"face": "x0"}])
     for direction, height, width in ((2, h, b), (1, b, h)):
-        exact = beams.timoshenko(beams.rectangle(length, width, height, E, 0.0, RHO), 2)
+        exact = beams.timoshenko(rectangle(length, width, height, E, 0.0, RHO), 2)
         np.testing.assert_allclose(bending(group, direction)[:2], exact, rtol=3e-4)
 
 
@@ -164,7 +165,7 @@ def test_clamped_steel_beam_is_a_little_stiffer():
     """With Poisson's ratio the clamp also holds the section's width: up to 1 % at h/L = 1/20, never softer."""
     length, h = 1.0, 0.05
     group = the_modes(brick("hexahedron20", (20, 2, 2), (length, h, h)), supports=[{"face": "x0"}])
-    exact = beams.timoshenko(beams.rectangle(length, h, h, E, NU, RHO), 2)
+    exact = beams.timoshenko(rectangle(length, h, h, E, NU, RHO), 2)
     # a square section: its pairs lie at the same frequency in any plane
     pairs = group.omega[[0, 1, 2, 3]].reshape(2, 2)
     np.testing.assert_allclose(pairs[:, 0], pairs[:, 1], rtol=1e-8)
@@ -190,7 +191,7 @@ def rotating_blade(speeds, hub=0.0, **rotation):
     )  # fmt: skip
 
 
-SECTION = beams.rectangle(1.0, 0.01, 0.01, E, 0.0, RHO)
+SECTION = rectangle(1.0, 0.01, 0.01, E, 0.0, RHO)
 ETA = (0.0, 2.0, 6.0, 12.0)
 
 
@@ -329,7 +330,7 @@ def test_gyroscopic_splitting_of_a_stocky_shaft():
     L, h = 0.8, 0.1
     mesh = brick("hexahedron20", (2, 2, 12), (h, h, L), (-h / 2, -h / 2, 0))
     mesh = with_sets(mesh, middle=np.array([nearest(mesh, (0, 0, L / 2))]))
-    section = beams.rectangle(L, h, h, E, NU, RHO)
+    section = rectangle(L, h, h, E, NU, RHO)
     speed = 0.25 * shafts.spinning_shaft(section, 1, 0.0)[1]
     supports = [{"face": "z0", "directions": "xy"}, {"face": "z1", "directions": "xy"}]
     group = the_modes(

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms.joined_beams import shear_spring
 from scipy.integrate import quad
 
 from microslip.contact.curves import curve
 from microslip.contact.identification import Resonance, identify, two_beams
 from microslip.contact.layer import Layer, modal_stiffness, modes_needed
 from microslip.contact.solids import Solid
-from microslip.reference import joined_beams
 from microslip.reference.beams import rectangle
 
 STEEL = Solid(2.1e11, 0.3)
@@ -87,7 +87,7 @@ def test_the_rig_tells_both_printed_stiffnesses():
     found = identify(rig, [Resonance(f[0], 0.1, 1), Resonance(f[1], 0.1, 2)])
     assert found.stiffness == pytest.approx(printed, rel=1e-6)
     assert found.deviation == pytest.approx([0.004, 0.011], rel=0.05)
-    assert joined_beams.shear_spring(beam, 2 * np.pi * f[1]) == pytest.approx(31.7e6, rel=1e-9)
+    assert shear_spring(beam, 2 * np.pi * f[1]) == pytest.approx(31.7e6, rel=1e-9)
 
 
 def test_fig_3_5_3_tangential_stiffness_over_force():

@@ -78,10 +78,11 @@ def write_triangles(out: str, unit: str) -> None:
     place[tags] = np.arange(len(tags))
     found = [(tag, gmsh.model.mesh.getElementsByType(2, tag)[1]) for tag in boundary_surfaces()]
     np.savez(
-        out, points=xyz.reshape(-1, 3) * UNITS[unit],
+        out,
+        points=xyz.reshape(-1, 3) * UNITS[unit],
         triangles=place[np.concatenate([nodes for _, nodes in found]).astype(np.int64)].reshape(-1, 3),
         surface=np.concatenate([np.full(len(nodes) // 3, tag) for tag, nodes in found]),
-    )  # fmt: skip
+    )
 
 
 def solid_line(tag: int) -> str:

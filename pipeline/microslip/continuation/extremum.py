@@ -125,9 +125,12 @@ NARROW = 1e-6
 
 def _reversed(state: State) -> State:
     return replace(
-        state, tangent=-state.tangent, orientation=-state.orientation, sense=-state.sense,
+        state,
+        tangent=-state.tangent,
+        orientation=-state.orientation,
+        sense=-state.sense,
         origin_tangent=-state.origin_tangent,
-    )  # fmt: skip
+    )
 
 
 class _Place(NamedTuple):
@@ -221,7 +224,7 @@ SAME = 5e-3
 
 def lowest(
     highest: Callable[[float], Peak], values: Sequence[float], tolerance: float = 1e-4, most: int = 12
-) -> Lowest:  # fmt: skip
+) -> Lowest:
     """The value of a parameter at which the highest peak is lowest.
 
     It is found at all values; then between the lowest one and its neighbour on the side to which it falls, in turn

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Indices, ModalBasis, ModalGroup, UserError
+from ..data import Indices, ModalBasis, ModalGroup, UserError
 from ..reduced.coordinates import in_modes
 from ..ring.resonances import speeds_of
+from ..units import rpm_text
 
 
 @dataclass(frozen=True)
@@ -78,16 +79,13 @@ def real(group: ModalGroup, form: str) -> ModalGroup:
     Raises:
         UserError: a sector at a nodal diameter between 0 and N/2.
     """
-    if np.iscomplexobj(group.M_r) or np.iscomplexobj(group.phi) or np.iscomplexobj(group.K_r) or _complex_rows(group):
+    numbers = [group.M_r, group.K_r, group.phi, *(i.rows for i in group.interfaces.values())]
+    if any(np.iscomplexobj(a) for a in numbers):
         raise UserError(
             f"export --to {form}: nodal diameter {group.harmonic} has complex shapes, which the format cannot hold; "
             "choose --nodal-diameter 0 or N/2, or --to mat, mtx or uff"
         )
     return group
-
-
-def _complex_rows(group: ModalGroup) -> bool:
-    return any(np.iscomplexobj(i.rows) for i in group.interfaces.values())
 
 
 def with_shapes(basis: ModalBasis, group: ModalGroup, form: str) -> ModalGroup:
@@ -115,7 +113,7 @@ def body_in_motion(basis: ModalBasis, form: str) -> ModalGroup:
         raise UserError(f"{basis.name}: export --to {form}: a cyclic sector is no whole body; mesh the whole body")
     if group.speed:
         raise UserError(
-            f"{basis.name}: export --to {form}: the modes at {group.speed * 30 / np.pi:.6g} rpm hold the stiffness "
+            f"{basis.name}: export --to {form}: the modes at {rpm_text(group.speed)} hold the stiffness "
             "of that speed, which a multibody program adds itself; export a group at rest (speeds_rpm = [0])"
         )
     if group.invariants is None:
@@ -138,20 +136,20 @@ def elastic(g: ModalGroup, form: str) -> ModalGroup:
     some, v = np.ix_(keep, keep), g.invariants
     assert v is not None
     cut = replace(
-        v, shape=v.shape[:, keep], position_shape=v.position_shape[:, :, keep],
-        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep], stiffening=v.stiffening[:, keep][:, :, keep],
-    )  # fmt: skip
+        v,
+        shape=v.shape[:, keep],
+        position_shape=v.position_shape[:, :, keep],
+        shape_shape=v.shape_shape[:, :, keep][:, :, :, keep],
+        stiffening=v.stiffening[:, keep][:, :, keep],
+    )
     return replace(
         g, omega=g.omega[keep], kind=tuple(g.kind[j] for j in keep), damping_ratio=g.damping_ratio[keep],
-        M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some], phi=_columns(g.phi, keep),
+        M_r=g.M_r[some], K_r=g.K_r[some], C_r=g.C_r[some], G_r=g.G_r[some],
+        phi=g.phi[:, :, keep] if len(g.phi) else g.phi,
         interfaces={n: replace(i, rows=i.rows[:, keep]) for n, i in g.interfaces.items()},
         monitors={n: replace(r, rows=r.rows[:, keep]) for n, r in g.monitors.items()},
         invariants=cut,
     )  # fmt: skip
-
-
-def _columns(phi: Array, keep: Indices) -> Array:
-    return phi[:, :, keep] if len(phi) else phi
 
 
 def one_line(text: str) -> str:

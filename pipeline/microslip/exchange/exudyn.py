@@ -66,7 +66,7 @@ def exudyn_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
         "microslip_origin": v.point,
         "microslip_frequency": g.frequency,
         "microslip_damping_ratio": g.damping_ratio,
-    }  # fmt: skip
+    }
 
 
 def _blocks(A: Array) -> Array:

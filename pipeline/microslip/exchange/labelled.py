@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import INTERFACE_ROWS, VOIGT, Interface, ModalBasis, ModalGroup, Rows
+from ..data import INTERFACE_ROWS, VOIGT, ModalBasis, ModalGroup, Rows
 from .choice import STATEMENT, node_numbers
 
 _UNITS = {
@@ -33,7 +33,7 @@ def to_xarray(basis: ModalBasis) -> Any:
     tree = {"/": _root(basis, xarray)}
     for (speed, harmonic), group in sorted(basis.groups.items()):
         place = f"/speed_{speed}" + (f"/nd_{harmonic}" if basis.sectors > 1 else "")
-        tree[place] = _group(basis, group, xarray)
+        tree[place] = _group(group, xarray)
     return xarray.DataTree.from_dict(tree, name=_name(basis.name))
 
 
@@ -49,7 +49,7 @@ def _root(basis: ModalBasis, xarray: Any) -> Any:
     )
 
 
-def _group(basis: ModalBasis, g: ModalGroup, xarray: Any) -> Any:
+def _group(g: ModalGroup, xarray: Any) -> Any:
     own = "mode" if g.to_diagonal is None else "own_mode"
     table: dict[str, Any] = {name: ((own,), getattr(g, name)) for name in ("omega", "frequency", "damping_ratio")}
     table |= {name: (("mode", "mode_column"), getattr(g, name)) for name in ("M_r", "C_r", "K_r", "G_r")}
@@ -59,7 +59,7 @@ def _group(basis: ModalBasis, g: ModalGroup, xarray: Any) -> Any:
         table["phi"] = (("node", "axis", "mode"), g.phi)
     table["u_static"] = (("node", "axis"), g.u_static)
     coords: dict[str, Any] = {"mode": np.arange(1, g.n_modes + 1), "kind": (("mode",), list(g.kind))}
-    table |= _interfaces(g.interfaces)
+    table |= {f"interface_{_name(n)}": (("interface_row", "mode"), i.rows) for n, i in g.interfaces.items()}
     for kind, named in (("excitation", g.excitations), ("monitor", g.monitors), ("gauge", g.gauges)):
         table |= _rows(kind, named, coords)
     table |= _compliance(g, coords) | _stress(g, coords)
@@ -71,10 +71,6 @@ def _group(basis: ModalBasis, g: ModalGroup, xarray: Any) -> Any:
     }
     attrs = {"speed_rad_per_s": g.speed, "nodal_diameter": g.harmonic, "prestress": g.prestress}
     return xarray.Dataset(named_units, coords=coords, attrs=attrs)
-
-
-def _interfaces(named: Mapping[str, Interface]) -> dict[str, Any]:
-    return {f"interface_{_name(n)}": (("interface_row", "mode"), i.rows) for n, i in named.items()}
 
 
 def _rows(kind: str, named: Mapping[str, Rows], coords: dict[str, Any]) -> dict[str, Any]:

@@ -22,10 +22,10 @@ from ..files.store import complete_or_absent
 from .choice import STATEMENT, Format
 
 _HEADER = b"MATLAB 5.0 MAT-file, modal basis written by microslip"
-_KEYWORDS = {
-    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
-    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
-}  # fmt: skip
+_KEYWORDS = set(
+    "break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd "
+    "switch try while".split()
+)
 
 
 def write_mat(basis: ModalBasis, path: Path | str) -> None:

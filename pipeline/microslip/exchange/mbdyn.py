@@ -50,7 +50,8 @@ def _head(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list
     return [
         "** MBDyn MODAL DATA FILE",
         f"** {one_line(basis.name)}, written by microslip. {STATEMENT}.",
-        "** Origin of the body frame in the mesh, m: " + " ".join(f"{x:.16e}" for x in g.invariants.point)  # type: ignore[union-attr]
+        "** Origin of the body frame in the mesh, m: "
+        + " ".join(f"{x:.16e}" for x in g.invariants.point)  # type: ignore[union-attr]
         + "; shapes x y z rx ry rz in body axes, phi^T M phi = 1",
         *(f"** node {i + 1}: {one_line(a.name)}" for i, a in enumerate(nodes)),
         *(f"** check: frequency {j + 1} of groups 9 and 10 is {f:.9g} Hz" for j, f in enumerate(g.frequency)),
@@ -58,7 +59,7 @@ def _head(basis: ModalBasis, g: ModalGroup, nodes: Sequence[Attachment]) -> list
         "**   REVISION,  NODE,  NORMAL, ATTACHMENT, CONSTRAINT, REJECTED MODES.",
         f"      REV0{len(nodes):10d}{g.n_modes:10d}{0:10d}{0:10d}{0:10d}",
         "**",
-    ]  # fmt: skip
+    ]
 
 
 def _integers(values: Sequence[int]) -> list[str]:

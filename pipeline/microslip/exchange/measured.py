@@ -218,9 +218,7 @@ def _shapes(modes: Sequence[_Mode]) -> tuple[Array, bool]:
     return (flat * signs(flat)).reshape(phi.shape), scaled
 
 
-def _basis(
-    name: str, points: Array, number: Indices, modes: Sequence[_Mode], phi: Array, scaled: bool
-) -> ModalBasis:  # fmt: skip
+def _basis(name: str, points: Array, number: Indices, modes: Sequence[_Mode], phi: Array, scaled: bool) -> ModalBasis:
     m, n = len(modes), len(points)
     omega, D = np.array([x.omega for x in modes]), np.array([x.damping for x in modes])
     reads = {}

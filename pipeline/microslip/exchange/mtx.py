@@ -21,6 +21,7 @@ import numpy as np
 from ..data import Array, ModalBasis, ModalGroup, UserError
 from ..files.store import refused
 from ..reduced.coordinates import compliance_row
+from ..units import rpm_text
 from .choice import STATEMENT, Format
 from .mat import field_names
 
@@ -123,7 +124,7 @@ def interface_coordinates(g: ModalGroup) -> dict[int, str]:
 
 def _readme(basis: ModalBasis) -> str:
     groups = [
-        f"  speed_{s}{f'_nd_{k}' if basis.sectors > 1 else ''}: {g.speed * 30 / np.pi:.6g} rpm"
+        f"  speed_{s}{f'_nd_{k}' if basis.sectors > 1 else ''}: {rpm_text(g.speed)}"
         + (f", nodal diameter {k} of {basis.sectors} sectors" if basis.sectors > 1 else "")
         + (", complex" if np.iscomplexobj(g.K_r) or np.iscomplexobj(g.phi) else "")
         for (s, k), g in sorted(basis.groups.items())

@@ -67,11 +67,14 @@ def _node(number: int, a: Attachment) -> list[str]:
     m = a.phi.shape[1]
     turned = np.array([skew(p) for p in a.psi.T])
     return [
-        f"new node = {number}", "rframe = body ref",
+        f"new node = {number}",
+        "rframe = body ref",
         *_taylor("origin", a.position[:, None], a.phi.T[:, :, None], m),
-        *_taylor("phi", a.phi, None, m), *_taylor("psi", a.psi, None, m), *_taylor("AP", np.eye(3), turned, m),
+        *_taylor("phi", a.phi, None, m),
+        *_taylor("psi", a.psi, None, m),
+        *_taylor("AP", np.eye(3), turned, m),
         "end node",
-    ]  # fmt: skip
+    ]
 
 
 def sid_tables(g: ModalGroup) -> dict[str, tuple[Array | None, Array | None]]:
@@ -90,12 +93,14 @@ def sid_tables(g: ModalGroup) -> dict[str, tuple[Array | None, Array | None]]:
         "Me": (g.M_r, None),
         "Gr": (-2 * np.hstack(list(turning)), -2 * np.array([np.hstack(list(b)) for b in tilde_tilde(v.shape_shape)])),
         "Ge": (-2 * crossed.transpose(1, 2, 0).reshape(m, 3 * m), None),
-        "Oe": (centrifugal(v.position_shape[..., None])[:, :, 0],
-               centrifugal(v.shape_shape.transpose(0, 1, 3, 2)).transpose(2, 0, 1) + stiff[:, :, :6]),
+        "Oe": (
+            centrifugal(v.position_shape[..., None])[:, :, 0],
+            centrifugal(v.shape_shape.transpose(0, 1, 3, 2)).transpose(2, 0, 1) + stiff[:, :, :6],
+        ),
         "ksigma": (np.zeros((m, 0)), None),
         "Ke": (g.K_r, None),
         "De": (g.C_r, None),
-    }  # fmt: skip
+    }
 
 
 def centrifugal(D: Array) -> Array:
@@ -121,8 +126,10 @@ def _taylor(name: str, m0: Array | None, m1: Array | None, modes: int) -> list[s
     if m1 is not None:
         body += [
             f"m1({i + 1:4d},{q + 1:4d},{k + 1:4d}) = {m1[q, i, k]:.16e}"
-            for i in range(rows) for q in range(modes) for k in range(columns)
-        ]  # fmt: skip
+            for i in range(rows)
+            for q in range(modes)
+            for k in range(columns)
+        ]
     return [*head, *body, f"end {name}"]
 
 

@@ -22,6 +22,7 @@ from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..files.store import write_text
 from ..mesh import boundary_facets
 from ..ring.resonances import eigenmodes
+from ..units import rpm_text
 from .choice import Format, node_numbers, one_line, with_shapes
 
 TRIANGLE, QUAD = 41, 44
@@ -50,8 +51,7 @@ def _header(basis: ModalBasis) -> str:
     program = f"microslip {__version__}"
     date = f"{'01-Jan-00':<10}{'00:00:00':<10}"
     said = "modal basis; SI; frame of the mesh, x y z of each node; phi^H M phi = 1"
-    return _set(151, [_line(basis.name), said, program,
-                      date + f"{0:10d}{0:10d}{0:10d}", date, program, date])  # fmt: skip
+    return _set(151, [_line(basis.name), said, program, date + f"{0:10d}{0:10d}{0:10d}", date, program, date])
 
 
 def _line(text: str) -> str:
@@ -89,7 +89,7 @@ def _skin(basis: ModalBasis, nodes: Indices) -> str:
 
 
 def _modes(basis: ModalBasis, g: ModalGroup, speed: int, nodes: Indices) -> Iterator[str]:
-    where = f"{g.speed * 30 / np.pi:.6g} rpm, nodal diameter {g.harmonic}, {basis.sectors} sectors"
+    where = f"{rpm_text(g.speed)}, nodal diameter {g.harmonic}, {basis.sectors} sectors"
     complex_shapes = np.iscomplexobj(g.phi)
     for j in range(g.n_modes):
         lines = [_line(basis.name), "mode shape, kg^-1/2, phi^H M phi = 1", "NONE", where[:80]]

@@ -20,6 +20,7 @@ from ..mesh import boundary_facets
 from ..reduced.coordinates import basis_in_modes, in_modes
 from ..ring.expansion import expand, multiplicity, replicate, ring_scale, sector_rotation
 from ..ring.resonances import eigenmodes, speeds_of
+from ..units import to_rpm
 from .choice import STATEMENT, Format, with_shapes
 
 
@@ -67,7 +68,7 @@ def write_pvd(basis: ModalBasis, path: Path | str) -> None:
         for j in range(g.n_modes):
             number = len(files) + 1
             files[number] = path.with_name(f"{path.stem}_mode{number:03d}.vtu")
-            state = (("Hz", g.frequency[j]), ("rpm", g.speed * 30 / np.pi), ("nodal_diameter", g.harmonic))
+            state = (("Hz", g.frequency[j]), ("rpm", to_rpm(g.speed)), ("nodal_diameter", g.harmonic))
             data = _parts("shape", g.phi[:, :, j]) | {n: np.full(basis.mesh.n_points, v) for n, v in state}
             save(meshio.Mesh(basis.mesh.points, cells(basis.mesh), point_data=data), files[number])
     write_text(path, collection(files))
@@ -99,7 +100,7 @@ def mode_label(group: ModalGroup, mode: int) -> str:
 
 def _prefix(basis: ModalBasis, group: ModalGroup, harmonic: int) -> str:
     several = len({g.speed for g in basis.groups.values()}) > 1
-    text = f"{group.speed * 30 / np.pi:.6g}rpm_" if several else ""
+    text = f"{to_rpm(group.speed):.6g}rpm_" if several else ""
     return text + (f"nd{harmonic}_" if any(h for _, h in basis.groups) else "")
 
 
@@ -166,7 +167,7 @@ def write_ring(basis: ModalBasis, path: Path | str, speed: int = 0) -> Path:
         thin = replace(g, phi=g.phi[used] if len(g.phi) else g.phi, u_static=g.u_static[used])
         _write_ring_group(basis, ring.mesh, thin, files[k])
         twice = multiplicity(k, basis.sectors)
-        rows += [f"{g.speed * 30 / np.pi:.6g},{k},{j + 1},{f:.8g},{twice}" for j, f in enumerate(g.frequency)]
+        rows += [f"{to_rpm(g.speed):.6g},{k},{j + 1},{f:.8g},{twice}" for j, f in enumerate(g.frequency)]
     write_text(path.with_suffix(".csv"), "\n".join(rows) + "\n")
     write_text(path, collection(files))
     return path

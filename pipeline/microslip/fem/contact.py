@@ -300,7 +300,7 @@ class Grip:
     Attributes:
         pair, cut: see there. at: (n, 3) positions. multiplier: (v,) Pa, lambda. gap: (v,) m, mean gaps of the
             nodes, interference counted (infinite where a node meets nothing). area: (v,) m2. pressure: (v,) Pa,
-            >= 0. touching: (v,) whether a node is closed. point_gap, point_pressure, point_weight: (p,) at the
+            >= 0. touching: (v,) whether a node is closed. point_pressure, point_weight: (p,) at the
             quadrature points.
         on_slave, on_master: (p, 3n) derivative of the gaps with respect to the displacements, by body.
         hats: (v, p). projections: per block of the cut.
@@ -314,7 +314,6 @@ class Grip:
     area: Array
     pressure: Array
     touching: Array
-    point_gap: Array
     point_pressure: Array
     point_weight: Array
     on_slave: sp.csr_matrix
@@ -331,11 +330,6 @@ class Grip:
     def slave_force(self) -> Array:
         """(n, 3) the part that acts on the slave face, N."""
         return self._forces(self.on_slave)
-
-    @property
-    def master_force(self) -> Array:
-        """(n, 3) the part that acts on the master face, N, as it stands in the body's own place."""
-        return self._forces(self.on_master)
 
     def _forces(self, rows: sp.csr_matrix) -> Array:
         return np.asarray(rows.T @ (self.point_weight * self.point_pressure)).reshape(-1, 3)
@@ -360,13 +354,15 @@ def grip(
     """
     n = len(x)
     found = tuple(project(pair, p, x) for p in made.points)
-    on_slave = sp.vstack([
-        _sparse(p.slave, p.N[..., None] * f.normal[:, None], n) for p, f in zip(made.points, found, strict=True)
-    ]).tocsr()  # fmt: skip
-    on_master = sp.vstack([
-        _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
-        for p, f in zip(made.points, found, strict=True)
-    ]).tocsr()  # fmt: skip
+    on_slave = sp.vstack(
+        [_sparse(p.slave, p.N[..., None] * f.normal[:, None], n) for p, f in zip(made.points, found, strict=True)]
+    ).tocsr()
+    on_master = sp.vstack(
+        [
+            _sparse(p.master, -f.N[..., None] * (f.normal @ pair.turn)[:, None], n)
+            for p, f in zip(made.points, found, strict=True)
+        ]
+    ).tocsr()
     hats = _hats(made, len(pair.nodes))
     weight = np.concatenate([p.weight for p in made.points])
     inside = level * pair.interference if pair.interference > 0 else pair.interference
@@ -381,7 +377,7 @@ def grip(
     # faces that touch without force count as closed
     touching = held | meets & (trial > -1e-9 * pair.penalty * pair.size)
     return Grip(
-        pair, made, x, multiplier, gap, np.where(meets, area, 0.0), pressure, touching, point_gap, hats.T @ pressure,
+        pair, made, x, multiplier, gap, np.where(meets, area, 0.0), pressure, touching, hats.T @ pressure,
         weight, on_slave, on_master, hats, found,
     )  # fmt: skip
 
@@ -399,13 +395,13 @@ def _hats(made: Cut, nodes: int) -> sp.csr_matrix:
     return sp.csr_matrix(entries, shape=(nodes, start))
 
 
-def contact_stiffness(g: Grip, pattern: Pattern, bent: bool = True, phase: complex = 1.0) -> Array:
+def contact_stiffness(g: Grip, pattern: Pattern, bent: bool = True) -> Array:
     """(p, 3, 3) stiffness of a contact over the pattern, N/m; arguments as those of `contact_matrix`.
 
     Raises:
         UserError: points that the pattern does not couple: the faces have slid too far.
     """
-    return _on_pattern(contact_matrix(g, bent, phase).tocoo(), pattern, g.pair)
+    return _on_pattern(contact_matrix(g, bent).tocoo(), pattern, g.pair)
 
 
 def contact_matrix(g: Grip, bent: bool = True, phase: complex = 1.0) -> sp.csr_matrix:

@@ -29,14 +29,13 @@ class CutFaces:
     """The paired nodes of the two cut faces: node ``right[i]`` is node ``left[i]`` turned by the sector angle.
 
     Attributes:
-        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R. mismatch: largest distance of a pair, m.
+        sectors: N. left, right: (l,) point indices. rotation: (3, 3) R.
     """
 
     sectors: int
     left: Indices
     right: Indices
     rotation: Array
-    mismatch: float
 
     def phase(self, harmonic: int) -> complex | float:
         """exp(+i k 2 pi / N); a real number for k = 0 and k = N/2."""
@@ -65,7 +64,7 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
     distance, nearest = _nearest(y, x @ R.T)
     if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
         raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), spacing))
-    return CutFaces(sectors, a, b[nearest], R, float(distance.max()))
+    return CutFaces(sectors, a, b[nearest], R)
 
 
 def refuse_other_facets(mesh: Mesh, left: str, right: str, cut: CutFaces) -> None:

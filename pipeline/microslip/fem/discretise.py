@@ -245,7 +245,7 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None, region: int, cells: I
     at, weights = quadrature(cell_type, degree)
     N, dN = shape_functions(cell_type, at)
     jacobian = np.einsum("eki,qjk->eqij", mesh.points[cells], dN, optimize=True)
-    det = _det3(jacobian)
+    det = np.einsum("...i,...i->...", jacobian[..., 0, :], np.cross(jacobian[..., 1, :], jacobian[..., 2, :]))
     if (bad := (det <= 0).any(axis=1)).any():
         raise UserError(
             f"{bad.sum()} of {len(cells)} {cell_type} cells are inside out or degenerate where they are "
@@ -254,10 +254,6 @@ def _block(mesh: Mesh, cell_type: str, degree: int | None, region: int, cells: I
         )
     grad = np.matmul(_inverse3(jacobian, det).transpose(0, 1, 3, 2), dN[None])
     return Block(cell_type, cells, at, N, grad, det * weights, region)
-
-
-def _det3(J: Array) -> Array:
-    return np.einsum("...i,...i->...", J[..., 0, :], np.cross(J[..., 1, :], J[..., 2, :]))
 
 
 def _inverse3(J: Array, det: Array) -> Array:

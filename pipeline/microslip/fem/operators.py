@@ -188,6 +188,11 @@ def tangent_tensor(elasticity: Array, factor: Array | None, H: Array | None, str
     else:
         F = np.eye(3) + H
         A = _between(F, C, F)
+    return _stressed(A, factor, stress)
+
+
+def _stressed(A: Array, factor: Array | None, stress: Array) -> Array:
+    """A times the factor of its modulus, and the stress (e, q, 6) in the three directions."""
     if factor is not None:
         A *= factor[..., None, None, None, None]
     S = to_symmetric(stress)
@@ -209,10 +214,4 @@ def tangent_tensor_slope(elasticity: Array, factor: Array | None, H: Array, dH: 
     """
     C, F = to_tensor(elasticity), np.eye(3) + H
     half = _between(dH, C, F)
-    A = half + np.transpose(half, (0, 1, 4, 5, 2, 3))
-    if factor is not None:
-        A *= factor[..., None, None, None, None]
-    S = to_symmetric(stress_slope)
-    for k in range(3):
-        A[..., k, :, k, :] += S
-    return A
+    return _stressed(half + np.transpose(half, (0, 1, 4, 5, 2, 3)), factor, stress_slope)

@@ -29,13 +29,12 @@ class Points:
     """Quadrature points on pieces of one pair of facet types.
 
     Attributes:
-        slave_type, master_type: of facet (master ``""``: a plane). slave: (p, ks), master: (p, km) point indices.
+        master_type: of facet (``""``: a plane). slave: (p, ks), master: (p, km) point indices.
         numbers: (p, ks) number of each node among those of the slave face. N: (p, ks) shape functions, hats: (p, ks)
             positive ones (`node_hats`). weight: (p,) area in the reference geometry, m2. start: (p, 2) where on the
-            master facet the projection begins. piece: (p,) number of the slave facet, of its type.
+            master facet the projection begins.
     """
 
-    slave_type: str
     master_type: str
     slave: Indices
     master: Indices
@@ -44,7 +43,6 @@ class Points:
     hats: Array
     weight: Array
     start: Array
-    piece: Indices
 
 
 @cache
@@ -242,8 +240,8 @@ def cut(
     weight = np.linalg.norm(np.cross(t[:, 0], t[:, 1]), axis=1) * (size[:, None] * w).ravel()
     start = np.broadcast_to(reference_nodes(corner_type(master_type)).mean(axis=0), flat_xi.shape)
     points = Points(
-        slave_type, master_type, slave_facets[own], master_facets[other], numbers[own], N,
-        node_hats(slave_type, flat_xi), weight, start, own,
+        master_type, slave_facets[own], master_facets[other], numbers[own], N,
+        node_hats(slave_type, flat_xi), weight, start,
     )  # fmt: skip
     return points, i, j
 
@@ -257,6 +255,6 @@ def whole(reference: Array, slave_type: str, facets: Indices, numbers: Indices) 
     f, q = weight.shape
     own = np.repeat(np.arange(f), q)
     return Points(
-        slave_type, "", facets[own], np.zeros((f * q, 0), dtype=np.int64), numbers[own], np.tile(N, (f, 1)),
-        np.tile(node_hats(slave_type, at), (f, 1)), weight.ravel(), np.zeros((f * q, 2)), own,
+        "", facets[own], np.zeros((f * q, 0), dtype=np.int64), numbers[own], np.tile(N, (f, 1)),
+        np.tile(node_hats(slave_type, at), (f, 1)), weight.ravel(), np.zeros((f * q, 2)),
     )  # fmt: skip

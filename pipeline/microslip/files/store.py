@@ -29,9 +29,12 @@ import numpy as np
 from ..data import UserError
 
 _ODD = {
-    stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
-}  # fmt: skip
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 
 def _odd(path: Path) -> str:
@@ -310,7 +313,7 @@ def sidecar_path(product: Path | str) -> Path:
 
 def nothing_to_do(
     product: Path | str, inputs: Mapping[str, Any], force: bool = False, report: Callable[[str], None] = lambda _: None
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether a stage has no work to do: `product` and all that was written with it is up to date. Said to `report`.
 
     Make is told that the product is as new as what it was made from.

@@ -165,7 +165,9 @@ def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], waves: int)
 def _order(sizes: list[int], waves: int) -> Array:
     """Places in a vector ordered by harmonics, then parts, of one ordered by parts, then harmonics."""
     total, begins = sum(sizes), np.cumsum([0, *sizes])
-    return np.concatenate([
-        (np.arange(waves)[:, None] * total + np.arange(b, e)).ravel()
-        for b, e in zip(begins[:-1], begins[1:], strict=True)
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            (np.arange(waves)[:, None] * total + np.arange(b, e)).ravel()
+            for b, e in zip(begins[:-1], begins[1:], strict=True)
+        ]
+    )

@@ -122,7 +122,7 @@ def _near(s: Array) -> Array:
 
 def normal_table(
     law: Normal, middle: float, half: float, tolerance: float = NORMAL_TOLERANCE, where: Path | None = None
-) -> Table:  # fmt: skip
+) -> Table:
     """The table of a normal law without dimensions, from the folder of tables or made and put there.
 
     A tangent with kinks (heights that are equally frequent, a measured curve) may keep it from meeting the tolerance:

@@ -92,9 +92,11 @@ def kept_curve(
         for i, p in enumerate(state.found):
             problem, Omega = family.problem(p.lam), family.Omega(p.lam)
             point = Point(Omega, p.x, CONVERGED, 0.0, p.evaluations)
-            row = record(problem, point, operating(problem, point)) | {
-                "parameter": p.lam / family.unit, "fold": int(p.kind == "fold"), "arclength": p.arclength,
-            } | _way(p, state, state.status if i == last else "")  # fmt: skip
+            row = (
+                record(problem, point, operating(problem, point))
+                | {"parameter": p.lam / family.unit, "fold": int(p.kind == "fold"), "arclength": p.arclength}
+                | _way(p, state, state.status if i == last else "")
+            )
             journal.keep(series, len(rows), row)
             rows.append(row)
 

@@ -14,7 +14,6 @@ import numpy as np
 from ..continuation import CONVERGED
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Indices, UserError
-from ..system.assembly import Assembly, Ring
 from ..units import METRES, Quantity
 from . import response
 from .peak import checked, resonance
@@ -56,17 +55,6 @@ class OverOrders:
             "stuck_Hz": self.stuck,
             "failed_points": self.failed.astype(float),
         }
-
-
-def at_order(assembly: Assembly, order: int) -> Assembly:
-    """A ring driven by another base engine order.
-
-    Raises:
-        UserError: bodies that stand in no ring.
-    """
-    if assembly.ring is None:
-        raise UserError("engine orders: the bodies stand in no ring; add [ring] with its blades")
-    return replace(assembly, ring=Ring(assembly.ring.blades, order))
 
 
 def over_orders(
@@ -161,8 +149,10 @@ class Envelope:
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
         name = self.quantity.column
-        each = {name(f"combination_{i + 1}"): np.where(ok, np.abs(a), np.nan)
-                for i, (a, ok) in enumerate(zip(self.monitor, self.converged, strict=True))}  # fmt: skip
+        each = {
+            name(f"combination_{i + 1}"): np.where(ok, np.abs(a), np.nan)
+            for i, (a, ok) in enumerate(zip(self.monitor, self.converged, strict=True))
+        }
         return {"frequency_Hz": self.frequency, name("low"): self.low, name("high"): self.high, **each}
 
     def corners(self) -> dict[str, Array]:
@@ -178,9 +168,12 @@ class Envelope:
 
 
 def envelope(
-    build: Callable[..., Problem], ranges: Mapping[str, Sequence[float]], frequency: Array,
-    report: Report = lambda _: None, keep: Callable[[Envelope], None] = lambda _: None,
-) -> Envelope:  # fmt: skip
+    build: Callable[..., Problem],
+    ranges: Mapping[str, Sequence[float]],
+    frequency: Array,
+    report: Report = lambda _: None,
+    keep: Callable[[Envelope], None] = lambda _: None,
+) -> Envelope:
     """Responses at all combinations of given values, and what encloses them.
 
     The combinations are run through so that neighbours differ in one value; each begins where the last one began. A

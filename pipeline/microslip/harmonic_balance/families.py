@@ -173,9 +173,12 @@ def curve(family: Family, report: Report = lambda _: None, settings: Settings | 
 
 
 def followed(
-    family: Family, report: Report = lambda _: None, settings: Settings | None = None, begun: Branch | None = None,
+    family: Family,
+    report: Report = lambda _: None,
+    settings: Settings | None = None,
+    begun: Branch | None = None,
     keep: Callable[[State], None] = lambda _: None,
-) -> Branch:  # fmt: skip
+) -> Branch:
     """The curve from a solution at its beginning; without one a branch that says so.
 
     Args:

@@ -110,11 +110,6 @@ def springs(patch: Patch, normal: float, tangential: float) -> Array:
     return np.einsum("n,nia,i,nib->ab", share, G, np.array([normal, tangential, tangential]), G)
 
 
-def _at_index(assembly: Assembly, index: int) -> Assembly:
-    bare = replace(assembly, loads=(), outputs=())
-    return replace(bare, ring=Ring(assembly.ring.blades, index)) if assembly.ring else bare
-
-
 @dataclass(frozen=True, eq=False)
 class Coupling:
     """An assembly in one wave whose contacts are springs: its frequencies over the springs' stiffness.
@@ -154,14 +149,15 @@ def _eigenvalues(K: Array, M: Array) -> Array:
 
 def coupling(assembly: Assembly, index: int, ratio: float) -> Coupling:
     """The assembly in the wave of an index, all contacts alike in c_N and in c_T / c_N = ratio."""
-    part = _at_index(assembly, index).joined(1)
+    bare = replace(assembly, loads=(), outputs=())
+    part = (replace(bare, ring=Ring(assembly.ring.blades, index)) if assembly.ring else bare).joined(1)
     unit = [springs(c.patch, 1.0, ratio) for c in assembly.contacts]
     return Coupling(part.M, part.K, part.rows, part.residual, scipy.linalg.block_diag(*unit))
 
 
 def nodal_diagram(
     assembly: Assembly, stiffness: float, ratio: float, indices: Sequence[int] | None = None, modes: int = 6
-) -> NodalDiagram:  # fmt: skip
+) -> NodalDiagram:
     """Frequencies of the coupled system over the nodal diameter, from 0 to N/2 if not told which.
 
     Raises:
@@ -172,9 +168,7 @@ def nodal_diagram(
     return NodalDiagram(np.array(waves), np.array(found), stiffness, ratio)
 
 
-def identify(
-    assembly: Assembly, fit: Measured, ratio: float, measured: Sequence[Measured] = ()
-) -> Identified:  # fmt: skip
+def identify(assembly: Assembly, fit: Measured, ratio: float, measured: Sequence[Measured] = ()) -> Identified:
     """The contact stiffness that gives one measured frequency, and what it predicts for others.
 
     Args:

@@ -47,9 +47,7 @@ class Traced(NamedTuple):
     cycle: Cycle
 
 
-def traced(
-    law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0
-) -> Traced:  # fmt: skip
+def traced(law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0) -> Traced:
     """One more cycle than the force is found from, looked at in time.
 
     Args:

@@ -133,4 +133,4 @@ def optimum(
     best: Lowest = lowest(at, values)
     return Optimum(
         best.parameter, found[best.parameter], best.status, dict(sorted(found.items())), dict(sorted(rising.items()))
-    )  # fmt: skip
+    )

@@ -315,10 +315,12 @@ class AtFrequency:
         p = self.problem
         g = self.amplitudes(self._excess(p.displacement(x), force))
         return [
-            [s.modal * (p.share if h else 1.0) - s.modal_compliance @ g[h][at]
-             for s, at in zip(parts, p.slices(), strict=True)]
+            [
+                s.modal * (p.share if h else 1.0) - s.modal_compliance @ g[h][at]
+                for s, at in zip(parts, p.slices(), strict=True)
+            ]
             for h, parts in enumerate(self.seen)
-        ]  # fmt: skip
+        ]
 
     def amplitudes(self, v: Array) -> list[ComplexArray]:
         """(c,) complex amplitudes of the harmonics 0 to H of (W, c) real ones."""
@@ -416,9 +418,11 @@ def of(
     """
     assembly.check_names()
     for name, value, bounds in (
-        ("harmonics", harmonics, {"ge": 1}), ("cycles", cycles, {"ge": 1}), ("periodicity", periodicity, {"ge": 0}),
+        ("harmonics", harmonics, {"ge": 1}),
+        ("cycles", cycles, {"ge": 1}),
+        ("periodicity", periodicity, {"ge": 0}),
         ("length", length, {"gt": 0}),
-    ):  # fmt: skip
+    ):
         if value is not None:
             bounded(name, value, **bounds)
     together = len(assembly.members) <= RELATIVE_AT_MOST if form is None else form == "relative"

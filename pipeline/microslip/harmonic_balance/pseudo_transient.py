@@ -79,7 +79,8 @@ def serves(problem: Problem) -> bool:
 
 def unheld(problem: Problem) -> bool:
     """Whether nothing at all but the contacts holds some motion of a body."""
-    return any(bool((shares < FREE).any()) for shares in _shares(problem))
+    parts = zip(problem.parts[0], problem.stiffness, strict=True)
+    return any(bool((unconstrained(part, k)[1] < FREE).any()) for part, k in parts)
 
 
 def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
@@ -93,10 +94,6 @@ def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
     """
     shares, motions = scipy.linalg.eigh(part.K, _stuck(part, stiffness))
     return motions[:, shares < HELD], shares[shares < HELD]
-
-
-def _shares(problem: Problem) -> list[Array]:
-    return [unconstrained(part, k)[1] for part, k in zip(problem.parts[0], problem.stiffness, strict=True)]
 
 
 def _stuck(part: Linear, stiffness: Array) -> Array:

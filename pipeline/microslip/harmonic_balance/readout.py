@@ -38,7 +38,7 @@ class Amplitude:
 
 def amplitude(
     at: AtFrequency, x: Array, force: Array, slopes: list[Array], output: int = 0, harmonic: int = 1
-) -> Amplitude:  # fmt: skip
+) -> Amplitude:
     """The amplitude of read-out number `output` for forces (W, c) and their derivatives as `AtFrequency.forces` gives.
 
     y = W q + e - r F with q = q_ref - X (F - k v): linear in the forces and in v.

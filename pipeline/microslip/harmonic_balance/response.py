@@ -147,14 +147,14 @@ class HarmonicResponse(FrequencyResponse):
 
 def harmonic_response(
     problem: Problem, frequency: Array, limit: Array, report: Report = lambda _: None, start: Array | None = None
-) -> HarmonicResponse:  # fmt: skip
+) -> HarmonicResponse:
     """`sweep`, and what a reader asks of its points. limit: (patches,) friction limits, N, for reports."""
     return of_points(problem, sweep(problem, frequency, report, start), limit)
 
 
 def of_points(
     problem: Problem, points: Sequence[Point], limit: Array, found: Sequence[Operating] = (), asked: Array | None = None
-) -> HarmonicResponse:  # fmt: skip
+) -> HarmonicResponse:
     """What a reader asks of solved points, in order of their frequencies where some of them were added.
 
     Args:
@@ -242,9 +242,7 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[fl
     return resonances(response, [(one[0].Omega / (2 * np.pi), one[1]) for one in found if one])
 
 
-def highest(
-    problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]
-) -> tuple[Point, float] | None:  # fmt: skip
+def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]) -> tuple[Point, float] | None:
     """The peak of the curve of solutions beside three points of a sweep and its amplitude, m, if there is one.
 
     It is looked for between the outer two, in twelve steps. If these do not close in on it from both sides, because

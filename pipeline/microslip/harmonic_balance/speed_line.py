@@ -6,16 +6,14 @@ loads are that speed's: a problem of its own, started from its neighbours.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from ..data import CENTRIFUGAL, Array, ModalBasis, ModalGroup, UserError
-from ..modes.speed_range import basis_at
-from ..system.assembly import Assembly, Load, Member
-from ..system.damping import structural
+from ..data import Array, UserError
+from ..system.assembly import Assembly
 from . import problem as balance
 from . import response
 from .problem import Forces
@@ -116,71 +114,3 @@ def _together(found: list[HarmonicResponse]) -> dict[str, Any]:
         else:
             out[f.name] = np.concatenate(values)
     return out
-
-
-# --- an assembly at another speed ------------------------------------------------------------------------------------
-
-
-def member_at(
-    member: Member, basis: ModalBasis, rpm: float, made: Callable[[ModalGroup], ModalGroup] = lambda g: g
-) -> Member:  # fmt: skip
-    """The member at a speed of its modal file or of its speed range; with loss factors if it has some.
-
-    Args:
-        made: what else is made of a group: other damping, rows of a pressure field.
-
-    Raises:
-        UserError: see `speed_range.basis_at`.
-    """
-    at = basis_at(basis, rpm)
-    there = replace(member, groups={k: made(g) for (_, k), g in at.groups.items()})
-    return structural(there) if member.loss else there
-
-
-def loads_at(loads: tuple[Load, ...], members: tuple[Member, ...], rpm: float) -> tuple[Load, ...]:
-    """The loads with the centrifugal ones as they are at a speed."""
-    groups = {m.name: next(iter(m.groups.values())) for m in members}
-
-    def at(x: Load) -> Load:
-        centrifugal = groups[x.member].excitations[x.row].unit == CENTRIFUGAL
-        return replace(x, amplitude=(rpm * np.pi / 30) ** 2) if centrifugal else x
-
-    return tuple(at(x) for x in loads)
-
-
-def static_normal_force(group: ModalGroup, interface: str) -> float:
-    """Normal force (N) of the closure on an interface in the static state, or on the interface it faces.
-
-    Raises:
-        UserError: the body has no such closure.
-    """
-    names = {interface, group.interfaces[interface].partner} - {""}
-    for contact in group.contacts.values():
-        if contact.interface in names:
-            return contact.normal_force
-    raise UserError(
-        f"interface '{interface}': the modal file has no closure on it or on its partner, which would tell the normal "
-        "force at speed; add [[closures]] to the body or give the force"
-    )
-
-
-def assembly_at(
-    assembly: Assembly, bases: Mapping[str, ModalBasis], rpm: float, normal: Mapping[str, float] | None = None,
-    made: Callable[[ModalGroup], ModalGroup] = lambda g: g,
-) -> Assembly:  # fmt: skip
-    """An assembly at another speed.
-
-    Args:
-        bases: member -> its modal basis; members that are not named do not turn. normal: contact -> normal force
-            there, N; the others stay as they are pressed. made: see `member_at`.
-
-    Raises:
-        UserError: see `speed_range.basis_at`; a patch that deforms, whose rows would stay those of another speed.
-    """
-    stiff = [c.name for c in assembly.contacts for s in (c.first, c.second) if s and s.rows and s.member in bases]
-    if stiff:
-        raise UserError(f"contact '{stiff[0]}': its patch deforms with the shapes of one speed; make it anew at each")
-    members = tuple(member_at(m, bases[m.name], rpm, made) if m.name in bases else m for m in assembly.members)
-    forces = normal or {}
-    contacts = tuple(c.pressed(forces[c.name]) if c.name in forces else c for c in assembly.contacts)
-    return replace(assembly, members=members, contacts=contacts, loads=loads_at(assembly.loads, members, rpm))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data import Array, Indices
+from ..files.tables import columns_csv
 from ..results.names import apart as told_apart
 from ..units import METRES, Quantity
 
@@ -171,11 +172,8 @@ def resonances(response: FrequencyResponse, found: Sequence[tuple[float, float]]
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
     """CSV text: the frequencies asked for and, per normal force, amplitude, phase, energies and what else a response
     has."""
-    head, columns = ["frequency_Hz"], []
-    for force, r in zip(told_apart(list(responses)), responses.values(), strict=True):
-        head += [f"{name}_FN_{force}_N" for name in r.columns()]
-        columns += [column[r.asked] for column in r.columns().values()]
     first = next(iter(responses.values()))
-    table = np.column_stack([first.frequency[first.asked], *columns])
-    lines = [",".join(head)] + [",".join(f"{v:.9g}" for v in row) for row in table]
-    return "\n".join(lines) + "\n"
+    columns = {"frequency_Hz": first.frequency[first.asked]}
+    for force, r in zip(told_apart(list(responses)), responses.values(), strict=True):
+        columns |= {f"{name}_FN_{force}_N": column[r.asked] for name, column in r.columns().items()}
+    return columns_csv(columns, 9)

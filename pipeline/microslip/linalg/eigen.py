@@ -314,7 +314,8 @@ def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: floa
     before = pencil.solves
     values, vectors = found.values, found.vectors
     for _ in range(6):
-        below = _count_below(pencil, found.upper_shift, values)
+        pencil.solver.factorise(pencil.shifted(found.upper_shift))
+        below = pencil.solver.negative()
         if below == len(values):
             refound, solves = len(values) - len(found.values), found.solves + pencil.solves - before
             if not refound:
@@ -332,11 +333,6 @@ def certify(pencil: Pencil, found: Spectrum, shift: float = 0.0, tolerance: floa
         order = np.argsort(values, kind="stable")
         values, vectors = values[order], vectors[:, order]
     raise NotConverged("the spectrum could not be certified complete: ask for a few modes more or fewer")
-
-
-def _count_below(pencil: Pencil, upper: float, values: Array) -> int:
-    pencil.solver.factorise(pencil.shifted(upper))
-    return pencil.solver.negative()
 
 
 def _finish(

@@ -121,24 +121,6 @@ def general_modes(M: Array, C: Array, K: Array) -> tuple[ComplexArray, ComplexAr
     return s.astype(complex), z[:m].astype(complex)
 
 
-def damped_modes(M: Array, C: Array, G: Array, K: Array) -> tuple[Array, Array, ComplexArray]:
-    """Modes of M q'' + (C + G) q' + K q = 0 with damping C, ascending in |omega|.
-
-    Returns:
-        omega: (w,) rad/s, imaginary parts of the eigenvalues (zero: creeps without vibration). damping: (w,) ratios
-        D = -Re s / |s|, negative for a mode that grows. shapes: (m, w). Of conjugate pairs of real matrices one.
-    """
-    s, x = general_modes(M, C + G, K)
-    tiny = 1e-12 * np.abs(s).max(initial=0.0)
-    if not any(np.iscomplexobj(a) for a in (M, C, G, K)):
-        keep = s.imag > -tiny
-        s, x = s[keep], x[:, keep]
-    order = np.lexsort((s.real, np.round(np.abs(s.imag) / max(tiny, 1e-300))))
-    s, x = s[order], definite(x[:, order], M)
-    size = np.abs(s)
-    return s.imag, np.divide(-s.real, size, out=np.zeros_like(size), where=size > tiny), x
-
-
 def definite(x: ComplexArray, M: Array) -> ComplexArray:
     """Shapes with x^H M x = 1 and the largest coordinate real and positive (of near ties the first)."""
     if not x.size:

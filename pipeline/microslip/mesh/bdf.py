@@ -28,7 +28,6 @@ _SOLIDS: dict[str, dict[int, tuple[str, Sequence[int]]]] = {
 }
 _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
-_CORD = {"CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S"}
 _MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
 _READ = {"GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", *_SOLIDS, *_SHELLS, *_MATERIALS}
 
@@ -164,14 +163,7 @@ def _elements(cards: Cards, raw: RawMesh, numbering: Numbering) -> list[int]:
             number, region = _whole(card, 1), properties.setdefault(_whole(card, 2), len(properties))
             kind, nodes = _cell(name, number, card)
             blocks.setdefault(kind, []).append((number, region, nodes))
-    for kind, found in blocks.items():
-        cells = np.array([nodes for _, _, nodes in found], dtype=np.int64)
-        raw.blocks.append((kind, numbering.positions(cells, "an element names")))
-        raw.cell_id.append(np.array([n for n, _, _ in found], dtype=np.int64))
-        raw.regions.append(np.array([r for _, r, _ in found]))
-    ids, count = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *raw.cell_id]), return_counts=True)
-    if (count > 1).any():
-        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
+    raw.add_solids(blocks, numbering, "an element names")
     return list(properties)
 
 

@@ -14,18 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array, Indices
+from ..data import Array
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number
 from .supports import Constraints, add_supports
 
 _SOLIDS = {185: 8, 45: 8, 186: 20, 95: 20, 187: 10, 92: 10, 285: 4}
 """Element type -> number of nodes. Others that are known to hold no stiffness of a solid are left out."""
-_OTHERS = {
-    14, 21, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 177, 178, 179, 180, 181, 184, 188, 189, 200,
-    208, 209, 214, 281, 290,
-}  # fmt: skip
+_OTHERS = {14, 21, 156, 184, 188, 189, 200, 208, 209, 214, 281, 290}
+_OTHERS |= {*range(151, 155), *range(169, 176), *range(177, 182)}
 # corners I J K L M N O P are 0-7; mid-sides Q R S T U V W X Y Z A B are 8-19
 _FORMS: dict[int, dict[str, Sequence[int]]] = {
     8: {"hexahedron": range(8), "wedge": (0, 1, 2, 4, 5, 6), "pyramid": range(5), "tetra": (0, 1, 2, 4)},
@@ -270,7 +268,7 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
         return
     if value and _number(value, "D") != 0:
         archive.held.left_out.append(f"D,{where},{label} prescribes a displacement")
-    elif where.isdecimal() and len(where) < 18:
+    elif is_number(where):
         archive.held.hold(int(where), directions)
     else:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
@@ -299,13 +297,7 @@ def _assembled(archive: _Archive) -> RawMesh:
         if named is not None:
             region = regions.setdefault((material, system), len(regions))
             blocks.setdefault(named[0], []).append((number, region, named[1]))
-    for form, found in blocks.items():
-        ids = np.array([n for n, _, _ in found], dtype=np.int64)
-        cells = np.array([nodes for _, _, nodes in found], dtype=np.int64)
-        raw.blocks.append((form, numbering.positions(cells, "EBLOCK names")))
-        raw.cell_id.append(ids)
-        raw.regions.append(np.array([r for _, r, _ in found]))
-    _refuse_twice(raw.cell_id)
+    raw.add_solids(blocks, numbering, "EBLOCK names")
     for name, members in archive.components.items():
         if members:
             chosen = np.array(members, dtype=np.int64)
@@ -314,12 +306,6 @@ def _assembled(archive: _Archive) -> RawMesh:
     raw.materials = [_material(archive, *key) for key in regions]
     _assign_temperatures(archive, raw, numbering)
     return raw
-
-
-def _refuse_twice(cell_id: list[Indices]) -> None:
-    ids, count = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *cell_id]), return_counts=True)
-    if (count > 1).any():
-        raise Damaged(f"element {ids[count > 1][0]} is defined twice")
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:

@@ -61,7 +61,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
         f"{inside} of {count} facets of the set '{name}' are not on the surface of the volume mesh; it is no face"
         for name, (inside, count) in mesh.inner.items()
     ]
-    pairs = _coincident(mesh.points)
+    size = np.ptp(mesh.points, axis=0).max()
+    pairs = cKDTree(mesh.points).query_pairs(1e-9 * size, output_type="ndarray")
     parts = part_numbers(mesh)
     if not errors and (overlapping := _overlapping(mesh)):
         errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
@@ -109,11 +110,6 @@ def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
     corners = _NEIGHBOURS[CELL_TYPES[cell_type].corners]
     edges = (np.stack([p[:, j] - p[:, i] for j in others], axis=1) for i, *others in corners)
     return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
-
-
-def _coincident(points: Array) -> Indices:
-    size = np.ptp(points, axis=0).max()
-    return cKDTree(points).query_pairs(1e-9 * size, output_type="ndarray")
 
 
 def part_numbers(mesh: Mesh) -> Indices:

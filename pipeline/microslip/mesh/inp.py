@@ -18,7 +18,7 @@ from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
 from ..files.store import ordinary
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, joined, refuse_twice
 from .supports import Constraints, add_supports
 
 _SOLIDS = {
@@ -200,10 +200,7 @@ def _read_nodes(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> No
     ids = _numbers(",".join(row[0] for row in rows), "*NODE")
     if len(ids) != len(rows):
         raise Damaged("*NODE holds a line without a number")
-    try:
-        values = [[float(v.replace("D", "e").replace("d", "e")) if v.strip() else 0.0 for v in r[1:4]] for r in rows]
-    except ValueError as error:
-        raise Damaged(f"*NODE holds something that is no number ({str(error)[-60:]})") from None
+    values = _table([",".join(row[1:4]) for row in rows], "*NODE")
     deck.node_id.append(ids)
     deck.points.append(np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3))
     if "NSET" in parameters:
@@ -239,13 +236,11 @@ def _set(deck: _Deck, sets: dict[str, list[Indices]], name: str) -> list[Indices
 
 
 def _read_node_set(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    known = np.concatenate(deck.node_id) if deck.node_id else np.zeros(0, dtype=np.int64)
-    _read_set(deck, deck.node_sets, parameters, "NSET", lines, known)
+    _read_set(deck, deck.node_sets, parameters, "NSET", lines, joined(deck.node_id))
 
 
 def _read_cell_set(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    every = [c.ids for c in (*deck.solids, *deck.facets)]
-    known = np.concatenate(every) if every else np.zeros(0, dtype=np.int64)
+    known = joined(cells.ids for cells in (*deck.solids, *deck.facets))
     _read_set(deck, deck.cell_sets, parameters, "ELSET", lines, known)
 
 
@@ -287,13 +282,10 @@ def _read_surface(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
 def _table(lines: list[str], what: str) -> list[list[float]]:
     """Numbers of the data lines; an empty place counts as 0."""
     try:
-        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in _words(s)] for s in lines]
+        rows = [line.rstrip().rstrip(",").split(",") for line in lines]
+        return [[float(w.replace("D", "e").replace("d", "e")) if w.strip() else 0.0 for w in row] for row in rows]
     except ValueError as error:
         raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None
-
-
-def _words(line: str) -> list[str]:
-    return line.rstrip().rstrip(",").split(",")
 
 
 def _read_material(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
@@ -464,11 +456,11 @@ def _assembled(deck: _Deck) -> RawMesh:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
     raw.cell_id = [cells.ids for cells in deck.solids]
-    _check_cell_numbers(deck)
+    refuse_twice(raw.cell_id, "cell")
     _assign_materials(deck, raw)
     _assign_temperatures(deck, raw, numbering)
     for key, parts in deck.node_sets.items():
-        members = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
+        members = np.unique(joined(parts))
         if len(members):
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
@@ -486,13 +478,6 @@ def _assembled(deck: _Deck) -> RawMesh:
         elif kind == "ELEMENT":
             _element_surface(deck, raw, name, rows)
     return raw
-
-
-def _check_cell_numbers(deck: _Deck) -> None:
-    every = np.concatenate([np.zeros(0, dtype=np.int64), *(c.ids for c in deck.solids)])
-    ids, count = np.unique(every, return_counts=True)
-    if (count > 1).any():
-        raise Damaged(f"cell {ids[count > 1][0]} is defined twice")
 
 
 def _unique_nodes(node_id: Indices, points: Array) -> tuple[Indices, Array]:
@@ -568,10 +553,10 @@ def _assign_temperatures(deck: _Deck, raw: RawMesh, numbering: Numbering) -> Non
         return
     raw.temperature = np.full((len(raw.points), 2), np.nan)
     for column, word, value in deck.temperatures:
-        if word.isdecimal() and len(word) < 18:
+        if is_number(word):
             members = np.array([int(word)])
         elif word.strip('"').upper() in deck.node_sets:
-            members = np.concatenate([np.zeros(0, dtype=np.int64), *deck.node_sets[word.strip('"').upper()]])
+            members = joined(deck.node_sets[word.strip('"').upper()])
         else:
             raise Damaged(f"*TEMPERATURE names the node set '{word}', which is not defined")
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
@@ -585,7 +570,7 @@ def _constraints(deck: _Deck) -> Constraints:
         key = next((k for k in (word.upper(), tail.upper()) if k in deck.node_sets), None)
         if key is not None:
             held.hold(deck.written[key], directions)
-        elif tail.isdecimal() and len(tail) < 18:
+        elif is_number(tail):
             held.hold(int(tail), directions)
         else:
             held.left_out.append(f"*BOUNDARY names the node set '{word}', which is not defined")
@@ -593,23 +578,25 @@ def _constraints(deck: _Deck) -> Constraints:
 
 
 def _members(deck: _Deck, key: str) -> Indices:
-    return np.concatenate([np.zeros(0, dtype=np.int64), *deck.cell_sets.get(key, [])])
+    return joined(deck.cell_sets.get(key, []))
+
+
+def _named(word: str, sets: dict[str, list[Indices]]) -> list[Indices]:
+    """The node or cell of that number, or the parts of the set of that name, if there is one."""
+    number = word.rpartition(".")[2]
+    return [np.array([int(number)])] if is_number(number) else sets.get(word.strip('"').upper(), [])
 
 
 def _node_surface(deck: _Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]]) -> None:
     for row in rows:
-        word = row[0].rpartition(".")[2]
-        by_number = word.isdecimal() and len(word) < 18
-        for part in [np.array([int(word)])] if by_number else deck.node_sets.get(row[0].strip('"').upper(), []):
+        for part in _named(row[0], deck.node_sets):
             raw.add_points(name, numbering.positions(part, f"the surface '{name}' names"))
 
 
 def _element_surface(deck: _Deck, raw: RawMesh, name: str, rows: list[list[str]]) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
-        word = row[0].rpartition(".")[2]
-        by_number = word.isdecimal() and len(word) < 18
-        chosen = np.array([int(word)]) if by_number else _members(deck, row[0].strip('"').upper())
+        chosen = joined(_named(row[0], deck.cell_sets))
         face = row[1].upper() if len(row) > 1 else ""
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,6 +73,38 @@ class RawMesh:
         """Add to a point set."""
         before = self.point_sets.get(name, np.zeros(0, dtype=np.int64))
         self.point_sets[name] = np.union1d(before, positions).astype(np.int64)
+
+    def add_solids(
+        self, solids: Mapping[str, list[tuple[int, int, list[int]]]], numbering: Numbering, what: str
+    ) -> None:
+        """Add cells: type -> number, region and node numbers of each.
+
+        Raises:
+            Damaged: a node that is not there, a cell that is there twice.
+        """
+        for kind, found in solids.items():
+            ids, regions, nodes = (np.array(part, dtype=np.int64) for part in zip(*found, strict=True))
+            self.blocks.append((kind, numbering.positions(nodes, what)))
+            self.cell_id.append(ids)
+            self.regions.append(regions)
+        refuse_twice(self.cell_id, "element")
+
+
+def joined(parts: Iterable[Indices]) -> Indices:
+    """Whole numbers one behind the other; none where there are no parts."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
+
+
+def refuse_twice(numbers: Iterable[Indices], what: str) -> None:
+    """Raises `Damaged` if a number stands there twice."""
+    ids, count = np.unique(joined(numbers), return_counts=True)
+    if (count > 1).any():
+        raise Damaged(f"{what} {ids[count > 1][0]} is defined twice")
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a node's or a cell's number, which fits into 64 bits."""
+    return word.isdecimal() and len(word) < 18
 
 
 class Numbering:

@@ -85,7 +85,7 @@ def _read_raw(path: Path) -> RawMesh:
     if suffix in _READERS:
         return _READERS[suffix](path)
     if suffix in _BY_MESHIO:
-        return _read_by_meshio(path)
+        return _by_meshio(path, _from_meshio)
     known = ", ".join([*_READERS, *_BY_MESHIO])
     raise UserError(f"{path}: meshes are not read from a file '{suffix}'; use one of {known}")
 
@@ -126,10 +126,6 @@ def point_data(path: Path) -> tuple[Array, dict[str, Array]]:
     except Damaged as error:
         raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
     return np.asarray(mesh.points, dtype=float), {k: np.asarray(v) for k, v in mesh.point_data.items()}
-
-
-def _read_by_meshio(path: Path) -> RawMesh:
-    return _by_meshio(path, _from_meshio)
 
 
 def _by_meshio(path: Path, made: Callable[[Any], Any]) -> Any:
@@ -192,9 +188,7 @@ def _from_meshio(mesh: Any) -> RawMesh:
     raw = RawMesh(points, np.arange(1, len(points) + 1))
     for block in mesh.cells:
         nodes = _valid(block.data, len(points))
-        if block.type in CELL_TYPES:
-            raw.blocks.append((block.type, nodes))
-        elif block.type not in FACET_CORNERS and block.type not in _IGNORED:
+        if block.type not in FACET_CORNERS and block.type not in _IGNORED:
             raw.blocks.append((block.type, nodes))
     for name, chosen in (mesh.point_sets or {}).items():
         raw.add_points(str(name), np.unique(_valid(chosen, len(points))))

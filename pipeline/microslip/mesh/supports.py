@@ -60,9 +60,5 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
         name = next(same, f"held {directions}")
         raw.add_points(name, members)
         raw.supports[name] = directions
-    raw.not_held = _short(list(left_out))
-
-
-def _short(texts: list[str]) -> list[str]:
-    """The first few, and how many there are."""
-    return texts if len(texts) <= 5 else [*texts[:4], f"and {len(texts) - 4} more like these"]
+    told = list(left_out)
+    raw.not_held = told if len(told) <= 5 else [*told[:4], f"and {len(told) - 4} more like these"]

@@ -27,10 +27,10 @@ _SOLIDS: dict[int, tuple[str, tuple[int, ...]]] = {
 }
 """Descriptor of a solid -> cell type, and places in its list of VTK's nodes."""
 _SHELLS: dict[int, tuple[str, tuple[int, ...]]] = {
-    **{d: ("triangle", (0, 1, 2)) for d in (41, 51, 61, 74, 81, 91)},
-    **{d: ("triangle6", (0, 2, 4, 1, 3, 5)) for d in (42, 52, 62, 72, 82, 92)},
-    **{d: ("quad", (0, 1, 2, 3)) for d in (44, 54, 64, 71, 84, 94)},
-    **{d: ("quad8", (0, 2, 4, 6, 1, 3, 5, 7)) for d in (45, 55, 65, 75, 85, 95)},
+    **dict.fromkeys((41, 51, 61, 74, 81, 91), ("triangle", (0, 1, 2))),
+    **dict.fromkeys((42, 52, 62, 72, 82, 92), ("triangle6", (0, 2, 4, 1, 3, 5))),
+    **dict.fromkeys((44, 54, 64, 71, 84, 94), ("quad", (0, 1, 2, 3))),
+    **dict.fromkeys((45, 55, 65, 75, 85, 95), ("quad8", (0, 2, 4, 6, 1, 3, 5, 7))),
 }
 _BEAMS = {11, 21, 22, 23, 24}
 """Beams and rods; the data set gives them a line more."""

@@ -11,6 +11,7 @@ from ..data import Array, ModalGroup, SpeedRange, UserError
 from ..linalg import canonical, eigen
 from ..reduction import Reduced
 from ..settings.body import BodySettings
+from ..units import from_rpm, rpm_text
 from .body_rows import BodyRows
 from .common import Common, Guess, Settled, Solved, common_coordinates, lagrange
 from .compute import assemble_group, searched_state
@@ -43,7 +44,7 @@ def body_ranges(
             'rotation.range_rpm: closures whose modes are "closed" make the stiffness jump where they close, which no '
             'range can follow; use modes = "open", or rotation.speeds_rpm alone'
         )
-    low, high = (v * np.pi / 30 for v in r.range_rpm)
+    low, high = (from_rpm(v) for v in r.range_rpm)
     report(f"speed range {r.range_rpm[0]:g} to {r.range_rpm[1]:g} rpm")
     body = _Body(model, settings, motions, rows, solver, sector, report, settled, searched)
     found: dict[int, Common] = {}
@@ -113,7 +114,7 @@ class _Body:
             u = np.sum([w * self.states[s].u for s, (w, _) in weights.items()], axis=0)
             u += np.sum([v * self.slopes[s] for s, (_, v) in weights.items() if v], axis=0)
             start = StaticState(u, None, [], np.zeros(0), prestress)
-        self.report(f"equilibrium at {speed * 30 / np.pi:.6g} rpm")
+        self.report(f"equilibrium at {rpm_text(speed)}")
         state = equilibrium(self.model, speed, prestress, self.solver, start, self.report)
         self.pencils[speed], self.states[speed] = self._pencils(state.K), state
 
@@ -161,7 +162,7 @@ def _range(body: _Body, k: int, common: Common) -> SpeedRange:
         projection_error=np.array([h.projection for h in held]),
         total_error=np.array([h.total for h in held]),
         tolerance=r.range_tolerance,
-        points=np.linspace(*r.range_rpm, r.range_points) * np.pi / 30,
+        points=from_rpm(np.linspace(*r.range_rpm, r.range_points)),
         gyroscopic=r.gyroscopic,
     )
 

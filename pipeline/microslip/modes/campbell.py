@@ -176,12 +176,12 @@ def track_basis(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
     return track(groups, point_weights(basis))
 
 
-def track_gyroscopic(basis: ModalBasis, harmonic: int = 0) -> Tracks | None:
+def track_gyroscopic(basis: ModalBasis) -> Tracks | None:
     """Curves of the modes with gyroscopic coupling of a real group, in the rotating frame; None without shapes.
 
     They begin at rest with the modes that have none.
     """
-    groups = [g for (_, h), g in sorted(basis.groups.items()) if h == harmonic]
+    groups = [g for (_, h), g in sorted(basis.groups.items()) if h == 0]
     held = [g.gyroscopic is not None or not g.speed for g in groups]
     if len(groups) < 2 or not all(held) or not any(g.speed for g in groups) or not all(len(g.phi) for g in groups):
         return None

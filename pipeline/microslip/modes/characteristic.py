@@ -76,7 +76,7 @@ def _selection(dofs: Indices, free: Indices) -> sp.csr_matrix:
 
 def _shapes(
     pencil: eigen.Pencil, select: sp.csr_matrix, answers: Array, R: Array, B: sp.csr_matrix, count: int
-) -> Array:  # fmt: skip
+) -> Array:
     """(b, count) softest displacements of the patch's unknowns with its rigid coordinates B u = 0."""
     condensed, K, _ = static_shapes(R, select, answers, "characteristic coordinates")
     M = condensed.T @ pencil.M(condensed)

@@ -11,6 +11,7 @@ from ..data import Array, ContactState, Indices, Material, Mesh, UserError
 from ..fem.contact import ContactPair, Grip, Plane, gap_at, make_pair, node_values
 from ..fem.discretise import face_blocks, quadrature
 from ..fem.loads import traction
+from ..files.tables import columns_csv
 from ..linalg.eigen import DirectSolver
 from ..settings.body import GROUND, BodySettings, Closure
 from .boundary import require_face
@@ -177,9 +178,8 @@ class ContactCurve:
 
     def table(self) -> str:
         """CSV."""
-        rows = zip(self.approach, self.force, self.stiffness, self.closed_share, strict=True)
-        lines = [",".join(f"{v:.9g}" for v in row) for row in rows]
-        return "approach_m,normal_force_N,stiffness_N_per_m,closed_share\n" + "\n".join(lines) + "\n"
+        found = {"approach_m": self.approach, "normal_force_N": self.force, "stiffness_N_per_m": self.stiffness}
+        return columns_csv({**found, "closed_share": self.closed_share}, 9)
 
 
 def contact_curve(

@@ -33,6 +33,7 @@ import numpy as np
 
 from ..data import Array, NotConverged
 from ..linalg import eigen
+from ..units import rpm_text
 
 SPAN = 1e-12
 """Directions of the union of shapes whose squared M-norm is a smaller share than this are rounding."""
@@ -503,7 +504,7 @@ class _Search:
             modes = h is unknown and h.projection > 0.5 * self.tolerance
             far = h.interpolation > FAR * self.tolerance
             if modes or far or (h is worst and h.interpolation > 0.5 * self.tolerance):
-                report(f"one sample more: {_rpm(h.speed)}" + (", with its modes" if modes else ""))
+                report(f"one sample more: {rpm_text(h.speed)}" + (", with its modes" if modes else ""))
                 self.add(self.held[h.speed], modes)
         if len(self.held) == len(found):  # both within half of the tolerance, their sum is not
             self.add(self.held[unknown.speed], True)
@@ -541,15 +542,15 @@ def common_coordinates(
         found = search.examine()
         for h in found:
             report(
-                f"held out {_rpm(h.speed)}: interpolation ({search.form}) {h.interpolation:.1e}, "
+                f"held out {rpm_text(h.speed)}: interpolation ({search.form}) {h.interpolation:.1e}, "
                 f"projection {h.projection:.1e}"
             )
         if max(h.total for h in found) <= tolerance:
             return _result(search, found)
         if len(search.samples) >= MOST:
             raise NotConverged(
-                f"{len(search.samples)} samples between {_rpm(low)} and {_rpm(high)} leave a frequency error of "
-                f"{max(h.total for h in found):.1e}; cut the range in two or raise the tolerance {tolerance:g}"
+                f"{len(search.samples)} samples between {rpm_text(low)} and {rpm_text(high)} leave a frequency error "
+                f"of {max(h.total for h in found):.1e}; cut the range in two or raise the tolerance {tolerance:g}"
             )
         search.widen(found, report)
 
@@ -568,7 +569,3 @@ def _result(search: _Search, found: list[HeldOut]) -> Common:
         V, samples, K_r, np.array(slopes).reshape(-1, *K_r.shape[1:]), search.solved, search.refined, found, worst,
         search.form, f.shift,
     )  # fmt: skip
-
-
-def _rpm(speed: float) -> str:
-    return f"{speed * 30 / np.pi:.6g} rpm"

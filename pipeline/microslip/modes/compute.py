@@ -27,6 +27,7 @@ from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
 from ..reduction import Reduced
 from ..settings.body import BodySettings
+from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_gauge, reduced_interfaces, reduced_rows, with_centrifugal
 from .boundary import check_held, fixed_dofs, known_materials, materials_of, refuse_overlap, with_dead_loads
@@ -46,9 +47,12 @@ Report = Callable[[str], None]
 
 
 def modal_basis(
-    mesh: Mesh, settings: BodySettings, temperature: Array | None = None, report: Report = lambda _: None,
+    mesh: Mesh,
+    settings: BodySettings,
+    temperature: Array | None = None,
+    report: Report = lambda _: None,
     provenance: Mapping[str, str] | None = None,
-) -> ModalBasis:  # fmt: skip
+) -> ModalBasis:
     """The modal basis of a body at each of its rotation speeds (Sextro section 2.4).
 
     Args:
@@ -148,7 +152,7 @@ def _at_speeds(
     state: StaticState | None = None
     before = 0.0
     for number, rpm in enumerate(speeds):
-        speed = rpm * np.pi / 30
+        speed = from_rpm(rpm)
         if len(speeds) > 1 or speed:
             report(f"speed {number + 1} of {len(speeds)}: {rpm:g} rpm")
         if floats:
@@ -173,9 +177,12 @@ def _at_speeds(
 
 
 def _stiffened(
-    b: Prepared, settings: BodySettings, groups: dict[tuple[int, int], ModalGroup], solver: eigen.DirectSolver,
+    b: Prepared,
+    settings: BodySettings,
+    groups: dict[tuple[int, int], ModalGroup],
+    solver: eigen.DirectSolver,
     report: Report,
-) -> dict[tuple[int, int], ModalGroup]:  # fmt: skip
+) -> dict[tuple[int, int], ModalGroup]:
     """The groups with the stiffening by inertia forces, where it is asked for."""
     if not settings.output.stiffening or b.sector is not None:
         return groups

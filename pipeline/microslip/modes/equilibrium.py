@@ -27,12 +27,12 @@ from ..fem.operators import (
     per_block,
     spin_projector,
     stiffness,
-    stress_stiffness,
     tangent,
     tangent_tensor,
     tangent_tensor_slope,
 )
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
+from ..units import rpm_text
 from .closing import Closing
 
 Report = Callable[[str], None]
@@ -361,7 +361,7 @@ def _factors_serve(steps: list[float]) -> bool:
 def _unstable(model: BodyModel, speed: float, count: int) -> str:
     why = "buckling or centrifugal divergence); lower the speed or the loads" if speed else "buckling); lower them"
     return (
-        f"{what_loads(model, speed)}: at {speed * 30 / np.pi:.6g} rpm the body is unstable (its stiffness has {count} "
+        f"{what_loads(model, speed)}: at {rpm_text(speed)} the body is unstable (its stiffness has {count} "
         f"negative directions: {why}"
     )
 
@@ -377,14 +377,9 @@ def what_loads(model: BodyModel, speed: float) -> str:
 
 def _no_equilibrium(speed: float) -> str:
     return (
-        f"no static equilibrium was found at {speed * 30 / np.pi:.6g} rpm; lower the speed or the loads, or use "
+        f"no static equilibrium was found at {rpm_text(speed)}; lower the speed or the loads, or use "
         'rotation.prestress = "linear" to see whether the state is plausible'
     )
-
-
-def linear_stiffness(model: BodyModel, state: StaticState) -> Array:
-    """(p, 3, 3) K0 + K_sigma: the textbook's linear prestress without the displaced geometry, for comparison."""
-    return model.K0 + stress_stiffness(model.d, state.stress)[:, None, None] * np.eye(3)
 
 
 def cauchy(state: StaticState, block: int) -> Array:

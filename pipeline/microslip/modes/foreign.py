@@ -15,6 +15,7 @@ from ..frames import skew
 from ..linalg import canonical, eigen
 from ..reduction import Reduced, stuck
 from ..settings.body import BodySettings
+from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from .boundary import AXES, check_held, require_face
@@ -30,9 +31,8 @@ NOT_RIGID = 1e-6
 
 
 def foreign_basis(
-    body: Matrices, settings: BodySettings, report: Report = lambda _: None,
-    provenance: Mapping[str, str] | None = None,
-) -> tuple[ModalBasis, list[str]]:  # fmt: skip
+    body: Matrices, settings: BodySettings, report: Report = lambda _: None, provenance: Mapping[str, str] | None = None
+) -> tuple[ModalBasis, list[str]]:
     """The modal basis of a body given by its matrices (Sextro section 2.4), and what a person should know of it.
 
     Raises:
@@ -68,7 +68,7 @@ def foreign_basis(
         solved = reduced_on(place, layout.width // 3, settings, s, rows)
     finally:
         solver.close()
-    group = _group(body, settings, solved, rows, layout, free, motions)
+    group = _group(body, settings, solved, rows, layout, free)
     damping = "matrix" if body.damping is not None else settings.damping.source
     axis = np.array(settings.rotation.axis)
     basis = ModalBasis(
@@ -125,9 +125,7 @@ def _wide(B: sp.csr_matrix, width: int) -> sp.csr_matrix:
     return sp.csr_matrix((B.data, B.indices, B.indptr), shape=(B.shape[0], width))
 
 
-def _padded(
-    rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout
-) -> tuple[BodyRows, list[str]]:  # fmt: skip
+def _padded(rows: BodyRows, settings: BodySettings, body: Matrices, layout: Layout) -> tuple[BodyRows, list[str]]:
     """Rows over the whole layout, and what is odd about them; an interface on a single node has that node's own."""
 
     def wide(p: Patch) -> Patch:
@@ -364,12 +362,12 @@ def _search(
 
 
 def _group(
-    body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices, motions: Array
+    body: Matrices, settings: BodySettings, s: Solution, rows: BodyRows, layout: Layout, free: Indices
 ) -> ModalGroup:
     reduced, n = s.reduced, body.mesh.n_points
     whole = s.unknowns.expand(reduced.vectors, n)
     shapes = whole.reshape(layout.width // 3, 3, -1)
-    m, speed = whole.shape[1], settings.rotation.speeds_rpm[0] * np.pi / 30
+    m, speed = whole.shape[1], from_rpm(settings.rotation.speeds_rpm[0])
     B, labels = rows.stacked(settings)
     T = np.asarray(B @ whole) if B.shape[0] else np.zeros((0, m))
     C, ratios = _damping(body, settings, reduced, free)

@@ -15,7 +15,6 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..data import Array, Indices, Mesh, UserError
 from ..fem.discretise import face_blocks, shape_functions
-from ..fem.operators import engineering
 from ..frames import skew
 from ..topology import CELL_TYPES, CellType
 
@@ -371,8 +370,3 @@ def slope_rows(n: int, place: Location, direction: Array) -> sp.csr_matrix:
     for i in range(3):
         rows[i, place.nodes, i] = slope
     return sp.csr_matrix(rows.reshape(3, -1))
-
-
-def strain_of(grad_u: Array) -> Array:
-    """(..., 6) small strain of displacement gradients (..., 3, 3)."""
-    return engineering(0.5 * (grad_u + np.swapaxes(grad_u, -1, -2)))

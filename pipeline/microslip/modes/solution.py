@@ -16,6 +16,7 @@ from ..mesh import longest_over_shortest
 from ..reduced.coordinates import held
 from ..reduction import METHODS, Problem, Reduced, stuck
 from ..settings.body import BodySettings
+from ..units import rpm_text
 from . import rigid
 from .body_rows import BodyRows
 from .common import SPARE
@@ -176,9 +177,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     plain = held_compliance(np.asarray(s.B @ problem.vectors), METHODS["eigenmodes"](problem))
     T = np.asarray(s.B @ reduced.vectors)
     held = held_compliance(T, reduced, s.labels)
-    quality = stuck.indicators(
-        settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero
-    )  # fmt: skip
+    quality = stuck.indicators(settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero)
     return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
 
 
@@ -242,7 +241,7 @@ def _divergence(settings: BodySettings, speed: float, count: int, model: BodyMod
     elif not speed:
         remedy = "it buckles under what loads it at rest: reduce that, or check the material"
     return (
-        f"{what_loads(model, speed)}: at {speed * 30 / np.pi:.6g} rpm{where and ', ' + where + ','} {count} "
+        f"{what_loads(model, speed)}: at {rpm_text(speed)}{where and ', ' + where + ','} {count} "
         f"eigenvalue{'s are' if count > 1 else ' is'} negative: the body diverges; {remedy}"
     )
 

@@ -30,6 +30,7 @@ from ..linalg import canonical, eigen
 from ..linalg.gyroscopic import gyroscopic_modes, hermitian_modes
 from ..reduced.coordinates import compliance_rows, in_coordinates
 from ..reduction import METHODS, Problem, Reduced
+from ..units import from_rpm, rpm_text, to_rpm
 from .common import Interpolant, lagrange
 from .compute import modal_damping, without_massless
 from .solution import held_compliance
@@ -44,12 +45,12 @@ def group_at(basis: ModalBasis, rpm: float, harmonic: int = 0) -> ModalGroup:
     Raises:
         UserError: no range in the file, a speed outside of it.
     """
-    r, speed = _range_of(basis, harmonic), rpm * np.pi / 30
+    r, speed = _range_of(basis, harmonic), from_rpm(rpm)
     low, high = r.speeds[[0, -1]]
     if not low * (1 - 1e-9) <= speed <= high * (1 + 1e-9):
         raise UserError(
-            f"{rpm:.10g} rpm is outside the speed range of '{basis.name}', {low * 30 / np.pi:.6g} to "
-            f"{high * 30 / np.pi:.6g} rpm; ask for a speed inside, or widen rotation.range_rpm and make the modes anew"
+            f"{rpm:.10g} rpm is outside the speed range of '{basis.name}', {to_rpm(low):.6g} to "
+            f"{rpm_text(high)}; ask for a speed inside, or widen rotation.range_rpm and make the modes anew"
         )
     at = _Evaluated(basis, r, float(np.clip(speed, low, high)))
     return at.group()
@@ -70,7 +71,7 @@ def basis_at(basis: ModalBasis, rpm: float) -> ModalBasis:
 
 
 def _rpm_of(basis: ModalBasis, speed: int) -> float:
-    return next(g.speed for (s, _), g in sorted(basis.groups.items()) if s == speed) * 30 / np.pi
+    return to_rpm(next(g.speed for (s, _), g in sorted(basis.groups.items()) if s == speed))
 
 
 def _range_of(basis: ModalBasis, harmonic: int) -> SpeedRange:
@@ -101,13 +102,13 @@ def frequencies_over(r: SpeedRange, speeds: Array, count: int | None = None) -> 
     return omega, modes
 
 
-def waves_over(r: SpeedRange, speeds: Array, forward: bool, count: int | None = None) -> tuple[Array, list[Array]]:
+def waves_over(r: SpeedRange, speeds: Array, forward: bool) -> tuple[Array, list[Array]]:
     """`frequencies_over` with gyroscopic coupling, for the waves that run forward or the others.
 
     Raises:
         numpy.linalg.LinAlgError: the body is unstable at one of the speeds.
     """
-    count, run_up = count or r.count, r.samples[0].run_up
+    count, run_up = r.count, r.samples[0].run_up
     if run_up is None:
         return frequencies_over(r, speeds, count)
     parts, N = interpolant(r), run_up.N

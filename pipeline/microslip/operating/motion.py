@@ -69,7 +69,7 @@ class Motion:
 
     def of(
         self, read: Callable[[ModalGroup], Array], beside: Callable[[Residual], Array] | None = None
-    ) -> ComplexArray:  # fmt: skip
+    ) -> ComplexArray:
         """(f, H + 1, ...) harmonics of what rows read; read(group) -> (..., m), beside(residual) -> (..., r)."""
         found = []
         for p in self.parts:
@@ -79,9 +79,12 @@ class Motion:
 
 
 def motion_of(
-    Omega: Array, q: Array, groups: ModalGroup | Sequence[ModalGroup], conjugate: Sequence[bool] = (),
+    Omega: Array,
+    q: Array,
+    groups: ModalGroup | Sequence[ModalGroup],
+    conjugate: Sequence[bool] = (),
     forces: Array | None = None,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """The motion of coordinates q (f, H + 1, m), or (H + 1, m) at one frequency.
 
     Args:

@@ -49,9 +49,7 @@ def _stresses(motion: Motion, basis: ModalBasis, limits: MaterialLimits | None) 
     return fields
 
 
-def write_shape_vtu(
-    motion: Motion, basis: ModalBasis, path: Path | str, limits: MaterialLimits | None = None
-) -> None:  # fmt: skip
+def write_shape_vtu(motion: Motion, basis: ModalBasis, path: Path | str, limits: MaterialLimits | None = None) -> None:
     """Write the fields of `shape_fields` on the body's mesh, complete or absent.
 
     Raises:

@@ -15,13 +15,15 @@ import numpy as np
 from ..data import Array, ComplexArray, ModalGroup, StressSet, UserError
 from .motion import Motion, Part, longest
 
-DEVIATOR = np.array([
-    [1.0, -0.5, -0.5, 0.0, 0.0, 0.0],
-    [0.0, np.sqrt(0.75), -np.sqrt(0.75), 0.0, 0.0, 0.0],
-    [0.0, 0.0, 0.0, np.sqrt(3.0), 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, np.sqrt(3.0), 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(3.0)],
-])  # fmt: skip
+DEVIATOR = np.array(
+    [
+        [1.0, -0.5, -0.5, 0.0, 0.0, 0.0],
+        [0.0, np.sqrt(0.75), -np.sqrt(0.75), 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, np.sqrt(3.0), 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, np.sqrt(3.0), 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(3.0)],
+    ]
+)
 """(5, 6) D: von Mises stress = |D sigma|, sigma in the order `VOIGT`."""
 
 SAMPLES = 16
@@ -98,8 +100,7 @@ class StressPeaks:
 
     Attributes:
         amplitude, mean, largest: (f,) see `CycleStress`; mean is that of the place of the largest amplitude. place:
-            (f,) number of the place of the largest amplitude. points: (f, 3) where it is. largest_place: (f,) where
-            `largest` is.
+            (f,) number of the place of the largest amplitude. points: (f, 3) where it is.
     """
 
     amplitude: Array
@@ -107,13 +108,15 @@ class StressPeaks:
     largest: Array
     place: Array
     points: Array
-    largest_place: Array
 
 
 def stress_peaks(
-    motion: Motion, location: str = "nodes", only: Array | None = None, first_harmonic: bool = False,
+    motion: Motion,
+    location: str = "nodes",
+    only: Array | None = None,
+    first_harmonic: bool = False,
     largest: bool = True,
-) -> StressPeaks:  # fmt: skip
+) -> StressPeaks:
     """The most stressed place of every point of a sweep, block by block of places.
 
     Args:
@@ -131,7 +134,7 @@ def stress_peaks(
         kept = [k.with_places(s, chosen[block]) for k in kept]
     swing, most = kept[0], kept[-1] if largest else _Highest.none(f, False, False)
     mean = np.array([_mean(stress_at(motion.at(i), [swing.place[i]], location)[0, 0, 0].real) for i in range(f)])
-    return StressPeaks(swing.value, mean, most.value, swing.place, at[swing.place], most.place)
+    return StressPeaks(swing.value, mean, most.value, swing.place, at[swing.place])
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..data import ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
 from ..modes.campbell import track_basis
 from ..reduced.coordinates import basis_in_modes
 from ..ring.expansion import multiplicity
 from ..ring.resonances import eigenmodes
+from ..units import to_rpm
 from . import plots
 from .scene import quiet_vtk
 
@@ -79,9 +78,12 @@ def _tried(python: str) -> str | None:
 
 
 def draw_all(
-    basis: ModalBasis, folder: Path | str, report: Report = lambda _: None, engine_orders: Sequence[int] = (),
+    basis: ModalBasis,
+    folder: Path | str,
+    report: Report = lambda _: None,
+    engine_orders: Sequence[int] = (),
     scenes: bool = True,
-) -> dict[str, Path]:  # fmt: skip
+) -> dict[str, Path]:
     """Draw everything a modal file can show.
 
     Args:
@@ -234,7 +236,7 @@ def _ring(basis: ModalBasis, studio: Studio, folder: Path, report: Report) -> di
 
 
 def _rpm(group: ModalGroup) -> str:
-    return f"{group.speed * 30 / np.pi:.6g}rpm"
+    return f"{to_rpm(group.speed):.6g}rpm"
 
 
 def _animations(studio: Studio, group: ModalGroup, folder: Path) -> dict[str, Path]:

@@ -36,7 +36,7 @@ AREA = 60_000
 def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
     """The MAC of every mode with every other; pairs have a frame and their number."""
     rows, columns = found.mac.shape
-    figure = plots._figure(1.8 + 0.42 * min(max(columns, 6), 30), 1.6 + 0.36 * min(max(rows, 6), 30))
+    figure = plots.empty_figure(1.8 + 0.42 * min(max(columns, 6), 30), 1.6 + 0.36 * min(max(rows, 6), 30))
     axes = figure.add_subplot()
     drawn = axes.imshow(found.mac, cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
     for p in found.pairs:
@@ -50,7 +50,7 @@ def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
         axis.set_label_text(name)
     axes.tick_params(axis="x", rotation=90)
     figure.colorbar(drawn, label="MAC; numbers: pairs, per cent", fraction=0.05)
-    return plots._save(figure, path)
+    return plots.save_figure(figure, path)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plots import COLOURS, _figure, _length, _plain, _save
+from .plots import COLOURS, empty_figure, length_unit, plain_axes, save_figure, single_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +20,7 @@ GREY = "#5b6270"
 
 def draw(study: Study, folder: Path) -> list[Path]:
     """A PNG for every table that has a picture."""
-    return [_save(_DRAWN[name](study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
+    return [save_figure(_DRAWN[name](study), folder / f"{name}.png") for name in study.tables if name in _DRAWN]
 
 
 def _title(study: Study, what: str) -> str:
@@ -62,7 +62,7 @@ def _seconds(values: np.ndarray) -> tuple[np.ndarray, str]:
 
 def _metres(*values: np.ndarray) -> tuple[list[np.ndarray], str]:
     """Several lengths in one unit."""
-    scaled, unit = _length(np.concatenate([np.ravel(v) for v in values]))
+    scaled, unit = length_unit(np.concatenate([np.ravel(v) for v in values]))
     ends = np.cumsum([np.size(v) for v in values])[:-1]
     return [part.reshape(v.shape) for part, v in zip(np.split(scaled, ends), values, strict=True)], unit
 
@@ -78,12 +78,12 @@ def normal_figure(study: Study) -> Any:
     """Force over the approach, stiffness over the force, area in contact."""
     t, working = study.tables["normal"], study.working
     rough = study.contact.roughness is not None
-    figure = _figure(10.5 if rough else 8.0, 3.6)
+    figure = empty_figure(10.5 if rough else 8.0, 3.6)
     panels = figure.subplots(1, 3 if rough else 2)
     (u,), unit = _metres(t["approach_m"])
     force, newton = _newtons(t["force_N"])
     for axes in panels:
-        _plain(axes)
+        plain_axes(axes)
     panels[0].plot(u, force, color=COLOURS[0], linewidth=1.8)
     panels[0].set(xlabel=f"approach $u_n$ in {unit}", ylabel=f"normal force in {newton}")
     if working is not None and working[1] > 0:
@@ -99,8 +99,11 @@ def normal_figure(study: Study) -> Any:
 
 
 def _stiffness_panel(axes: Axes, t: Columns, force: np.ndarray, newton: str) -> None:
-    names = {"normal_stiffness_N/m": "normal", "tangential_stiffness_t1_N/m": "tangential, t1",
-             "tangential_stiffness_t2_N/m": "tangential, t2"}  # fmt: skip
+    names = {
+        "normal_stiffness_N/m": "normal",
+        "tangential_stiffness_t1_N/m": "tangential, t1",
+        "tangential_stiffness_t2_N/m": "tangential, t2",
+    }
     found = {label: t[name] for name, label in names.items() if name in t}
     same = "tangential, t2" in found and np.array_equal(found["tangential, t1"], found["tangential, t2"])
     if same:
@@ -120,7 +123,7 @@ def _stiffness_panel(axes: Axes, t: Columns, force: np.ndarray, newton: str) -> 
 def loops_figure(study: Study) -> Any:
     """Tangential force over displacement for several amplitudes, and the energy of a cycle over the amplitude."""
     t = study.tables["loops"]
-    figure = _figure(9.6, 4.2)
+    figure = empty_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     (u, amplitude), unit = _metres(t["u_t1_m"], t["amplitude_m"])
     force, newton = _newtons(t["F_t1_N"])
@@ -131,8 +134,8 @@ def loops_figure(study: Study) -> Any:
             label = _number(size, unit) if part else None
             left.plot(u[chosen], force[chosen], line, color=colour, linewidth=1.5, label=label)
     left.set(xlabel=f"displacement $u_{{t1}}$ in {unit}", ylabel=f"tangential force $F_{{t1}}$ in {newton}")
-    left.legend(title="amplitude\n(dotted: first loading)", fontsize=8, title_fontsize=8, loc="center left",
-                bbox_to_anchor=(1.0, 0.5), frameon=False)  # fmt: skip
+    where = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "frameon": False}
+    left.legend(title="amplitude\n(dotted: first loading)", fontsize=8, title_fontsize=8, **where)
     energy = np.array([t["dissipated_J"][amplitude == size][0] for size in sizes])
     scaled, joule = _amount(energy, "J", _JOULE)
     right.plot(sizes, scaled, "-o", color=COLOURS[0], linewidth=1.5, markersize=4.5)
@@ -140,7 +143,7 @@ def loops_figure(study: Study) -> Any:
     right.set_xlim(left=0)
     right.set_ylim(bottom=0)
     for axes in (left, right):
-        _plain(axes)
+        plain_axes(axes)
     figure.suptitle(_title(study, "hysteresis at the working point"), fontweight="bold")
     return figure
 
@@ -190,9 +193,9 @@ def _panels(count: int) -> list[Any]:
     """Axes in rows of three, of four in two rows of two."""
     columns = 2 if count == 4 else min(count, 3)
     rows = -(-count // columns)
-    found = list(_figure(3.67 * columns, 3.3 * rows).subplots(rows, columns, squeeze=False).ravel())
+    found = list(empty_figure(3.67 * columns, 3.3 * rows).subplots(rows, columns, squeeze=False).ravel())
     for axes in found:
-        _plain(axes)
+        plain_axes(axes)
     for axes in found[count:]:
         axes.set_visible(False)
     return found[:count]
@@ -240,8 +243,8 @@ def _shade(axes: Any, time: np.ndarray, state: np.ndarray, stick: str) -> None:
 def _legend_above(axes: Axes) -> None:
     handles, _ = axes.get_legend_handles_labels()
     columns = min(len(handles), 5)
-    axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns,
-                columnspacing=1.0, handlelength=1.4)  # fmt: skip
+    where = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
+    axes.legend(frameon=False, fontsize=8, columnspacing=1.0, handlelength=1.4, **where)
 
 
 # --- friction ------------------------------------------------------------------------------------------------------
@@ -250,17 +253,15 @@ def _legend_above(axes: Axes) -> None:
 def friction_figure(study: Study) -> Any:
     """The coefficient over the speed of sliding."""
     t = study.tables["friction"]
-    figure = _figure(6.4, 4.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(6.4, 4.0)
     speed = t["speed_m/s"]
     if "approach_m" in t:
         _fluid(axes, t)
     else:
         axes.plot(speed, t["coefficient"], color=COLOURS[0], linewidth=1.8, label="coefficient")
         if "mean_less_deviation" in t:
-            axes.fill_between(speed, t["mean_less_deviation"], t["mean_plus_deviation"], color=COLOURS[0], alpha=0.18,
-                              linewidth=0, label="one standard deviation")  # fmt: skip
+            low, high, label = t["mean_less_deviation"], t["mean_plus_deviation"], "one standard deviation"
+            axes.fill_between(speed, low, high, color=COLOURS[0], alpha=0.18, linewidth=0, label=label)
         if "smoothed" in t:
             axes.plot(speed, t["smoothed"], "--", color=COLOURS[1], linewidth=1.5, label="smoothed")
         _warm(axes, t)
@@ -289,8 +290,8 @@ def _fluid(axes: Axes, t: Columns) -> None:
     (approach,), unit = _metres(t["approach_m"])
     for colour, value in zip(COLOURS, np.unique(approach), strict=False):
         chosen = approach == value
-        axes.plot(t["speed_m/s"][chosen], t["coefficient"][chosen], color=colour, linewidth=1.6,
-                  label=f"$u_n$ = {_number(value, unit)}")  # fmt: skip
+        x, y, label = t["speed_m/s"][chosen], t["coefficient"][chosen], f"$u_n$ = {_number(value, unit)}"
+        axes.plot(x, y, color=colour, linewidth=1.6, label=label)
         axes.plot(t["speed_m/s"][chosen], t["dry_part"][chosen], ":", color=colour, linewidth=1.2)
     axes.plot([], [], ":", color=GREY, label="dry part alone")
 
@@ -300,7 +301,7 @@ def _fluid(axes: Axes, t: Columns) -> None:
 
 def microslip_figure(study: Study) -> Any:
     """First loading: tangential force (friction coefficient, under given normal forces) over displacement."""
-    figure = _figure(7.4, 4.2)
+    figure = empty_figure(7.4, 4.2)
     microslip_panel(study, figure.subplots())
     figure.suptitle(_title(study, "microslip, first loading"), fontweight="bold")
     return figure
@@ -310,7 +311,7 @@ def microslip_panel(study: Study, axes: Axes) -> None:
     """One curve an approach or a normal force."""
     t, given = study.tables["microslip"], study.contact.file.microslip
     pressed = given is not None and bool(given.normal_forces)
-    _plain(axes)
+    plain_axes(axes)
     (w,), unit = _metres(t["displacement_m"])
     (u,), length = _metres(t["approach_m"])
     (force, newton), (loads, load_unit) = _newtons(t["F_t_N"]), _newtons(t["normal_force_N"])
@@ -335,18 +336,19 @@ def _shades(count: int) -> list[Any]:
 def wear_figure(study: Study) -> Any:
     """Heights and pressure at several times; area, stiffness, pressure and roughness over the time."""
     t, h = study.tables["wear"], study.tables["wear_heights"]
-    figure = _figure(11.0, 6.4)
+    figure = empty_figure(11.0, 6.4)
     panels = figure.subplots(2, 3).ravel()
     for axes in panels:
-        _plain(axes)
+        plain_axes(axes)
     (depth,), unit = _metres(h["depth_m"])
     pressure, pascal = _pascals(h["pressure_Pa"])
     times, second = _seconds(h["time_s"])
     for colour, at in zip(_shades(len(np.unique(times))), np.unique(times), strict=True):
         chosen = times == at
         panels[0].plot(100 * h["area_share"][chosen], depth[chosen], color=colour, linewidth=1.5)
-        panels[1].plot(100 * h["area_share"][chosen], pressure[chosen], color=colour, linewidth=1.5,
-                       label=_number(at, second))  # fmt: skip
+        panels[1].plot(
+            100 * h["area_share"][chosen], pressure[chosen], color=colour, linewidth=1.5, label=_number(at, second)
+        )
     panels[0].invert_yaxis()
     panels[0].set(xlabel="share of the area in %", ylabel=f"depth in {unit}")
     panels[1].set(xlabel="share of the area in %", ylabel=f"pressure in {pascal}")
@@ -362,9 +364,10 @@ def _wear_histories(panels: list[Axes], t: Columns) -> None:
     (approach, height), unit = _metres(t["approach_m"], t["peak_to_valley_m"])
     pressure, pascal = _pascals(t["largest_pressure_Pa"])
     shown = (
-        (100 * t["area_share"], "area in contact in %"), (stiffness, f"normal stiffness in {stiff}"),
+        (100 * t["area_share"], "area in contact in %"),
+        (stiffness, f"normal stiffness in {stiff}"),
         (pressure, f"largest pressure in {pascal}"),
-    )  # fmt: skip
+    )
     for axes, (values, name) in zip(panels, shown, strict=False):
         axes.plot(time, values, color=COLOURS[0], linewidth=1.7)
         axes.set_ylabel(name)
@@ -381,9 +384,7 @@ def _wear_histories(panels: list[Axes], t: Columns) -> None:
 def yield_figure(study: Study) -> Any:
     """Mean pressure and shear of the area in contact, and the largest shear stress against the yield limit."""
     t = study.tables["yield"]
-    figure = _figure(6.8, 4.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(6.8, 4.0)
     time, second = _seconds(t["time_s"] - t["time_s"][0])
     shear = np.hypot(t["shear_t1_Pa"], t["shear_t2_Pa"])
     both, pascal = _pascals(np.stack([t["pressure_Pa"], shear]))

@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Array
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import _figure, _plain, _save
+from .plots import empty_figure, plain_axes, plain_numbers, save_figure, single_panel, whole_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,52 +22,38 @@ if TYPE_CHECKING:
 
 def _in_millionths(axes: Axes, of: Quantity) -> None:
     """Amplitudes of a quantity on a logarithmic scale with plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
     axes.set_ylabel(f"amplitude in {of.micro} (0-peak)")
-
-
-def _whole(axes: Axes) -> None:
-    """Whole numbers along the abscissa."""
-    from matplotlib.ticker import MaxNLocator
-
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def nodal_diameter_picture(
     diagrams: Sequence[NodalDiagram], path: Path, title: str, found: Identified | None = None
-) -> Path:  # fmt: skip
+) -> Path:
     """Frequencies over the nodal diameter for several contact stiffnesses, with what was measured (Sextro Fig. 5.4-1).
 
     Args:
         diagrams: of rising stiffness. found: measured frequencies, the fitted one filled.
     """
-    figure = _figure(9.0, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(9.0, 6.0)
     for colour, d in zip(shades(len(diagrams)), diagrams, strict=True):
         for j, f in enumerate(d.frequency.T):
             label = f"$c_N$ = {d.stiffness:.3g} N/m" if j == 0 else None
             axes.plot(d.index, f, "o-", color=colour, markersize=3.5, linewidth=1.3, label=label)
     if found is not None:
         for m in found.measured:
-            fitted = m == found.fitted
-            axes.plot(m.index, m.frequency, "^", color="#b3261e", markersize=9, zorder=5,
-                      markerfacecolor="#b3261e" if fitted else "none")  # fmt: skip
+            fill = "#b3261e" if m == found.fitted else "none"
+            axes.plot(m.index, m.frequency, "^", color="#b3261e", markersize=9, zorder=5, markerfacecolor=fill)
         axes.plot([], [], "^", color="#b3261e", label="measured, fitted")
         if len(found.measured) > 1:
             axes.plot([], [], "^", color="#b3261e", markerfacecolor="none", label="measured, predicted")
     axes.set_xlabel("nodal diameter")
     axes.set_ylabel("frequency in Hz")
     axes.set_title(title)
-    _whole(axes)
+    whole_numbers(axes)
     axes.set_ylim(bottom=0.0)
     figure.legend(loc="outside lower center", ncols=4, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str) -> Path:
@@ -76,10 +62,10 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     Args:
         found: label, such as a normal force, -> resonances.
     """
-    figure = _figure(9.0, 7.0)
+    figure = empty_figure(9.0, 7.0)
     upper, lower = figure.subplots(2, 1, sharex=True)
     for axes in (upper, lower):
-        _plain(axes)
+        plain_axes(axes)
     for colour, (label, r) in zip(shades(len(found)), found.items(), strict=True):
         upper.plot(r.order, r.frequency, "o-", color=colour, markersize=4, linewidth=1.3, label=label)
         lower.plot(r.order, 1e6 * r.amplitude, "o-", color=colour, markersize=4, linewidth=1.3)
@@ -88,51 +74,41 @@ def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str)
     upper.set_ylabel("resonance in Hz")
     _in_millionths(lower, last.quantity)
     lower.set_xlabel("engine order")
-    _whole(lower)
+    whole_numbers(lower)
     upper.set_title(title)
     figure.legend(loc="outside lower center", ncols=4, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
-def envelope_picture(
-    found: Envelope, path: Path, title: str, measured: tuple[Array, Array] | None = None
-) -> Path:  # fmt: skip
-    """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2).
-
-    Args:
-        measured: (f,) Hz and (f,) amplitudes.
-    """
-    figure = _figure(9.0, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
-    axes.fill_between(found.frequency, 1e6 * found.low, 1e6 * found.high, color="#9ec5e8", alpha=0.6, linewidth=0,
-                      label="between the smallest and the largest")  # fmt: skip
+def envelope_picture(found: Envelope, path: Path, title: str) -> Path:
+    """Smallest and largest amplitude over the frequency, with every combination (Sextro Fig. 5.4-2)."""
+    figure, axes = single_panel(9.0, 6.0)
+    low, high, between = 1e6 * found.low, 1e6 * found.high, "between the smallest and the largest"
+    axes.fill_between(found.frequency, low, high, color="#9ec5e8", alpha=0.6, linewidth=0, label=between)
     for i, (a, ok) in enumerate(zip(found.monitor, found.converged, strict=True)):
         label = f"each of {len(found.monitor)} combinations" if i == 0 else None
         axes.plot(found.frequency, np.where(ok, 1e6 * np.abs(a), np.nan), color="0.45", linewidth=0.6, label=label)
-    if measured is not None:
-        axes.plot(measured[0], 1e6 * measured[1], ".", color="#b3261e", label="measured")
     _in_millionths(axes, found.quantity)
     axes.set_xlim(found.frequency[0], found.frequency[-1])
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_title(title)
     figure.legend(loc="outside lower center", ncols=3, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def speed_line_picture(
     rpm: Array, frequency: Array, amplitude: Array, normal: Array, path: Path, title: str, of: Quantity = METRES
-) -> Path:  # fmt: skip
+) -> Path:
     """Amplitude and normal forces along an engine-order line.
 
     Args:
         rpm, frequency: (s,) speeds and Hz. amplitude: (s,) m, NaN where not converged. normal: (s, contacts) N. of:
             what is read; m stands for its unit.
     """
-    figure = _figure(9.0, 6.5)
+    figure = empty_figure(9.0, 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     for axes in (upper, lower):
-        _plain(axes)
+        plain_axes(axes)
     upper.plot(rpm, 1e6 * amplitude, color="#1f5f99", linewidth=1.6)
     _in_millionths(upper, of)
     upper.set_title(title)
@@ -146,4 +122,4 @@ def speed_line_picture(
     ratio = float(frequency[0] / rpm[0])
     second = upper.secondary_xaxis("top", functions=(lambda n: n * ratio, lambda f: f / ratio))
     second.set_xlabel("excitation frequency in Hz")
-    return _save(figure, path)
+    return save_figure(figure, path)

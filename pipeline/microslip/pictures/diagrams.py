@@ -28,7 +28,19 @@ from ..ring.resonances import (
     wave_tracks,
     zigzag,
 )
-from .plots import COLOURS, _end_labels, _figure, _order_label, _per_minute, _per_second, _plain, _save
+from ..units import from_rpm, rpm_text, to_rpm
+from .plots import (
+    COLOURS,
+    _end_labels,
+    _order_label,
+    _per_minute,
+    _per_second,
+    empty_figure,
+    plain_axes,
+    said_beside,
+    save_figure,
+    single_panel,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,10 +61,6 @@ def _hertz(omega: Array) -> Array:
     return omega / (2 * np.pi)
 
 
-def _rpm_text(speed: float) -> str:
-    return f"{speed * 30 / np.pi:.6g} rpm"
-
-
 def _note(axes: Axes, text: str, below: float) -> None:
     axes.text(0.5, below, text, transform=axes.transAxes, ha="center", va="top", fontsize=8, color=FAINT, wrap=True)
 
@@ -62,9 +70,7 @@ def _note(axes: Axes, text: str, below: float) -> None:
 
 def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     """Frequency over nodal diameter at the lowest and the highest speed, one line a family."""
-    figure = _figure(8.6, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.6, 6.0)
     ends = dict.fromkeys((speeds_of(basis)[0], speeds_of(basis)[-1]))
     shown = [families(basis, s) for s in ends]
     top = 1.05 * max(float(eigenmodes(basis.groups[s, k]).frequency.max()) for s in ends for k in harmonics_of(basis))
@@ -78,9 +84,9 @@ def nodal_diameter_plot(basis: ModalBasis, path: Path) -> Path:
     axes.set_title(f"{basis.name}: nodal diameters of {basis.sectors} sectors", fontweight="bold")
     note = "lines join modes of the same shape (MAC)"
     if len(shown) > 1:
-        note = f"filled: at {_rpm_text(shown[0].speed)}; hollow: at {_rpm_text(shown[1].speed)}; {note}"
+        note = f"filled: at {rpm_text(shown[0].speed)}; hollow: at {rpm_text(shown[1].speed)}; {note}"
     _note(axes, note, -0.11)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _family_lines(axes: Axes, found: Families, top: float, solid: bool = True, width: float = 1.4) -> None:
@@ -136,9 +142,7 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     shut = {k: _hertz(stuck(basis, basis.groups[speed, k], name)[0]) for k in harmonics}
     shown = max(2, len(found.omega) // 2)
     top = 1.05 * max(float(f[:shown].max()) for f in shut.values())
-    figure = _figure(8.6, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.6, 6.0)
     _family_lines(axes, found, top, width=0.8)
     _family_labels(axes, found, top)
     for k, f in shut.items():
@@ -148,10 +152,10 @@ def stuck_plot(basis: ModalBasis, path: Path) -> Path | None:
     axes.set_ylabel("frequency in Hz")
     kept = any(c.modes == "closed" and c.sector_shift for c in basis.groups[speed, harmonics[0]].contacts.values())
     apart, state = ("sliding", "closed along their normal") if kept else ("apart", "open")
-    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {_rpm_text(found.speed)}", fontweight="bold")
+    axes.set_title(f"{basis.name}: neighbours {apart} and stuck, {rpm_text(found.speed)}", fontweight="bold")
     note = f"lines: contacts {state}; black squares: the contact '{name}' and its neighbour do not move on each other"
     _note(axes, note, -0.11)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 # --- interference --------------------------------------------------------------------------------------------------
@@ -165,7 +169,7 @@ def safe_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -> Path | No
     turning = [turning[i] for i in np.unique(np.linspace(0, len(turning) - 1, MOST_PANELS).round().astype(int))]
     columns = 1 if len(turning) == 1 else 2
     rows = math.ceil(len(turning) / columns)
-    figure = _figure(8.0 if columns == 1 else 6.4 * columns, 1.3 + 5.2 * rows)
+    figure = empty_figure(8.0 if columns == 1 else 6.4 * columns, 1.3 + 5.2 * rows)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, speed in zip(panels, turning, strict=False):
         _safe_panel(axes, basis, speed, sorted({e for e in orders if e > 0}))
@@ -176,7 +180,7 @@ def safe_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -> Path | No
         panels[-1].text(0.5, 0.5, note, ha="center", va="center", color=FAINT)
     else:
         figure.supxlabel(note, fontsize=8.5, color=FAINT)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 _SAFE_NOTE = (
@@ -186,7 +190,7 @@ _SAFE_NOTE = (
 
 
 def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]) -> None:
-    _plain(axes)
+    plain_axes(axes)
     found = families(basis, speed)
     turns = found.speed / (2 * np.pi)
     top = _safe_ceiling(found, orders, turns)
@@ -198,7 +202,7 @@ def _safe_panel(axes: Axes, basis: ModalBasis, speed: int, orders: Sequence[int]
     _close_ones(axes, margins(basis, speed, orders, CLOSE), top)
     _nodal_axis(axes, basis)
     axes.set_ylabel("frequency in Hz")
-    axes.set_title(_rpm_text(found.speed), fontsize=11)
+    axes.set_title(rpm_text(found.speed), fontsize=11)
 
 
 def _safe_ceiling(found: Families, orders: Sequence[int], turns: float) -> float:
@@ -234,10 +238,9 @@ def _on_line(axes: Axes, text: str, k: int, hertz: float, direction: str, at_edg
 
     right = not at_edge
     shift = {FORWARD: (7, 6), STANDING: (8, -2)}.get(direction, (7, -6)) if right else (-8, 0)
-    axes.annotate(
-        text, (k, hertz), xytext=shift, textcoords="offset points", fontsize=8, color="#3c424e", zorder=5,
-        ha="left" if right else "right", va="center", path_effects=[withStroke(linewidth=3, foreground="white")],
-    )  # fmt: skip
+    how = {"ha": "left" if right else "right", "va": "center", "fontsize": 8, "color": "#3c424e", "zorder": 5}
+    behind = [withStroke(linewidth=3, foreground="white")]
+    said_beside(axes, text, (k, hertz), shift, path_effects=behind, **how)
 
 
 def _close_ones(axes: Axes, found: Sequence[Margin], top: float) -> None:
@@ -259,12 +262,10 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     curves = tracks(basis)
     if not curves:
         return None
-    figure = _figure(9.2, 6.8)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(9.2, 6.8)
     orders = sorted({e for e in orders if e > 0})
     speeds = next(iter(curves.values())).speeds
-    rpm = np.linspace(speeds[0], speeds[-1], 201) * 30 / np.pi
+    rpm = to_rpm(np.linspace(speeds[0], speeds[-1], 201))
     top = _campbell_ceiling(curves, orders, speeds[-1])
     joined = families(basis)
     found = [r for r in resonances(basis, orders) if r.frequency <= top]
@@ -275,7 +276,8 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
         axes.plot(rpm, order * rpm / 60, color=FAINT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1.5)
         at = _free_place(order, rpm, top, strong, found)
         _order_label(axes, order, at, top, f"EO {order}, k={aliased(order, basis.sectors)[0]}")
-    _rings(axes, found)
+    x, y = [to_rpm(r.speed) for r in found], [r.frequency for r in found]
+    axes.plot(x, y, "o", mfc="white", mec=INK, markersize=6, zorder=4, linestyle="none")
     axes.set_xlim(rpm[0], rpm[-1])
     axes.set_ylim(0, top)
     axes.set_xlabel("rotation speed in rpm")
@@ -288,7 +290,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
         note += "circles: true resonances (same frequency, same k)"
     above = f"; {hidden} {'family lies' if hidden == 1 else 'families lie'} above" if hidden else ""
     _note(axes, note + above, -0.13)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _campbell_ceiling(curves: dict[int, Tracks], orders: Sequence[int], fastest: float) -> float:
@@ -306,7 +308,7 @@ def _waves(
     top: float,
 ) -> tuple[int, list[Array]]:  # fmt: skip
     """Draw every curve, faint unless its wave is excited; how many families lie above, and the strong curves."""
-    speeds, labels, hidden, drawn = rpm * np.pi / 30, [], 0, []
+    speeds, labels, hidden, drawn = from_rpm(rpm), [], 0, []
     for c, row in enumerate(joined.modes):
         members = {int(k): int(j) for k, j in zip(joined.harmonics, row, strict=True) if j >= 0}
         lines = {k: f for k, j in members.items() if (f := _line(curves[k], j, speeds)) is not None}
@@ -334,7 +336,7 @@ def _free_place(order: int, rpm: Array, top: float, curves: Sequence[Array], rin
         x = part * last
         y = order * x / 60
         here = [abs(float(np.interp(x, rpm, f)) - y) / top for f in curves]
-        marks = [max(abs(r.speed * 30 / np.pi - x) / rpm[-1] - 0.03, 0) + abs(r.frequency - y) / top for r in rings]
+        marks = [max(abs(to_rpm(r.speed) - x) / rpm[-1] - 0.03, 0) + abs(r.frequency - y) / top for r in rings]
         room = min([f for f in [*here, *marks] if np.isfinite(f)], default=1.0)
         if room > 0.028:
             return float(x)
@@ -346,9 +348,3 @@ def _line(t: Tracks, mode: int, speeds: Array) -> Array | None:
     """Frequencies of the curve that begins as `mode` at the lowest speed."""
     curve = np.flatnonzero(t.modes[:, 0] == mode)
     return t.frequency(int(curve[0]), speeds) if len(curve) else None
-
-
-def _rings(axes: Axes, found: Sequence[Resonance]) -> None:
-    """A circle at each true resonance."""
-    x, y = [r.speed * 30 / np.pi for r in found], [r.frequency for r in found]
-    axes.plot(x, y, "o", mfc="white", mec=INK, markersize=6, zorder=4, linestyle="none")

@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Array
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import COLOURS, _figure, _length, _plain, _save
+from .plots import COLOURS, empty_figure, length_unit, plain_axes, plain_numbers, said_beside, save_figure, single_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,17 +24,15 @@ if TYPE_CHECKING:
 
 def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
     """Amplitude over frequency, load or normal force; folds marked, every second leg between folds dashed."""
-    figure = _figure(9.0, 5.6)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(9.0, 5.6)
     scale, unit = _scale(0.1 * np.concatenate([one.amplitude for one in found]), found[0].quantity)
     colours = shades(len(found)) if len(found) > 1 else [COLOURS[0]]
     for colour, one in zip(colours, found, strict=True):
         x, y = one.parameter, scale * one.amplitude
         ends = [0, *np.flatnonzero(one.fold), len(x) - 1]
         for leg, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
-            axes.plot(x[a : b + 1], y[a : b + 1], color=colour, linewidth=1.6, linestyle="--" if leg % 2 else "-",
-                      label=one.label.replace("F_N", "$F_N$") if leg == 0 else None)  # fmt: skip
+            line, label = "--" if leg % 2 else "-", one.label.replace("F_N", "$F_N$") if leg == 0 else None
+            axes.plot(x[a : b + 1], y[a : b + 1], line, color=colour, linewidth=1.6, label=label)
         size = 6 if one.fold.sum() < 8 else 3.5
         axes.plot(x[one.fold], y[one.fold], "o", color=colour, markersize=size, markerfacecolor="white", zorder=4)
         if not one.complete:
@@ -47,7 +45,7 @@ def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
     _for_reading(axes, found, scale)
     axes.set(xlabel=_OVER[found[0].over], ylabel=f"amplitude of the read-out in {unit} (0-peak)", title=title)
     figure.legend(loc="outside lower center", ncols=5, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 _OVER = {"frequency": "excitation frequency in Hz", "load": "share of the load", "normal_force": "normal force in N"}
@@ -55,8 +53,6 @@ _OVER = {"frequency": "excitation frequency in Hz", "load": "share of the load",
 
 def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
     """Logarithmic axes where values are spread over more than a factor of thirty."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     heights = scale * np.concatenate([one.amplitude for one in found])
     ends = np.concatenate([one.parameter for one in found])
     spread = {"y": heights} if found[0].over == "frequency" else {"y": heights, "x": ends}
@@ -66,21 +62,19 @@ def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
             continue
         axis = axes.yaxis if name == "y" else axes.xaxis
         axes.set(**{f"{name}scale": "log"})
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if values.max() < 300 * values.min() else (1.0,)))
-        axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        plain_numbers(axis, (1.0, 2.0, 5.0) if values.max() < 300 * values.min() else (1.0,))
         axes.autoscale(axis="both" if name == "y" else "x")
 
 
 def _scale(values: Array, of: Quantity) -> tuple[float, str]:
     """Factor and unit in which values of a quantity need no powers of ten."""
-    _, unit = _length(values)
+    _, unit = length_unit(values)
     return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit], unit.removesuffix("m") + of.said
 
 
 def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Quantity = METRES) -> Path:
     """Frequency and damping ratio over the amplitude of what is read, a curve a normal force (N)."""
-    figure = _figure(10.5, 4.4)
+    figure = empty_figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
     scale, unit = _scale(0.1 * np.concatenate([[1e-9], *(one.amplitude[-1:] for one in found.values())]), of)
     for colour, (normal, one) in zip(shades(len(found)), sorted(found.items()), strict=True):
@@ -89,17 +83,17 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
         left.axhline(one.stuck / (2 * np.pi), color=colour, linewidth=0.8, linestyle=":")
         right.semilogx(x, 100 * one.damping, color=colour, linewidth=1.7, label=label)
     for axes, quantity in ((left, "frequency in Hz (dotted: contacts stuck)"), (right, "damping ratio in %")):
-        _plain(axes)
+        plain_axes(axes)
         axes.set(xlabel=f"amplitude of the read-out in {unit} (0-peak)", ylabel=quantity)
     right.set_ylim(bottom=0)
     figure.suptitle(title, fontsize=12)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantity = METRES) -> Path:
     """Height and frequency of the highest resonance of what is read over a setting, the optimum marked."""
-    figure = _figure(10.5, 4.4)
+    figure = empty_figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
     scale, unit = _scale(np.array([found.resonance.amplitude]), of)
     known = {value: one for value, one in found.found.items() if one.status == "converged"}
@@ -110,7 +104,7 @@ def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantit
         axes.plot(x, y, "o-", color=COLOURS[0], markersize=4, linewidth=1.6)
         at = (found.parameter, y[list(known).index(found.parameter)])
         axes.plot(*at, "o", markersize=11, mfc="none", mec="#c8382c", mew=1.8)
-        _plain(axes)
+        plain_axes(axes)
         axes.set_xlabel(label)
         if x.min() > 0:
             axes.set_xscale("log")
@@ -119,24 +113,19 @@ def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantit
             axes.set_xticks(ticks, labels=[f"{v:g}" for v in ticks])
             axes.minorticks_off()
         if axes is left:
-            axes.annotate(
-                f"{found.parameter:.4g}", at, xytext=(0, -18), textcoords="offset points", ha="center", fontsize=9,
-                color="#c8382c",
-            )  # fmt: skip
+            said_beside(axes, f"{found.parameter:.4g}", at, (0, -18), ha="center", fontsize=9, color="#c8382c")
     if height.max() > 20 * height.min():
         left.set_yscale("log")
     left.set_ylabel(f"height of the highest resonance in {unit} (0-peak)")
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")
     figure.suptitle(title, fontsize=12)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str, path: Path) -> Path:
     """Largest multiplier over the frequency, a curve a normal force (N); what is not stable stands out."""
-    figure = _figure(9.0, 5.0)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(9.0, 5.0)
     axes.axhline(1.0, color="#333", linewidth=1.0)
     for colour, (normal, points) in zip(shades(len(found)), sorted(found.items()), strict=True):
         f = np.array(sorted(points))
@@ -148,4 +137,4 @@ def stability_plot(found: Mapping[float, Mapping[float, Stability]], title: str,
         xlabel="excitation frequency in Hz", ylabel="largest Floquet multiplier (red dots: not stable)", title=title
     )
     figure.legend(loc="outside lower center", ncols=6, fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)

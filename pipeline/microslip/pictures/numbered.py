@@ -53,7 +53,7 @@ def surfaces_picture(points: Array, triangles: Indices, surface: Indices, title:
 
 def _view(
     stage: Stage, camera: Camera, points: Array, triangles: Indices, surface: Indices
-) -> tuple[Picture, list[int]]:  # fmt: skip
+) -> tuple[Picture, list[int]]:
     """One view, and the surfaces that got a number in it."""
     names, which = np.unique(surface, return_inverse=True)
     flat = _split(triangles, which, len(points))

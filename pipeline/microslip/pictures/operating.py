@@ -12,7 +12,16 @@ from ..data import Array
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, at_time, displacement, longest
 from ..operating.stress import CycleStress, StressPeaks
-from .plots import COLOURS, _figure, _length, _plain, _save
+from .plots import (
+    COLOURS,
+    empty_figure,
+    length_unit,
+    plain_numbers,
+    said_beside,
+    save_figure,
+    single_panel,
+    whole_numbers,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,48 +44,31 @@ def shades(count: int) -> list[tuple[float, ...]]:
 # over frequency, over normal force ---------------------------------------------------------------------------------
 
 
-def over_frequency_plot(
-    curves: Curves, quantity: str, title: str, path: Path, lines: Sequence[float] = (),
-    free: tuple[Array, Array] | None = None, note: str = "",
-) -> Path:  # fmt: skip
+def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -> Path:
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
-        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit. lines: frequencies
-            (Hz) to mark, those with sticking contacts. free: the response without contacts.
+        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit.
     """
-    figure = _figure(9.0, 6.0)
-    axes = figure.subplots()
-    _plain(axes)
-    if free is not None:
-        axes.semilogy(*free, color="0.6", linewidth=1, label="no contact")
+    figure, axes = single_panel(9.0, 6.0)
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     for colour, (normal, (x, y)) in reversed(pairs):  # the light ones on top
         axes.semilogy(x, y, color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
-    for f in [f for f in lines if low < f < high]:
-        axes.axvline(f, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
-        axes.annotate(
-            f"{f:.0f}", (f, 0.0), xycoords=("data", "axes fraction"), xytext=(2, 3), textcoords="offset points",
-            fontsize=8, color="0.45",
-        )  # fmt: skip
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
-    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 6, "fontsize": 9}
-    figure.legend(**where, title=note or None, title_fontsize=8)
-    return _save(figure, path)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=9)
+    return save_figure(figure, path)
 
 
 def over_normal_force_plot(
     peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path
-) -> Path:  # fmt: skip
+) -> Path:
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
         peaks: name of a resonance -> (normal force, value) pairs. A normal force of 0 has no place on the axis.
     """
-    figure = _figure(8.0, 5.2)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.0, 5.2)
     for i, (name, pairs) in enumerate(peaks.items()):
         x, y = np.array(sorted(p for p in pairs if p[0] > 0)).reshape(-1, 2).T
         if not len(x):
@@ -85,29 +77,23 @@ def over_normal_force_plot(
         axes.loglog(x, y, "o-", color=colour, linewidth=1.6, markersize=4, label=name)
         if 0 < best < len(x) - 1:
             axes.plot(x[best], y[best], "o", markersize=9, mfc="none", mec=colour, mew=1.6)
-            axes.annotate(
-                f"{x[best]:.3g} N", (x[best], y[best]), xytext=(0, -9), textcoords="offset points", ha="center",
-                va="top", fontsize=8.5, color=colour,
-            )  # fmt: skip
+            how = {"ha": "center", "va": "top", "fontsize": 8.5, "color": colour}
+            said_beside(axes, f"{x[best]:.3g} N", (x[best], y[best]), (0, -9), **how)
     axes.set(xlabel="normal force in N", ylabel=quantity, title=title)
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
-        _plain_numbers(axis)
+        _numbers_within(axis)
     if len(peaks) > 1:
         axes.legend(fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
-def _plain_numbers(axis: Any) -> None:
+def _numbers_within(axis: Any) -> None:
     """Numbers without powers of ten on a logarithmic axis; more of them where it spans less than a decade or two."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
     low, high = axis.get_view_interval()
     span = np.log10(high / low)
     within = (1.0,) if span > 2.5 else (1.0, 2.0, 5.0) if span > 0.8 else tuple(np.arange(1.0, 10.0))
-    axis.set_major_locator(LogLocator(subs=within))
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+    plain_numbers(axis, within)
 
 
 def over_engine_order_plot(curves: Curves, quantity: str, title: str, path: Path) -> Path:
@@ -116,38 +102,29 @@ def over_engine_order_plot(curves: Curves, quantity: str, title: str, path: Path
     Args:
         curves: normal force, N -> engine orders and values.
     """
-    from matplotlib.ticker import MaxNLocator
-
-    figure = _figure(8.0, 5.2)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.0, 5.2)
     marks = "osD^vP*X"
     for i, (colour, (normal, (x, y))) in enumerate(zip(shades(len(curves)), sorted(curves.items()), strict=True)):
         axes.semilogy(
             x, y, marker=marks[i % len(marks)], color=colour, linewidth=1.4, markersize=5, label=f"$F_N$ = {normal:g} N"
         )
     axes.set(xlabel="engine order", ylabel=quantity, title=title)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    whole_numbers(axes)
     figure.legend(loc="outside right upper", fontsize=9)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 # fatigue -----------------------------------------------------------------------------------------------------------
 
 
-def haigh_plot(
-    cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, path: Path, only: Array | None = None
-) -> Path:  # fmt: skip
+def haigh_plot(cycle: CycleStress, limits: MaterialLimits, worst: Endurance, title: str, path: Path) -> Path:
     """All places in the Haigh diagram: amplitude over mean, with the Goodman line and the line of yielding.
 
     Args:
-        worst: the place to mark. only: numbers of the places shown.
+        worst: the place to mark.
     """
-    figure = _figure(8.0, 5.4)
-    axes = figure.subplots()
-    _plain(axes)
-    chosen = np.arange(len(cycle.points)) if only is None else np.asarray(only)
-    mean, amplitude = 1e-6 * cycle.mean[chosen], 1e-6 * cycle.amplitude[chosen]
+    figure, axes = single_panel(8.0, 5.4)
+    mean, amplitude = 1e-6 * cycle.mean, 1e-6 * cycle.amplitude
     left = min(float(mean.min()), -0.15e-6 * limits.tensile_strength)
     x = np.linspace(left, 1e-6 * limits.tensile_strength, 201)
     axes.plot(x, 1e-6 * allowed_amplitude(limits, 1e6 * x), color=COLOURS[1], linewidth=1.8, label="Goodman")
@@ -161,12 +138,15 @@ def haigh_plot(
     )
     top = max(1.15e-6 * limits.fatigue_strength, 1.1 * float(amplitude.max()))
     axes.set(
-        xlabel="mean stress in MPa (static and mean, compression negative)", ylabel="stress amplitude in MPa",
-        title=title, ylim=(0, top), xlim=(left, 1.03e-6 * limits.tensile_strength),
-    )  # fmt: skip
+        xlabel="mean stress in MPa (static and mean, compression negative)",
+        ylabel="stress amplitude in MPa",
+        title=title,
+        ylim=(0, top),
+        xlim=(left, 1.03e-6 * limits.tensile_strength),
+    )
     axes.legend(fontsize=9, loc="upper right")
     _close_up(axes, mean, amplitude)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
@@ -176,11 +156,9 @@ def _close_up(axes: Axes, mean: Array, amplitude: Array) -> None:
     if not 0 < high < 0.25 * top:
         return
     if np.ptp(mean) < 0.005 * (right - left):
-        axes.annotate(
-            f"all places: mean stress {mean.mean():.2g} MPa (no static load),\namplitude up to {high:.3g} MPa",
-            (float(mean.mean()), high), xytext=(40, 40), textcoords="offset points", fontsize=9, color=COLOURS[0],
-            arrowprops={"arrowstyle": "-", "color": COLOURS[0]},
-        )  # fmt: skip
+        said = f"all places: mean stress {mean.mean():.2g} MPa (no static load),\namplitude up to {high:.3g} MPa"
+        line = {"arrowstyle": "-", "color": COLOURS[0]}
+        said_beside(axes, said, (mean.mean(), high), (40, 40), fontsize=9, color=COLOURS[0], arrowprops=line)
         return
     window = axes.inset_axes((0.52, 0.36, 0.45, 0.3))
     window.scatter(mean, amplitude, s=5, color=COLOURS[0], alpha=0.35, linewidths=0)
@@ -214,7 +192,9 @@ def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path
     high = min(4.0 * slender, 1.6)  # inches of a panel; what is wider than it needs to be stays white
     narrow = slender > 0.4  # titles in two lines
     beside = 0.8 if narrow else 0.62
-    figure = _figure(max(0.8 + min(1.9 + high / slender, 5.2) * len(maps), 6.5), 0.7 + len(_PANELS) * (beside + high))
+    figure = empty_figure(
+        max(0.8 + min(1.9 + high / slender, 5.2) * len(maps), 6.5), 0.7 + len(_PANELS) * (beside + high)
+    )
     table = figure.subplots(len(_PANELS), len(maps), squeeze=False)
     for j, (m, lies) in enumerate(zip(maps, flat, strict=True)):
         for i, panel in enumerate(_PANELS):
@@ -225,7 +205,7 @@ def contact_map_plot(maps: Sequence[ContactMap], title: str, path: Path) -> Path
             axes.tick_params(labelbottom=False)
         table[-1, j].set_xlabel(("t1" if lies else "t2") + " in mm", fontsize=9)
     figure.suptitle(title, fontweight="bold")
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _energy(joules: float) -> str:
@@ -237,7 +217,7 @@ def _energy(joules: float) -> str:
 
 def _map_panel(
     axes: Axes, m: ContactMap, name: str, label: str, scale: float, unit: str, colours: str, lies: bool, between: str
-) -> None:  # fmt: skip
+) -> None:
     from matplotlib.ticker import MaxNLocator
 
     from ..operating.patches import grid_of, on_grid
@@ -260,6 +240,7 @@ def _map_panel(
 
 def _span(values: Array) -> str:
     """Smallest and largest value; one where all are the same."""
+
     low, high = float(values.min()), float(values.max())
     return f"{high:.3g} everywhere, in" if high - low <= 1e-3 * abs(high) else f"{low:.3g} to {high:.3g}"
 
@@ -301,7 +282,7 @@ def stress_picture(
     for label, values, unit, colours in fields:
         image = views.stress_tile(studio, values, grown * shape, camera, 0.8, unit, colours, mark=mark)
         tiles.append(captioned(image, label, size=16))
-    amount, unit = _length(np.array([size]))
+    amount, unit = length_unit(np.array([size]))
     ring = "" if mark is None else f" Ring: the worst place{'' if _seen(studio, mark) else ', on the far side'}."
     note = (
         f"Drawn at {degrees:.0f} degrees of the cycle, {grown:g} times as large; largest displacement "

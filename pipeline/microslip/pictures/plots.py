@@ -13,9 +13,11 @@ from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
 from ..modes.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
 from ..reduced.truncation import Coordinate, coordinates, percent
+from ..units import from_rpm, rpm_text, to_rpm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from ..modes.closures import ContactCurve
@@ -23,23 +25,52 @@ if TYPE_CHECKING:
 COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f", "#5b6270", "#94a112")
 
 
-def _figure(width: float, height: float) -> Figure:
+def empty_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), dpi=110, layout="constrained")
 
 
-def _save(figure: Figure, path: Path) -> Path:
+def single_panel(width: float, height: float) -> tuple[Figure, Axes]:
+    """A figure (inches) of a single diagram."""
+    figure = empty_figure(width, height)
+    axes = figure.subplots()
+    plain_axes(axes)
+    return figure, axes
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
     """As PNG, complete or absent, without a date in it."""
     with complete_or_absent(path) as temporary:
         figure.savefig(temporary, format="png", metadata={"Software": None}, facecolor="white")
     return path
 
 
-def _plain(axes: Axes) -> None:
+def plain_axes(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, color="#dde0e6", linewidth=0.7)
     axes.set_axisbelow(True)
+
+
+def said_beside(axes: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
+    """Words beside a place of a diagram, so many points to the right and above it."""
+    axes.annotate(text, at, xytext=shift, textcoords="offset points", **how)
+
+
+def whole_numbers(axes: Axes) -> None:
+    """Along the abscissa."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def plain_numbers(axis: Axis, within: tuple[float, ...]) -> None:
+    """Numbers without powers of ten on a logarithmic axis, at these multiples of every power."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=within))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 # --- closure -------------------------------------------------------------------------------------------------------
@@ -47,25 +78,25 @@ def _plain(axes: Axes) -> None:
 
 def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
     """Normal force of a closure over the approach of its faces, and its slope, the stiffness of the contact."""
-    figure = _figure(10.5, 3.9)
-    x, unit = _length(curve.approach)
+    figure = empty_figure(10.5, 3.9)
+    x, unit = length_unit(curve.approach)
     panels = (
         (curve.force, "normal force in N"),
         (curve.stiffness, "stiffness in N/m"),
         (100 * curve.closed_share, "share of the face in contact in %"),
     )
     for axes, (y, name) in zip(figure.subplots(1, 3), panels, strict=True):
-        _plain(axes)
+        plain_axes(axes)
         axes.plot(x, y, "-o", color=COLOURS[0], linewidth=1.6, markersize=4)
         axes.set_xlabel(f"approach of the faces in {unit}")
         axes.set_ylabel(name)
         axes.set_ylim(0, 1.08 * max(float(y.max()), 1e-300))
         axes.ticklabel_format(axis="y", scilimits=(-3, 5), useMathText=True)
     figure.suptitle(title, fontweight="bold")
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
-def _length(values: Array) -> tuple[Array, str]:
+def length_unit(values: Array) -> tuple[Array, str]:
     """Lengths (m) in a unit that needs no powers of ten."""
     top = float(np.abs(values).max())
     scale, unit = next(((s, u) for s, u in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")) if top * s >= 0.1), (1e9, "nm"))
@@ -93,7 +124,7 @@ def compliance_plot(basis: ModalBasis, group: ModalGroup, path: Path, most: int 
     names = list(panels)[:most]
     columns = min(len(names), 3)
     rows = math.ceil(len(names) / columns)
-    figure = _figure(max(4.8 * columns, 6.0), 0.9 + 2.9 * rows)  # the legends stand beside the panels
+    figure = empty_figure(max(4.8 * columns, 6.0), 0.9 + 2.9 * rows)  # the legends stand beside the panels
     table = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, name in zip(table, names, strict=False):
         _compliance_panel(axes, name, panels[name], group.n_modes)
@@ -103,13 +134,11 @@ def compliance_plot(basis: ModalBasis, group: ModalGroup, path: Path, most: int 
     figure.supylabel("share of the static compliance in %")
     more = f" (first {most} of {len(panels)} panels)" if len(panels) > most else ""
     figure.suptitle(f"{basis.name}: how much of the static compliance the modes hold{more}", fontweight="bold")
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count: int) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    _plain(axes)
+    plain_axes(axes)
     axes.axhline(100, color="#5b6270", linewidth=0.8)
     kept = np.arange(count + 2)
     for i, c in enumerate(found):
@@ -122,7 +151,7 @@ def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count:
     axes.set_title(name, fontsize=10)
     axes.set_xlim(0, count + 0.6)
     axes.set_ylim(-3, 106)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    whole_numbers(axes)
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, handlelength=1.4)
 
 
@@ -131,12 +160,10 @@ def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count:
 
 def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path: Path) -> Path:
     """Frequencies over the speed with engine-order lines and their crossings."""
-    figure = _figure(8.6, 6.4)
-    axes = figure.subplots()
-    _plain(axes)
+    figure, axes = single_panel(8.6, 6.4)
     orders = sorted({k for k in orders if k > 0})
     top = _ceiling(tracks, orders)
-    rpm = np.linspace(tracks.speeds[0], tracks.speeds[-1], 201) * 30 / np.pi
+    rpm = to_rpm(np.linspace(tracks.speeds[0], tracks.speeds[-1], 201))
     split = track_gyroscopic(basis) if gyroscopic_change(basis) > VISIBLE else None
     _curves(axes, tracks, rpm, top)
     if split is not None:
@@ -146,7 +173,7 @@ def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path
         _order_label(axes, order, rpm[-1], top)
     _mark(axes, [c for c in crossings(tracks, orders) if c.frequency <= top])
     _campbell_frame(axes, basis, rpm, top, tracks)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 VISIBLE = 0.005
@@ -160,12 +187,12 @@ def _split(axes: Axes, basis: ModalBasis, split: Tracks, rpm: Array, top: float)
     ink = "#30343c"
     for omega in split.omega:  # the split grows with Omega, not with its square
         known = np.isfinite(omega)
-        at = split.speeds[known] * 30 / np.pi
+        at = to_rpm(split.speeds[known])
         f = np.interp(rpm, at, omega[known], left=np.nan, right=np.nan) / (2 * np.pi)
         axes.plot(rpm, np.where(f <= top, f, np.nan), color=ink, linewidth=0.9, linestyle=(0, (4, 1.5)), zorder=2.5)
     for way, mark in _WHIRL.items():
         at = [
-            (g.speed * 30 / np.pi, f)
+            (to_rpm(g.speed), f)
             for (_, h), g in sorted(basis.groups.items())
             if g.gyroscopic is not None and h == 0
             for f, direction in zip(g.gyroscopic.frequency, g.gyroscopic.direction, strict=True)
@@ -188,7 +215,7 @@ def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
 
 
 def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
-    speeds = rpm * np.pi / 30
+    speeds = from_rpm(rpm)
     labels = []
     for c in range(len(tracks.modes)):
         f = tracks.frequency(c, speeds)
@@ -200,7 +227,7 @@ def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:
         at = tracks.speeds[known] if tracks.solved is None else tracks.solved
         stations = tracks.frequency(c, at)
         shown = stations <= top
-        axes.plot(at[shown] * 30 / np.pi, stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
+        axes.plot(to_rpm(at[shown]), stations[shown], "o", color=colour, markersize=4.5, clip_on=False, zorder=3)
         for step in np.flatnonzero(tracks.mac[c] < SURE):
             part = (speeds >= tracks.speeds[step]) & (speeds <= tracks.speeds[step + 1])
             axes.plot(rpm[part], f[part], color="white", linewidth=2.4, linestyle=(0, (2, 3)))
@@ -216,9 +243,8 @@ def _end_labels(axes: Axes, labels: list[tuple[float, float, str, str]], last: f
     for f, x, text, colour in sorted(labels):
         y = max(f, y + gap)
         cut = x < last  # leaves the picture through its upper edge
-        where: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8.5}
         at, shift = ((x, f), (5, -8)) if cut else ((x, y), (6, 0))
-        axes.annotate(text, at, xytext=shift, color=colour, annotation_clip=False, **where)
+        said_beside(axes, text, at, shift, color=colour, annotation_clip=False, va="center", fontsize=8.5)
 
 
 def _order_label(axes: Axes, order: int, last: float, top: float, text: str = "") -> None:
@@ -234,7 +260,7 @@ def _order_label(axes: Axes, order: int, last: float, top: float, text: str = ""
 
 
 def _mark(axes: Axes, found: Sequence[Crossing]) -> None:
-    x = [c.speed * 30 / np.pi for c in found]
+    x = [to_rpm(c.speed) for c in found]
     axes.plot(
         x, [c.frequency for c in found], "o", mfc="white", mec="#111111", markersize=6, zorder=4, linestyle="none"
     )
@@ -286,8 +312,8 @@ def closure_plot(basis: ModalBasis, path: Path) -> Path | None:
     draw = _closures_beside if len(names) <= CURVES_BESIDE else _closures_tiled
     figure = draw(states, names[:MOST_CLOSURES])
     more = f" (first {MOST_CLOSURES} of {len(names)})" if len(names) > MOST_CLOSURES else ""
-    figure.suptitle(f"{basis.name}: contact at {max(states) * 30 / np.pi:.6g} rpm{more}", fontweight="bold")
-    return _save(figure, path)
+    figure.suptitle(f"{basis.name}: contact at {rpm_text(max(states))}{more}", fontweight="bold")
+    return save_figure(figure, path)
 
 
 States = Mapping[float, Mapping[str, ContactState]]
@@ -297,7 +323,7 @@ def _closures_beside(states: States, names: Sequence[str]) -> Figure:
     """A row for each closure: its pressure, and its force over the speeds."""
     several = len(states) > 1
     last = states[max(states)]
-    figure = _figure(9.6, 0.4 + sum(_height(last[name], 5.2 if several else 8.6) for name in names))
+    figure = empty_figure(9.6, 0.4 + sum(_height(last[name], 5.2 if several else 8.6) for name in names))
     panels = figure.subplots(len(names), 2 if several else 1, squeeze=False, width_ratios=[3, 2] if several else [1])
     for row, name in zip(panels, names, strict=True):
         _pressure_map(row[0], name, last[name])
@@ -311,7 +337,7 @@ def _closures_tiled(states: States, names: Sequence[str], columns: int = 4) -> F
     rows, several = math.ceil(len(names) / columns), len(states) > 1
     last = states[max(states)]
     high = [max(_height(last[name], 2.6) for name in names)] * rows + [3.0] * several
-    figure = _figure(3.4 * columns, 0.4 + sum(high))
+    figure = empty_figure(3.4 * columns, 0.4 + sum(high))
     grid = figure.add_gridspec(rows + several, columns, height_ratios=high)
     for i, name in enumerate(names):
         _pressure_map(figure.add_subplot(grid[i // columns, i % columns]), name, last[name])
@@ -324,8 +350,8 @@ def _closures_tiled(states: States, names: Sequence[str], columns: int = 4) -> F
 
 def _force_curves(axes: Axes, states: States, names: Sequence[str]) -> None:
     """Normal forces over the speeds that were solved for."""
-    _plain(axes)
-    rpm = [speed * 30 / np.pi for speed in states]
+    plain_axes(axes)
+    rpm = [to_rpm(speed) for speed in states]
     for i, name in enumerate(names):
         force = [contacts[name].normal_force for contacts in states.values()]
         axes.plot(rpm, force, "o-", color=COLOURS[i % len(COLOURS)], label=name)

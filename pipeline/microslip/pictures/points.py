@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Array, ModalBasis, ModalGroup
 from ..reduced.coordinates import in_modes
-from .plots import _figure, _save
+from .plots import empty_figure, save_figure
 
 MOST = 12
 COLUMNS = 4
@@ -24,13 +24,13 @@ def points_sheet(basis: ModalBasis, group: ModalGroup, path: Path, most: int = M
     if not len(g.phi) or not elastic:
         return None
     rows, columns = -(-len(elastic) // COLUMNS), min(COLUMNS, len(elastic))
-    figure = _figure(3.0 * columns, 3.1 * rows)
+    figure = empty_figure(3.0 * columns, 3.1 * rows)
     for place, j in enumerate(elastic, 1):
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         _sketch(axes, basis.mesh.points, g.phi[:, :, j].real if moves(g, j) else np.zeros_like(basis.mesh.points))
         still = "" if moves(g, j) else "\nrotations alone"
         axes.set_title(f"{j + 1}: {g.omega[j] / 2 / np.pi:.5g} Hz{still}", fontsize=10)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def moves(group: ModalGroup, mode: int) -> bool:

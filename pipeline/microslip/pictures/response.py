@@ -13,6 +13,7 @@ from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
+from .plots import said_beside
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -35,10 +36,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
     low, high = result.free.frequency[[0, -1]]
     for f in result.stuck[(result.stuck > low) & (result.stuck < high)]:
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
-        axes.annotate(
-            f"{f:.0f}", (f, 0.0), xycoords=("data", "axes fraction"), xytext=(2, 3), textcoords="offset points",
-            fontsize=8, color="0.45",
-        )  # fmt: skip
+        said_beside(axes, f"{f:.0f}", (f, 0.0), (2, 3), xycoords=("data", "axes fraction"), fontsize=8, color="0.45")
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_ylabel(f"amplitude of {_read(s, result.quantity)}, in {result.quantity.micro} (0-peak)")

@@ -13,7 +13,7 @@ from ..ring.expansion import expand, multiplicity, sector_rotation
 from ..ring.resonances import eigenmodes
 from .lettering import captioned, colour_bar, sheet, stacked
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
-from .views import AREA, STEEPEST, _map, at_speed, hertz
+from .views import AREA, _map, at_speed, hertz, mode_scale
 
 if TYPE_CHECKING:
     from .lettering import Picture
@@ -77,22 +77,9 @@ def open_ring(basis: ModalBasis, stage: Stage) -> RingStudio:
 
 def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
     """(N v, 3) complex displacement of the ring's vertices in one mode."""
-    one = _one_mode(group, mode)
+    one = replace(group, phi=group.phi[:, :, mode : mode + 1])
     source = ring.outside.source
     return np.concatenate([expand(one, ring.basis, j)[source, :, 0] for j in range(ring.basis.sectors)])
-
-
-def _one_mode(group: ModalGroup, mode: int) -> ModalGroup:
-    return replace(group, phi=group.phi[:, :, mode : mode + 1])
-
-
-def _scale(ring: RingStudio, shape: Array) -> float:
-    """Factor that gives a shape (n, 3) of the sector the drawn amplitude, or less where it would bend too steeply."""
-    a, b = ring.outside.sides.T
-    points = ring.basis.mesh.points
-    turn = np.linalg.norm(shape[a] - shape[b], axis=1) / np.linalg.norm(points[a] - points[b], axis=1)
-    largest = float(np.linalg.norm(shape, axis=1).max())
-    return min(SWING * ring.extent / max(largest, 1e-300), STEEPEST / max(float(np.quantile(turn, 0.98)), 1e-300))
 
 
 def _directions(ring: RingStudio) -> Array:
@@ -114,7 +101,7 @@ class _Shown:
 
 
 def _prepare(ring: RingStudio, group: ModalGroup, mode: int) -> _Shown:
-    moved = _scale(ring, group.phi[:, :, mode]) * wave(ring, group, mode)
+    moved = mode_scale(ring, group.phi[:, :, mode], SWING) * wave(ring, group, mode)
     parts = np.einsum("vdi,vi->dv", _directions(ring), moved)
     strongest = int((np.abs(parts) ** 2).sum(axis=1).argmax())
     value = parts[strongest]
@@ -126,7 +113,7 @@ def ring_camera(ring: RingStudio, area: float = 0.45 * AREA) -> Camera:
     return fit(ring.points() * (1 + 1.2 * SWING), ring.axes, area)
 
 
-def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
+def _skin(ring: RingStudio) -> tuple[object, Indices]:
     count, stage = len(ring.outside.source), ring.stage
     triangles = ring.every(ring.triangles, count)
     points = ring.points()
@@ -137,13 +124,13 @@ def _skin(ring: RingStudio, camera: Camera) -> tuple[object, Indices]:
 
 def ring_sheet(
     ring: RingStudio, groups: Sequence[ModalGroup], modes: int, camera: Camera, across: int | None = None
-) -> Picture:  # fmt: skip
+) -> Picture:
     """The first modes of nodal diameters as standing shapes.
 
     Args:
         across: how many pictures a row has; the modes of one nodal diameter if not given.
     """
-    data, triangles = _skin(ring, camera)
+    data, triangles = _skin(ring)
     still, tiles = ring.points(), []
     for group in groups:
         for j in range(min(modes, eigenmodes(group).n_modes)):
@@ -162,7 +149,7 @@ def ring_sheet(
 
 def ring_wave(ring: RingStudio, group: ModalGroup, mode: int, camera: Camera, steps: int = 20) -> list[Picture]:
     """Frames of one period of a mode: u = Re(phi exp(i omega t)); for 0 < k < N/2 a wave that runs backward."""
-    data, triangles = _skin(ring, camera)
+    data, triangles = _skin(ring)
     still, shown = ring.points(), _prepare(ring, group, mode)
     kind = "standing" if multiplicity(group.harmonic, ring.basis.sectors) == 1 else "backward wave"
     title = f"Nodal diameter {group.harmonic}, {kind}: {hertz(group.frequency[mode])}{at_speed(group)}"

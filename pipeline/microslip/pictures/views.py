@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Array, Indices, Interface, ModalBasis, ModalGroup
 from ..modes.stress import von_mises
+from ..units import rpm_text
 from .lettering import (
     INK,
     Colour,
@@ -45,6 +46,7 @@ from .scene import (
 
 if TYPE_CHECKING:
     from .lettering import Picture
+    from .ring_views import RingStudio
 
 AREA = 420_000
 """Pixels of one picture of the body."""
@@ -91,7 +93,7 @@ def open_studio(basis: ModalBasis) -> Studio:
 
 def at_speed(group: ModalGroup) -> str:
     """`` at 1500 rpm``."""
-    return f" at {group.speed * 30 / np.pi:.6g} rpm"
+    return f" at {rpm_text(group.speed)}"
 
 
 def hertz(frequency: float) -> str:
@@ -322,14 +324,14 @@ def _cross(a: Array, b: Array) -> Array:
 # --- modes ---------------------------------------------------------------------------------------------------------
 
 
-def mode_scale(studio: Studio, shape: Array) -> float:
+def mode_scale(studio: Studio | RingStudio, shape: Array, amplitude: float = AMPLITUDE) -> float:
     """Factor that gives a shape (n, 3) the drawn amplitude, or less where element sides would turn too far."""
     a, b = studio.outside.sides.T
     points = studio.basis.mesh.points
     turn = np.linalg.norm(shape[a] - shape[b], axis=1) / np.linalg.norm(points[a] - points[b], axis=1)
     largest = float(np.linalg.norm(shape, axis=1).max())
     steepest = float(np.quantile(turn, 0.98))
-    return min(AMPLITUDE * studio.extent / max(largest, 1e-300), STEEPEST / max(steepest, 1e-300))
+    return min(amplitude * studio.extent / max(largest, 1e-300), STEEPEST / max(steepest, 1e-300))
 
 
 def mode_camera(studio: Studio, groups: Sequence[ModalGroup], count: int, area: float = AREA) -> Camera:
@@ -387,10 +389,7 @@ def contact_sheet(studio: Studio, group: ModalGroup, images: Sequence[Picture]) 
         captioned(scaled(image, min(factor, 1.0)), mode_title(group, j), size=17) for j, image in enumerate(images)
     ]
     left = f" The other {group.n_modes - len(images)} modes are not drawn." if group.n_modes > len(images) else ""
-    page = sheet(
-        tiles, f"{studio.basis.name}: modes{at_speed(group)}",
-        f"Amplified; grey lines: at rest.{left}",
-    )  # fmt: skip
+    page = sheet(tiles, f"{studio.basis.name}: modes{at_speed(group)}", f"Amplified; grey lines: at rest.{left}")
     return stacked([page, colour_bar(_map(DISPLACEMENT_MAP), "0", "1", "displacement over its largest value", 700)], 4)
 
 

@@ -88,9 +88,7 @@ def _pair(group: ModalGroup, reduction: str, a: str, b: str, sectors: int) -> Sh
     return _share(group, reduction, f"{a} + {b} {words}", "squeeze", "m/N", pick, 2 if sectors == 1 else 1)
 
 
-def _share(
-    group: ModalGroup, reduction: str, label: str, kind: str, unit: str, pick: Array, contacts: int
-) -> Share:  # fmt: skip
+def _share(group: ModalGroup, reduction: str, label: str, kind: str, unit: str, pick: Array, contacts: int) -> Share:
     c = group.compliance
 
     def along(C: Array) -> float:

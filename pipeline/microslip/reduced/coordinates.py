@@ -197,9 +197,12 @@ def _run_up(r: RunUp | None, V: Array) -> RunUp | None:
 def _invariants(i: Invariants | None, V: Array) -> Invariants | None:
     W = V.conj().T
     return i and replace(
-        i, shape=i.shape @ V, position_shape=i.position_shape @ V, shape_shape=W @ i.shape_shape @ V,
+        i,
+        shape=i.shape @ V,
+        position_shape=i.position_shape @ V,
+        shape_shape=W @ i.shape_shape @ V,
         stiffening=W @ i.stiffening @ V,
-    )  # fmt: skip
+    )
 
 
 def _gyroscopic(modes: GyroscopicModes | None, V: Array, M_r: Array) -> GyroscopicModes | None:

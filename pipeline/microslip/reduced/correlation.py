@@ -36,18 +36,6 @@ def mac(A: Array, B: Array) -> Array:
     return np.divide(cross, own, out=np.zeros_like(own), where=own > 0)
 
 
-def share_in(A: Array, B: Array) -> Array:
-    """(a,) share of each column of A that the columns of B span together, 1: wholly.
-
-    What MAC is for one shape, this is for the members of a repeated frequency, which no two programs choose alike.
-    """
-    U, s, _ = np.linalg.svd(B, full_matrices=False)
-    Q = U[:, s > 1e-9 * s.max(initial=0.0)]
-    own = (np.abs(A) ** 2).sum(axis=0)
-    held = (np.abs(Q.conj().T @ A) ** 2).sum(axis=0)
-    return np.divide(held, own, out=np.zeros_like(own), where=own > 0)
-
-
 @dataclass(frozen=True)
 class Pair:
     """A mode of one body and the mode of another that is most like it.
@@ -99,8 +87,9 @@ def nearest_points(asked: Array, points: Array, limit: float, names: Indices | N
     numbers = np.arange(1, len(asked) + 1) if names is None else names
     if (far := distance > limit).any():
         worst = int(distance.argmax())
+        place = ", ".join(f"{v:.4g}" for v in asked[worst])
         raise UserError(
-            f"point {numbers[worst]} at ({_place(asked[worst])}) m is {distance[worst]:.3g} m from the nearest node of "
+            f"point {numbers[worst]} at ({place}) m is {distance[worst]:.3g} m from the nearest node of "
             f"the other body, {int(far.sum())} of {len(far)} points are beyond {limit:.3g} m; are both in one frame "
             "and one unit of length? Move the points, or allow a larger distance"
         )
@@ -112,10 +101,6 @@ def nearest_points(asked: Array, points: Array, limit: float, names: Indices | N
             "coarse there, or the points are in another unit of length"
         )
     return at, distance
-
-
-def _place(point: Array) -> str:
-    return ", ".join(f"{v:.4g}" for v in point)
 
 
 def measured_directions(basis: ModalBasis, group: ModalGroup) -> Array:
@@ -151,9 +136,8 @@ class Comparison:
 
 
 def compare_groups(
-    first: ModalBasis, second: ModalBasis, key: tuple[int, int] = (0, 0), limit: float | None = None,
-    least: float = 0.5,
-) -> Comparison:  # fmt: skip
+    first: ModalBasis, second: ModalBasis, key: tuple[int, int] = (0, 0), limit: float | None = None, least: float = 0.5
+) -> Comparison:
     """MAC and pairs of two bodies in one frame, at the points of the one that has fewer.
 
     Args:

@@ -108,7 +108,7 @@ def closing(group: ModalGroup, a: str, b: str, sectors: int = 1) -> Array:
 
 def _coordinate(
     group: ModalGroup, label: str, kind: str, unit: str, pick: Array, static: Array, T: Array
-) -> Coordinate:  # fmt: skip
+) -> Coordinate:
     omega = np.where(group.omega > 0, group.omega, np.inf)
     parts = np.cumsum(np.abs(pick @ T / omega) ** 2)
     whole = float((pick @ static @ pick.conj()).real)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import UserError
 from .problem import Problem, Reduced, frequencies, hermitian, refuse_dependent
 
 
@@ -48,9 +48,5 @@ def reduce(problem: Problem) -> Reduced:
     across = -stiffness @ moved
     K_r = np.block([[stiffness, across], [across.conj().T, np.diag(omega**2) - hermitian(moved.conj().T @ across)]])
     vectors = np.hstack([boundary, X - boundary @ moved])
-    return Reduced(vectors, ("massless-interface",) * b + problem.kind, M_r, K_r, omega, _own(moved))
-
-
-def _own(moved: Array) -> Array:
-    """Nothing on the interface: its coordinates follow the modes."""
-    return np.vstack([moved, np.eye(moved.shape[1])])
+    own = np.vstack([moved, np.eye(moved.shape[1])])  # nothing on the interface: its coordinates follow the modes
+    return Reduced(vectors, ("massless-interface",) * b + problem.kind, M_r, K_r, omega, own)

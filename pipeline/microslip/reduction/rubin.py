@@ -16,6 +16,8 @@ def reduce(problem: Problem) -> Reduced:
     """Eigenmodes and pseudo-modes, all M-orthonormal and K-orthogonal."""
     values, vectors = own_modes(problem.pencil, problem.residual(slice(None)))
     return diagonal(
-        np.hstack([problem.vectors, vectors]), problem.kind + ("attachment",) * len(values),
-        np.concatenate([problem.values, values]), problem.rigid,
-    )  # fmt: skip
+        np.hstack([problem.vectors, vectors]),
+        problem.kind + ("attachment",) * len(values),
+        np.concatenate([problem.values, values]),
+        problem.rigid,
+    )

@@ -1,1 +1,1 @@
-"""Closed forms and converged series that the finite elements are measured against. NumPy and SciPy only."""
+"""Closed forms that contact laws and small models are made of and measured against. NumPy and SciPy only."""

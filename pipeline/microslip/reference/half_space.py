@@ -12,12 +12,3 @@ def mean_inverse_distance(a: float, b: float) -> float:
     """
     ends = (a**3 + b**3 - (a * a + b * b) ** 1.5) / 3
     return float(2 * (a * a * b * np.arcsinh(b / a) + a * b * b * np.arcsinh(a / b) + ends) / (a * b) ** 2)
-
-
-def rectangle_compliance(a: float, b: float, young: float, poisson: float) -> float:
-    """Mean normal displacement (m) of a rectangle (m) on a half-space per newton of uniform pressure on it.
-
-    Boussinesq's w = (1 - nu^2) F/(pi E r) (K. L. Johnson, Contact Mechanics, 3.2), averaged over source and target.
-    A rigid stamp of the same outline is stiffer.
-    """
-    return (1 - poisson**2) / (np.pi * young) * mean_inverse_distance(a, b)

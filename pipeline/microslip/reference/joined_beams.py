@@ -23,26 +23,6 @@ FREE, HINGE_LOCKED, SHEAR_LOCKED = 1.8751040687119611, 2.3650203724313523, 3.926
 """b without contact, with the slopes at the contact held at zero, and with the tips held in place."""
 
 
-def hinge_spring(section: Section, omega: float) -> float:
-    """c_phi (N m/rad) that gives the first mode, both beams alike, this angular frequency (rad/s).
-
-    Raises:
-        ValueError: no spring does.
-    """
-    b = _number(section, omega, HINGE_LOCKED)
-    return 0.5 * section.young * section.inertia / section.length * _hinge(b)
-
-
-def shear_spring(section: Section, omega: float) -> float:
-    """c_T (N/m) that gives the second mode, beams against each other, this angular frequency (rad/s).
-
-    Raises:
-        ValueError: no spring does.
-    """
-    b = _number(section, omega, SHEAR_LOCKED)
-    return 0.5 * section.young * section.inertia / section.length**3 * _shear(b)
-
-
 def frequencies(section: Section, hinge: float, shear: float) -> tuple[float, float]:
     """Angular frequencies (rad/s) of the mode with both beams alike and of that against each other.
 
@@ -50,8 +30,8 @@ def frequencies(section: Section, hinge: float, shear: float) -> tuple[float, fl
         hinge: c_phi, N m/rad. shear: c_T, N/m.
     """
     stiffness = section.young * section.inertia / section.length
-    alike = _root(_hinge, 2 * hinge / stiffness, HINGE_LOCKED)
-    against = _root(_shear, 2 * shear * section.length**2 / stiffness, SHEAR_LOCKED)
+    alike = _root(hinge_number, 2 * hinge / stiffness, HINGE_LOCKED)
+    against = _root(shear_number, 2 * shear * section.length**2 / stiffness, SHEAR_LOCKED)
     return section.unit * alike**2, section.unit * against**2
 
 
@@ -62,17 +42,11 @@ def _root(function: Callable[[float], float], value: float, top: float) -> float
     return float(brentq(lambda b: function(b) - value, FREE, below, xtol=1e-15, rtol=1e-15)) if value > 0 else FREE
 
 
-def _number(section: Section, omega: float, top: float) -> float:
-    b = np.sqrt(omega / section.unit)
-    if not FREE <= b < top:
-        low, high = section.unit * FREE**2, section.unit * top**2
-        raise ValueError(f"{omega:g} rad/s is outside the reach of the contact, {low:g} to {high:g} rad/s")
-    return float(b)
-
-
-def _hinge(b: float) -> float:
+def hinge_number(b: float) -> float:
+    """2 c_phi L/(E I)."""
     return float(-b * (1 + np.cosh(b) * np.cos(b)) / (np.cosh(b) * np.sin(b) + np.sinh(b) * np.cos(b)))
 
 
-def _shear(b: float) -> float:
+def shear_number(b: float) -> float:
+    """2 c_T L^3/(E I)."""
     return float(-(b**3) * (1 + np.cosh(b) * np.cos(b)) / (np.cosh(b) * np.sin(b) - np.sinh(b) * np.cos(b)))

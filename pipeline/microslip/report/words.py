@@ -16,7 +16,7 @@ RIGID_ENOUGH = 0.05
 
 def rpm(speed: float) -> str:
     """The speed (rad/s) with its unit."""
-    return f"{speed * 30 / np.pi:.6g} rpm"
+    return f"{rpm_text(speed)}"
 
 
 def hertz(frequency: Array, j: int) -> str:

@@ -88,15 +88,6 @@ def expand(group: ModalGroup, basis: ModalBasis, sector: int) -> Array:
     return turned * phase(group, basis.sectors, sector)
 
 
-def expand_tensor(values: Array, group: ModalGroup, basis: ModalBasis, sector: int) -> Array:
-    """(n, 6, m) stresses of sector j from those of sector 0 (order xx yy zz xy yz xz)."""
-    R = sector_rotation(basis, sector)
-    i, j = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
-    full = np.empty((len(values), 3, 3, *values.shape[2:]), dtype=values.dtype)
-    full[:, i, j], full[:, j, i] = values, values
-    return np.einsum("ia,jb,nab...->nij...", R, R, full, optimize=True)[:, i, j] * phase(group, basis.sectors, sector)
-
-
 def ring_scale(group: ModalGroup, sectors: int) -> float:
     """Factor on the sector's shapes that normalises the real ring modes on the ring: sqrt(2/N), or sqrt(1/N)."""
     return float(np.sqrt(multiplicity(group.harmonic, sectors) / sectors))
@@ -168,9 +159,7 @@ def ring_of(basis: ModalBasis, shared: bool = False, named: bool = False) -> Rin
     return replicate(basis.mesh, basis.rotation_axis, basis.rotation_point, basis.sectors, faces, named)
 
 
-def tied_points(
-    mesh: Mesh, axis: Array, point: Array, sectors: int, faces: tuple[str, str]
-) -> tuple[Indices, Indices]:  # fmt: skip
+def tied_points(mesh: Mesh, axis: Array, point: Array, sectors: int, faces: tuple[str, str]) -> tuple[Indices, Indices]:
     """Points of the left cyclic face, and those of the right one onto which the sector's turn carries them.
 
     Raises:

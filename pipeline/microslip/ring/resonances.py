@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Array, Indices, ModalBasis, ModalGroup
+from ..files.tables import rows_csv
 from ..linalg.gyroscopic import stability_sentence
 from ..modes.campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from ..reduced.coordinates import in_modes
+from ..units import to_rpm
 from .expansion import BACKWARD, FORWARD, STANDING, aliased
 
 
@@ -108,9 +110,12 @@ def eigenmodes(group: ModalGroup) -> ModalGroup:
     if count == group.n_modes:
         return group
     return replace(
-        group, omega=group.omega[:count], kind=group.kind[:count], damping_ratio=group.damping_ratio[:count],
+        group,
+        omega=group.omega[:count],
+        kind=group.kind[:count],
+        damping_ratio=group.damping_ratio[:count],
         phi=group.phi[:, :, :count],
-    )  # fmt: skip
+    )
 
 
 def travelling(group: ModalGroup, direction: str) -> ModalGroup:
@@ -167,10 +172,6 @@ def whirl_bounds(groups: Sequence[ModalGroup]) -> Array:
     return np.where(worst < 0, np.nan, worst)
 
 
-def _groups(basis: ModalBasis) -> dict[tuple[int, int], ModalGroup]:
-    return {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
-
-
 def families(basis: ModalBasis, speed: int = 0) -> Families:
     """Join the modes of neighbouring nodal diameters by the MAC of their shapes.
 
@@ -180,7 +181,7 @@ def families(basis: ModalBasis, speed: int = 0) -> Families:
     """
     harmonics = np.array(harmonics_of(basis))
     first = speeds_of(basis)[0]
-    groups = _groups(basis)
+    groups = {key: eigenmodes(g) for key, g in sorted(basis.groups.items())}
     modes, omega, mac = follow([groups[first, k] for k in harmonics.tolist()], point_weights(basis))
     at = speeds_of(basis).index(speed)
     if at:
@@ -203,13 +204,9 @@ def _carried(curves: Tracks, modes: Indices, at: int) -> Indices:
     return table[modes]
 
 
-def tracks(basis: ModalBasis, direction: str = "") -> dict[int, Tracks]:
-    """Curves over the speed of each nodal diameter; empty if the file holds fewer than two speeds.
-
-    Args:
-        direction: of the waves, with gyroscopic coupling where the file holds it; empty: without it.
-    """
-    return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, direction)) is not None}
+def tracks(basis: ModalBasis) -> dict[int, Tracks]:
+    """Curves over the speed of each nodal diameter, without gyroscopic coupling; empty with fewer than two speeds."""
+    return {k: t for k in harmonics_of(basis) if (t := _tracks_of(basis, k, "")) is not None}
 
 
 def wave_tracks(basis: ModalBasis, nodal_diameter: int, direction: str) -> Tracks | None:
@@ -297,7 +294,7 @@ def rows(found: Sequence[Resonance]) -> list[tuple[str, ...]]:
     """Cells under `HEAD`."""
     return [
         (
-            f"{r.speed * 30 / np.pi:.1f}", f"{r.frequency:.2f}", str(r.order), str(r.nodal_diameter), r.direction,
+            f"{to_rpm(r.speed):.1f}", f"{r.frequency:.2f}", str(r.order), str(r.nodal_diameter), r.direction,
             str(r.family or ""), str(r.mode),
         )
         for r in found
@@ -306,7 +303,7 @@ def rows(found: Sequence[Resonance]) -> list[tuple[str, ...]]:
 
 def resonance_csv(found: Sequence[Resonance]) -> str:
     """The table as comma-separated text, with a head."""
-    return "\n".join(",".join(row) for row in [HEAD, *rows(found)]) + "\n"
+    return rows_csv(HEAD, rows(found))
 
 
 def family_ranges(found: Families) -> Mapping[int, tuple[float, float]]:

@@ -48,9 +48,7 @@ def validate(model: type[Any], raw: dict[str, Any], path: Path) -> Any:
         raise UserError("\n".join(f"{path}: {line}" for line in dict.fromkeys(lines))) from error
 
 
-def bounded(
-    what: str, value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None
-) -> None:  # fmt: skip
+def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = None, le: float | None = None) -> None:
     """Check a number, or an array of them, that is given in Python and not in a file.
 
     Args:

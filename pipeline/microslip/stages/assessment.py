@@ -99,14 +99,14 @@ class Assessment:
 
 def assess(
     response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
-    only: Array | None = None, report: Report = lambda _: None,
+    report: Report = lambda _: None,
 ) -> Assessment:  # fmt: skip
     """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
     where the read-out is largest: another mode may stress the body on its flank.
 
     Args:
         monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
-            where there is one body. only: numbers of the stress places that count, all if None.
+            where there is one body.
 
     Raises:
         UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
@@ -121,15 +121,15 @@ def assess(
         normal = float(series.parameters.get("normal_force", 0.0))
         size = abs(series.monitor(monitor)[:, 0, 1])
         chosen, at = drawn_points(series), tops(series, size)
-        peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+        peaks = stress_peaks(motion.at(chosen), largest=False)
         ranges = _ranges(peaks.amplitude, chosen, series.converged, at)
-        most = [_most_stressed(motion, r, chosen, peaks, only) for r in ranges]
+        most = [_most_stressed(motion, r, chosen, peaks) for r in ranges]
         if not np.isin(most, chosen).all():
             chosen = np.union1d(chosen, most)
-            peaks = stress_peaks(motion.at(chosen), only=only, largest=False)
+            peaks = stress_peaks(motion.at(chosen), largest=False)
         sweeps[normal] = (series, motion, chosen, peaks)
         for i, r, j in zip(at, ranges, most, strict=True):
-            worst = endurance(cycle_stress(motion, j), limits or ENDLESS, only)
+            worst = endurance(cycle_stress(motion, j), limits or ENDLESS)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
             found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst))
     return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
@@ -156,9 +156,7 @@ def _ranges(stress: Array, chosen: Array, known: Array, at: Indices) -> list[Ind
     return [points[(points >= a) & (points <= b)] for a, b in zip(lows[:-1], lows[1:], strict=True)]
 
 
-def _most_stressed(
-    motion: Motion, around: Indices, chosen: Indices, peaks: StressPeaks, only: Array | None
-) -> int:  # fmt: skip
+def _most_stressed(motion: Motion, around: Indices, chosen: Indices, peaks: StressPeaks) -> int:
     """The point of a range with the largest stress amplitude: of those chosen, whose peaks are known, then of all
     beside it."""
     inside = np.flatnonzero(np.isin(chosen, around))
@@ -166,7 +164,7 @@ def _most_stressed(
         k = inside[peaks.amplitude[inside].argmax()]
         low, high = chosen[max(k - 1, 0)], chosen[min(k + 1, len(chosen) - 1)]
         around = around[(around >= low) & (around <= high)]
-    return int(around[stress_peaks(motion.at(around), only=only, largest=False).amplitude.argmax()])
+    return int(around[stress_peaks(motion.at(around), largest=False).amplitude.argmax()])
 
 
 MOST_DRAWN, BESIDE_A_PEAK = 400, 20
@@ -261,9 +259,11 @@ def draw(
         )
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
-            lines, "largest stress amplitude of the body in MPa", f"{case}: resonances over the normal force",
+            lines,
+            "largest stress amplitude of the body in MPa",
+            f"{case}: resonances over the normal force",
             folder / "stress_over_normal_force.png",
-        )  # fmt: skip
+        )
     top = found.highest
     if top is not None:
         drawn |= _at_worst(found, top, basis, case, folder, scenes)
@@ -313,7 +313,7 @@ def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
 
 def _at_worst(
     found: Assessment, top: Resonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
-) -> dict[str, Path]:  # fmt: skip
+) -> dict[str, Path]:
     from ..files.store import complete_or_absent
     from ..pictures import operating
 

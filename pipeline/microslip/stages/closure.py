@@ -9,6 +9,7 @@ import numpy as np
 from ..data import UserError
 from ..files import store
 from ..mesh import UNITS
+from ..units import from_rpm
 from .job import Job
 from .meshing import load_mesh, mesh_stage
 from .modal import with_temperature
@@ -42,7 +43,7 @@ def closure_stage(
     try:
         settings, temperature = with_temperature(job, mesh)
         levels = np.linspace(low, high, points) * scale
-        curve = closure_curve(mesh, settings, chosen, levels, rpm * np.pi / 30, temperature, report)
+        curve = closure_curve(mesh, settings, chosen, levels, from_rpm(rpm), temperature, report)
     except UserError as error:
         raise UserError(f"{job.path}: {error}") from error
     folder = output or job.basis_file.parent

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from ..data import Array
 from ..files import store
+from ..files.tables import columns_csv, rows_csv
 from .stage import Report
 
 
 def contact_stage(
     path: Path, assignments: list[str], output: Path | None, report: Report = lambda _: None
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """What a contact law does: tables (CSV) and pictures (PNG) in build/<name>/ or `output`.
 
     Returns:
@@ -34,13 +33,8 @@ def contact_stage(
     with store.making(summary, report):
         files = [*draw(found, folder), *(folder / f"{name}.csv" for name in found.tables), summary]
         for name, columns in found.tables.items():
-            store.write_text(folder / f"{name}.csv", _columns_csv(columns))
-        store.write_text(summary, "\n".join(["what,value", *(f'"{a}","{b}"' for a, b in rows)]) + "\n")
+            store.write_text(folder / f"{name}.csv", columns_csv(columns, 10))
+        store.write_text(summary, rows_csv(("what", "value"), ((f'"{a}"', f'"{b}"') for a, b in rows)))
     width = max(len(what) for what, _ in found.told)
     lines = [f"{what:{width}}  {value}" for what, value in found.told]
     return [*lines, *found.sentences, *map(str, sorted(files))]
-
-
-def _columns_csv(columns: Mapping[str, Array]) -> str:
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{x:.10g}" for x in row) for row in rows)]) + "\n"

@@ -6,7 +6,7 @@ Each is a table (CSV) and a picture in the case's folder, and sentences for the 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -21,6 +21,7 @@ from ..case.problem import problem_of
 from ..continuation import NO_OPTIMUM
 from ..data import ModalBasis, UserError
 from ..files import store
+from ..files.tables import rows_csv
 from ..harmonic_balance.readout import measured
 from ..results import read_response
 from ..results.checks import checked, largest
@@ -69,6 +70,11 @@ class Case:
                 override(raw, [f"{key}={value!r}"], self.path)
         return build(validate(CaseSettings, raw, self.path), self.bases, self.path)
 
+    def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Path:
+        """A CSV file of the case."""
+        store.write_text(self.folder / name, rows_csv(head, rows))
+        return self.folder / name
+
 
 def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: Sequence[str] = ()) -> Case:
     """A case and its modal files."""
@@ -93,9 +99,12 @@ def normal_forces(built: Built) -> tuple[float | None, ...]:
 
 
 def backbones(
-    case: Case, mode: int | None = None, low: float | None = None, high: float | None = None,
+    case: Case,
+    mode: int | None = None,
+    low: float | None = None,
+    high: float | None = None,
     report: Report = lambda _: None,
-) -> dict[float, Backbone]:  # fmt: skip
+) -> dict[float, Backbone]:
     """Frequency and damping over the amplitude of the first read-out, for every normal force (N) of the case.
 
     Args:
@@ -138,12 +147,12 @@ def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
 
 
 def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
-    rows = [f"normal_force_N,{case.quantity.column('amplitude')},frequency_Hz,damping_ratio"]
+    rows = []
     for normal, one in sorted(found.items()):
         order = zip(one.amplitude, one.Omega / (2 * np.pi), one.damping, strict=True)
-        rows += [f"{normal:g},{a:.8g},{f:.10g},{d:.8g}" for a, f, d in order]
-    store.write_text(case.folder / "backbone.csv", "\n".join(rows) + "\n")
-    return case.folder / "backbone.csv"
+        rows += [(f"{normal:g}", f"{a:.8g}", f"{f:.10g}", f"{d:.8g}") for a, f, d in order]
+    head = ("normal_force_N", case.quantity.column("amplitude"), "frequency_Hz", "damping_ratio")
+    return case.table("backbone.csv", head, rows)
 
 
 def _title(case: Case, what: str) -> str:
@@ -211,16 +220,12 @@ def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
 
 
 def _optimum_table(found: Mapping[float, Resonance], over: str, case: Case, best: Optimum | None = None) -> Path:
-    rows = [f"{over},frequency_Hz,{case.quantity.column('amplitude')},what"]
-    for value, one in found.items():
-        what = "highest resonance" if one.status == "converged" else one.status
-        rows.append(f"{value:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
+    shown = [(v, r, "highest resonance" if r.status == "converged" else r.status) for v, r in found.items()]
     if best is not None:
-        one = best.resonance
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"
-        rows.append(f"{best.parameter:.10g},{one.Omega / 2 / np.pi:.10g},{one.amplitude:.8g},{what}")
-    store.write_text(case.folder / "optimum.csv", "\n".join(rows) + "\n")
-    return case.folder / "optimum.csv"
+        shown.append((best.parameter, best.resonance, what))
+    rows = [(f"{v:.10g}", f"{r.Omega / 2 / np.pi:.10g}", f"{r.amplitude:.8g}", what) for v, r, what in shown]
+    return case.table("optimum.csv", (over, "frequency_Hz", case.quantity.column("amplitude"), "what"), rows)
 
 
 def told(found: Optimum, over: str, of: Quantity = METRES) -> str:
@@ -322,13 +327,13 @@ def write_stabilities(found: Mapping[float, Mapping[float, Stability]], case: Ca
 
 
 def _stability_table(found: Mapping[float, Mapping[float, Stability]], case: Case) -> Path:
-    rows = ["normal_force_N,frequency_Hz,stable,growth,error,loss"]
+    rows = []
     for normal, points in found.items():
         for f, one in sorted(points.items()):
             error = one.error[0] if len(one.error) else 0.0
-            rows.append(f"{normal:g},{f:.10g},{one.stable:d},{one.growth:.6g},{error:.2g},{one.loss}")
-    store.write_text(case.folder / "stability.csv", "\n".join(rows) + "\n")
-    return case.folder / "stability.csv"
+            cells = f"{normal:g}", f"{f:.10g}", f"{one.stable:d}", f"{one.growth:.6g}", f"{error:.2g}", one.loss
+            rows.append(cells)
+    return case.table("stability.csv", ("normal_force_N", "frequency_Hz", "stable", "growth", "error", "loss"), rows)
 
 
 def unstable(found: Mapping[float, Mapping[float, Stability]]) -> str:

@@ -10,9 +10,7 @@ from typing import Any
 from ..data import UserError
 from ..settings.body import BodySettings, load_body, load_toml
 
-_NO_SETTINGS = {
-    ".step", ".stp", ".brep", ".iges", ".igs", ".inp", ".cdb", ".msh", ".med", ".unv", ".bdf", ".mtx", ".mat",
-}  # fmt: skip
+_NO_SETTINGS = set(".step .stp .brep .iges .igs .inp .cdb .msh .med .unv .bdf .mtx .mat".split())
 
 
 @dataclass(frozen=True)

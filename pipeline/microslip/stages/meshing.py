@@ -74,8 +74,9 @@ def _refuse_unnamed_faces(job: Job) -> None:
     told = f"it names {', '.join(names) or 'none'}"
     wrong = [
         f"{job.path}: {table}.{label}.face: geometry.faces names no face '{face}'; {told}"
-        for table, label, face in asked if face not in names
-    ]  # fmt: skip
+        for table, label, face in asked
+        if face not in names
+    ]
     if wrong:
         raise UserError("\n".join(wrong))
 
@@ -159,7 +160,7 @@ def _mesher_failure(job: Job, done: subprocess.CompletedProcess[str]) -> str:
     return f"{job.path}: meshing failed ({last}); check [geometry] and [mesh]"
 
 
-def load_mesh(job: Job, path: Path | None = None, report: Report = lambda _: None) -> tuple[Mesh, list[str]]:
+def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     """Read the mesh of a body, name its faces by the body's rules, and pass the quality gates.
 
     Returns:

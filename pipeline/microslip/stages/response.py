@@ -22,7 +22,7 @@ from ..files import store
 from ..report.response import response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
-from ..units import counted
+from ..units import counted, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, hashes_of
 from .stage import Made, Report, Stage
@@ -56,7 +56,7 @@ def response_stage(
         stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files))
         summary = json.loads(stage.product.read_text())
         if log:
-            _write_log(read_response(folder / "response.h5"), folder)
+            store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
         _tell(summary, report)
         return summary, summary["failed_points"] == 0
 
@@ -68,7 +68,7 @@ def response_of_case(folder: Path, force: bool = False, report: Report = lambda 
 
 def _work(
     stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path]
-) -> Made:  # fmt: skip
+) -> Made:
     bases = {name: read_basis(file) for name, file in files.items()}
     folder = stage.product.parent
     points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, whole_sweep=True)
@@ -197,7 +197,7 @@ def _maps(
 
 def _for_paraview(
     found: assessment.Assessment, basis: ModalBasis, maps: Mapping[str, list[ContactMap]], folder: Path
-) -> list[Path]:  # fmt: skip
+) -> list[Path]:
     """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
     if not _is_there("meshio"):
         return []
@@ -228,11 +228,6 @@ def _is_there(package: str) -> bool:
         return False
 
 
-def _write_log(response: Response, folder: Path) -> None:
-    """``convergence.csv``: what Newton's method did at every point."""
-    store.write_text(folder / "convergence.csv", convergence_table(response))
-
-
 def convergence_table(response: Response) -> str:
     """CSV text: a row a point with its status, steps, and the error before every Newton step."""
     rows = ["sweep,frequency_Hz,peak,status,iterations,error,errors before each step"]
@@ -260,7 +255,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "harmonics": result.settings.balanced,
         **truncation,
         "description": result.settings.description,
-        "rotation_speed_rpm": result.speed * 30 / np.pi,
+        "rotation_speed_rpm": to_rpm(result.speed),
         "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
         "damping": result.settings.damping_as,
         "stuck_modes": _stuck_modes(result),

@@ -19,6 +19,7 @@ from ..ring.resonances import (
     whirl_bounds,
     whirl_sentence,
 )
+from ..units import to_rpm
 
 
 def whirl_rows(modes: GyroscopicModes) -> list[str]:
@@ -43,7 +44,7 @@ def basis_summary(basis: ModalBasis) -> list[str]:
     if basis.sectors > 1:
         return lines + _ring_summary(basis) + ranges
     for (_, harmonic), g in sorted(basis.groups.items()):
-        state = f"{g.speed * 30 / np.pi:g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
+        state = f"{to_rpm(g.speed):g} rpm" + (f", {g.prestress} prestress" if g.prestress != "none" else "")
         proof = between_stations([g]) or ("certified complete" if g.checks.get("certified") else "NOT certified")
         if basis.source == "measured":
             proof = "measured: others may have been missed"
@@ -86,7 +87,7 @@ def contact_lines(group: ModalGroup) -> list[str]:
 def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
     """Samples and held-out errors of a speed range, in lines for the terminal."""
     solved, known, rpm = (
-        ", ".join(f"{v:.6g}" for v in speeds * 30 / np.pi)
+        ", ".join(f"{v:.6g}" for v in to_rpm(speeds))
         for speeds in (r.speeds[r.solved], r.speeds[~r.held], r.speeds[[0, -1]])
     )
     lines = [
@@ -94,7 +95,7 @@ def range_summary(harmonic: int, r: SpeedRange) -> list[str]:
         f"for {r.count} modes",
         f"  modes taken from {solved} rpm, stiffness from {known} rpm",
     ]
-    held = zip(r.held_out * 30 / np.pi, r.interpolation_error, r.projection_error, r.total_error, strict=True)
+    held = zip(to_rpm(r.held_out), r.interpolation_error, r.projection_error, r.total_error, strict=True)
     lines += [
         f"  held out {v:.6g} rpm: frequency error {total:.1e} (interpolation {a:.1e}, projection {b:.1e})"
         for v, a, b, total in held
@@ -113,7 +114,7 @@ def _hertz_line(frequency: Array, most: int = MOST_COLUMNS) -> str:
 def frequency_lines(basis: ModalBasis, columns: int = 5, rows: int = 15) -> list[str]:
     """The first frequencies of each speed and nodal diameter, a line each, in few lines for the terminal."""
     table = [
-        f"{g.speed * 30 / np.pi:8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  "
+        f"{to_rpm(g.speed):8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  "
         f"{_hertz_line(eigenmodes(g).frequency, columns)}  Hz{f'  of {g.n_modes}' if g.n_modes > columns else ''}"
         for (_, k), g in sorted(basis.groups.items())[:rows]
     ]
@@ -141,7 +142,7 @@ def _ring_summary(basis: ModalBasis) -> list[str]:
     for speed in speeds_of(basis):
         groups = [eigenmodes(basis.groups[speed, k]) for k in harmonics_of(basis)]
         first = basis.groups[speed, harmonics_of(basis)[0]]
-        state = f"{first.speed * 30 / np.pi:g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
+        state = f"{to_rpm(first.speed):g} rpm" + (f", {first.prestress} prestress" * (first.prestress != "none"))
         proof = between_stations([basis.groups[speed, k] for k in harmonics_of(basis)])
         lines.append(f"{state}: {proof or certificate_words(certify_ring(basis, speed))}")
         lines += contact_lines(first)

@@ -16,6 +16,7 @@ from ..case import CaseSettings, checkpoint, load_case, surveys
 from ..case.curves import Followed, curves
 from ..data import Array, ModalBasis
 from ..files import store
+from ..files.tables import columns_csv
 from ..report.response import survey_html
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
@@ -84,7 +85,7 @@ def survey_stage(
 
 def _work(
     stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path], kind: str
-) -> Made:  # fmt: skip
+) -> Made:
     said, folder = stage.product, stage.product.parent
 
     def begin() -> None:
@@ -96,7 +97,7 @@ def _work(
     def write(tables: Tables) -> None:
         begin()
         for name, columns in tables.items():
-            store.write_text(folder / name, table(columns))
+            store.write_text(folder / name, columns_csv(columns, 12))
 
     survey = partial(KINDS[kind], write) if kind in KINDS else partial(_curve, kind, points)
     found = survey(settings, {name: read_basis(file) for name, file in files.items()}, case_path, stage.report)
@@ -131,12 +132,6 @@ def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
     return page
 
 
-def table(columns: Mapping[str, Array]) -> str:
-    """CSV text of columns of equal length."""
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in rows)]) + "\n"
-
-
 def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
     from ..pictures.coupled import over_orders_picture
 
@@ -153,8 +148,7 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = sum(int(r.failed.sum()) for r in found.values())
-    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)},
-                  failed=failed)  # fmt: skip
+    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}, failed=failed)
 
 
 def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -175,8 +169,9 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     return Survey(
         tables(r),
         {"pictures/speeds.png": lambda p: speed_line_picture(*drawn, p, title, r.quantity)},
-        said, int((~r.converged).sum()),
-    )  # fmt: skip
+        said,
+        int((~r.converged).sum()),
+    )
 
 
 def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -190,10 +185,8 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     most = f"{e.peaks.min():.4g} and {e.peaks.max():.4g} {e.quantity.said}"
     said = [f"Largest amplitude between {most} on the grid of the sweep."]
     return Survey(
-        tables(e),
-        {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)},
-        said, int((~e.converged).sum()),
-    )  # fmt: skip
+        tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, said, int((~e.converged).sum())
+    )
 
 
 def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -206,7 +199,7 @@ def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Pa
         {"identification.csv": found.columns(), "nodal_diameters.csv": at.columns()},
         {"pictures/nodal_diameters_stuck.png": lambda p: nodal_diameter_picture(diagrams, p, title, found)},
         found.sentences(),
-    )  # fmt: skip
+    )
 
 
 def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -249,5 +242,8 @@ def _written(points: Checkpoint, found: list[Followed], whole: bool) -> Response
 
 
 KINDS: dict[str, Callable[[Write, CaseSettings, Bases, Path, Report], Survey]] = {
-    "orders": _orders, "speeds": _speeds, "ranges": _ranges, "identification": _identification,
-}  # fmt: skip
+    "orders": _orders,
+    "speeds": _speeds,
+    "ranges": _ranges,
+    "identification": _identification,
+}

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from ..data import INTERFACE_ROWS, Array, ComplexArray, ModalGroup, Rows, UserError
+from ..data import INTERFACE_ROWS, Array, ComplexArray, ModalGroup, UserError
 from ..settings.mistakes import bounded
 
 if TYPE_CHECKING:
@@ -393,16 +393,19 @@ class Assembly:
         rows = np.vstack(T) if T else np.zeros((0, m))
         amplitudes = np.array([x.amplitude for x in loads], dtype=complex)
         f = sum((np.conj(at.excitation(x.row)) * x.amplitude for x in loads), np.zeros(m, dtype=complex))
-        frames = [s.frame * s.phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
-                  for s, t in zip(sides, T, strict=True)]  # fmt: skip
+        frames = [
+            s.frame * s.phase(index, self.blades) if s.rows is None else np.zeros((len(t), 6))
+            for s, t in zip(sides, T, strict=True)
+        ]
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]
-        forced = [_load_label(at.group.excitations[x.row], x.row) for x in loads]
+        forced = [f"excitation:{x.row}:{at.group.excitations[x.row].labels[0]}" for x in loads]
         own = [w.member == member.name for w in self.outputs]
         seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.outputs, own, strict=True)]
         zero = np.zeros(m)
-        output = np.array([at.monitor(w.monitor, w.label) if mine else zero
-                          for w, mine in zip(self.outputs, own, strict=True)]).reshape(-1, m)  # fmt: skip
+        output = np.array(
+            [at.monitor(w.monitor, w.label) if mine else zero for w, mine in zip(self.outputs, own, strict=True)]
+        ).reshape(-1, m)
         B = A @ at.residual(labels, labels) @ A.conj().T
         lost = (at.loss, member.residual_loss * B) if harmonic and at.loss is not None else (None, None)
         return Linear(
@@ -553,10 +556,6 @@ def _damped(part: Linear, stiffness: Array, ratios: Sequence[float]) -> Linear:
     omega, P = np.sqrt(np.maximum(values, 0.0)), part.M @ shapes
     D = np.append(ratios, np.full(max(len(omega) - len(ratios), 0), ratios[-1]))[: len(omega)]
     return replace(part, C=part.C + (P * (2 * D * omega)) @ P.conj().T)
-
-
-def _load_label(rows: Rows, name: str) -> str:
-    return f"excitation:{name}:{rows.labels[0]}"
 
 
 def across(first: Array, second: Array, offset: Array | None = None) -> Array:

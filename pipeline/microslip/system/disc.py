@@ -92,7 +92,7 @@ def _faces(first: ModalGroup, waves: list[InWave], N: int) -> dict[str, Interfac
 
 def _rows(
     named: Mapping[str, Rows], of: Callable[[InWave, str], Array], waves: list[InWave], N: int
-) -> dict[str, Rows]:  # fmt: skip
+) -> dict[str, Rows]:
     found = {}
     for name, rows in named.items():
         for j in range(N):

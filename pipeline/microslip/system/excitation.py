@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..data import CENTRIFUGAL, Array, ComplexArray, ModalGroup, UserError
+from ..data import Array, ComplexArray, UserError
 from ..ring.expansion import BACKWARD, FORWARD, STANDING
 from .assembly import Load, Ring
 
@@ -200,52 +200,20 @@ def engine_order(
     return Load(member, row, amplitude * complex(np.exp(1j * phase)), harmonic_of(order, base, turning))
 
 
-def gas_load(
-    member: str, row: str, steady: float, stimulus: float, order: int, base: int | Ring, phase: float = 0.0,
-    turning: Turning = 1,
-) -> Load:  # fmt: skip
-    """Stimulus times the steady gas load (Sextro section 5.1), as an engine order.
-
-    Args:
-        steady: Pa of a pressure, N of a force. stimulus: amplitude over steady load, not in per cent.
-
-    Raises:
-        UserError: a negative stimulus.
-    """
-    if stimulus < 0:
-        raise UserError(f"stimulus: {stimulus:g} is negative; give the amplitude as a share of the steady load")
-    return engine_order(member, row, stimulus * steady, order, base, phase, turning)
-
-
 def pattern_loads(
-    member: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1,
-    orders: Sequence[int] | None = None,
-) -> tuple[Load, ...]:  # fmt: skip
+    member: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1
+) -> tuple[Load, ...]:
     """The engine orders of a pattern on a row of a member, its mean as a steady load.
 
     Args:
-        place: angle at which the loaded spot of the first sector stands at t = 0, rad. orders: to take; all that the
-            pattern has if None.
+        place: angle at which the loaded spot of the first sector stands at t = 0, rad.
     """
     found = []
-    for e in pattern.orders() if orders is None else orders:
+    for e in pattern.orders():
         P = complex(pattern.amplitudes[e] * np.exp(1j * e * place))
         found.append(Load(member, row, P if turning > 0 else P.conjugate(), harmonic_of(e, base, turning)))
     mean = float(pattern.amplitudes[0].real)
     return (*found, Load(member, row, mean, 0)) if mean else tuple(found)
-
-
-def centrifugal_load(member: str, row: str, group: ModalGroup, speed: float) -> Load:
-    """The centrifugal force of a loose member at a speed (rad/s), steady.
-
-    Raises:
-        UserError: a row that is no centrifugal load.
-    """
-    if group.excitations[row].unit != CENTRIFUGAL:
-        raise UserError(
-            f"{member}: excitation '{row}' is no centrifugal load; write centrifugal = true in its body.toml"
-        )
-    return Load(member, row, speed**2, 0)
 
 
 def unheard(loads: Sequence[Load], harmonics: int) -> list[str]:

@@ -116,14 +116,14 @@ class Link:
 
 def Spring(
     first: str, second: str, stiffness: Any, axis: Sequence[float] | None = None, at: Sequence[float] | None = None
-) -> Link:  # fmt: skip
+) -> Link:
     """A `Link` without damping."""
     return Link(first, second, stiffness=stiffness, axis=axis, at=at)
 
 
 def Damper(
     first: str, second: str, damping: Any, axis: Sequence[float] | None = None, at: Sequence[float] | None = None
-) -> Link:  # fmt: skip
+) -> Link:
     """A `Link` without stiffness."""
     return Link(first, second, damping=damping, axis=axis, at=at)
 
@@ -378,7 +378,7 @@ class System:
 
     def _group(
         self, X: Array, omega: Array, D: Array, C_r: Array, rigid: int, faces: Mapping[str, tuple[Array, Array]]
-    ) -> ModalGroup:  # fmt: skip
+    ) -> ModalGroup:
         loads, reads = {}, {}
         for f in self.forces:
             rows, point = self.rows_at(f.on, f.at, f"force {f.name}")
@@ -463,7 +463,7 @@ def _canonical(X: Array, values: Array, rigid: int, faces: list[Array], shapes: 
 
 def _compliance(
     interfaces: Mapping[str, Interface], loads: Mapping[str, Rows], reads: Mapping[str, Rows], omega: Array
-) -> Compliance:  # fmt: skip
+) -> Compliance:
     """Over every row; all modes are kept, so they hold all of it."""
     labels = [f"interface:{n}:{row}" for n, i in interfaces.items() if i.role != "load" for row in INTERFACE_ROWS]
     parts = [i.rows for i in interfaces.values() if i.role != "load"]

@@ -62,9 +62,12 @@ Face = tuple[Member, str]
 
 
 def nodal(
-    first: Face, second: Face | None = None, met: Pairing | None = None, indices: Sequence[int] = (0,),
+    first: Face,
+    second: Face | None = None,
+    met: Pairing | None = None,
+    indices: Sequence[int] = (0,),
     tolerance: float = COMPLIANT,
-) -> Nodal:  # fmt: skip
+) -> Nodal:
     """Common coordinates of two faces that deform, or of one against a rigid wall.
 
     Args:
@@ -183,9 +186,7 @@ def interpolation(known: Array, wanted: Array) -> Array:
 # coordinates ---------------------------------------------------------------------------------------------------------
 
 
-def _motions(
-    face: Face, indices: Sequence[int], Q: Array, take: Array | None
-) -> dict[int, tuple[Array, Array]]:  # fmt: skip
+def _motions(face: Face, indices: Sequence[int], Q: Array, take: Array | None) -> dict[int, tuple[Array, Array]]:
     """Index -> (n, 3, m) motion of the points in the first face's frame per unit coordinate, and (m, m) the factor
     that makes it one per root of energy."""
     member, name = face
@@ -209,7 +210,7 @@ def _per_energy(wave: InWave) -> Array:
 
 def _spanned(
     points: Array, areas: Array, moved: list[dict[int, tuple[Array, Array]]], tolerance: float
-) -> tuple[Array, float]:  # fmt: skip
+) -> tuple[Array, float]:
     """(n, 3, k) shapes: the rigid ones, then deformations orthogonal to them over the area; and what is lost."""
     from ..contact.patch import Patch
 

@@ -66,7 +66,7 @@ class Place:
 
 def facing(
     first: Interface, second: Interface, place: Place | None = None, names: tuple[str, str] = ("first", "second")
-) -> Pairing:  # fmt: skip
+) -> Pairing:
     """The pairing of a face with another body's.
 
     Args:
@@ -77,8 +77,8 @@ def facing(
     """
     met, wrong = _meeting(first, second, place or Place())
     if wrong:
-        raise UserError(f"{_named(names)} do not face each other: {wrong}; name two faces that touch, or place the "
-                        "bodies so that these do")  # fmt: skip
+        advice = "name two faces that touch, or place the bodies so that these do"
+        raise UserError(f"{_named(names)} do not face each other: {wrong}; {advice}")
     return met
 
 
@@ -139,8 +139,10 @@ def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Pairing:
     angle = _degrees(axes[0], -first.rotation[0])
     remarks: tuple[str, ...] = ()
     if angle > NOTICED:
-        remarks = (f"The normals of the faces miss being opposite by {angle:.2g} degrees; the contact is taken as "
-                   "flat, in the plane of the first.",)  # fmt: skip
+        remarks = (
+            f"The normals of the faces miss being opposite by {angle:.2g} degrees; the contact is taken as "
+            "flat, in the plane of the first.",
+        )
     if abs(gap) > NOTICEABLE * np.max(first.extent, initial=0.0) > 0:
         words = "apart" if gap > 0 else "inside each other"
         remarks += (f"The faces are drawn {1e3 * abs(gap):.3g} mm {words}; the contact counts from where they touch.",)
@@ -158,8 +160,10 @@ def _missing(met: Pairing, first: Interface, second: Interface, axes: Array) -> 
         return ""
     there = axes[1:] @ (-met.offset @ first.rotation[1:])  # the first origin, seen by the second
     if not any((np.abs(at) <= half + 1e-6 * size).all() for at, half in zip((met.offset, there), halves, strict=True)):
-        return (f"their centres lie {1e3 * np.linalg.norm(met.offset):.4g} mm apart in the contact plane, each outside "
-                "the other face")  # fmt: skip
+        return (
+            f"their centres lie {1e3 * np.linalg.norm(met.offset):.4g} mm apart in the contact plane, each outside "
+            "the other face"
+        )
     if abs(met.gap) > size:
         words = "apart along the normal" if met.gap > 0 else "inside each other"
         return f"they lie {1e3 * abs(met.gap):.4g} mm {words}, more than half of their size"

@@ -155,11 +155,12 @@ def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh)
         if not ordinary(path).is_file():
             raise UserError(f"{path}: there is no such file; correct geometry.matrices.dofs")
         try:
-            return read_dofs(path, mesh), path.name
+            return read_dofs(path), path.name
         except (Unreadable, OSError) as error:
             raise UserError(f"{path}: {_told(error)}; write it again") from error
     if own := [f.dofs for f in found.values() if f.dofs is not None]:
-        return np.unique(np.vstack(own), axis=0) if not _same(own) else own[0], "the matrices' file"
+        alike = all(np.array_equal(a, own[0]) for a in own)
+        return own[0] if alike else np.unique(np.vstack(own), axis=0), "the matrices' file"
     rows, nodes = found["stiffness"].matrix.shape[0], len(mesh.points)
     for count in (3, 6):
         if rows == count * nodes:
@@ -169,10 +170,6 @@ def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh)
         f"geometry.matrices.dofs: the stiffness has {rows} rows and there are {nodes} nodes, neither three nor six a "
         "node; give a file with node and direction (1 to 6) of every row"
     )
-
-
-def _same(lists: list[Indices]) -> bool:
-    return all(a.shape == lists[0].shape and (a == lists[0]).all() for a in lists)
 
 
 def _meaning(dofs: Indices, mesh: Mesh, rows: int, superelement: bool, where: str) -> tuple[Indices, Indices]:

@@ -23,9 +23,10 @@ def names(path: Path) -> list[str]:
     import scipy.io
 
     return [
-        name for name, shape, kind in _trusting(scipy.io.whosmat, path)
+        name
+        for name, shape, kind in _trusting(scipy.io.whosmat, path)
         if len(shape) == 2 and shape[0] == shape[1] and kind in ("double", "single", "sparse")
-    ]  # fmt: skip
+    ]
 
 
 def read(path: Path, name: str) -> Found:

@@ -27,11 +27,11 @@ def read_nodes(path: Path, name: str, unit: str) -> Mesh:
     """
     suffix = path.suffix.lower()
     if suffix in _TABLES:
-        return _mesh_of(table(path.read_text(encoding="utf-8", errors="replace"), 4, path.name), unit, path)
+        return _mesh_of(table(path.read_text(encoding="utf-8", errors="replace"), 4, path.name), unit)
     if suffix in (".mat", ".h5", ".hdf5"):
-        return _mesh_of(_stored(path, name), unit, path)
+        return _mesh_of(_stored(path, name), unit)
     if suffix in (".bdf", ".dat", ".nas", ".pch"):
-        return _mesh_of(nastran.grids(path), unit, path)
+        return _mesh_of(nastran.grids(path), unit)
     return read_mesh(path, unit)
 
 
@@ -49,7 +49,7 @@ def _stored(path: Path, name: str) -> Array:
     return np.asarray(matlab._trusting(scipy.io.loadmat, path, variable_names=[found])[found], dtype=float)
 
 
-def _mesh_of(values: Any, unit: str, path: Path) -> Mesh:
+def _mesh_of(values: Any, unit: str) -> Mesh:
     values = np.asarray(values, dtype=float)
     number = values[:, 0]
     if not len(values) or not np.isfinite(values).all() or np.abs(values).max() > 1e15:
@@ -63,7 +63,7 @@ def _mesh_of(values: Any, unit: str, path: Path) -> Mesh:
     return Mesh(values[:, 1:] * UNITS[unit], {}, {}, {}, ids)
 
 
-def read_dofs(path: Path, mesh: Mesh) -> Indices:
+def read_dofs(path: Path) -> Indices:
     """(m, 2) node number and component (1 to 6; 0 0: generalised) of every row, from ``node.direction`` or two columns.
 
     Raises:

@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from scipy import special
 from scipy.optimize import brentq
 
-from ..data import Array
+from microslip.data import Array
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Indices, Mesh, UserError
-from ..fem.discretise import Discretisation, discretise, free_upper
-from ..linalg import eigen
-from ..settings.body import BodySettings
-from .body_rows import INTERFACE_LABELS, BodyRows, body_rows
-from .boundary import fixed_dofs, materials_of
-from .equilibrium import make_model
-from .spectrum import make_pencil
+from microslip.data import Array, Indices, Mesh, UserError
+from microslip.fem.discretise import Discretisation, discretise, free_upper
+from microslip.linalg import eigen
+from microslip.modes.body_rows import INTERFACE_LABELS, BodyRows, body_rows
+from microslip.modes.boundary import fixed_dofs, materials_of
+from microslip.modes.equilibrium import make_model
+from microslip.modes.spectrum import make_pencil
+from microslip.settings.body import BodySettings
 
 
 @dataclass(frozen=True)

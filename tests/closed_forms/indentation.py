@@ -1,4 +1,4 @@
-"""Pressed and sheared round contacts in closed form: sphere, cone, flat stamp; Mindlin's and Cattaneo's results.
+"""Pressed and sheared round contacts in closed form: sphere, cone, stamps; Mindlin's and Cattaneo's results.
 
 K. L. Johnson, Contact Mechanics, chapters 3 to 5 and 7; V. L. Popov, Contact Mechanics and Friction, chapters 5 and 8.
 ``modulus`` is E*, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2, in Pa. SI.
@@ -7,6 +7,8 @@ K. L. Johnson, Contact Mechanics, chapters 3 to 5 and 7; V. L. Popov, Contact Me
 from __future__ import annotations
 
 import numpy as np
+
+from microslip.reference.half_space import mean_inverse_distance
 
 
 def sphere_force(modulus: float, radius: float, approach: float) -> float:
@@ -51,3 +53,12 @@ def cattaneo_loss(force: float, friction: float, normal_force: float, stiffness:
     limit = friction * normal_force
     t = force / limit
     return 7.2 * limit**2 / stiffness * (1 - (1 - t) ** (5 / 3) - 5 / 6 * t * (1 + (1 - t) ** (2 / 3)))
+
+
+def rectangle_compliance(a: float, b: float, young: float, poisson: float) -> float:
+    """Mean normal displacement (m) of a rectangle (m) on a half-space per newton of uniform pressure on it.
+
+    Boussinesq's w = (1 - nu^2) F/(pi E r) (K. L. Johnson, Contact Mechanics, 3.2), averaged over source and target.
+    A rigid stamp of the same outline is stiffer.
+    """
+    return (1 - poisson**2) / (np.pi * young) * mean_inverse_distance(a, b)

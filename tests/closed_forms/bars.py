@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from ..data import Array
+from microslip.data import Array
 
 
 def rod_frequencies(young: float, density: float, length: float, count: int, ends: str = "clamped-free") -> Array:
