@@ -19,10 +19,11 @@ from ..reduced.quality import sentences
 from ..reduced.truncation import percent, verdict
 from ..ring.expansion import certificate_words, certify_ring, ring_checks
 from ..ring.resonances import eigenmodes, harmonics_of, speeds_of
+from ..units import rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
 from .response import response_pieces
-from .words import certificate, contact_sentence, fit_sentence, fit_summary, hertz, number_list, range_sentence, rpm
+from .words import certificate, contact_sentence, fit_sentence, fit_summary, hertz, number_list, range_sentence
 
 
 def report_html(
@@ -139,14 +140,14 @@ def _rotation(basis: ModalBasis) -> str:
 def _frequencies(basis: ModalBasis, album: Album) -> list[Piece]:
     groups = _groups(basis)
     several = len(groups) > 1
-    proofs = [(f"{rpm(g.speed)}: " if several else "") + certificate(g) for g in groups]
+    proofs = [(f"{rpm_text(g.speed)}: " if several else "") + certificate(g) for g in groups]
     certified = all(g.checks.get("certified") for g in groups)
     rows = []
     for j in range(max(g.n_modes for g in groups)):
         cells = ["0" if j < g.n_modes and not g.omega[j] else hertz(g.frequency, j) for g in groups]
         first = next(g for g in groups if j < g.n_modes)
         rows.append([j + 1, *cells, number(100 * first.damping_ratio[j]), first.kind[j]])
-    head = ["mode", *(f"Hz at {rpm(g.speed)}" if several else "Hz" for g in groups), "damping in %", "kind"]
+    head = ["mode", *(f"Hz at {rpm_text(g.speed)}" if several else "Hz" for g in groups), "damping in %", "kind"]
     return [
         say(*proofs, tone="note" if certified else "warn"),
         table(head, rows),
@@ -160,7 +161,7 @@ def _gyroscopic(group: ModalGroup) -> list[Piece]:
     """Frequencies with gyroscopic coupling, and whether the body is stable."""
     if (y := group.gyroscopic) is None:
         return []
-    at = rpm(group.speed)
+    at = rpm_text(group.speed)
     bounds = [f"{100 * e:.2g} %" if np.isfinite(e) else "" for e in y.error]
     rows = [
         [i + 1, f"{f:#.6g}", way, f"{s:+.2f}", bound]
@@ -179,7 +180,7 @@ def _campbell(basis: ModalBasis, album: Album) -> list[Piece]:
         return []
     rows = [
         [c.order, int(tracks.modes[c.curve][tracks.modes[c.curve] >= 0][0]) + 1]
-        + [f"{c.speed * 30 / np.pi:.0f}", f"{c.frequency:.5g}"]
+        + [f"{to_rpm(c.speed):.0f}", f"{c.frequency:.5g}"]
         for c in crossings(tracks, engine_orders(basis))
     ]
     return [
@@ -195,7 +196,7 @@ def _modes(basis: ModalBasis, album: Album) -> list[Piece]:
     moving = [Piece("row", album.begun(prefix)) for prefix in ("ring_wave_", "animation_")]
     single = []
     for group in _groups(basis):
-        at = rpm(group.speed)
+        at = rpm_text(group.speed)
         of = f" of nodal diameter {group.harmonic}" if basis.sectors > 1 else ""
         shown = Piece("row", album.begun("mode_", "_" + at.replace(" ", "")))
         single.append(fold(f"Each mode{of} at {at}", shown))
@@ -225,7 +226,7 @@ def _interfaces(basis: ModalBasis, album: Album) -> list[Piece]:
 def _contacts(basis: ModalBasis, album: Album) -> list[Piece]:
     """Closures over the speeds; the nodal diameters share one static state."""
     states = {g.speed: g.contacts for g in reversed(_groups(basis))}
-    closures = [(rpm(speed), name, c) for speed in sorted(states) for name, c in states[speed].items()]
+    closures = [(rpm_text(speed), name, c) for speed in sorted(states) for name, c in states[speed].items()]
     if not closures:
         return []
     rows = []

@@ -10,14 +10,15 @@ from ..data import ModalBasis, ModalGroup
 from ..modes.campbell import engine_orders
 from ..ring import resonances
 from ..ring.expansion import aliased, certificate_words, certify_ring
+from ..units import rpm_text
 from .page import Album, Piece, fold, say, table
-from .words import hertz, number_list, range_sentence, rpm
+from .words import hertz, number_list, range_sentence
 
 
 def frequencies(basis: ModalBasis, album: Album) -> list[Piece]:
     """Frequencies over the nodal diameters, and what the sector proves of the ring."""
     held = resonances.harmonics_of(basis)
-    speeds = {s: rpm(basis.groups[s, held[0]].speed) for s in resonances.speeds_of(basis)}
+    speeds = {s: rpm_text(basis.groups[s, held[0]].speed) for s in resonances.speeds_of(basis)}
     out = []
     for s, at in speeds.items():
         proof = certify_ring(basis, s)
@@ -42,7 +43,7 @@ def whirl(groups: Sequence[ModalGroup]) -> list[Piece]:
     """Backward and forward waves of every nodal diameter with gyroscopic coupling, if a speed's groups hold it."""
     if (words := resonances.whirl_sentence(groups)) is None:
         return []
-    at = rpm(groups[0].speed)
+    at = rpm_text(groups[0].speed)
     waves = {f"k = {g.harmonic}\n{way}": f for g in groups for way, (f, _) in resonances.waves_of(g).items()}
     bounds = [f"{100 * b:.2g} %" if np.isfinite(b) else "" for b in resonances.whirl_bounds(groups)]
     rows = [[j + 1, *(hertz(f, j) for f in waves.values()), bound] for j, bound in enumerate(bounds)]
@@ -84,5 +85,5 @@ def _nearest(basis: ModalBasis, asked: Sequence[int]) -> Piece:
         for m in resonances.margins(basis, fastest, asked)[:12]
     ]
     head = ["engine order", "nodal diameter", "wave", "family", "mode in Hz", "excitation in Hz", "mode above it"]
-    at = rpm(basis.groups[fastest, resonances.harmonics_of(basis)[0]].speed)
+    at = rpm_text(basis.groups[fastest, resonances.harmonics_of(basis)[0]].speed)
     return fold(f"The modes nearest to an engine order at {at}", table(head, rows))

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from ..data import Array, ContactState, Interface, ModalGroup, SpeedRange
 from ..reduced.truncation import percent
 from ..settings.body import GROUND
+from ..units import to_rpm
 
 RIGID_ENOUGH = 0.05
 """A patch whose fit residual is below this moves as a rigid patch for most purposes."""
-
-
-def rpm(speed: float) -> str:
-    """The speed (rad/s) with its unit."""
-    return f"{rpm_text(speed)}"
 
 
 def hertz(frequency: Array, j: int) -> str:
@@ -50,8 +44,8 @@ def certificate(group: ModalGroup) -> str:
 
 def range_sentence(harmonic: int, r: SpeedRange) -> str:
     """How a speed range was made and how good it is."""
-    low, high = r.speeds[[0, -1]] * 30 / np.pi
-    held = " and ".join(f"{v:.0f}" for v in r.held_out * 30 / np.pi)
+    low, high = to_rpm(r.speeds[[0, -1]])
+    held = " and ".join(f"{v:.0f}" for v in to_rpm(r.held_out))
     which = f"Nodal diameter {harmonic}: between" if harmonic else "Between"
     return (
         f"{which} {low:.6g} and {high:.6g} rpm one basis of {r.samples[0].n_modes} coordinates serves at every speed: "
