@@ -40,7 +40,8 @@ from microslip.data import Compliance, Interface, ModalGroup, Rows
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import newton, sweep
-from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Side
+from microslip.system.assembly import Assembly, Contact, Load, Output, Side
+from microslip.system.component import Member
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"

@@ -27,7 +27,8 @@ from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.results.checks import BALANCE, COUNTED, MOTION, Checks
-from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Side
+from microslip.system.assembly import Assembly, Contact, Load, Output, Side
+from microslip.system.component import Member
 
 Array = np.ndarray
 

@@ -18,8 +18,8 @@ from microslip.linalg import eigen
 from microslip.modes import rigid
 from microslip.modes.body_rows import body_rows
 from microslip.modes.boundary import fixed_dofs
-from microslip.modes.compute import inertia_of
 from microslip.modes.equilibrium import BodyModel, make_model
+from microslip.modes.group import inertia_of
 from microslip.modes.spectrum import make_pencil, rigid_shift
 from microslip.settings.body import BodySettings
 

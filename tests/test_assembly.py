@@ -19,7 +19,8 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, across, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, across, preloaded_contact
+from microslip.system.component import Member, Ring
 
 
 def blade() -> ModalBasis:

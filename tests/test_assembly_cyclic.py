@@ -22,7 +22,8 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.ring.neighbours import frame_change
 from microslip.ring.neighbours import stuck as stuck_neighbours
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.component import Member, Ring
 from microslip.system.damping import structural
 from microslip.system.disc import whole
 from microslip.system.nodal import nodal

@@ -15,7 +15,7 @@ from microslip.case.assemble import Built, build
 from microslip.cli import main
 from microslip.data import UserError
 from microslip.modes import modal_basis
-from microslip.system.assembly import Ring
+from microslip.system.component import Ring
 
 CASE = """
 name = "ring"

@@ -25,7 +25,8 @@ from microslip.contact.sliders import Iwan, rough_strips, uniform
 from microslip.contact.solids import Solid
 from microslip.data import Array, UserError
 from microslip.reference.half_space import mean_inverse_distance
-from microslip.system.assembly import Member, Side
+from microslip.system.assembly import Side
+from microslip.system.component import Member
 from microslip.system.nodal import nodal, static_compliance
 
 STEEL = Solid(2.1e11, 0.3)

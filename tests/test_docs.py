@@ -119,6 +119,28 @@ def test_rooms_import_only_from_rooms_above() -> None:
         assert room_imports(room) <= set(order[:i]), room
 
 
+def needed(file: Path) -> set[Path]:
+    """Files of the package that a file imports to run; what types alone need is left out."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            node.body = []
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            found |= {p.with_suffix(".py") for p in (place, *(place / a.name for a in node.names))}
+    return {f for f in found if f.is_file()} - {file}
+
+
+def test_no_files_import_each_other() -> None:
+    """Not even by a way round: what a file imports can be read before it."""
+    left = {f: needed(f) for f in PACKAGE.rglob("*.py")}
+    while ends := {f for f, others in left.items() if not others & left.keys()}:
+        left = {f: others for f, others in left.items() if f not in ends}
+    assert not left, sorted(str(f.relative_to(PACKAGE)) for f in left)
+
+
 def test_gmsh_is_imported_only_where_the_page_says() -> None:
     for file in [*PACKAGE.rglob("*.py"), *(ROOT / "geometry").rglob("*.py")]:
         text = file.read_text(encoding="utf-8")

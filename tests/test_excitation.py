@@ -21,7 +21,8 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.ring.expansion import aliased
 from microslip.system import damping, excitation, pressure
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring
+from microslip.system.assembly import Assembly, Load, Output
+from microslip.system.component import Member, Ring
 
 # ---------------------------------------------------------------- engine orders and patterns
 

@@ -33,7 +33,7 @@ from microslip.fem import (
 from microslip.fem.discretise import face_blocks, free_upper, reference_nodes
 from microslip.fem.loads import body_force, thermal, traction
 from microslip.fem.operators import engineering, from_tensor, tangent_tensor, to_symmetric, to_tensor
-from microslip.modes.compute import inertia_of
+from microslip.modes.group import inertia_of
 from microslip.modes.rigid import rigid_fields
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]

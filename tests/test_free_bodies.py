@@ -19,8 +19,9 @@ from microslip.harmonic_balance import pseudo_transient, response
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import from_rest, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Side
+from microslip.system.assembly import Assembly, Load, Output, Side
 from microslip.system.assembly import Contact as Touching
+from microslip.system.component import Member
 
 Array = np.ndarray
 Omega = 2 * np.pi * 97.0

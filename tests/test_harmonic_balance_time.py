@@ -25,7 +25,8 @@ from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
-from microslip.system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, across, preloaded_contact
+from microslip.system.assembly import Assembly, Contact, Load, Output, Side, across, preloaded_contact
+from microslip.system.component import Member, Ring
 
 Array = np.ndarray
 

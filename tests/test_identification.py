@@ -21,7 +21,8 @@ from microslip.harmonic_balance.identification import Measured
 from microslip.modes import modal_basis
 from microslip.ring.expansion import phase
 from microslip.ring.neighbours import frame_change, stuck
-from microslip.system.assembly import Assembly, Contact, Member, Ring, Side
+from microslip.system.assembly import Assembly, Contact, Side
+from microslip.system.component import Member, Ring
 
 SHROUD = (0.02, 0.03)  # m, of the patch whose springs are spread
 

@@ -14,7 +14,8 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import harmonic_response
 from microslip.reference.one_harmonic import JenkinsContact, frequency_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.component import Member
 
 SPRINGS, SIZE = (3e6, 2e6, 5e6), (0.08, 0.03)
 LAW = Example(Jenkins(value(3e6), value(2e6), value(5e6), value(4.0), 2), 1e-5, 1e-5)

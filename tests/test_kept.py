@@ -33,8 +33,9 @@ from microslip.reduced.coordinates import in_modes
 from microslip.results import open_journal, response_of
 from microslip.settings.body import BodySettings
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
 from microslip.system.assembly import Contact as Rub
+from microslip.system.component import Member
 
 FREQUENCY = np.linspace(180.0, 270.0, 16)
 SERIES = "normal force 20 N"

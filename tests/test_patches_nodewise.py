@@ -23,7 +23,8 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.settings.body import BodySettings
-from microslip.system.assembly import Assembly, Load, Member, Output, Ring, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.component import Member, Ring
 from microslip.system.nodal import interpolation, nodal, static_compliance
 from microslip.system.pairing import facing, rigid_points
 

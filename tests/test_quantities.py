@@ -11,7 +11,8 @@ from small import basis as small_basis
 from microslip.case.curves import Followed
 from microslip.harmonic_balance.envelope import Envelope, OverOrders
 from microslip.harmonic_balance.readout import measured
-from microslip.system.assembly import Assembly, Member, Output
+from microslip.system.assembly import Assembly, Output
+from microslip.system.component import Member
 from microslip.units import METRES, Quantity, amplitude_of, counted, percent
 
 STRAIN = Quantity("1")

@@ -15,7 +15,8 @@ from microslip.data import ModalGroup
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response
 from microslip.modes import modal_basis
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.component import Member
 
 TIP = {"name": "tip", "face": "x1", "t2": [0.0, 0.0, 1.0]}
 PUSH = {"name": "push", "face": "z1", "direction": [0.0, 0.3, 1.0]}

@@ -19,7 +19,8 @@ from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
 from microslip.modes.campbell import crossings, track_basis
 from microslip.modes.speed_range import basis_at
-from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.component import Member
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
 ORDER = 4

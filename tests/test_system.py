@@ -354,7 +354,8 @@ def rubbed(g=None, law=None, **changed):
     pytest.importorskip("jax")
     from microslip.contact.patch import Patch
     from microslip.contact.sliders import jenkins
-    from microslip.system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+    from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+    from microslip.system.component import Member
 
     g = g or chain().basis().groups[0, 0]
     patch = Patch("rub", np.zeros((1, 2)), np.ones(1), law or jenkins(2e3, 0.3, 1.0))

@@ -23,7 +23,8 @@ from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
 from ..modes.speed_range import basis_at
 from ..reduced.compliance import SURFACE, statics_beside
 from ..reduced.coordinates import first_modes, in_modes, of_density
-from ..system.assembly import Assembly, Contact, Load, Member, Output, Ring, Side, preloaded_contact
+from ..system.assembly import Assembly, Contact, Load, Output, Side, preloaded_contact
+from ..system.component import Member, Ring
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
 from .counting import Face, Springs, brought, counted_once

@@ -12,7 +12,8 @@ from pydantic import Field, model_validator
 
 from ..data import ModalGroup, UserError
 from ..settings.body import Model, NotNegative, Number, Numbers, Positive
-from ..system.assembly import Load, Member, Ring
+from ..system.assembly import Load
+from ..system.component import Member, Ring
 from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
 from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
 from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure

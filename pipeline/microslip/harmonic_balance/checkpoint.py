@@ -14,7 +14,8 @@ from ..continuation.newton import Scaled
 from ..data import Array, ComplexArray
 from ..results.checks import Checks
 from ..results.journal import Journal
-from ..system.assembly import Assembly, Member, Output
+from ..system.assembly import Assembly, Output
+from ..system.component import Member
 from .checks import forces_on, judged
 from .families import Family, followed
 from .patch import Cycle

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import ComplexArray
 from ..results.checks import Checks, shares, work
-from ..system.assembly import Member
+from ..system.component import Member
 from .problem import Problem
 from .solver import Point
 

@@ -16,7 +16,8 @@ import scipy.optimize
 
 from ..contact.patch import Patch
 from ..data import Array, Indices, UserError
-from ..system.assembly import Assembly, Ring
+from ..system.assembly import Assembly
+from ..system.component import Ring
 
 OPEN, RIGID = 1e-10, 1e5
 """Shares of the stiffness that the highest mode has at a contact, below and above which a contact is as good as open

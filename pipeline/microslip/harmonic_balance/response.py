@@ -14,7 +14,8 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
-from ..system.assembly import Assembly, Load, Member, Output, Side, preloaded_contact
+from ..system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from ..system.component import Member
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged

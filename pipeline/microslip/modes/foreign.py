@@ -19,7 +19,7 @@ from ..units import from_rpm
 from . import rigid
 from .body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from .boundary import AXES, check_held, require_face
-from .compute import modal_damping
+from .group import modal_damping
 from .rows import Patch
 from .solution import Searched, Solution, certified, held_compliance, reduced_on
 from .spectrum import static_answers

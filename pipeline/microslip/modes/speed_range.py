@@ -32,7 +32,7 @@ from ..reduced.coordinates import compliance_rows, in_coordinates
 from ..reduction import METHODS, Problem, Reduced
 from ..units import from_rpm, rpm_text, to_rpm
 from .common import Interpolant, lagrange
-from .compute import modal_damping, without_massless
+from .group import modal_damping, without_massless
 from .solution import held_compliance
 
 

@@ -161,38 +161,3 @@ def read_out(motion: Motion, name: str, kind: str = "monitors") -> ComplexArray:
         "gauges": lambda r: r.gauges[name],
     }.get(kind)
     return motion.of(rows, beside)
-
-
-def amplitude(harmonics: ComplexArray, axis: int = 1, samples: int | None = None) -> Array:
-    """Largest |x(t) - mean| over the cycle of signals whose harmonics stand along an axis.
-
-    With one harmonic |a_1|; with more the largest of samples, refined; see `stress.largest_of_wave`.
-    """
-    from .stress import largest_of_wave
-
-    a = np.moveaxis(harmonics, axis, 0)[1:]
-    if len(a) == 1:
-        return np.abs(a[0])
-    up, down = (largest_of_wave(np.moveaxis(s * a, 0, -1), samples) for s in (1.0, -1.0))
-    return np.maximum(up, down)
-
-
-def phase(harmonics: ComplexArray, harmonic: int = 1, axis: int = 1) -> Array:
-    """Phase of one harmonic against cos(h Omega t), rad between -pi and pi; a quantity that lags has a negative one."""
-    return np.angle(np.take(harmonics, harmonic, axis=axis))
-
-
-def longest(vectors: ComplexArray) -> Array:
-    """(...,) largest length over the cycle of the vectors Re(a exp(i t)), a (..., d): half the ellipse's long axis.
-
-    |x(t)|^2 = (|a|^2 + Re(a . a exp(2 i t)))/2, so the largest is sqrt((|a|^2 + |a . a|)/2).
-    """
-    square = (vectors.real**2 + vectors.imag**2).sum(axis=-1)
-    return np.sqrt(0.5 * (square + np.abs((vectors * vectors).sum(axis=-1))))
-
-
-def at_time(harmonics: ComplexArray, angle: float | Array, axis: int = 1) -> Array:
-    """Values at Omega t = angle (rad), of one angle, or of several along a new first axis."""
-    a = np.moveaxis(harmonics, axis, 0)
-    turn = np.exp(1j * np.multiply.outer(np.asarray(angle, dtype=float), np.arange(len(a))))
-    return np.tensordot(turn, a, axes=1).real

@@ -12,8 +12,9 @@ from ..exchange import vtu
 from ..files.store import write_text
 from ..modes.stress import von_mises
 from ..ring.expansion import replicate, sector_rotation
+from .cycle import at_time, longest
 from .fatigue import MaterialLimits, vibration_margin
-from .motion import Motion, at_time, displacement, longest
+from .motion import Motion, displacement
 from .stress import cycle_stress
 
 INSTANTS = 16

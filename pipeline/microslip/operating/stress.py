@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Array, ComplexArray, ModalGroup, StressSet, UserError
-from .motion import Motion, Part, longest
+from .cycle import SAMPLES, longest, wave_top
+from .motion import Motion, Part
 
 DEVIATOR = np.array(
     [
@@ -26,8 +27,6 @@ DEVIATOR = np.array(
 )
 """(5, 6) D: von Mises stress = |D sigma|, sigma in the order `VOIGT`."""
 
-SAMPLES = 16
-"""Samples of a cycle for each harmonic of a wave whose largest value is sought."""
 
 _MEMORY = 2**25
 """Bytes of a block of places that is worked on at once."""
@@ -269,7 +268,7 @@ def _mean(steady: Array) -> Array:
 
 def _longest_of_wave(s: ComplexArray) -> Array:
     """Largest length over the cycle of vectors of (..., H + 1, d) harmonics."""
-    return np.sqrt(np.maximum(_largest(_square(s), SAMPLES), 0.0))
+    return np.sqrt(np.maximum(wave_top(_square(s), SAMPLES), 0.0))
 
 
 def _square(s: ComplexArray) -> ComplexArray:
@@ -288,45 +287,3 @@ def _square(s: ComplexArray) -> ComplexArray:
         found[..., n] = (both[..., h + H, :] * both[..., n - h + H, :]).sum(axis=(-1, -2))
     found[..., 1:] *= 2.0
     return found
-
-
-def largest_of_wave(harmonics: ComplexArray, samples: int | None = None) -> Array:
-    """(...,) largest value over the cycle of real waves sum Re(a_h exp(i h t)), a_h (..., H), h = 1 ... H."""
-    zero = np.zeros((*harmonics.shape[:-1], 1), dtype=complex)
-    return _largest(np.concatenate([zero, harmonics], axis=-1), SAMPLES if samples is None else samples)
-
-
-def _largest(a: ComplexArray, per_harmonic: int) -> Array:
-    """Largest of p(t) = Re(sum a_n exp(i n t)), a (..., n + 1): the highest hill, Newton's method to its top.
-
-    Every sample is raised to the top of the parabola through it and its neighbours, so that of two hills the higher is
-    taken. What may be wrong is the hill alone, and then by no more than the error of a parabola; without it the
-    largest of N samples is still cos(pi n / N) of the largest |p| (Ehlich and Zeller, Math. Z. 86 (1964) 41).
-    """
-    order = a.shape[-1] - 1
-    if order == 0:
-        return a[..., 0].real
-    count = max(per_harmonic * order, 16)
-    n = np.arange(order + 1)
-    t = 2 * np.pi * np.arange(count) / count
-    turn = np.exp(1j * np.outer(n, t))
-    value = a.real @ turn.real
-    value -= a.imag @ turn.imag
-    top = _hill(value)
-    best, at = np.take_along_axis(value, top[..., None], axis=-1)[..., 0], t[top]
-    for _ in range(3):
-        wave = a * np.exp(1j * at[..., None] * n)
-        slope, bend = -(wave.imag @ n), -(wave.real @ n**2)
-        step = np.divide(-slope, bend, out=np.zeros_like(slope), where=bend < 0)
-        at = at + np.clip(step, -np.pi / count, np.pi / count)
-        best = np.maximum(best, (a * np.exp(1j * at[..., None] * n)).real.sum(axis=-1))
-    return best
-
-
-def _hill(value: Array) -> Array:
-    """Number of the sample (last axis, periodic) whose parabola through three samples is the highest at its top."""
-    before, after = np.roll(value, 1, axis=-1), np.roll(value, -1, axis=-1)
-    bend = 2 * value - before - after
-    hill = (before <= value) & (value >= after) & (bend > 0)
-    rise = np.divide((after - before) ** 2, 8 * bend, out=np.zeros_like(value), where=hill)
-    return (value + rise).argmax(axis=-1)

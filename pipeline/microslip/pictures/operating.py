@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array
+from ..operating.cycle import at_time, longest
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
-from ..operating.motion import Motion, at_time, displacement, longest
+from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
 from .plots import (
     COLOURS,

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..data import Array, Indices, ModalBasis, UserError
 from ..harmonic_balance.sweeps import prominent
+from ..operating.cycle import amplitude
 from ..operating.fatigue import Endurance, MaterialLimits, endurance
-from ..operating.motion import Motion, amplitude, read_out
+from ..operating.motion import Motion, read_out
 from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from ..results import Response, Series
 from ..results.files import unit_of

@@ -12,7 +12,7 @@ import numpy as np
 from ..data import Array, ModalGroup, UserError
 from ..files.store import ordinary
 from ..ring.expansion import BACKWARD, FORWARD
-from .assembly import Member
+from .component import Member
 from .excitation import Turning, direction, index_of
 
 BOTH = "both"

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, Compliance, Interface, ModalGroup, Rows, UserError
-from .assembly import InWave, Member
+from .component import InWave, Member
 
 
 def at_sector(name: str, sector: int) -> str:

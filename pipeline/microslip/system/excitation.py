@@ -20,7 +20,8 @@ import numpy as np
 
 from ..data import Array, ComplexArray, UserError
 from ..ring.expansion import BACKWARD, FORWARD, STANDING
-from .assembly import Load, Ring
+from .assembly import Load
+from .component import Ring
 
 Turning = Literal[1, -1]
 """Sense of the rotor's rotation: 1 carries sector j to where sector j + 1 stood, -1 the other way."""

@@ -15,7 +15,8 @@ import scipy.linalg
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from ..data import Array, Interface, UserError
-from .assembly import InWave, Member, Side
+from .assembly import Side
+from .component import InWave, Member
 from .pairing import Pairing
 
 NEIGHBOURS = 12

@@ -18,7 +18,8 @@ from scipy.spatial import KDTree
 from ..data import Array, ComplexArray, Interface, ModalGroup, Rows, UserError
 from ..files.store import ordinary
 from ..mesh import UNITS, point_data
-from .assembly import Load, Member
+from .assembly import Load
+from .component import Member
 
 COLUMNS = ("x", "y", "z", "p_real", "p_imag")
 

@@ -1,0 +1,193 @@
+"""One modal group: the spectrum of a state, reduced, with its rows, stresses, damping and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import (
+    Array,
+    Compliance,
+    GyroscopicModes,
+    ModalGroup,
+    Residual,
+    RunUp,
+    StressSet,
+)
+from ..fem.discretise import Discretisation
+from ..fem.operators import per_block
+from ..linalg import eigen
+from ..linalg.gyroscopic import Certified, gyroscopic_modes
+from ..reduction import Reduced
+from ..settings.body import BodySettings
+from .body_rows import BodyRows, reduced_gauge, reduced_interfaces, reduced_rows
+from .closures import contact_states
+from .equilibrium import BodyModel, StaticState
+from .invariants import inertia_invariants
+from .preload import pressed_modes
+from .run_up import run_up_terms
+from .sector import Sector
+from .solution import Searched, Solution, held_compliance, searched
+from .spectrum import make_pencil
+from .stress import gauss_set, nodal_set
+
+Report = Callable[[str], None]
+
+
+def inertia_of(d: Discretisation, density: float | Sequence[float]) -> tuple[float, Array, Array]:
+    """Mass (kg), centre (3,) m, inertia (3, 3) about the centre, kg m2 (Sextro Eqs. (2.3-32) to (2.3-34)).
+
+    Args:
+        density: kg/m3, one or one per block.
+    """
+    points = np.concatenate([np.einsum("qk,eki->eqi", b.N, d.mesh.points[b.cells]).reshape(-1, 3) for b in d.blocks])
+    dm = np.concatenate([rho * b.dx.reshape(-1) for rho, b in zip(per_block(d, density), d.blocks, strict=True)])
+    m = dm.sum()
+    centre = dm @ points / m
+    r = points - centre
+    second = np.einsum("p,pi,pj->ij", dm, r, r)
+    return float(m), centre, np.trace(second) * np.eye(3) - second
+
+
+def searched_state(
+    model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
+    solver: eigen.DirectSolver, sector: Sector | None, report: Report, pressed: Array | None = None,
+) -> dict[int, Searched]:  # fmt: skip
+    """Nodal diameter -> certified modes of one state; pressed: centre of mass of a free body under its bolts."""
+    if sector is not None:
+        return sector.searched(model, settings, state, speed, motions, rows, report)
+    pencil = make_pencil(model, state.K, solver)
+    if pressed is not None:
+        pencil, motions = pressed_modes(model, state, pencil, pressed)
+    return {0: searched(model, settings, pencil, speed, motions, rows, report)}
+
+
+def assemble_group(
+    model: BodyModel, settings: BodySettings, state: StaticState, speed: float, rows: BodyRows, s: Solution,
+    harmonic: int, report: Report,
+) -> ModalGroup:  # fmt: skip
+    """Everything the modal file holds of one state and nodal diameter."""
+    reduced = s.reduced
+    phi = s.unknowns.expand(reduced.vectors, model.d.mesh.n_points)
+    n, m, omega = model.d.mesh.n_points, phi.shape[1], reduced.omega
+    shapes = phi.reshape(n, 3, m)
+    ratios = settings.damping.ratios(omega)
+    B, labels = rows.stacked(settings)
+    T = np.asarray(B @ phi) if B.shape[0] else np.zeros((0, m))
+    modal = held_compliance(T, reduced, labels)
+    Mphi = (model.M_full @ phi.reshape(n, 3 * m)).reshape(n, 3, m)
+    run_up = run_up_terms(model, state, shapes, Mphi, harmonic)
+    run_up = without_massless(run_up, reduced)
+    G = 2 * speed * run_up.N
+    if (settings.output.gauss or settings.output.nodal_stress) and settings.output.stress_at(harmonic):
+        report("strain and stress modes")
+    u = state.u.reshape(-1)
+    return ModalGroup(
+        speed=speed,
+        omega=omega,
+        kind=reduced.kind,
+        damping_ratio=ratios,
+        M_r=reduced.M_r,
+        K_r=reduced.K_r,
+        C_r=modal_damping(reduced, 2 * ratios * omega),
+        to_diagonal=reduced.to_diagonal,
+        G_r=G,
+        run_up=run_up,
+        gyroscopic=_gyroscopic(settings, speed, reduced, run_up, s.found, s.kept),
+        invariants=None if settings.cyclic else inertia_invariants(model, state, shapes, Mphi),
+        phi=shapes if settings.output.shapes else np.zeros((0, 3, m)),
+        interfaces=reduced_interfaces(rows, settings, phi, shapes),
+        excitations={k: reduced_rows(v, phi, None) for k, v in rows.excitations.items()},
+        monitors={k: reduced_rows(v, phi, u) for k, v in rows.monitors.items()},
+        gauges={k: reduced_gauge(v, phi, state) for k, v in rows.gauges.items()},
+        compliance=Compliance(labels, s.static, modal, bool((omega == 0).any()), s.eigenmodes),
+        stresses=_stress_sets(model, settings, state, shapes, harmonic),
+        u_static=state.u,
+        checks={**_checks(s.found, model, state, s.kept), **s.indicators},
+        prestress=state.prestress if (speed or model.loaded) else "none",
+        harmonic=harmonic,
+        spin_softening=model.spin_softening,
+        contacts=contact_states(model.d.mesh, settings, state.contacts),
+        residual=_residual(model, settings, state, rows, s, harmonic),
+    )
+
+
+def _stress_sets(
+    model: BodyModel, settings: BodySettings, state: StaticState, shapes: Array, harmonic: int
+) -> dict[str, StressSet]:
+    """The sets that the settings ask for, of shapes (n, 3, m)."""
+    found: dict[str, StressSet] = {}
+    if settings.output.stress_at(harmonic):
+        if settings.output.gauss:
+            found["gauss"] = gauss_set(model, state, shapes)
+        if settings.output.nodal_stress:
+            found["nodes"] = nodal_set(model, state, shapes, harmonic)
+    return found
+
+
+def _residual(
+    model: BodyModel, settings: BodySettings, state: StaticState, rows: BodyRows, s: Solution, harmonic: int
+) -> Residual | None:
+    """Shapes, gauges, strain and stress of the residual attachment modes that the solver adds (MacNeal)."""
+    if s.reduced.residual is None:
+        return None
+    n, r = model.d.mesh.n_points, s.reduced.residual.shape[1]
+    whole = s.unknowns.expand(s.reduced.residual, n)
+    shapes = whole.reshape(n, 3, r)
+    sets = _stress_sets(model, settings, state, shapes, harmonic) if r else {}
+    return Residual(
+        s.force_labels,
+        shapes if settings.output.shapes else np.zeros((0, 3, r)),
+        {k: reduced_gauge(v, whole, state).rows for k, v in rows.gauges.items()},
+        {name: x.strain for name, x in sets.items()},
+        {name: x.stress for name, x in sets.items()},
+    )
+
+
+def without_massless(r: RunUp, reduced: Reduced) -> RunUp:
+    """The same with the inertia of the modes alone where some coordinates carry no mass."""
+    if "massless-interface" not in reduced.kind or reduced.to_diagonal is None:
+        return r
+    onto = reduced.to_diagonal @ reduced.to_diagonal.conj().T @ reduced.M_r
+    left = onto.conj().T
+    return RunUp(left @ r.N @ onto, left @ r.P @ onto, left @ r.euler, left @ r.centrifugal)
+
+
+def _gyroscopic(
+    settings: BodySettings, speed: float, reduced: Reduced, run_up: RunUp, found: eigen.Spectrum, kept: int
+) -> GyroscopicModes | None:
+    """Modes with gyroscopic coupling at speed, with the bound that the certified spectrum allows."""
+    if not (speed and settings.rotation.gyroscopic):
+        return None
+    V = np.eye(len(reduced.omega)) if reduced.to_diagonal is None else reduced.to_diagonal
+    N, P = V.conj().T @ run_up.N @ V, V.conj().T @ run_up.P @ V
+    values = [found.upper_shift, *found.values[kept : kept + 1]] if found.certified else [0.0]
+    next_omega = float(np.sqrt(max(min(values), 0.0)))
+    known = Certified(P, speed, next_omega, kept if reduced.to_diagonal is None else 0)
+    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, np.diag(reduced.omega**2), N, known)
+    return replace(own, shapes=V @ own.shapes)
+
+
+def modal_damping(reduced: Reduced, diagonal: Array) -> Array:
+    """(c, c) damping matrix with the given diagonal in the reduced body's own modes."""
+    if reduced.to_diagonal is None:
+        return np.diag(diagonal)
+    back = reduced.M_r @ reduced.to_diagonal  # V^-H, because V^H M_r V = 1
+    return (back * diagonal) @ back.conj().T
+
+
+def _checks(found: eigen.Spectrum, model: BodyModel, state: StaticState, kept: int) -> dict[str, float]:
+    total = float(model.M_full.sum())
+    volume = float(sum(m.density * b.dx.sum() for m, b in zip(model.materials, model.d.blocks, strict=True)))
+    return {
+        "certified": float(found.certified),
+        "count_below_upper_shift": float(len(found.values)),
+        "upper_shift_hz": float(np.sqrt(max(found.upper_shift, 0.0)) / 2 / np.pi),
+        "refound": float(found.refound),
+        "orthogonality": found.orthogonality,
+        "backward_error": float(found.backward_error[:kept].max()),
+        "mass_error": abs(total - volume) / volume,
+        "newton_steps": float(state.iterations),
+    }
