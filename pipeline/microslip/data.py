@@ -199,7 +199,7 @@ class Interface:
     )] = field(default_factory=lambda: np.zeros(2))  # fmt: skip
     polygon: Annotated[Array, Stored(
         "corner axis", "m", "corners of the convex outline seen along n, anticlockwise about n",
-        at=f"{_FRAME}/patch/polygon", when="a face that does not close on itself",
+        at=f"{_FRAME}/patch/polygon", when="the face does not close on itself",
     )] = field(default_factory=lambda: np.zeros((0, 3)))  # fmt: skip
     characteristic: Annotated[Array, Stored(
         "shape mode", "kg^-1/2", "amplitudes, m root mean square, of the characteristic shapes; compliance rows "

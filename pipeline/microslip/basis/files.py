@@ -38,7 +38,20 @@ from ..data import (
     StressSet,
     UserError,
 )
-from ..files.declared import Noun, array, escaped, indices, names, read, read_each, texts, unescaped, write, write_each
+from ..files.declared import (
+    Noun,
+    Scales,
+    array,
+    escaped,
+    indices,
+    names,
+    read,
+    read_each,
+    texts,
+    unescaped,
+    write,
+    write_each,
+)
 from ..files.hdf5 import create, put, put_scale, seal, seal_state
 from ..files.hostile import inspect, trial
 from ..files.store import complete_or_absent, ordinary
@@ -91,19 +104,19 @@ def write_basis(path: Path | str, basis: ModalBasis) -> None:
 
 
 def _write(file: h5py.File, basis: ModalBasis) -> None:
-    _write_root(file, basis)
-    _write_mesh(file, basis.mesh)
-    _write_frames(file, basis.groups[min(basis.groups)])
+    scales = _write_root(file, basis)
+    _write_mesh(file, basis.mesh, scales)
+    _write_frames(file, basis.groups[min(basis.groups)], scales)
     for (speed, harmonic), group in sorted(basis.groups.items()):
         where = file.require_group(f"speed_{speed}")
         where.attrs["rpm"] = group.speed * 30 / np.pi
         where.attrs["Omega"] = group.speed
-        _write_group(where.create_group(f"nd_{harmonic}"), group, basis.rotation_axis)
+        _write_group(where.create_group(f"nd_{harmonic}"), group, basis.rotation_axis, scales)
     for harmonic, found in sorted(basis.ranges.items()):
-        _write_range(file.create_group(f"range/nd_{harmonic}"), found, basis.rotation_axis)
+        _write_range(file.create_group(f"range/nd_{harmonic}"), found, basis.rotation_axis, scales)
 
 
-def _write_root(file: h5py.File, basis: ModalBasis) -> None:
+def _write_root(file: h5py.File, basis: ModalBasis) -> Scales:
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
     file.attrs["name"] = basis.name
@@ -114,26 +127,27 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> None:
     file.attrs["free"] = int(basis.free)
     file.attrs["damping_source"] = basis.damping_source
     file.attrs["source"] = basis.source
-    put_scale(file, "axis", np.array(["x", "y", "z"]))
-    put_scale(file, "component", np.array(VOIGT))
-    put_scale(file, "frame_axis", np.array(["n", "t1", "t2"]))
-    put_scale(file, "interface_row", np.array(INTERFACE_ROWS))
+    words = {"axis": "xyz", "component": VOIGT, "frame_axis": ("n", "t1", "t2"), "interface_row": INTERFACE_ROWS}
+    scales = {name: put_scale(file, name, np.array(list(told))) for name, told in words.items()}
     provenance = file.create_group("provenance")
     for key, value in sorted(basis.provenance.items()):
         provenance.attrs[key] = value.replace("\0", "")
-    write(file, basis, part="body/")
-    write(file, basis, part="rotation/")
+    write(file, basis, scales, part="body/")
+    write(file, basis, scales, part="rotation/")
     cyclic = file.create_group("cyclic")
     cyclic.attrs["N"] = basis.sectors
     cyclic.attrs["sector_angle"] = 2 * np.pi / basis.sectors
     cyclic.attrs["left"], cyclic.attrs["right"] = basis.cyclic_faces if basis.sectors > 1 else ("", "")
+    return scales
 
 
-def _write_mesh(file: h5py.File, mesh: Mesh) -> None:
+def _write_mesh(file: h5py.File, mesh: Mesh, scales: Scales) -> None:
     group = file.create_group("mesh")
     ids = mesh.node_id if len(mesh.node_id) else np.arange(1, mesh.n_points + 1)
-    file["node"] = put_scale(group, "node", ids)  # the same dataset again, where every group below finds it
-    write(group, mesh)
+    file["node"] = scales["node"] = put_scale(
+        group, "node", ids
+    )  # the same dataset again, where every group below finds it
+    write(group, mesh, scales)
     cells = group.create_group("cells")
     cells.attrs["order"] = "VTK node order, 0-based positions in /mesh/node"
     for cell_type, connectivity in sorted(mesh.cells.items()):
@@ -179,41 +193,42 @@ def _read_materials(group: h5py.Group, cells: dict[str, Indices]) -> dict[str, A
     return {"materials": materials, "regions": regions}
 
 
-def _write_frames(file: h5py.File, group: ModalGroup) -> None:
+def _write_frames(file: h5py.File, group: ModalGroup, scales: Scales) -> None:
     """Frames and patches do not depend on speed: they stand at the root."""
     where = file.create_group("interfaces")
     where.attrs["order"] = json.dumps(list(group.interfaces))
     for name, item in group.interfaces.items():
-        write(file, item, name, part="/", homes={"shape": where.require_group(escaped(name))})
+        write(file, item, scales, name, part="/", homes={"shape": where.require_group(escaped(name))})
 
 
-def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
+def _write_group(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) -> None:
     modes = group.create_group("modes")
     mode = put_scale(modes, "mode", np.arange(1, g.n_modes + 1))
     column = put_scale(modes, "mode_column", np.arange(1, g.n_modes + 1))
+    scales = {**scales, "mode": mode, "mode_column": column}
     group["mode"], group["mode_column"] = mode, column  # where run_up and gyroscopic find them
     if len(g.omega) < g.n_modes:
-        put_scale(modes, "own_mode", np.arange(1, len(g.omega) + 1))
-    write(group, g, part="modes/")
+        scales["own_mode"] = put_scale(modes, "own_mode", np.arange(1, len(g.omega) + 1))
+    write(group, g, scales, part="modes/")
     cyclic = group.create_group("cyclic")
     cyclic.attrs["harmonic"], cyclic.attrs["real"] = g.harmonic, int(not np.iscomplexobj(g.phi))
-    _write_interfaces(group, g)
+    _write_interfaces(group, g, scales)
     for kind, field in _ROW_FIELDS.items():
-        write_each(group.create_group(kind), getattr(g, field))
-    write(group, g.compliance)
+        write_each(group.create_group(kind), getattr(g, field), scales)
+    write(group, g.compliance, scales)
     for name, s in sorted(g.stresses.items()):
-        _write_stress(group, name, s)
-    _write_state(group, g, axis)
+        _write_stress(group, name, s, scales)
+    _write_state(group, g, axis, scales)
     if g.contacts:
-        write_each(group.create_group("contacts"), g.contacts)
+        write_each(group.create_group("contacts"), g.contacts, scales)
     if g.residual is not None:
-        _write_residual(group, g.residual)
+        _write_residual(group, g.residual, scales)
     if g.run_up is not None:
-        write(group.create_group("run_up"), g.run_up)
+        write(group.create_group("run_up"), g.run_up, scales)
     if g.gyroscopic is not None:
-        _write_gyroscopic(group.create_group("gyroscopic"), g.gyroscopic)
+        _write_gyroscopic(group.create_group("gyroscopic"), g.gyroscopic, scales)
     if g.invariants is not None:
-        write(group.create_group("invariants"), g.invariants, scaled=False)
+        write(group.create_group("invariants"), g.invariants, None)
         if len(g.invariants.stiffening):
             group["invariants/stiffening"].attrs["motions"] = " ".join(MOTIONS)
     checks = group.create_group("checks")
@@ -221,29 +236,30 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
         put(checks, name, value).attrs["tolerance"] = TOLERANCES.get(name, np.nan)
 
 
-def _write_range(group: h5py.Group, r: SpeedRange, axis: Array) -> None:
+def _write_range(group: h5py.Group, r: SpeedRange, axis: Array, scales: Scales) -> None:
     """The samples as groups like any other; what they share, phi and patch shapes, stands in the first alone."""
-    write(group, r, scaled=False)
+    write(group, r, None)
     for i, g in enumerate(r.samples):
         if i:
             faces = {k: replace(f, shapes=f.shapes[:0]) for k, f in g.interfaces.items()}
             g = replace(g, phi=g.phi[:0], interfaces=faces)
         where = group.create_group(f"sample_{i}")
         where.attrs["rpm"], where.attrs["Omega"] = g.speed * 30 / np.pi, g.speed
-        _write_group(where, g, axis)
+        _write_group(where, g, axis, scales)
 
 
 _ROW_FIELDS = {"excitation": "excitations", "monitor": "monitors", "gauge": "gauges"}
 
 
-def _write_interfaces(group: h5py.Group, g: ModalGroup) -> None:
+def _write_interfaces(group: h5py.Group, g: ModalGroup, scales: Scales) -> None:
     where, frames = group.create_group("interfaces"), group.file["interfaces"]
     for name, item in g.interfaces.items():
         frame = frames[escaped(name)]
-        write(where.create_group(escaped(name)), item, name, homes={"shape": frame, "point": frame["patch"]})
+        homes = {"shape": frame, "point": frame["patch"]}
+        write(where.create_group(escaped(name)), item, scales, name, homes=homes)
 
 
-def _write_state(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
+def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) -> None:
     """Rotation and the static state the modes are taken about."""
     where = group.create_group("rotation")
     where.attrs["Omega"] = g.speed * axis
@@ -252,20 +268,20 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array) -> None:
     where.attrs["spin_softening"] = int(g.spin_softening)
     where.attrs["gyroscopic"] = 0
     where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r"
-    write(group, g, part="rotation/")
+    write(group, g, scales, part="rotation/")
     for name, s in sorted(g.stresses.items()):
-        write(group, s, name, part="rotation/", scaled=False)
+        write(group, s, None, name, part="rotation/")
 
 
-def _write_gyroscopic(where: h5py.Group, modes: GyroscopicModes) -> None:
+def _write_gyroscopic(where: h5py.Group, modes: GyroscopicModes, scales: Scales) -> None:
     where.attrs["stable"] = int(modes.stable)
     where.attrs["frame"] = "turns with the body; q = shapes exp(i omega t); forward: with the rotation"
-    write(where, modes)
+    write(where, modes, scales)
 
 
-def _write_residual(group: h5py.Group, r: Residual) -> None:
-    file, where = group.file, group.create_group("residual")
-    write(where, r)
+def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:
+    where = group.create_group("residual")
+    write(where, r, scales)
     for name, values in r.gauges.items():
         item = where.create_group(f"gauge/{escaped(name)}")
         item["row"] = group[f"gauge/{escaped(name)}/row"]
@@ -274,7 +290,9 @@ def _write_residual(group: h5py.Group, r: Residual) -> None:
         for name, values in sorted(getattr(r, kind).items()):
             item = where.create_group(f"{kind}/{name}")
             item["place"] = group[f"stress/{name}/place"]
-            put(item, "T", values, f"{unit} per unit force", scales=[item["place"], file["component"], where["force"]])
+            put(
+                item, "T", values, f"{unit} per unit force", scales=[item["place"], scales["component"], where["force"]]
+            )
 
 
 def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dict[str, StressSet]) -> Residual:
@@ -285,17 +303,17 @@ def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dic
     return read(Residual, where, {"node": n}, gauges=own, **held)
 
 
-def _write_stress(group: h5py.Group, name: str, s: StressSet) -> None:
+def _write_stress(group: h5py.Group, name: str, s: StressSet, scales: Scales) -> None:
     """Places and weights of both stand with the stress; the strain's group has links."""
     stress, strain = (group.require_group(kind).create_group(name) for kind in ("stress", "strain"))
     for where in (stress, strain):
         where.attrs["location"] = s.location
         where.attrs["order"] = " ".join(VOIGT)
     strain.attrs["shear"] = "engineering"
-    write(group, s, name, part=("stress/<name>/points", "stress/<name>/weights"))
+    write(group, s, scales, name, part=("stress/<name>/points", "stress/<name>/weights"))
     for shared in ("place", "points", "weights"):
         strain[shared] = stress[shared]
-    write(group, s, name, part=("strain/", "stress/<name>/T"))
+    write(group, s, {**scales, "place": stress["place"]}, name, part=("strain/", "stress/<name>/T"))
 
 
 # reading ---------------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from ..data import INTERFACE_ROWS, MOTIONS, VOIGT, Array, ComplexArray, Flags, I
 from .hdf5 import IMAGINARY, put, put_scale
 
 Noun = TypeVar("Noun")
+Scales = dict[str, h5py.Dataset]
 SIZES = {
     "axis": 3,
     "component": len(VOIGT),
@@ -52,33 +53,33 @@ def unescaped(name: str) -> str:
 
 
 def write(
-    group: h5py.Group, noun: Any, name: str = "", part: str | tuple[str, ...] = "", *, scaled: bool = True,
+    group: h5py.Group, noun: Any, scales: Scales | None, name: str = "", part: str | tuple[str, ...] = "",
     homes: Mapping[str, h5py.Group] | None = None,
 ) -> None:  # fmt: skip
     """Write a noun's fields into its group.
 
     Args:
-        name: what the noun is called. part: how the places begin that are written; without it all that are not
-            absolute. scaled: whether axes have scales, or names alone. homes: dimension -> the group in which its scale
-            stands, if not in the group of the dataset or above it; it is linked there.
+        scales: those of dimensions that stand in the group or above it; others are made of numbers from 1. None: axes
+            have names alone. name: what the noun is called. part: how the places begin that are written; without it all
+            that are not absolute. homes: dimension -> the group in which its scale stands, if elsewhere; it is linked.
     """
+    scales, groups = scales if scales is None else dict(scales), {"": group}
     for field, (how, _) in declared(noun.__class__).items():
         at, value = how.at or field, getattr(noun, how.by or field)
-        if not (at.startswith(part) if part else at[0] != "/"):
+        if not (at.startswith(part) if part else at[0] != "/") or how.when and (value is None or not value.size):
             continue
         place, _, attributes = at.replace("<name>", escaped(name)).partition("@")
         if attributes:
             _put_attributes(group[place] if place and place in group else _group(group, place), attributes, value)
             continue
-        if how.when and (value is None or not value.size):
-            continue
-        value = np.array(value, dtype="U") if isinstance(value, tuple) else np.asarray(value)
         above, _, own = place.rpartition("/")
-        where = _group(group, above)
+        if above not in groups:
+            groups[above] = _group(group, above)
+        where, axes = groups[above], (how.over, scales, homes or {})
         unit = getattr(noun, how.unit[1:]) if how.unit.startswith("@") else how.unit
-        _put(where, own, value.astype(np.int64) if value.dtype == bool else value, unit, how.over, scaled, homes or {})
+        _put(where, own, np.array(value, dtype="U") if isinstance(value, tuple) else np.asarray(value), unit, *axes)
         if how.hertz:
-            _put(where, "frequency", noun.frequency, "Hz", how.over, scaled, homes or {})
+            _put(where, "frequency", noun.frequency, "Hz", *axes)
 
 
 def _group(group: h5py.Group, place: str) -> h5py.Group:
@@ -96,45 +97,44 @@ def _put_attributes(where: Any, names: str, value: Any) -> None:
 
 
 def _put(
-    where: h5py.Group, name: str, value: Array, unit: str, over: str, scaled: bool, homes: Mapping[str, h5py.Group]
-) -> None:
-    if over == name:  # the values along a dimension are its scale
-        put_scale(where, name, value)
+    where: h5py.Group, name: str, value: Array, unit: str, over: str, scales: Scales | None,
+    homes: Mapping[str, h5py.Group],
+) -> None:  # fmt: skip
+    value = value.astype(np.int64) if value.dtype == bool else value
+    if scales is not None and over == name:  # the values along a dimension are its scale
+        scales[name] = put_scale(where, name, value)
         return
     labels: list[str] = []
     for label in over.split():
-        if label == "own_mode" and "own_mode" not in where:  # as many modes as coordinates
+        if label == "own_mode" and label not in (scales or {}):  # as many modes as coordinates
             label = "mode"
         labels.append(TWIN[label] if label in labels else label)
-    if not scaled or {"axis_", "component_"} & set(labels):
+    if scales is None or {"axis_", "component_"} & set(labels):
         put(where, name, value, unit, tuple(labels))
-    else:
-        scales = [_scale(where, label, n, homes) for label, n in zip(labels, value.shape, strict=True)]
-        put(where, name, value, unit, scales=scales)
+        return
+    for label, size in zip(labels, value.shape, strict=True):
+        if label not in scales:
+            scales[label] = _scale(where, label, size, scales, homes)
+    put(where, name, value, unit, scales=[scales[label] for label in labels])
 
 
-def _scale(where: h5py.Group, label: str, size: int, homes: Mapping[str, h5py.Group]) -> h5py.Dataset:
-    """The scale of a dimension: the one that stands here or above, or at its home, or a new one."""
-    above = where
-    while True:
-        if label in above and getattr(above[label], "is_scale", False):
-            return above[label]
-        if above.name == "/":
-            break
-        above = above.parent
+def _scale(
+    where: h5py.Group, label: str, size: int, scales: Scales, homes: Mapping[str, h5py.Group]
+) -> h5py.Dataset:  # fmt: skip
+    """The scale of a dimension from its home, or a new one."""
     home = homes.get(label, where)
     twin = next((of for of, other in TWIN.items() if other == label), "")
-    scale = home.get(label) or put_scale(home, label, where[twin][()] if twin else np.arange(1, size + 1))
+    scale = home.get(label) or put_scale(home, label, scales[twin][()] if twin else np.arange(1, size + 1))
     if home != where:
         where[label] = scale
     return scale
 
 
-def write_each(where: h5py.Group, nouns: Mapping[str, Any]) -> None:
+def write_each(where: h5py.Group, nouns: Mapping[str, Any], scales: Scales) -> None:
     """Write nouns by their names into groups of their own; attribute `order`: their order of precedence."""
     where.attrs["order"] = json.dumps(list(nouns))
     for name, noun in nouns.items():
-        write(where.create_group(escaped(name)), noun)
+        write(where.create_group(escaped(name)), noun, scales)
 
 
 # reading ---------------------------------------------------------------------------------------------------------
@@ -240,9 +240,10 @@ def texts(group: h5py.Group, name: str, count: int | None = None) -> tuple[str, 
 
 
 def _dataset(group: h5py.Group, name: str, shape: tuple[int | None, ...], kinds: str, what: str) -> h5py.Dataset:
-    if name not in group:
-        raise ValueError(f"{group.name}/{name} is missing")
-    dataset = group[name]
+    try:
+        dataset = group[name]
+    except KeyError as error:
+        raise ValueError(f"{group.name}/{name} is missing") from error
     found = getattr(dataset, "shape", None)
     if found is None or len(found) != len(shape) or any(b not in (None, a) for a, b in zip(found, shape, strict=True)):
         wanted = " x ".join("any" if n is None else str(n) for n in shape) or "one number"
