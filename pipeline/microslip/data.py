@@ -185,17 +185,16 @@ class Interface:
         "point axis mode", "kg^-1/2", "displacement of the points, body axes", at="patch/shapes",
         when="`output.patch_shapes`", order=1,
     )]  # fmt: skip
-    role: Annotated[str, Stored(holds="`left`, `right`, `ground`, `load` or `bolt`", at=f"{_FRAME}@role", order=-1)] = (
+    role: Annotated[str, Stored(holds="`left`, `right`, `ground`, `load`, `bolt`", at=f"{_FRAME}@role", order=-1)] = (
         "ground"
     )
     partner: Annotated[str, Stored(holds="name of the facing interface", at=f"{_FRAME}@partner", order=-1)] = ""
     sector_shift: Annotated[int, Stored(
         holds="+1: the partner belongs to the next blade, -1: previous, 0: the same body or ground",
-        at=f"{_FRAME}@sector_shift",
-        order=-1,
+        at=f"{_FRAME}@sector_shift", order=-1,
     )] = 0  # fmt: skip
     extent: Annotated[Array, Stored(
-        "", "m", "along t1 and t2 (Sextro Fig. 5.1-3)", at=f"{_FRAME}/patch@b0,h0"
+        "", "m", "extents along t1 and t2 (Sextro Fig. 5.1-3)", at=f"{_FRAME}/patch@b0,h0"
     )] = field(default_factory=lambda: np.zeros(2))  # fmt: skip
     polygon: Annotated[Array, Stored(
         "corner axis", "m", "corners of the convex outline seen along n, anticlockwise about n",
@@ -230,9 +229,7 @@ class StressSet:
 
     location: Annotated[str, Stored(holds="`gauss` or `nodal-averaged`", at="stress/<name>@location")]
     points: Annotated[Array, Stored("place axis", "m", "the places, also in `strain`", at="stress/<name>/points")]
-    strain: Annotated[Array, Stored(
-        "place component mode", "m^-1 kg^-1/2", "engineering shear", at="strain/<name>/T"
-    )]  # fmt: skip
+    strain: Annotated[Array, Stored("place component mode", "m^-1 kg^-1/2", "engineering shear", at="strain/<name>/T")]
     stress: Annotated[Array, Stored(
         "place component mode", "Pa m^-1 kg^-1/2", "per unit coordinate", at="stress/<name>/T"
     )]  # fmt: skip
@@ -279,9 +276,7 @@ class Compliance:
     modal: Annotated[Array, Stored(
         *_COMPLIANCE, "sum of T_i T_j / omega^2 over the kept elastic modes", at="compliance_modal"
     )]  # fmt: skip
-    inertia_relief: Annotated[bool, Stored(
-        holds="1: the body is free", at="compliance_static@inertia_relief", order=1
-    )]  # fmt: skip
+    inertia_relief: Annotated[bool, Stored(holds="1: the body is free", at="compliance_static@inertia_relief", order=1)]
     eigenmodes: Annotated[Array | None, Stored(
         *_COMPLIANCE, "what the eigenmodes of the band hold alone, equal to modal where nothing else is kept (see "
         "[compliance counted once](reduction.md#compliance-counted-once))", at="compliance_plain", by="plain",
@@ -460,9 +455,7 @@ class ModalGroup:
     kind: Annotated[tuple[str, ...], Stored(
         "mode", "", "`rigid`, `normal`, and what other [reductions](reduction.md) add", at="modes/kind", order=1
     )]  # fmt: skip
-    damping_ratio: Annotated[Array, Stored(
-        "own_mode", "1", "D_j of Sextro Eq. (2.4-13)", at="modes/damping_ratio"
-    )]  # fmt: skip
+    damping_ratio: Annotated[Array, Stored("own_mode", "1", "D_j of Sextro Eq. (2.4-13)", at="modes/damping_ratio")]
     M_r: Annotated[Array, Stored("mode mode", "1", "reduced mass", at="modes/M_r", order=1)]
     K_r: Annotated[Array, Stored("mode mode", "s^-2", "stiffness", at="modes/K_r", order=1)]
     C_r: Annotated[Array, Stored("mode mode", "s^-1", "damping", at="modes/C_r", order=1)]

@@ -52,8 +52,8 @@ from ..files.declared import (
     write,
     write_each,
 )
-from ..files.hdf5 import create, put, put_scale, seal, seal_state
-from ..files.hostile import inspect, trial
+from ..files.hdf5 import create, put, put_scale, seal
+from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary
 from ..topology import CELL_TYPES, FACET_CORNERS
 from .checks import TOLERANCES, Check, check_basis
@@ -81,11 +81,6 @@ CONVENTIONS = {
 }
 
 _FACET_NODES = {"triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9}
-_DAMAGE = (
-    OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
-    NotImplementedError,
-)  # fmt: skip
-"""What h5py and numpy raise on content that is not what it should be."""
 
 
 # writing ---------------------------------------------------------------------------------------------------------
@@ -144,9 +139,8 @@ def _write_root(file: h5py.File, basis: ModalBasis) -> Scales:
 def _write_mesh(file: h5py.File, mesh: Mesh, scales: Scales) -> None:
     group = file.create_group("mesh")
     ids = mesh.node_id if len(mesh.node_id) else np.arange(1, mesh.n_points + 1)
-    file["node"] = scales["node"] = put_scale(
-        group, "node", ids
-    )  # the same dataset again, where every group below finds it
+    scales["node"] = put_scale(group, "node", ids)
+    file["node"] = scales["node"]  # the same dataset again, where every group below finds it
     write(group, mesh, scales)
     cells = group.create_group("cells")
     cells.attrs["order"] = "VTK node order, 0-based positions in /mesh/node"
@@ -226,7 +220,10 @@ def _write_group(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
     if g.run_up is not None:
         write(group.create_group("run_up"), g.run_up, scales)
     if g.gyroscopic is not None:
-        _write_gyroscopic(group.create_group("gyroscopic"), g.gyroscopic, scales)
+        where = group.create_group("gyroscopic")
+        where.attrs["stable"] = int(g.gyroscopic.stable)
+        where.attrs["frame"] = "turns with the body; q = shapes exp(i omega t); forward: with the rotation"
+        write(where, g.gyroscopic, scales)
     if g.invariants is not None:
         write(group.create_group("invariants"), g.invariants, None)
         if len(g.invariants.stiffening):
@@ -273,12 +270,6 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
         write(group, s, None, name, part="rotation/")
 
 
-def _write_gyroscopic(where: h5py.Group, modes: GyroscopicModes, scales: Scales) -> None:
-    where.attrs["stable"] = int(modes.stable)
-    where.attrs["frame"] = "turns with the body; q = shapes exp(i omega t); forward: with the rotation"
-    write(where, modes, scales)
-
-
 def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:
     where = group.create_group("residual")
     write(where, r, scales)
@@ -290,9 +281,8 @@ def _write_residual(group: h5py.Group, r: Residual, scales: Scales) -> None:
         for name, values in sorted(getattr(r, kind).items()):
             item = where.create_group(f"{kind}/{name}")
             item["place"] = group[f"stress/{name}/place"]
-            put(
-                item, "T", values, f"{unit} per unit force", scales=[item["place"], scales["component"], where["force"]]
-            )
+            axes = [item["place"], scales["component"], where["force"]]
+            put(item, "T", values, f"{unit} per unit force", scales=axes)
 
 
 def _read_residual(where: h5py.Group, n: int, gauges: dict[str, Rows], sets: dict[str, StressSet]) -> Residual:
@@ -330,25 +320,13 @@ class OtherFormat(UserError):
 def open_file(path: Path | str) -> h5py.File:
     """Open a modal file for reading after looking at its seal, its format and the kind of its content.
 
-    A file without a seal, one that another program has written or changed, is first read by a process of its own:
-    damaged HDF5 can hang the library or crash it.
-
     Raises:
         UserError: missing, damaged, foreign or of another major version.
     """
     path = Path(path)
     if not ordinary(path).is_file():
         raise UserError(f"{path}: no such modal file; make it first or correct the path")
-    try:
-        state = seal_state(path)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
-    if state == "broken":
-        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); write it again")
-    if not h5py.is_hdf5(path):
-        raise UserError(f"{path}: is damaged or no HDF5 file; write it again")
-    if state == "absent" and (trouble := trial(_TRIAL, path)):
-        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); write it again")
+    refuse_damaged(path, _TRIAL, "write it again")
     return _open(path)
 
 
@@ -358,8 +336,8 @@ _TRIAL = "from microslip.basis.files import _open, _read; _read(_open(path))"
 def _open(path: Path) -> h5py.File:
     try:
         file = h5py.File(path, "r")
-    except _DAMAGE as error:
-        raise UserError(f"{path}: is damaged or no HDF5 file ({_short(error)}); write it again") from error
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or no HDF5 file ({short(error)}); write it again") from error
     try:
         _accept(file, path)
     except BaseException:
@@ -372,20 +350,16 @@ def _accept(file: h5py.File, path: Path) -> None:
     try:
         form, version = file.attrs.get("format"), file.attrs.get("format_version")
         known = form == FORMAT
-    except _DAMAGE as error:
-        raise UserError(f"{path}: is damaged ({_short(error)}); write it again") from error
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged ({short(error)}); write it again") from error
     if not known:
         raise OtherFormat(path, form)
     if not isinstance(version, str) or version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
         raise UserError(f"{path}: has format version {version}, this program reads {FORMAT_VERSION}; write it again")
     try:
         inspect(file)
-    except (*_DAMAGE, RecursionError) as error:
-        raise UserError(f"{path}: is damaged or no modal file ({_short(error)}); write it again") from error
-
-
-def _short(error: BaseException) -> str:
-    return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or no modal file ({short(error)}); write it again") from error
 
 
 def read_basis(path: Path | str) -> ModalBasis:
@@ -401,8 +375,8 @@ def read_basis(path: Path | str) -> ModalBasis:
 def _read_or_refuse(file: h5py.File, path: Path) -> ModalBasis:
     try:
         return _read(file)
-    except (*_DAMAGE, RecursionError) as error:
-        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); write it again") from error
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); write it again") from error
 
 
 def _read(file: h5py.File) -> ModalBasis:

@@ -11,18 +11,12 @@ from typing import Any, TypeVar, get_type_hints
 import h5py
 import numpy as np
 
-from ..data import INTERFACE_ROWS, MOTIONS, VOIGT, Array, ComplexArray, Flags, Indices, Stored
+from ..data import INTERFACE_ROWS, MOTIONS, Array, ComplexArray, Flags, Indices, Stored
 from .hdf5 import IMAGINARY, put, put_scale
 
 Noun = TypeVar("Noun")
 Scales = dict[str, h5py.Dataset]
-SIZES = {
-    "axis": 3,
-    "component": len(VOIGT),
-    "frame_axis": 3,
-    "interface_row": len(INTERFACE_ROWS),
-    "motion": len(MOTIONS),
-}
+SIZES = {"axis": 3, "component": 6, "frame_axis": 3, "interface_row": len(INTERFACE_ROWS), "motion": len(MOTIONS)}
 TWIN = {"axis": "axis_", "component": "component_", "mode": "mode_column", "compliance_row": "compliance_column"}
 """What a dimension is called where it stands a second time: xarray wants distinct names."""
 
