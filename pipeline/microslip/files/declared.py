@@ -60,7 +60,7 @@ def write(
     scales, groups = scales if scales is None else dict(scales), {"": group}
     for field, (how, _) in declared(noun.__class__).items():
         at, value = how.at or field, getattr(noun, how.by or field)
-        if not (at.startswith(part) if part else at[0] != "/") or how.when and (value is None or not value.size):
+        if not (at.startswith(part) if part else at[0] != "/") or how.when and (value is None or not np.size(value)):
             continue
         place, _, attributes = at.replace("<name>", escaped(name)).partition("@")
         if attributes:
@@ -87,7 +87,7 @@ def _group(group: h5py.Group, place: str) -> h5py.Group:
 
 def _put_attributes(where: Any, names: str, value: Any) -> None:
     for name, v in zip(names.split(","), value if "," in names else [value], strict=True):
-        where.attrs[name] = np.nan if v is None else int(v) if isinstance(v, bool) else v
+        where.attrs[name] = np.nan if v is None else int(v) if isinstance(v, bool | np.bool_) else v
 
 
 def _put(
