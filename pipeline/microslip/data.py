@@ -326,7 +326,8 @@ class GyroscopicModes:
         "one all, a negative omega being the conjugate wave at its magnitude", hertz=True,
     )]  # fmt: skip
     shapes: Annotated[ComplexArray, Stored(
-        "mode whirl", "1", "complex, shapes^H M_r shapes = 1, in the coordinates of the group", order=1
+        "mode whirl", "1", "complex (`shapes`, `shapes_imag`), shapes^H M_r shapes = 1, in the group's coordinates",
+        order=1,
     )]  # fmt: skip
     growth: Annotated[Array, Stored("whirl", "s^-1", "growth rate, 0 where stable")]
     sense: Annotated[
