@@ -19,6 +19,8 @@ Scales = dict[str, h5py.Dataset]
 SIZES = {"axis": 3, "component": 6, "frame_axis": 3, "interface_row": len(INTERFACE_ROWS), "motion": len(MOTIONS)}
 TWIN = {"axis": "axis_", "component": "component_", "mode": "mode_column", "compliance_row": "compliance_column"}
 """What a dimension is called where it stands a second time: xarray wants distinct names."""
+COORDINATES = {"mode", "compliance_row", "force"}
+"""Over one of these a dataset may be complex."""
 
 
 @cache
@@ -185,30 +187,33 @@ def _value(group: h5py.Group, place: str, how: Stored, hint: Any, sizes: dict[st
     elif hint == Flags:
         value = indices(group, place, None, 2).astype(bool)
     else:
-        value = array(group, place, *shape)
+        value = (array if COORDINATES & set(how.over.split()) else real)(group, place, *shape)
     for d, n in zip(how.over.split(), np.shape(value), strict=True):
         if sizes.setdefault(d, n) != n:
             raise ValueError(f"{group.name}/{place} has shape {np.shape(value)}, but {d} is {sizes[d]} long")
     if how.hertz:
-        hertz = array(group, f"{place.removesuffix('omega')}frequency", *shape)
+        hertz = real(group, f"{place.removesuffix('omega')}frequency", *shape)
         if not np.allclose(hertz * 2 * np.pi, np.abs(value), rtol=1e-12, atol=0, equal_nan=True):
             raise ValueError(f"{group.name}/{place} is not 2 pi times the frequency beside it")
     return float(value) if hint is float else value.astype(complex) if hint == ComplexArray else value
 
 
 def array(group: h5py.Group, name: str, *shape: int | None) -> Array:
-    """Numbers of the given shape (None: any length).
+    """Numbers of the given shape (None: any length), complex where their imaginary part stands beside them.
 
     Raises:
         ValueError: missing, of another shape or type.
     """
-    dataset = _dataset(group, name, shape, "f", "floating-point numbers")
-    real = np.asarray(dataset[()], dtype=np.float64)
-    if not name.endswith(IMAGINARY) and name + IMAGINARY in group:
-        both = real.astype(np.complex128)  # parts put in one by one keep the signs of zeros
-        both.imag = array(group, name + IMAGINARY, *shape)
-        return both
-    return real
+    found = real(group, name, *shape)
+    if name + IMAGINARY in group:
+        found = found.astype(np.complex128)  # parts put in one by one keep the signs of zeros
+        found.imag = real(group, name + IMAGINARY, *shape)
+    return found
+
+
+def real(group: h5py.Group, name: str, *shape: int | None) -> Array:
+    """Likewise, real whatever stands beside."""
+    return np.asarray(_dataset(group, name, shape, "f", "floating-point numbers")[()], dtype=np.float64)
 
 
 def indices(group: h5py.Group, name: str, columns: int | None, limit: int) -> Indices:
