@@ -16,7 +16,7 @@ from typing import Any
 
 import damper_study
 import numpy as np
-from pages import HERE, body_reference, case_reference, contact_reference, fill, play, table
+from pages import HERE, body_reference, case_reference, contact_reference, fill, modal_reference, play, table
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
@@ -1062,7 +1062,8 @@ def own() -> None:
 
 
 def reference() -> None:
-    """The references of body.toml, contact.toml and case.toml."""
+    """The references of body.toml, contact.toml and case.toml, and the table of the modal file."""
+    fill("modal_file.md", "modal_file", modal_reference())
     fill("body_toml.md", "body_toml", body_reference())
     fill("contact_toml.md", "contact_toml", contact_reference())
     fill("case_toml.md", "case_toml", case_reference())

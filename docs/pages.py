@@ -1,4 +1,4 @@
-"""What keeps these pages true: tables made by program, examples that are run, the reference of body.toml.
+"""What keeps these pages true: tables made by program, examples that are run, references of settings and files.
 
 Marks in a page:
 
@@ -20,6 +20,22 @@ from typing import Any
 
 from microslip.case.settings import CaseSettings, ContactSettings
 from microslip.contact.settings import ContactFile
+from microslip.data import (
+    Compliance,
+    ContactState,
+    GyroscopicModes,
+    Interface,
+    Invariants,
+    Mesh,
+    ModalBasis,
+    ModalGroup,
+    Residual,
+    Rows,
+    RunUp,
+    SpeedRange,
+    StressSet,
+)
+from microslip.files.declared import declared
 from microslip.settings.body import BodySettings, _is_length
 
 HERE = Path(__file__).parent
@@ -489,6 +505,34 @@ def contact_reference() -> str:
 def case_reference() -> str:
     """Tables of every key of case.toml, likewise."""
     return _reference(CaseSettings, MEANING_CASE, "case.toml")
+
+
+STORED: tuple[tuple[str, type], ...] = (
+    ("", ModalBasis), ("/mesh", Mesh), ("S/interfaces/<name>", Interface), ("S", ModalGroup),
+    ("S/excitation/<name>", Rows), ("S", Compliance), ("S", StressSet), ("S/contacts/<name>", ContactState),
+    ("S/residual", Residual), ("S/run_up", RunUp), ("S/gyroscopic", GyroscopicModes), ("S/invariants", Invariants),
+    ("/range/nd_<k>", SpeedRange),
+)  # fmt: skip
+"""Groups of the modal file and the nouns that stand in them."""
+
+
+def modal_reference() -> str:
+    """Table of what the nouns say of their fields, see `microslip.data.Stored`."""
+    rows = [row for group, noun in STORED for row in stored_rows(group, noun)]
+    return table(["path", "axes", "unit", "holds"], rows)
+
+
+def stored_rows(group: str, noun: type) -> list[list[str]]:
+    rows = []
+    for field, (how, _) in declared(noun).items():
+        at, axes = how.at or field, how.over.replace(" ", " x ")
+        path = at if at[0] == "/" else group + at if at[0] == "@" else f"{group}/{at}"
+        unit = f"`{how.unit}`" if how.unit.startswith("@") else how.unit
+        rows.append([f"`{path}`", axes, unit, how.holds + (f"; only if {how.when}" if how.when else "")])
+        if how.hertz:
+            place = path.removesuffix("omega")
+            rows.append([f"`{place}frequency`", axes, "Hz", "omega / (2 pi), never negative"])
+    return rows
 
 
 def _reference(model: Any, meanings: dict[str, tuple[str, str]], file: str) -> str:

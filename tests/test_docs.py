@@ -73,11 +73,12 @@ def test_every_picture_is_shown_and_small() -> None:
     assert max(f.stat().st_size for f in files) < 300_000 and sum(f.stat().st_size for f in files) < 3_000_000
 
 
-def test_references_of_settings_files_are_current() -> None:
+def test_references_of_files_are_current() -> None:
     """`python docs/make_pictures.py reference` would change nothing."""
     assert pages.filled("body_toml.md", "body_toml") == pages.body_reference().strip()
     assert pages.filled("contact_toml.md", "contact_toml") == pages.contact_reference().strip()
     assert pages.filled("case_toml.md", "case_toml") == pages.case_reference().strip()
+    assert pages.filled("modal_file.md", "modal_file") == pages.modal_reference().strip()
 
 
 def test_python_blocks_are_python() -> None:

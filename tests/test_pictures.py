@@ -193,7 +193,7 @@ def test_pressures_of_many_closures_fit_on_a_page(count: int, speeds: tuple[floa
 
     x = np.stack(np.meshgrid(np.arange(40.0), np.arange(6.0), [0.0]), axis=-1).reshape(-1, 3) * 1e-3
     one, basis, force = np.ones(len(x)), small.basis(speeds), np.array([0.0, 0.0, 240.0])
-    state = ContactState("a", "b", 0, "", 240.0, force, x[0], x, 1e-6 * one, 1e6 * one, one, 1.0, 0.0, 1.0, 0.0)
+    state = ContactState("a", "b", "", "open", 0, 240.0, 1.0, 0.0, 1.0, 0.0, force, x[0], x, 1e6 * one, one, 1e-6 * one)
     groups = {k: replace(g, contacts={f"c{i}": state for i in range(count)}) for k, g in basis.groups.items()}
     path = closure_plot(replace(basis, groups=groups), tmp_path / "closure.png")
     assert path is not None and closure_plot(basis, path) is None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,33 @@ Array = NDArray[Any]
 
 ComplexArray = NDArray[np.complex128]
 Indices = NDArray[np.signedinteger[Any]]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Stored:
+    """How a field stands in a modal file; `files.declared` writes, reads and checks by it, and docs/ shows it.
+
+    Attributes:
+        over: names of its dimensions, ``node axis mode``; fields over the same name have the same length there. Empty:
+            a number, or an attribute. unit: its attribute `unit`; ``@name``: what that field of the noun says.
+        holds: in words. at: where, from the noun's group on: ``modes/omega``; ``@role``: an attribute; an absolute path
+            for what all speeds share; ``<name>``: what the noun is called. Empty: the field's name.
+        when: in which files it is, if not in all; an empty array or None is not written. finite: whether it must be.
+        order: of writing, lower ones first, else as the fields stand. hertz: the frequency in Hz stands beside it.
+        by: property that is written in its place.
+    """
+
+    over: str = ""
+    unit: str = ""
+    holds: str = ""
+    at: str = ""
+    when: str = ""
+    finite: bool = True
+    order: int = 0
+    hertz: bool = False
+    by: str = ""
+
 
 VOIGT = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the six strain and stress components (Sextro Eqs. (2.2-17), (2.2-19); the same as VTK's)."""
@@ -58,7 +85,6 @@ class Mesh:
     """A volume mesh with named faces.
 
     Attributes:
-        points: (n, 3) reference positions, m.
         cells: cell type (meshio's names: ``tetra10``, ``hexahedron20``, ...) -> (e, k) point indices,
             0-based, in VTK's node order.
         faces: face name -> {facet type (``triangle6``, ``quad8``, ...): (f, k) point indices}; the facets are
@@ -74,7 +100,7 @@ class Mesh:
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
     """
 
-    points: Array
+    points: Annotated[Array, Stored("node axis", "m", "reference positions", at="xyz")]
     cells: Mapping[str, Indices]
     faces: Mapping[str, Mapping[str, Indices]] = field(default_factory=dict)
     point_sets: Mapping[str, Indices] = field(default_factory=dict)
@@ -132,45 +158,56 @@ class Matrices:
 
 
 INTERFACE_ROWS = ("u_n", "u_t1", "u_t2", "phi_n", "phi_t1", "phi_t2")
+_FRAME = "/interfaces/<name>"
 
 
 @dataclass(frozen=True)
 class Interface:
     """One contact patch of a body and its six rows (Sextro Eqs. (5.1-6), (5.1-8)).
 
-    Attributes:
-        origin: (3,) area centre of the patch, m, body axes.
-        rotation: (3, 3), rows n (outward normal of this body), t1, t2: ``x_interface = rotation @ x_body``.
-        rows: (6, m) translations u_n, u_t1, u_t2 and rotations about the same axes, per unit of each
-            generalised coordinate.
-        fit_residual: (m,) 1: root-mean-square displacement of the patch that its best rigid motion leaves,
-            over the root-mean-square displacement of the patch.
-        points: (p, 3) quadrature points of the patch, m. areas: (p,) m2 (their sum is the area).
-        normals: (p, 3) outward unit normals.
-        shapes: (p, 3, m) displacement of the points, body axes. May be empty (0 points) if not stored.
-        role: ``left``, ``right``, ``ground``, ``load`` or ``bolt``. partner: name of the facing interface.
-        extent: (2,) b0 along t1 and h0 along t2, m (Sextro Fig. 5.1-3). polygon: (k, 3) corners of the convex
-            outline seen along n, m, anticlockwise about n; empty for a face that closes on itself.
-        sector_shift: +1 if the partner belongs to the next blade, -1 previous, 0 the same body or ground.
-        characteristic: (c, m) amplitudes, m root-mean-square, of the patch's characteristic shapes, with
-            pattern: (p, 3, c) what one of them moves the points by, body axes. Empty for a rigid patch.
+    Rows and amplitudes are per unit of each generalised coordinate; ``x_interface = rotation @ x_body``.
     """
 
-    origin: Array
-    rotation: Array
-    rows: Array
-    fit_residual: Array
-    points: Array
-    areas: Array
-    normals: Array
-    shapes: Array
-    role: str = "ground"
-    partner: str = ""
-    sector_shift: int = 0
-    extent: Array = field(default_factory=lambda: np.zeros(2))
-    polygon: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    characteristic: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    pattern: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
+    origin: Annotated[Array, Stored("axis", "m", "area centre of the patch, body axes", at=f"{_FRAME}/origin")]
+    rotation: Annotated[Array, Stored(
+        "frame_axis axis", "1", "rows n (outward normal of this body), t1, t2", at=f"{_FRAME}/rotation"
+    )]  # fmt: skip
+    rows: Annotated[Array, Stored(
+        "interface_row mode", "kg^-1/2; last three m^-1 kg^-1/2", "u_n u_t1 u_t2 phi_n phi_t1 phi_t2", at="T"
+    )]  # fmt: skip
+    fit_residual: Annotated[Array, Stored(
+        "mode", "1", "root-mean-square motion of the patch that its best rigid motion leaves, over that of the patch"
+    )]  # fmt: skip
+    points: Annotated[Array, Stored("point axis", "m", "quadrature points", at=f"{_FRAME}/patch/points", order=1)]
+    areas: Annotated[Array, Stored("point", "m^2", "their sum is the patch's", at=f"{_FRAME}/patch/areas", order=1)]
+    normals: Annotated[Array, Stored("point axis", "1", "outward", at=f"{_FRAME}/patch/normals", order=1)]
+    shapes: Annotated[Array, Stored(
+        "point axis mode", "kg^-1/2", "displacement of the points, body axes", at="patch/shapes",
+        when="`output.patch_shapes`", order=1,
+    )]  # fmt: skip
+    role: Annotated[str, Stored(holds="`left`, `right`, `ground`, `load`, `bolt`", at=f"{_FRAME}@role", order=-1)] = (
+        "ground"
+    )
+    partner: Annotated[str, Stored(holds="name of the facing interface", at=f"{_FRAME}@partner", order=-1)] = ""
+    sector_shift: Annotated[int, Stored(
+        holds="+1: the partner belongs to the next blade, -1: previous, 0: the same body or ground",
+        at=f"{_FRAME}@sector_shift", order=-1,
+    )] = 0  # fmt: skip
+    extent: Annotated[Array, Stored(
+        "", "m", "extents along t1 and t2 (Sextro Fig. 5.1-3)", at=f"{_FRAME}/patch@b0,h0"
+    )] = field(default_factory=lambda: np.zeros(2))  # fmt: skip
+    polygon: Annotated[Array, Stored(
+        "corner axis", "m", "corners of the convex outline seen along n, anticlockwise about n",
+        at=f"{_FRAME}/patch/polygon", when="the face does not close on itself",
+    )] = field(default_factory=lambda: np.zeros((0, 3)))  # fmt: skip
+    characteristic: Annotated[Array, Stored(
+        "shape mode", "kg^-1/2", "amplitudes, m root mean square, of the characteristic shapes; compliance rows "
+        "`interface:<name>:c1`, ...", when='`coordinates = "characteristic"`',
+    )] = field(default_factory=lambda: np.zeros((0, 0)))  # fmt: skip
+    pattern: Annotated[Array, Stored(
+        "point axis shape", "1", "what one unit (m, root mean square) of each shape moves the points by, body axes",
+        at=f"{_FRAME}/patch/pattern", when='`coordinates = "characteristic"`', order=1,
+    )] = field(default_factory=lambda: np.zeros((0, 3, 0)))  # fmt: skip
 
     def row(self, name: str) -> Array:
         """(m,) one of the rows by its label: ``u_n``, ..., ``phi_t2``, ``c1``, ``c2``, ...
@@ -188,21 +225,18 @@ class Interface:
 
 @dataclass(frozen=True)
 class StressSet:
-    """Strain and stress of every generalised coordinate at a set of places (Sextro Eqs. (2.4-16), (2.4-17)).
+    """Strain and stress of every generalised coordinate at a set of places (Sextro Eqs. (2.4-16), (2.4-17))."""
 
-    Attributes:
-        location: ``gauss`` or ``nodal-averaged``.
-        points: (s, 3) m. strain: (s, 6, m) engineering shear. stress: (s, 6, m) Pa per unit coordinate.
-        static_stress: (s, 6) stress of the static state at speed, Pa (zeros without load).
-        weights: (s,) volume that belongs to the place, m3.
-    """
-
-    location: str
-    points: Array
-    strain: Array
-    stress: Array
-    static_stress: Array
-    weights: Array
+    location: Annotated[str, Stored(holds="`gauss` or `nodal-averaged`", at="stress/<name>@location")]
+    points: Annotated[Array, Stored("place axis", "m", "the places, also in `strain`", at="stress/<name>/points")]
+    strain: Annotated[Array, Stored("place component mode", "m^-1 kg^-1/2", "engineering shear", at="strain/<name>/T")]
+    stress: Annotated[Array, Stored(
+        "place component mode", "Pa m^-1 kg^-1/2", "per unit coordinate", at="stress/<name>/T"
+    )]  # fmt: skip
+    static_stress: Annotated[Array, Stored(
+        "place component", "Pa", "stress of the static state at speed", at="rotation/sigma_static/<name>"
+    )]  # fmt: skip
+    weights: Annotated[Array, Stored("place", "m^3", "volume that belongs to the place", at="stress/<name>/weights")]
 
 
 CENTRIFUGAL = "rad2/s2"
@@ -211,42 +245,42 @@ CENTRIFUGAL = "rad2/s2"
 
 @dataclass(frozen=True)
 class Rows:
-    """Named rows on the generalised coordinates: ``values = rows @ q`` for read-outs, ``rows.conj().T @ f`` for forces.
+    """Named rows on the coordinates: ``values = rows @ q`` for read-outs, ``rows.conj().T @ f`` for forces."""
 
-    Attributes:
-        rows: (r, m). labels: r texts. unit: of one row times a unit coordinate's displacement.
-        point: (3,) m, where it acts (mean point for distributed loads). distance: how far the point asked for
-            was from the body, m (0 when inside).
-        static: (r,) what the rows read in the static state at speed (zeros for force rows).
-    """
+    rows: Annotated[Array, Stored("row mode", "", "strain gauges read strain", at="T", order=1)]
+    labels: Annotated[tuple[str, ...], Stored("row", "", "names of the rows", at="row")]
+    unit: Annotated[str, Stored(holds="of one row times a unit coordinate's displacement", at="@unit", order=-1)]
+    point: Annotated[Array, Stored("axis", "m", "where it acts (mean point for distributed loads)")]
+    distance: Annotated[
+        float, Stored("", "m", "from the point asked for, 0 when inside the body", at="@distance", order=-1)
+    ] = 0.0
+    static: Annotated[Array, Stored(
+        "row", "@unit", "what the rows read in the static state at speed (zeros for loads)"
+    )] = field(default_factory=lambda: np.zeros(0))  # fmt: skip
 
-    rows: Array
-    labels: tuple[str, ...]
-    unit: str
-    point: Array
-    distance: float = 0.0
-    static: Array = field(default_factory=lambda: np.zeros(0))
+
+_COMPLIANCE = ("compliance_row compliance_row", "displacement of the row per unit force of the column, SI")
 
 
 @dataclass(frozen=True)
 class Compliance:
-    """Static compliance over ALL interface, load and monitor rows, and the part the kept modes hold.
+    """Static compliance over ALL interface, load and monitor rows, and the part the kept modes hold."""
 
-    Attributes:
-        labels: r texts ``interface:right:n``, ``excitation:...``, ``monitor:...``.
-        static: (r, r) displacement of row i under a unit force on row j, full model (inertia relief, i.e. the
-            elastic part about the rigid motion, when the body is free).
-        modal: (r, r) sum of T_i T_j / omega^2 over the kept elastic modes.
-        inertia_relief: True if the body is free.
-        eigenmodes: (r, r) the part that the eigenmodes of the band hold alone, whatever the method added to or made
-            of them; None where nothing but eigenmodes is kept, see `plain`.
-    """
-
-    labels: tuple[str, ...]
-    static: Array
-    modal: Array
-    inertia_relief: bool
-    eigenmodes: Array | None = None
+    labels: Annotated[tuple[str, ...], Stored(
+        "compliance_row", "", "`interface:right:u_n`, `excitation:...`, `monitor:...`", at="compliance_row"
+    )]  # fmt: skip
+    static: Annotated[Array, Stored(
+        *_COMPLIANCE, "displacement of row i under a unit force on row j, full model (the elastic part about the rigid "
+        "motion when the body is free)", at="compliance_static",
+    )]  # fmt: skip
+    modal: Annotated[Array, Stored(
+        *_COMPLIANCE, "sum of T_i T_j / omega^2 over the kept elastic modes", at="compliance_modal"
+    )]  # fmt: skip
+    inertia_relief: Annotated[bool, Stored(holds="1: the body is free", at="compliance_static@inertia_relief", order=1)]
+    eigenmodes: Annotated[Array | None, Stored(
+        *_COMPLIANCE, "what the eigenmodes of the band hold alone, equal to modal where nothing else is kept (see "
+        "[compliance counted once](reduction.md#compliance-counted-once))", at="compliance_plain", by="plain",
+    )] = None  # fmt: skip
 
     @property
     def plain(self) -> Array:
@@ -267,13 +301,17 @@ class Residual:
     gauges alike.
 
     Attributes:
-        labels: r texts, those of `Compliance.labels` that belong to interfaces and excitations.
-        phi: (n, 3, r) m per unit force; may be empty. gauges: name -> (1, r) strain per unit force.
-        strain, stress: stress set -> (s, 6, r), 1 and Pa per unit force.
+        gauges: name -> (1, r) strain per unit force. strain, stress: stress set -> (s, 6, r), 1 and Pa per unit force.
     """
 
-    labels: tuple[str, ...]
-    phi: Array
+    labels: Annotated[tuple[str, ...], Stored(
+        "force", "", "those of `compliance_row` that belong to interfaces and excitations", at="force"
+    )]  # fmt: skip
+    phi: Annotated[Array, Stored(
+        "node axis force", "m per unit force", "what the modes leave of the static answer to a unit force on each row: "
+        "displacement phi q + residual phi f, see [MacNeal](reduction.md#for-the-program-that-reads-the-file)",
+        when="`output.shapes`",
+    )]  # fmt: skip
     gauges: Mapping[str, Array]
     strain: Mapping[str, Array]
     stress: Mapping[str, Array]
@@ -281,23 +319,25 @@ class Residual:
 
 @dataclass(frozen=True)
 class GyroscopicModes:
-    """Complex modes q = x exp(i omega t) of M_r q'' + G_r q' + K_r q = 0, in the frame that turns with the body.
+    """Complex modes q = x exp(i omega t) of M_r q'' + G_r q' + K_r q = 0, in the frame that turns with the body."""
 
-    Attributes:
-        omega: (w,) rad/s, ascending in magnitude. Of a real group positive, one a pair of conjugates; of a complex one
-            all, a negative omega being the conjugate shape at |omega|. shapes: (m, w) complex, x^H M_r x = 1, in the
-            coordinates of the group. growth: (w,) 1/s, zeros where stable.
-        sense: (w,) between -1 and 1: mean sense of the orbits about the axis. direction: w texts ``forward`` (with
-            the rotation), ``backward``, ``mixed``. error: (w,) bound of the relative error of omega against the
-            unreduced body, NaN where none is known.
-    """
-
-    omega: Array
-    shapes: ComplexArray
-    growth: Array
-    sense: Array
-    direction: tuple[str, ...]
-    error: Array
+    omega: Annotated[Array, Stored(
+        "whirl", "rad/s", "ascending in magnitude. Of a real group positive, one a pair of conjugates; of a complex "
+        "one all, a negative omega being the conjugate wave at its magnitude", hertz=True,
+    )]  # fmt: skip
+    shapes: Annotated[ComplexArray, Stored(
+        "mode whirl", "1", "complex (`shapes`, `shapes_imag`), shapes^H M_r shapes = 1, in the group's coordinates",
+        order=1,
+    )]  # fmt: skip
+    growth: Annotated[Array, Stored("whirl", "s^-1", "growth rate, 0 where stable")]
+    sense: Annotated[
+        Array, Stored("whirl", "1", "mean sense of the orbits about the axis, 1 = circles with the rotation")
+    ]
+    direction: Annotated[tuple[str, ...], Stored("whirl", "", "`forward` (with the rotation), `backward`, `mixed`")]
+    error: Annotated[Array, Stored(
+        "whirl", "1", "bound of the relative error of omega against the unreduced body, NaN where none is known",
+        finite=False,
+    )]  # fmt: skip
 
     @property
     def stable(self) -> bool:
@@ -319,17 +359,18 @@ class RunUp:
         M_r q'' + (C_r + 2 Omega N) q' + (K_r + (Omega_0^2 - Omega^2) P + alpha N) q
             = f + (Omega^2 - Omega_0^2) centrifugal + alpha euler
 
-    Attributes:
-        N: (m, m) phi^H M (n x phi), skew-Hermitian: circulatory per rad/s^2, and G_r = 2 Omega_0 N.
-        P: (m, m) phi^H M (1 - n n^T) phi, Hermitian: spin softening per (rad/s)^2.
-        euler: (m,) -phi^H M (n x r), load per rad/s^2. centrifugal: (m,) phi^H M (1 - n n^T) r, load per (rad/s)^2;
-            r = x + u_static from the axis. Both vanish for nodal diameters other than 0.
+    r = x + u_static from the axis; the loads vanish for nodal diameters other than 0.
     """
 
-    N: Array
-    P: Array
-    euler: Array
-    centrifugal: Array
+    N: Annotated[Array, Stored(
+        "mode mode", "1", "phi^H M (n x phi), skew-Hermitian: circulatory per rad/s^2, and G_r = 2 Omega N"
+    )]  # fmt: skip
+    P: Annotated[Array, Stored(
+        "mode mode", "1", "phi^H M (1 - n n^T) phi, Hermitian: spin softening is -Omega^2 P, see "
+        "[rotation](rotation.md#run-up)",
+    )]  # fmt: skip
+    euler: Annotated[Array, Stored("mode", "kg^1/2 m", "-phi^H M (n x r), load per rad/s^2 of angular acceleration")]
+    centrifugal: Annotated[Array, Stored("mode", "kg^1/2 m", "phi^H M (1 - n n^T) r, load per (rad/s)^2 of Omega^2")]
 
 
 MOTIONS = ("wxx", "wyy", "wzz", "wxy", "wyz", "wxz", "ax", "ay", "az", "bx", "by", "bz")
@@ -341,54 +382,49 @@ point, angular accelerations."""
 class Invariants:
     """Inertia shape integrals about a reference point, in body axes, r = x + u_static from that point.
 
-    Attributes:
-        point: (3,) m. mass: kg. first_moment: (3,) integral of rho r. second_moment: (3, 3) of rho r_a r_b.
-        shape: (3, m) of rho phi_a. position_shape: (3, 3, m) of rho r_a phi_b. shape_shape: (3, 3, m, m) of
-            rho conj(phi_ai) phi_bj. So sum_a shape_shape[a, a] = M_r.
-        stiffening: (12, m, m) stiffness per unit of each of `MOTIONS`, or (0, m, m) if it was not asked for.
+    So sum_a shape_shape[a, a] = M_r.
     """
 
-    point: Array
-    mass: float
-    first_moment: Array
-    second_moment: Array
-    shape: Array
-    position_shape: Array
-    shape_shape: Array
-    stiffening: Array
+    point: Annotated[Array, Stored("axis", "m", "reference point, on the axis of rotation")]
+    mass: Annotated[float, Stored("", "kg", "of the body")]
+    first_moment: Annotated[Array, Stored("axis", "kg m", "integral of rho r_a")]
+    second_moment: Annotated[Array, Stored("axis axis", "kg m^2", "of rho r_a r_b")]
+    shape: Annotated[Array, Stored("axis mode", "kg^1/2", "of rho phi_a")]
+    position_shape: Annotated[Array, Stored("axis axis mode", "kg^1/2 m", "of rho r_a phi_b")]
+    shape_shape: Annotated[Array, Stored("axis axis mode mode", "1", "of rho conj(phi_ai) phi_bj")]
+    stiffening: Annotated[Array, Stored(
+        "motion mode mode", "per unit of the motion", "geometric stiffness per unit of the rigid motions in `@motions` "
+        "(products of angular velocities, accelerations of the point, angular accelerations)",
+        when="`output.stiffening`",
+    )]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ContactState:
     """Two faces in the static state at speed: how hard they press each other, where, and how near they are.
 
-    Attributes:
-        face, against, sector_shift: what may touch what. interface: name of the interface on `face`, or empty.
-        normal_force: N, size of the resultant. force: (3,) N, on `face`, body axes. centre: (3,) m, of the pressure,
-            in the reference geometry. points: (p, 3) m, areas: (p,) m2, quadrature points of the face, in the order of
-            the interface's. pressure: (p,) Pa, areas @ pressure its integral. gap: (p,) m, the
-            interference counted, negative where points overlap.
-        closed_share: area in contact over the area of the face. penetration: m, largest mean one of a node.
-        penalty: Pa/m, the largest used. interference: m. modes: ``open`` (the modes do not know the contact, its force
-            is a dead load) or ``closed`` (they keep its stiffness along the normal).
+    Points and areas are those of the face, in the order of the interface's.
     """
 
-    face: str
-    against: str
-    sector_shift: int
-    interface: str
-    normal_force: float
-    force: Array
-    centre: Array
-    points: Array
-    areas: Array
-    pressure: Array
-    gap: Array
-    closed_share: float
-    penetration: float
-    penalty: float
-    interference: float
-    modes: str = "open"
+    face: Annotated[str, Stored(holds="what may touch", at="@face")]
+    against: Annotated[str, Stored(holds="what it may touch", at="@against")]
+    interface: Annotated[str, Stored(holds="name of the interface on the face, or empty", at="@interface")]
+    modes: Annotated[str, Stored(
+        holds="`open`: K_r does not know the contact, its force is a dead load; `closed`: K_r keeps its stiffness "
+        "along the normal", at="@modes",
+    )]  # fmt: skip
+    sector_shift: Annotated[int, Stored(holds="as of an interface", at="@sector_shift")]
+    normal_force: Annotated[float, Stored("", "N", "size of the resultant")]
+    closed_share: Annotated[float, Stored("", "1", "area in contact over the area of the face")]
+    penetration: Annotated[float, Stored("", "m", "largest mean one of a node")]
+    penalty: Annotated[float, Stored("", "Pa/m", "the largest used")]
+    interference: Annotated[float, Stored("", "m", "from the settings")]
+    force: Annotated[Array, Stored("axis", "N", "on the face, body axes")]
+    centre: Annotated[Array, Stored("axis", "m", "of the pressure, in the reference geometry")]
+    points: Annotated[Array, Stored("point axis", "m", "quadrature points of the face")]
+    pressure: Annotated[Array, Stored("point", "Pa", "areas @ pressure is its integral")]
+    gap: Annotated[Array, Stored("point", "m", "the interference counted, negative where points overlap")]
+    areas: Annotated[Array, Stored("point", "m^2", "of the points")]
 
 
 @dataclass(frozen=True)
@@ -401,19 +437,9 @@ class ModalGroup:
 
     Attributes:
         speed: rotation speed, rad/s.
-        omega: (m,) angular eigenfrequencies, rad/s, ascending, with nothing on the interfaces; rigid modes are
-            exactly 0.
-        kind: m texts, see `reduction.problem.Reduced`.
-        to_diagonal: (m, p) V with V^H M_r V = 1, V^H K_r V = diag(omega^2); None if M_r and K_r are diagonal. With
-            it, `omega` and `damping_ratio` are those of the p modes V, and phi and all rows stand per coordinate.
-            p < m where some coordinates have no mass or are forces.
-        damping_ratio: (m,) or (p,) D_j of Sextro Eq. (2.4-13).
-        M_r, K_r, C_r, G_r: (m, m) reduced matrices; G_r is skew, for the given speed (Eq. (2.3-29)).
-        phi: (n, 3, m) shapes, kg^-1/2, in the mesh's point order. May be empty.
         interfaces, excitations, monitors, gauges: see the classes; gauge rows read strain.
         compliance: truncation check.
         stresses: location -> `StressSet`.
-        u_static: (n, 3) static displacement at speed, m.
         checks: name -> number (orthogonality, backward error, certified count, ...).
         prestress: ``none``, ``linear`` or ``nonlinear``: how K was made. harmonic: nodal diameter.
         spin_softening: whether -Omega^2 M P is in K.
@@ -423,26 +449,41 @@ class ModalGroup:
     """
 
     speed: float
-    omega: Array
-    kind: tuple[str, ...]
-    damping_ratio: Array
-    M_r: Array
-    K_r: Array
-    C_r: Array
-    G_r: Array
-    phi: Array
+    omega: Annotated[Array, Stored(
+        "own_mode", "rad/s", "angular eigenfrequencies, ascending, with nothing on the interfaces; rigid modes are "
+        "exactly 0", at="modes/omega", hertz=True,
+    )]  # fmt: skip
+    kind: Annotated[tuple[str, ...], Stored(
+        "mode", "", "`rigid`, `normal`, and what other [reductions](reduction.md) add", at="modes/kind", order=1
+    )]  # fmt: skip
+    damping_ratio: Annotated[Array, Stored("own_mode", "1", "D_j of Sextro Eq. (2.4-13)", at="modes/damping_ratio")]
+    M_r: Annotated[Array, Stored("mode mode", "1", "reduced mass", at="modes/M_r", order=1)]
+    K_r: Annotated[Array, Stored("mode mode", "s^-2", "stiffness", at="modes/K_r", order=1)]
+    C_r: Annotated[Array, Stored("mode mode", "s^-1", "damping", at="modes/C_r", order=1)]
+    G_r: Annotated[Array, Stored(
+        "mode mode", "s^-1", "gyroscopic at this speed, skew (Sextro Eq. (2.3-29))", at="modes/G_r", order=1
+    )]  # fmt: skip
+    phi: Annotated[Array, Stored(
+        "node axis mode", "kg^-1/2", "shapes, in the order of `/mesh/node`", at="modes/phi", when="`output.shapes`",
+        order=2,
+    )]  # fmt: skip
     interfaces: Mapping[str, Interface]
     excitations: Mapping[str, Rows]
     monitors: Mapping[str, Rows]
     gauges: Mapping[str, Rows]
     compliance: Compliance
     stresses: Mapping[str, StressSet]
-    u_static: Array
+    u_static: Annotated[Array, Stored("node axis", "m", "static displacement at speed", at="rotation/u_static")]
     checks: Mapping[str, float]
     prestress: str = "none"
     harmonic: int = 0
     spin_softening: bool = True
-    to_diagonal: Array | None = None
+    to_diagonal: Annotated[Array | None, Stored(
+        "mode own_mode", "1", "V with V^H M_r V = 1, V^H K_r V = diag(omega^2); omega and damping_ratio are those of "
+        "V, phi and all rows stand per coordinate. Fewer modes than coordinates (axis `own_mode`) where some have no "
+        "mass (`massless-interface`) or are forces (`interface-force`)",
+        at="modes/to_diagonal", when="M_r or K_r is not diagonal", order=1,
+    )] = None  # fmt: skip
     run_up: RunUp | None = None
     gyroscopic: GyroscopicModes | None = None
     invariants: Invariants | None = None
@@ -467,36 +508,41 @@ class SpeedRange:
     What depends on speed is the polynomial through the samples, entry by entry; G_r grows with Omega.
 
     Attributes:
-        samples: s groups at rising speeds in the SAME c coordinates: M_r = 1, K_r the projected stiffness about the
+        samples: groups at rising speeds in the SAME coordinates: M_r = 1, K_r the projected stiffness about the
             equilibrium there, to_diagonal the modes; phi and patch shapes are one array for all.
-        solved: (s,) True where the modes were solved for (certified), False where only the equilibrium was.
-        held: (s,) True for the h speeds held out: their K_r is compared, not used. All else of them is used.
-        slopes: (s - h, c, c) dK_r/dOmega^2 at the samples not held out, or (0, c, c) where they are not needed.
-        form: what of the stiffness is interpolated: ``stiffness`` K_r, or its ``root`` K_r^(1/2).
-        shift: a of the variable sqrt(Omega^2 + a) of all polynomials, (rad/s)^2; None: the variable is Omega^2.
-        count: modes kept in a group made from the range.
-        lead: (k, c) read-outs that decide the basis of pairs; the first `signs` of them decide signs (0: phi does).
-        interpolation_error, projection_error, total_error: (h,) largest relative frequency error of the kept modes at
-            the held-out speeds.
-        tolerance: that the total was held to. points: (p,) rad/s, speeds of the Campbell diagram.
-        gyroscopic: whether groups made from the range have their gyroscopic modes.
     """
 
     samples: tuple[ModalGroup, ...]
-    solved: Array
-    held: Array
-    slopes: Array
-    form: str
-    shift: float | None
-    count: int
-    lead: Array
-    signs: int
-    interpolation_error: Array
-    projection_error: Array
-    total_error: Array
-    tolerance: float
-    points: Array
-    gyroscopic: bool = False
+    form: Annotated[str, Stored(
+        holds="how K_r is interpolated, see [speeds](speeds.md#reading-it-elsewhere): `root` K_r^(1/2) or `stiffness` "
+        "K_r as a polynomial", at="@form",
+    )]  # fmt: skip
+    count: Annotated[int, Stored(holds="modes kept in a group made from the range", at="@count")]
+    signs: Annotated[int, Stored(holds="how many of the first rows of `lead` decide signs (0: phi does)", at="@signs")]
+    shift: Annotated[float | None, Stored(
+        "", "(rad/s)^2", "a of the variable sqrt(Omega^2 + a) of all polynomials; NaN: the variable is Omega^2",
+        at="@shift",
+    )]  # fmt: skip
+    tolerance: Annotated[float, Stored("", "1", "that the total error was held to", at="@tolerance")]
+    gyroscopic: Annotated[bool, Stored(
+        holds="whether groups made from the range have their gyroscopic modes", at="@gyroscopic"
+    )]  # fmt: skip
+    solved: Annotated[Flags, Stored(
+        "sample", "", "1 where the modes were solved for and certified, or refined and counted complete"
+    )]  # fmt: skip
+    held: Annotated[Flags, Stored(
+        "sample", "", "1 where the speed was held out: its K_r is compared, not used; all else of it is"
+    )]  # fmt: skip
+    slopes: Annotated[Array, Stored(
+        "used mode mode", "1", "dK_r/dOmega^2 at the samples not held out, or of length 0 where they are not needed"
+    )]  # fmt: skip
+    lead: Annotated[Array, Stored("lead mode", "", "read-outs that decide the basis of pairs")]
+    points: Annotated[Array, Stored("point", "rad/s", "speeds of the Campbell diagram")]
+    interpolation_error: Annotated[Array, Stored(
+        "held_out", "1", "largest relative frequency error of the kept modes at the held-out speeds, of the polynomials"
+    )]  # fmt: skip
+    projection_error: Annotated[Array, Stored("held_out", "1", "the same of the common coordinates")]
+    total_error: Annotated[Array, Stored("held_out", "1", "of both")]
 
     @property
     def speeds(self) -> Array:
@@ -515,8 +561,6 @@ class ModalBasis:
 
     Attributes:
         name: of the body. mesh: in SI. groups: (speed index, nodal diameter) -> group.
-        mass: kg. centre: (3,) m. inertia: (3, 3) kg m2 about the centre, body axes (Eqs. (2.3-32) to (2.3-34)).
-        rotation_axis, rotation_point: (3,) unit vector and a point of the axis, m.
         damping_source: text that says where the ratios come from (``ratio``, ``rayleigh``, ``table``).
         free: True if rigid motions remain.
         reduction: name of the method.
@@ -531,11 +575,13 @@ class ModalBasis:
     name: str
     mesh: Mesh
     groups: Mapping[tuple[int, int], ModalGroup]
-    mass: float
-    centre: Array
-    inertia: Array
-    rotation_axis: Array
-    rotation_point: Array
+    mass: Annotated[float, Stored("", "kg", "0: not known (`source` = `measured`)", at="body/mass")]
+    centre: Annotated[Array, Stored("axis", "m", "centre of mass", at="body/centre")]
+    inertia: Annotated[Array, Stored(
+        "axis axis", "kg m^2", "about the centre, body axes (Sextro Eqs. (2.3-32) to (2.3-34))", at="body/inertia"
+    )]  # fmt: skip
+    rotation_axis: Annotated[Array, Stored("axis", "1", "axis of rotation, unit vector", at="rotation/direction")]
+    rotation_point: Annotated[Array, Stored("axis", "m", "a point of the axis", at="rotation/point")]
     damping_source: str
     free: bool
     reduction: str

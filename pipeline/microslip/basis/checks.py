@@ -11,7 +11,6 @@ import numpy as np
 
 from ..data import (
     INTERFACE_ROWS,
-    MOTIONS,
     Array,
     ContactState,
     GyroscopicModes,
@@ -20,10 +19,10 @@ from ..data import (
     Mesh,
     ModalBasis,
     ModalGroup,
-    Rows,
     RunUp,
     SpeedRange,
 )
+from ..files.declared import agrees, nouns, numbers
 from ..linalg.gyroscopic import stability_sentence
 from ..modes.common import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes
@@ -100,10 +99,9 @@ def _mesh_checks(basis: ModalBasis) -> _Findings:
     highest = max((int(c.max()) for c in tables if c.size), default=-1)
     lowest = min((int(c.min()) for c in tables if c.size), default=0)
     found.append(("mesh: cells refer to points", float(highest if lowest >= 0 else np.inf), mesh.n_points - 1, ""))
-    numbers: tuple[Any, ...] = (mesh.points, basis.mass, basis.centre, basis.inertia)
-    numbers += (basis.rotation_axis, basis.rotation_point)
-    numbers += tuple(a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion))
-    found.append(("body: every number is finite", _not_finite(numbers), 0.0, ""))
+    told: list[Any] = [*numbers(mesh), *numbers(basis)]
+    told += [a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion)]
+    found.append(("body: every number is finite", _not_finite(told), 0.0, ""))
     unknown = 0.0 if basis.source == "measured" else 1.0  # a test does not weigh
     mass = max(-basis.mass, 0.0) if basis.mass else unknown
     found.append(("body: mass is positive", mass, 0.0, f"{basis.mass:.6g} kg" if basis.mass else "not known"))
@@ -165,15 +163,13 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
 def _range_checks(basis: ModalBasis, r: SpeedRange, mesh_is_sound: bool) -> _Findings:
     """The samples like groups (shapes and patches, which they share, once), and what the range claims of itself."""
     s, c, h = len(r.samples), r.samples[0].n_modes, len(r.total_error)
-    errors = (r.interpolation_error, r.projection_error, r.total_error)
-    fits = r.solved.shape == r.held.shape == (s,) and int(r.held.sum()) == h
-    fits = fits and r.slopes.shape in ((s - h, c, c), (0, c, c)) and not (r.held & r.solved).any() and s - h > 1
-    fits = fits and r.lead.shape[1] == c and 0 < r.count <= c and 0 <= r.signs <= len(r.lead)
-    fits = fits and all(e.shape == (h,) for e in errors) and all(g.n_modes == c for g in r.samples)
-    fits = fits and r.form in ("stiffness", "root")
+    fits = agrees(r, {"sample": s, "held_out": h, "mode": c}) and int(r.held.sum()) == h
+    fits = fits and len(r.slopes) in (s - h, 0) and not (r.held & r.solved).any() and s - h > 1
+    fits = fits and 0 < r.count <= c and 0 <= r.signs <= len(r.lead)
+    fits = fits and all(g.n_modes == c for g in r.samples) and r.form in ("stiffness", "root")
     found: _Findings = [("shapes of the arrays agree", 0.0 if fits else 1.0, 0.0, "")]
-    numbers = [r.lead, r.slopes, *errors, r.points, 0.0 if r.shift is None else r.shift, r.tolerance]
-    found.append(("every number is finite", _not_finite(numbers), 0.0, ""))
+    told = [*numbers(r), 0.0 if r.shift is None else r.shift, r.tolerance]
+    found.append(("every number is finite", _not_finite(told), 0.0, ""))
     if not fits or found[-1][1]:
         return found
     found.append(("speeds of the samples rise", float((np.diff(r.speeds) <= 0).sum()), 0.0, ""))
@@ -200,71 +196,22 @@ def _misstated(r: SpeedRange) -> float:
 
 
 def _shapes_agree(basis: ModalBasis, g: ModalGroup) -> bool:
-    m, n, r, own = g.n_modes, basis.mesh.n_points, len(g.compliance.labels), len(g.omega)
-    V = np.eye(own) if g.to_diagonal is None else g.to_diagonal
-    wanted: list[tuple[Array, tuple[int, ...]]] = [(a, (m, m)) for a in (g.M_r, g.K_r, g.C_r, g.G_r)]
-    wanted += [(g.damping_ratio, (own,)), (V, (m, own)), (g.u_static, (n, 3))]
-    wanted += [(g.phi, (n if g.phi.shape[0] else 0, 3, m))]
-    wanted += [(a, (r, r)) for a in (g.compliance.static, g.compliance.modal, g.compliance.plain)]
-    for i in g.interfaces.values():
-        p = len(i.areas)
-        wanted += [(i.rows, (6, m)), (i.fit_residual, (m,)), (i.rotation, (3, 3)), (i.origin, (3,))]
-        wanted += [(i.areas, (p,)), (i.points, (p, 3)), (i.normals, (p, 3))]
-        wanted += [(i.shapes, (p if i.shapes.shape[0] else 0, 3, m))]
-        if c := len(i.characteristic):
-            wanted += [(i.characteristic, (c, m)), (i.pattern, (p, 3, c))]
-    for rows in _every_row(g):
-        wanted += [(rows.rows, (len(rows.labels), m)), (rows.static, (len(rows.labels),)), (rows.point, (3,))]
-    for t in g.contacts.values():
-        k = len(t.areas)
-        wanted += [(t.force, (3,)), (t.centre, (3,)), (t.points, (k, 3)), (t.pressure, (k,)), (t.gap, (k,))]
-    for s in g.stresses.values():
-        k = len(s.weights)
-        wanted += [(s.strain, (k, 6, m)), (s.stress, (k, 6, m)), (s.static_stress, (k, 6)), (s.points, (k, 3))]
-    if (r_up := g.run_up) is not None:
-        wanted += [(r_up.N, (m, m)), (r_up.P, (m, m)), (r_up.euler, (m,)), (r_up.centrifugal, (m,))]
-    if (y := g.gyroscopic) is not None:
-        w = len(y.omega)
-        wanted += [(y.shapes, (m, w)), (y.growth, (w,)), (y.sense, (w,)), (y.error, (w,))]
-    if (i_v := g.invariants) is not None:
-        wanted += [(i_v.point, (3,)), (i_v.first_moment, (3,)), (i_v.second_moment, (3, 3)), (i_v.shape, (3, m))]
-        wanted += [(i_v.position_shape, (3, 3, m)), (i_v.shape_shape, (3, 3, m, m))]
-        wanted += [(i_v.stiffening, (len(MOTIONS) if len(i_v.stiffening) else 0, m, m))]
+    m, own = g.n_modes, len(g.omega)
+    sizes = {"node": basis.mesh.n_points, "mode": m, "own_mode": own}
+    fits = all(agrees(noun, sizes) for noun in nouns(g)) and (own == m if g.to_diagonal is None else own <= m)
     if (f := g.residual) is not None:
         k = len(f.labels)
-        wanted += [(f.phi, (n if f.phi.shape[0] else 0, 3, k))]
-        wanted += [(a, (len(g.gauges[name].labels), k)) for name, a in f.gauges.items()]
-        wanted += [(a, (len(g.stresses[x].weights), 6, k)) for s in (f.strain, f.stress) for x, a in s.items()]
+        fits &= all(a.shape == (len(g.gauges[name].labels), k) for name, a in f.gauges.items())
+        sets = [*f.strain.items(), *f.stress.items()]
+        fits &= all(a.shape == (len(g.stresses[x].weights), 6, k) for x, a in sets)
     forces, motions = g.kind.count("interface-force"), sum(c.startswith("interface:") for c in g.compliance.labels)
-    return forces in (0, motions) and own <= m and all(a.shape == shape for a, shape in wanted)
-
-
-def _every_row(g: ModalGroup) -> list[Rows]:
-    return [rows for named in (g.excitations, g.monitors, g.gauges) for rows in named.values()]
+    return forces in (0, motions) and fits
 
 
 def _numbers(g: ModalGroup) -> list[Any]:
-    found: list[Any] = [g.speed, g.omega, g.damping_ratio, g.M_r, g.K_r, g.C_r, g.G_r, g.phi, g.u_static]
-    found += [g.compliance.static, g.compliance.modal, g.compliance.plain]
-    if g.run_up is not None:
-        found += [g.run_up.N, g.run_up.P, g.run_up.euler, g.run_up.centrifugal]
-    if g.gyroscopic is not None:
-        found += [g.gyroscopic.omega, g.gyroscopic.shapes, g.gyroscopic.growth, g.gyroscopic.sense]
-    if (v := g.invariants) is not None:
-        found += [v.point, v.mass, v.first_moment, v.second_moment, v.shape, v.position_shape, v.shape_shape]
-        found += [v.stiffening]
-    for i in g.interfaces.values():
-        found += [i.rows, i.fit_residual, i.rotation, i.origin, i.areas, i.points, i.normals, i.shapes]
-        found += [i.characteristic, i.pattern]
-    for rows in _every_row(g):
-        found += [rows.rows, rows.static, rows.point]
-    for c in g.contacts.values():
-        found += [c.normal_force, c.force, c.centre, c.points, c.areas, c.pressure, c.gap]
-        found += [c.closed_share, c.penetration, c.penalty, c.interference]
-    for s in g.stresses.values():
-        found += [s.strain, s.stress, s.static_stress, s.points, s.weights]
-    if g.residual is not None:
-        found += [g.residual.phi, *g.residual.gauges.values(), *g.residual.strain.values(), *g.residual.stress.values()]
+    found: list[Any] = [g.speed, *(a for noun in nouns(g) for a in numbers(noun))]
+    if (f := g.residual) is not None:
+        found += [*f.gauges.values(), *f.strain.values(), *f.stress.values()]
     return found
 
 

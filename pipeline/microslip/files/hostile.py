@@ -13,11 +13,49 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..errors import UserError
+from .hdf5 import seal_state
+
+DAMAGE = (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
+    RecursionError, NotImplementedError,
+)  # fmt: skip
+"""What h5py and numpy raise on content that is not what it should be."""
+
 _DEPTH, _OBJECTS, _EXPANSION = 12, 200_000, 64
 
 
 class HostileFile(ValueError):
     """Content that no file of numbers needs and that could harm the reader."""
+
+
+def short(error: BaseException) -> str:
+    """The first line of what went wrong."""
+    return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
+
+
+def refuse_damaged(path: Path, code: str, again: str) -> None:
+    """Look at a file's seal before HDF5 meets the file.
+
+    A file without a seal, one that another program has written or changed, is first read by a process of its own:
+    damaged HDF5 can hang the library or crash it.
+
+    Args:
+        code: what reads the file at `path`, see `trial`. again: what to do about a damaged one.
+
+    Raises:
+        UserError: damaged, no HDF5 file, or no right to read it.
+    """
+    try:
+        state = seal_state(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
+    if state == "broken":
+        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); {again}")
+    if not h5py.is_hdf5(path):
+        raise UserError(f"{path}: is damaged or no HDF5 file; {again}")
+    if state == "absent" and (trouble := trial(code, path)):
+        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); {again}")
 
 
 def inspect(file: h5py.File) -> None:

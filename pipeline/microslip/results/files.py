@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,8 +13,8 @@ import h5py
 import numpy as np
 
 from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
-from ..files.hdf5 import IMAGINARY, create, put, seal, seal_state
-from ..files.hostile import HostileFile, inspect, trial
+from ..files.hdf5 import IMAGINARY, create, put, seal
+from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
@@ -29,11 +30,6 @@ UNITS = {
     "force": "N, N m", "limit": "N", "normal_swing": "N", "normal_mean": "N",
 }  # fmt: skip
 """Units by the last part of a name, or by its first one; everything else is a pure number."""
-
-_DAMAGE = (
-    OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
-    NotImplementedError, HostileFile, RecursionError,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -285,18 +281,10 @@ def read_response(path: Path | str) -> Response:
     path = Path(path)
     if not ordinary(path).is_file():
         raise UserError(f"{path}: no such response; run the case first or correct the path")
-    try:
+    with contextlib.suppress(OSError):  # told below
         if is_journal(path):
             return _from_journal(path)
-        state = seal_state(path)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path or its rights") from error
-    if state == "broken":
-        raise UserError(f"{path}: is damaged (its bytes are not those it was sealed with); run the case again")
-    if not h5py.is_hdf5(path):
-        raise UserError(f"{path}: is damaged or no HDF5 file; run the case again")
-    if state == "absent" and (trouble := trial(_TRIAL, path)):
-        raise UserError(f"{path}: is damaged (HDF5 {trouble} on it); run the case again")
+    refuse_damaged(path, _TRIAL, "run the case again")
     return _read(path)
 
 
@@ -307,8 +295,8 @@ def _from_journal(path: Path) -> Response:
     head, series = read_journal(path)
     try:
         return response_of(head, series)
-    except _DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); run the case again") from error
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
 
 
 def _read(path: Path) -> Response:
@@ -323,8 +311,8 @@ def _read(path: Path) -> Response:
                 )
             inspect(file)
             return _response(file)
-    except _DAMAGE as error:
-        raise UserError(f"{path}: is damaged or incomplete ({_short(error)}); run the case again") from error
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
 
 
 def _response(file: h5py.File) -> Response:
@@ -362,7 +350,3 @@ def _read_series(group: h5py.Group) -> Series:
         raise ValueError(f"{group.name}: arrays of different lengths")
     parameters = {str(k): float(v) for k, v in json.loads(group.attrs["parameters"]).items()}
     return Series(str(group.attrs["name"]), parameters, key, status, arrays)
-
-
-def _short(error: BaseException) -> str:
-    return " ".join((str(error).splitlines() or ["unreadable"])[0].split())[:120]
