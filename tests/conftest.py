@@ -25,8 +25,11 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-QUICK = "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0"
-"""Compile in a third of the time: a quick test runs a program once or twice. The slow tests compile as a user does."""
+QUICK = (
+    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1"
+)
+"""Compile in a quarter of the time: a quick test runs a program once or twice, and each piece that a program is split
+into costs a compiler of its own. The slow tests compile as a user does."""
 
 
 def locked(package: str) -> bool:
