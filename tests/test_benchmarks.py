@@ -70,13 +70,17 @@ def test_the_ring_response_benchmark_sees_the_same_peak_in_all_modes():
     assert all(r[4] == "0" and 100 < float(r[5]) < 115 for r in rows[1:])
 
 
-def test_the_duffing_benchmark_follows_one_curve_over_both_folds():
-    command = [sys.executable, str(ROOT / "benchmarks" / "duffing.py"), "--quick"]
-    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
-    assert done.returncode == 0, done.stderr
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("folds at")]
+@pytest.mark.parametrize("peers", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_duffing_benchmark_follows_one_curve_over_both_folds(peers, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    import duffing
+
+    if not peers:
+        monkeypatch.setattr(duffing, "PYHARM", ROOT / "none")
+    duffing.main(["--quick"])
+    told = capsys.readouterr().out
+    (line,) = [line for line in told.splitlines() if line.startswith("folds at")]
     upper, lower = (float(word) for word in line.split()[2::2])
     assert abs(upper - 1.462616482) < 1e-8 and abs(lower - 1.156017684) < 1e-8  # as with 12 harmonics and 256 samples
-    peers = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| pyHarm" in line]
-    assert all(float(r[-2]) < 1e-7 and float(r[-1]) < 1e-2 for r in peers)  # its tolerance; chords of our steps
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in told.splitlines() if "| pyHarm" in line]
+    assert all(float(r[-2]) < 1e-7 and float(r[-1]) < 1e-2 for r in rows)  # its tolerance; chords of our steps
