@@ -73,6 +73,31 @@ def programs_are_dropped() -> Iterator[None]:
         MOST["bytes"] = max(1.5e9, held() + 5e8)
 
 
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b550"
+    "000000a49444154789c63f80f0001010100b138f6140000000049454e44ae426082"
+)
+"""A picture of one white pixel."""
+
+
+@pytest.fixture
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a quick test are composed, but a pixel is saved of them, unless it is marked `drawn`: half a second
+    each. The slow tests draw as a user does."""
+    if request.config.getoption("markexpr") != "not slow" or request.node.get_closest_marker("drawn"):
+        return
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return
+
+    def save(_: Any, to: Any, **how: Any) -> None:
+        assert how["format"] == "png"
+        to.write(PIXEL) if hasattr(to, "write") else Path(to).write_bytes(PIXEL)
+
+    monkeypatch.setattr(Figure, "savefig", save)
+
+
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")
 """Why a test is skipped where another program or package is missing. With MICROSLIP_PEERS=required that fails."""
 

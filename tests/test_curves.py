@@ -22,6 +22,8 @@ from microslip.results import read_response
 from microslip.stages import surveying
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CASE = """
 name = "lifting"
 body = "lifting"

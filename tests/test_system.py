@@ -20,6 +20,8 @@ from microslip.data import UserError
 from microslip.reference.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 ROOT = Path(__file__).resolve().parents[1]
 THREE = (ROOT / "pipeline/microslip/templates/three-masses/system.toml").read_text(encoding="utf-8")
 
@@ -258,7 +260,7 @@ def test_a_point_contact_has_the_extents_of_its_case(tmp_path: Path) -> None:
     system = System("hub", [body], [soft], [Contact("pad", "hub", (0, 0, 1), (0, 1, 0))],
                     [Force("push", "hub", (1, 0, 0))], [Monitor("read", "hub")])  # fmt: skip
     (tmp_path / "case.toml").write_text(
-        'name = "hub"\nbody = "hub"\nexcitation = "push"\nmonitor = "read"\n[[contacts]]\n'
+        'name = "hub"\nbody = "hub"\nexcitation = "push"\nmonitor = "read"\nharmonics = 1\n[[contacts]]\n'
         'interface = "pad"\nlaw = "jenkins"\n'
         "normal_stiffness = 1e6\ntangential_stiffness = 4e5\nwidth = 0.3\nheight = 0.6\nfriction = 0.2\n"
         "[sweep]\nstart = 1.0\nstop = 9.0\npoints = 3\nnormal_forces = [1e6]\n"
