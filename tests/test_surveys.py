@@ -18,8 +18,6 @@ from microslip.cli import main
 from microslip.harmonic_balance import identification, response
 from microslip.stages.surveying import survey_stage
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 RING = """
 name = "ring"
 body = "blade"
@@ -63,7 +61,6 @@ def rows(path: str) -> dict[str, np.ndarray]:
     return {name: np.array([float(row[name]) for row in table]) for name in table[0]}
 
 
-@pytest.mark.drawn
 def test_identify_finds_the_stiffness_of_the_truth(ring: Path, capsys) -> None:
     """Frequencies of a ring with c_N = 3e6 N/m, c_T half of it, as if measured: found to 1e-6, the others predicted to
     1e-6; the file says which was fitted."""
