@@ -43,7 +43,9 @@ def test_first_modes_are_the_leading_ones_and_leave_more_compliance(sample: Moda
 
 
 LINEAR = [
-    "sweep.normal_forces=[100.0]", "harmonics=1", "samples=48",
+    "sweep.normal_forces=[100.0]",
+    "harmonics=1",
+    "samples=48",
     *(f"contacts.{side}.{key}" for side in ("right", "left") for key in ('law="jenkins"', "points=[2, 1]")),
 ]
 
