@@ -71,7 +71,6 @@ excitation = "shaker"
 monitor = "tip"
 direction = "x"
 harmonics = 1
-samples = 32
 
 [[contacts]]
 interface = "tip"

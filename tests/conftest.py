@@ -25,8 +25,11 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-QUICK = "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0"
-"""Compile in a third of the time: a quick test runs a program once or twice. The slow tests compile as a user does."""
+QUICK = (
+    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1"
+)
+"""Compile in a quarter of the time: a quick test runs a program once or twice, and each piece that a program is split
+into costs a compiler of its own. The slow tests compile as a user does."""
 
 
 def locked(package: str) -> bool:
@@ -68,6 +71,31 @@ def programs_are_dropped() -> Iterator[None]:
             trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # give it back: glibc alone has it
             trim and trim(0)
         MOST["bytes"] = max(1.5e9, held() + 5e8)
+
+
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b550"
+    "000000a49444154789c63f80f0001010100b138f6140000000049454e44ae426082"
+)
+"""A picture of one white pixel."""
+
+
+@pytest.fixture
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a quick test are composed, but a pixel is saved of them, unless it is marked `drawn`: half a second
+    each. The slow tests draw as a user does."""
+    if request.config.getoption("markexpr") != "not slow" or request.node.get_closest_marker("drawn"):
+        return
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return
+
+    def save(_: Any, to: Any, **how: Any) -> None:
+        assert how["format"] == "png"
+        to.write(PIXEL) if hasattr(to, "write") else Path(to).write_bytes(PIXEL)
+
+    monkeypatch.setattr(Figure, "savefig", save)
 
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")

@@ -14,44 +14,41 @@ ROOT = Path(__file__).resolve().parents[1]
 pytest.importorskip("gmsh", exc_type=ImportError)
 
 
-@pytest.mark.slow
-def test_the_modal_benchmark_times_every_stage(tmp_path):
-    command = [sys.executable, str(ROOT / "benchmarks" / "modal.py"), "--quick", "--peers", "--work", str(tmp_path)]
+def printed(name, *more):
+    command = [sys.executable, str(ROOT / "benchmarks" / name), "--quick", *map(str, more)]
     path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_modal_benchmark_times_every_stage(tmp_path):
+    said = printed("modal.py", "--peers", "--work", tmp_path)
     ratios = ("| certificate on top |", "| eigensolve / (factor + solves) |")
     for text in ("| microslip |", "pattern and gradients", *ratios):
-        assert text in done.stdout
+        assert text in said
 
 
 @pytest.mark.slow
 def test_the_cyclic_benchmark_compares_the_two_ways(tmp_path):
-    command = [sys.executable, str(ROOT / "benchmarks" / "cyclic.py"), "--quick", "--work", str(tmp_path)]
-    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
-    assert done.returncode == 0, done.stderr
+    said = printed("cyclic.py", "--work", tmp_path)
     for text in ("| cyclic / real, CPU |", "| cyclic |", "| real |", "condensation"):
-        assert text in done.stdout
+        assert text in said
 
 
 @pytest.mark.slow
 def test_the_ring_benchmark_certifies_its_made_up_ring(tmp_path):
-    command = [sys.executable, str(ROOT / "benchmarks" / "ring.py"), "--quick", "--work", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    dof, ring_dof, modes = (int(v) for v in done.stdout.splitlines()[-1].split("|")[1:4])
+    said = printed("ring.py", "--work", tmp_path)
+    dof, ring_dof, modes = (int(v) for v in said.splitlines()[-1].split("|")[1:4])
     assert ring_dof == 24 * dof and modes == 288  # 12 modes at each k, counted twice but for k = 0 and 12: 12 * 24
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
 def test_the_contact_benchmark_compares_laws_that_agree():
-    command = [sys.executable, str(ROOT / "benchmarks" / "contact_points.py"), "--quick"]
-    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
-    assert done.returncode == 0, done.stderr
-    rows = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| 64 |" in line]
+    said = printed("contact_points.py")
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in said.splitlines() if "| 64 |" in line]
     assert {r[1] for r in rows} >= {"microslip", "numpy loop"}
     # the same law and step; two cycles are fewer, and pyHarm's step is of first order in the samples
     most = {"microslip": 0.0, "numpy loop": 1e-12, "microslip, two cycles": 0.5, "pyHarm": 0.5}
@@ -60,23 +57,26 @@ def test_the_contact_benchmark_compares_laws_that_agree():
 
 @pytest.mark.slow
 def test_the_ring_response_benchmark_sees_the_same_peak_in_all_modes():
-    command = [sys.executable, str(ROOT / "benchmarks" / "ring_response.py"), "--quick"]
-    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
-    assert done.returncode == 0, done.stderr
-    lines = [line for line in done.stdout.splitlines() if line.startswith("| ")]
+    said = printed("ring_response.py")
+    lines = [line for line in said.splitlines() if line.startswith("| ")]
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
     assert [r[0] for r in rows[1:4]] == ["book", "marched, H = 1", "marched, H = 3"]
     assert all(r[4] == "0" and 100 < float(r[5]) < 115 for r in rows[1:])
 
 
-def test_the_duffing_benchmark_follows_one_curve_over_both_folds():
-    command = [sys.executable, str(ROOT / "benchmarks" / "duffing.py"), "--quick"]
-    path = os.pathsep.join([str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
-    assert done.returncode == 0, done.stderr
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("folds at")]
+@pytest.mark.parametrize("peers", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_duffing_benchmark_follows_one_curve_over_both_folds(peers, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    import duffing
+
+    if peers:
+        told = printed("duffing.py")
+    else:
+        monkeypatch.setattr(duffing, "PYHARM", ROOT / "none")
+        duffing.main(["--quick"])
+        told = capsys.readouterr().out
+    (line,) = [line for line in told.splitlines() if line.startswith("folds at")]
     upper, lower = (float(word) for word in line.split()[2::2])
     assert abs(upper - 1.462616482) < 1e-8 and abs(lower - 1.156017684) < 1e-8  # as with 12 harmonics and 256 samples
-    peers = [[c.strip() for c in line.strip("|").split("|")] for line in done.stdout.splitlines() if "| pyHarm" in line]
-    assert all(float(r[-2]) < 1e-7 and float(r[-1]) < 1e-2 for r in peers)  # its tolerance; chords of our steps
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in told.splitlines() if "| pyHarm" in line]
+    assert all(float(r[-2]) < 1e-7 and float(r[-1]) < 1e-2 for r in rows)  # its tolerance; chords of our steps

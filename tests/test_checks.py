@@ -28,6 +28,8 @@ from microslip.results import Response, read_response, write_response
 from microslip.results.checks import COUNTED, cause, check_response, largest, sentence
 from microslip.stages import response as making
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CLOSED = CASE.replace('law = "smooth"\npoints = [2, 2]', 'law = "jenkins"')
 
 

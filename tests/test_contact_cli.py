@@ -25,6 +25,8 @@ from microslip.contact.series import of_patch
 from microslip.contact.settings import load_contact
 from microslip.contact.study import study
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 ROOT = Path(__file__).resolve().parents[1]
 
 

@@ -16,6 +16,8 @@ from microslip.operating.motion import motion_of
 from microslip.reduced.coordinates import first_modes
 from microslip.stages.running import respond
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
 
 
@@ -42,6 +44,8 @@ def test_first_modes_are_the_leading_ones_and_leave_more_compliance(sample: Moda
 
 LINEAR = [
     "sweep.normal_forces=[100.0]",
+    "harmonics=1",
+    "samples=48",
     *(f"contacts.{side}.{key}" for side in ("right", "left") for key in ('law="jenkins"', "points=[2, 1]")),
 ]
 

@@ -34,6 +34,8 @@ from microslip.modes import modal_basis
 from microslip.settings.body import BodySettings, load_body, override, validate
 from microslip.system import system_basis
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 ROOT = Path(__file__).resolve().parents[1]
 
 

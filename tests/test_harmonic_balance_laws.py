@@ -461,7 +461,8 @@ def test_a_case_with_a_law_that_sticks_is_springs(answered: CaseResult, tmp_path
     result = answered
     narrow = f"width = {0.06 * np.sqrt(1 - 1 / 16)}\nheight = {0.03 * np.sqrt(1 - 1 / 4)}"
     law, size = ('"smooth"', '"jenkins"'), ("points = [4, 2]\nwidth = 0.06\nheight = 0.03", narrow)
-    springs = run_case(asked(tmp_path, FEW, law, size), sled(), "case.toml")
+    pressed = ("normal_forces = [5.0, 1e5]", "normal_forces = [1e5]")
+    springs = run_case(asked(tmp_path, FEW, law, size, pressed), sled(), "case.toml")
     assert all(r.converged.all() for r in result.responses.values())
     np.testing.assert_allclose(result.responses[1e5].monitor, springs.responses[1e5].monitor, rtol=1e-8)
     np.testing.assert_allclose(result.stuck, springs.stuck, rtol=1e-8)

@@ -28,6 +28,8 @@ from microslip.modes import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SIZE = (0.01, 0.014, 0.04)
 ROWS = """
 [[interfaces]]
@@ -647,6 +649,7 @@ def test_flipped_bytes_are_read_or_refused_but_never_crash(tmp_path_factory, kin
     flip()
 
 
+@pytest.mark.drawn
 def test_shapes_of_lone_nodes_are_drawn(tmp_path):
     """A picture that shows something: not one colour."""
     pytest.importorskip("matplotlib")

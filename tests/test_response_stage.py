@@ -27,6 +27,7 @@ from microslip.stages.following import open_case
 from microslip.stages.surveying import survey_stage
 
 pytest.importorskip("matplotlib")
+pytestmark = pytest.mark.usefixtures("undrawn")
 SAMPLES = Path(running.__file__).parents[1] / "samples"
 
 CASE = """
@@ -193,16 +194,10 @@ def test_killed_while_it_writes_from_the_command_line(folder: Path) -> None:
     assert found.keys() == points.keys() and all(np.array_equal(found[n], points[n]) for n in points)
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(making, "_can_draw", lambda: "not in this test")
-
-
-@pytest.mark.usefixtures("undrawn")
 def test_what_was_run_before_changes_nothing(folder: Path) -> None:
     """A sweep, another one, and the first again: the same table and points, to the last bit."""
     build, found = folder / "build" / "vane", []
-    for points in (3, 5, 3):
+    for points in (3, 4, 3):
         respond(folder, f"sweep.points={points}")
         arrays = read_response(build / "response.h5").series[0].arrays
         found.append(((build / "response.csv").read_text(), arrays))
@@ -255,6 +250,7 @@ def test_another_normal_force_adds_and_another_friction_begins_anew(folder: Path
     assert len(computed(respond(folder)[0])) == 5
 
 
+@pytest.mark.drawn
 def test_what_stands_in_the_folder(folder: Path) -> None:
     """Table, HDF5, summary, pictures, VTU, log; the coordinates in the file give what the table says."""
     respond(folder, log=True)
@@ -326,7 +322,6 @@ def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pyte
     assert any(t.startswith("warning") and "map" in t for t in told)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_point_that_fails_is_kept_with_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sweep goes on, the table and the summary tell, and the case counts as not converged."""
     from microslip.harmonic_balance import solver

@@ -19,6 +19,8 @@ from microslip.stages import meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
 from microslip.stages.stage import PACKAGE, _imported, hash_of_code
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 MESH, BASIS, RESPONSE = "meshes/box.msh", "build/box/basis.h5", "build/box/response.json"
 
 
@@ -140,6 +142,7 @@ def stopped(*_: object, **__: object) -> None:
     raise Stopped
 
 
+@pytest.mark.drawn
 def test_products_of_the_whole_chain_are_complete(box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = open_job(box, root=box)
     page, converged = running.run_body(job)
