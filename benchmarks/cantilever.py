@@ -40,8 +40,8 @@ from microslip.data import Compliance, Interface, ModalGroup, Rows
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import newton, sweep
-from microslip.system.assembly import Assembly, Contact, Load, Output, Side
-from microslip.system.component import Member
+from microslip.system.assembly import Assembly, Contact, ContactFace, Load, Output
+from microslip.system.component import Component
 
 ROOT = Path(__file__).resolve().parents[1]
 PYHARM = ROOT / "build" / "peers" / "pyharm" / "bin" / "python"
@@ -91,10 +91,10 @@ def cantilever(harmonics: int, samples: int) -> Problem:
     along = np.zeros((1, 3, 1))
     along[0, 1, 0] = 1.0
     patch = Patch("tip", np.zeros((1, 2)), np.ones(1), law, along)
-    side = Side("beam", "tip", rows={0: group.interfaces["tip"].rows[1:2]})
+    side = ContactFace("beam", "tip", rows={0: group.interfaces["tip"].rows[1:2]})
     contact = Contact("tip", patch, side, None, np.zeros(1), np.zeros(1))
-    member, push, output = Member("beam", {0: group}), Load("beam", "push"), Output("beam", "tip", "u")
-    assembly = Assembly((member,), (contact,), (push,), (output,))
+    component, push, output = Component("beam", {0: group}), Load("beam", "push"), Output("beam", "tip", "u")
+    assembly = Assembly((component,), (contact,), (push,), (output,))
     return replace(balance.of(assembly, harmonics, samples, length=LIMIT / SPRING), lam_scale=2.0)
 
 

@@ -26,7 +26,7 @@ DAMPER = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
 
 @dataclass(frozen=True)
-class Resonance:
+class StressedResonance:
     """The highest of a band: normal force (N), Hz, m (nan if there is none); its sweep, Hz and m (f,)."""
 
     normal: float
@@ -35,7 +35,7 @@ class Resonance:
     swept: tuple[Array, Array]
 
 
-def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str) -> list[Resonance]:
+def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str) -> list[StressedResonance]:
     """The highest resonance of an arrangement of the rig under each normal force (N). changes: of the case file."""
     built, found = opened(case, bases, *changes), []
     for normal in forces:
@@ -44,11 +44,11 @@ def over_forces(case: str, forces: Sequence[float], bases: Bases, *changes: str)
         peaks = filter(None, (response.highest(problem, swept, bracket) for bracket in brackets(swept)))
         sizes = [(size, point.Omega / (2 * np.pi)) for point, size in peaks]
         size, frequency = max(sizes, default=(np.nan, np.nan))
-        found.append(Resonance(normal, frequency, size, (BAND, np.abs(swept.monitor))))
+        found.append(StressedResonance(normal, frequency, size, (BAND, np.abs(swept.monitor))))
     return found
 
 
-def rig_picture(first: Sequence[Resonance], second: Sequence[Resonance], left: Any, right: Any) -> None:
+def rig_picture(first: Sequence[StressedResonance], second: Sequence[StressedResonance], left: Any, right: Any) -> None:
     """Figures 5.3-7 and 5.3-11: responses of the first arrangement, resonances of both over the normal force."""
     for r in first:
         frequency, size = (np.append(x, y) for x, y in zip(r.swept, (r.frequency, r.amplitude), strict=True))

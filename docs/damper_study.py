@@ -42,9 +42,9 @@ def opened(case: str, bases: Bases, *changes: str) -> Built:
     path = CASES / f"{case}.toml"
     settings, _ = load_case(path, list(changes))
     files: dict[str, ModalBasis] = {}
-    for b in settings.members:
+    for b in settings.components:
         files.setdefault(b.body or b.name, bases(b.body or b.name))
-    return build(settings, {b.name: files[b.body or b.name] for b in settings.members}, path)
+    return build(settings, {b.name: files[b.body or b.name] for b in settings.components}, path)
 
 
 def followed(problem: Problem, frequency: Array, finer: int = 3) -> Curve:

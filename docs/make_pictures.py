@@ -309,7 +309,8 @@ def damping_element() -> None:
         ("friction 0.5", tuple(f"contacts.{i}.friction=0.5" for i in range(2))),
         ("tangential stiffness x 4", tuple(f"contacts.{i}.tangential_stiffness=68e6" for i in range(2))),
         ("tangential stiffness / 4", tuple(f"contacts.{i}.tangential_stiffness=4.25e6" for i in range(2))),
-        ("hold 10 Hz", ("bodies.pin.hold=10.0",)), ("hold 60 Hz", ("bodies.pin.hold=60.0",)),
+        ("weak springs 10 Hz", ("bodies.pin.weak_springs=10.0",)),
+        ("weak springs 60 Hz", ("bodies.pin.weak_springs=60.0",)),
         ("force 20 N", ("excitations.0.amplitude=20.0",)),
     ):  # fmt: skip
         found = damper_study.opened("damping-element", companion, *changes)

@@ -395,7 +395,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "bodies.modes": ("", "how many of those that the modal file stores"),
     "bodies.mass": ("kg", "of the same shape and stiffness at rest, made of another density"),
     "bodies.turn": ("degrees", "about the body's rotation axis, from where its file has it"),
-    "bodies.hold": ("Hz", "weak springs that hold a body which nothing else does: frequency of its rigid motions"),
+    "bodies.weak_springs": ("Hz", "that hold a body which nothing else does: frequency of its rigid motions"),
     "bodies.shift": ("m", "from where its file has it, after the turn"),
     "ring.blades": ("", "N, as many as the sectors of a cyclic body"),
     "ring.engine_order": ("", "of the swept frequency; if not given, the greatest common divisor of those that "

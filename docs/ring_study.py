@@ -21,7 +21,7 @@ from microslip.harmonic_balance.solver import sweep
 from microslip.harmonic_balance.sweeps import brackets
 from microslip.operating.motion import motion_of
 from microslip.operating.stress import places, stress_peaks
-from microslip.system.assembly import Side
+from microslip.system.assembly import ContactFace
 
 CASE = Path(__file__).parents[1] / "pipeline/cases/ring.toml"
 FOOT = 0.1
@@ -116,7 +116,7 @@ def inclined(r: Ring, degrees: float, normal: float, order: int) -> Problem:
     built = build(s, {"blade": r.basis}, CASE)
     Q = np.kron(np.eye(2), rotation(np.array([0.0, 0.0, 1.0]), np.radians(degrees)))
 
-    def turned(side: Side) -> Side:
+    def turned(side: ContactFace) -> ContactFace:
         return replace(side, frame=Q @ side.frame)
 
     contacts = tuple(replace(c, first=turned(c.first), second=turned(c.second)) for c in built.assembly.contacts)

@@ -121,8 +121,8 @@ def of_summaries(a: Raw, b: Raw) -> dict[str, float]:
         stress = [k.endswith("_Pa") for k in _told(a[key][0])] if x.ndim == 2 else [False]
         size = np.where(stress, np.abs(x[..., stress]).max(initial=0.0) if any(stress) else 0.0, np.abs(x))
         found[f"json {key}"] = float((np.abs(y - x) / size).max(initial=0.0)) if x.shape == y.shape else math.inf
-    told = (len(a["remarks"]), a["failed_points"]) == (len(b["remarks"]), b["failed_points"])
-    return found | {"json remarks": 0.0 if told else math.inf}
+    told = (len(a["messages"]), a["failed_points"]) == (len(b["messages"]), b["failed_points"])
+    return found | {"json messages": 0.0 if told else math.inf}
 
 
 def of_rows(rows: list[Any]) -> Array:

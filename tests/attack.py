@@ -75,9 +75,9 @@ class Case:
         return folder
 
     def _modal(self) -> dict[str, Path]:
-        alone = len(self.settings.members) == 1
+        alone = len(self.settings.components) == 1
         return {b.file or ("basis.h5" if alone else f"build/{b.body or b.name}/basis.h5"): self.bodies[b.name]
-                for b in self.settings.members}  # fmt: skip
+                for b in self.settings.components}  # fmt: skip
 
     @property
     def inputs(self) -> list[str]:
@@ -135,7 +135,7 @@ def exchangeable(case: Case) -> list[int]:
     for i, c in enumerate(built.assembly.contacts):
         if c.second is None or c.second.rows is not None or whole:
             continue
-        one, two = (built.bodies[s.member].group.interfaces[s.interface] for s in (c.first, c.second))
+        one, two = (built.bodies[s.component].group.interfaces[s.interface] for s in (c.first, c.second))
         size = max(one.extent.max(), 1e-3)
         turned, arm = np.abs(np.diag(c.second.frame)[:3]), np.abs(c.second.frame[:3, 3:]).max()
         area = abs(c.patch.areas.sum() - np.prod(one.extent)) < 1e-2 * np.prod(one.extent) or not one.extent.all()

@@ -27,8 +27,8 @@ from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.results.checks import BALANCE, COUNTED, MOTION, Checks
-from microslip.system.assembly import Assembly, Contact, Load, Output, Side
-from microslip.system.component import Member
+from microslip.system.assembly import Assembly, Contact, ContactFace, Load, Output
+from microslip.system.component import Component
 
 Array = np.ndarray
 
@@ -229,11 +229,11 @@ def law(t: Touch) -> Law:
 
 def assembly(one: Drawn) -> Assembly:
     names = [f"body {i}" for i in range(len(one.bodies))]
-    members = tuple(Member(name, {0: body(one, *b)}) for name, b in zip(names, one.bodies, strict=True))
+    components = tuple(Component(name, {0: body(one, *b)}) for name, b in zip(names, one.bodies, strict=True))
     contacts = tuple(contact(one, f"contact {i}", t) for i, t in enumerate(one.touches))
     loads = tuple(Load(name, "push", f) for name, f in zip(names, one.forces, strict=True))
     outputs = tuple(Output(name, "tip", label) for name in names for label in ("u", "v"))
-    return Assembly(members, contacts, loads, outputs)
+    return Assembly(components, contacts, loads, outputs)
 
 
 def body(one: Drawn, omega: Array, push: Array, watched: Array):
@@ -245,7 +245,7 @@ def contact(one: Drawn, name: str, t: Touch) -> Contact:
     """Preloaded by what its points carry at rest."""
     shapes, at = t.shapes[:, :, t.along], t.along
     patch = Patch("face", np.zeros((len(shapes), 2)), np.ones(len(shapes)), law(t), shapes)
-    first, second = (None if b is None else Side(f"body {b}", "face", rows={0: rows[at]})
+    first, second = (None if b is None else ContactFace(f"body {b}", "face", rows={0: rows[at]})
                      for b, rows in zip((t.first, t.second), t.rows, strict=True))  # fmt: skip
     each = [p.pressed for p in points_of(one, t)]
     pressed = np.array(each).reshape(len(shapes), -1).sum(axis=1)

@@ -157,6 +157,6 @@ def test_a_case_says_where_its_harmonics_are_too_few():
     for harmonics, count in ((1, 1), (12, 0)):
         problem = opening(harmonics)
         found = harmonic_response(problem, np.array([22.0, 30.0]), np.ones(1))
-        remarks = _Left(built, None).out(problem, found, [], 8.0)
-        assert len(remarks) == count
-        assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in remarks)
+        messages = _Left(built, None).out(problem, found, [], 8.0)
+        assert len(messages) == count
+        assert all(re.match(r"At F_N = 8 N the amplitude at (22|30) Hz .* harmonics", r) for r in messages)

@@ -19,8 +19,8 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Output, Side, across, preloaded_contact
-from microslip.system.component import Member, Ring
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, across, preloaded_contact
+from microslip.system.component import Component, Ring
 
 
 def blade() -> ModalBasis:
@@ -42,10 +42,10 @@ def sector(blades: int, order: int, normal: float = 20.0, push: float = 4.0) -> 
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(0.05)), jnp.asarray(1e6 / n))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
-    sides = Side("blade", "right"), Side("blade", "left", facing, 1)
+    sides = ContactFace("blade", "right"), ContactFace("blade", "left", facing, 1)
     contact = preloaded_contact("shroud", patch, *sides, normal=normal)
-    member, load = Member("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
-    return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
+    component, load = Component("blade", {0: blade().groups[0, 0]}), Load("blade", "gas", push)
+    return Assembly((component,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(blades, order))
 
 
 FINE = {"harmonics": 3, "samples": 40, "cycles": 30, "periodicity": 1e-13, "length": 1e-6}
@@ -93,8 +93,10 @@ def test_both_forms_are_the_same_equations() -> None:
     ring = sector(3, 1, normal=50.0, push=2.0).unrolled()
     places, areas = grid(0.02, 0.01, (2, 2))
     law = PointContact(Penalty(jnp.asarray(2e6 / 4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e6 / 4))
-    wall = preloaded_contact("wall", Patch("left", places, areas, law), Side("blade_0", "left"), None, normal=30.0)
-    chain = Assembly(ring.members, (*ring.contacts[:2], wall), ring.loads, ring.outputs)
+    wall = preloaded_contact(
+        "wall", Patch("left", places, areas, law), ContactFace("blade_0", "left"), None, normal=30.0
+    )
+    chain = Assembly(ring.components, (*ring.contacts[:2], wall), ring.loads, ring.outputs)
     found = []
     for form in ("relative", "sides"):
         problem = balance.of(chain, form=form, **FINE)
@@ -134,17 +136,19 @@ def test_interference_finds_the_force_that_a_given_normal_force_has() -> None:
     """Pressed together by what the preload makes: the same response from a given approach as from a given force."""
     one, Omega = sector(6, 2, push=2.0), 2 * np.pi * 60.0
     given = one.contacts[0]
-    wall = preloaded_contact("shroud", given.patch, Side("blade", "right"), None, normal=20.0)
-    by_force = Assembly(one.members, (wall,), one.loads, one.outputs)
+    wall = preloaded_contact("shroud", given.patch, ContactFace("blade", "right"), None, normal=20.0)
+    by_force = Assembly(one.components, (wall,), one.loads, one.outputs)
     # the steady load that holds the blade against the wall where the contact is pressed by 20 N
-    near = preloaded_contact("shroud", given.patch, Side("blade", "right"), None, interference=float(wall.offset[0]))
+    near = preloaded_contact(
+        "shroud", given.patch, ContactFace("blade", "right"), None, interference=float(wall.offset[0])
+    )
     loads = (*one.loads, Load("blade", "hold", 1.0, harmonic=0))
-    group = one.members[0].groups[0]
+    group = one.components[0].groups[0]
     rows = group.interfaces["right"].rows[0][None] * 20.0
     held = replace(
         group, excitations={**group.excitations, "hold": replace(group.excitations["gas"], rows=rows, labels=("hold",))}
     )
-    by_balance = Assembly((Member("blade", {0: held}),), (near,), loads, one.outputs)
+    by_balance = Assembly((Component("blade", {0: held}),), (near,), loads, one.outputs)
     found = []
     for each in (by_force, by_balance):
         problem = balance.of(each, **FINE)
@@ -163,9 +167,9 @@ def test_read_outs_come_in_the_order_they_are_listed_in(form: str) -> None:
     kinds = (Output("blade_0", "tip", "u_x"), Output("blade_1", "tip", "u_y"), Output("blade_0", "tip", "u_y"))
     loads = (ring.loads[0],)  # on the first blade only, so that the two move differently
     Omega, right = 2 * np.pi * 60.0, None
-    for members in permutations(ring.members):
+    for components in permutations(ring.components):
         for outputs in permutations(kinds):
-            p = balance.of(Assembly(members, ring.contacts, loads, outputs), form=form, **(FINE | {"harmonics": 1}))
+            p = balance.of(Assembly(components, ring.contacts, loads, outputs), form=form, **(FINE | {"harmonics": 1}))
             point = newton(p.at(Omega), p.at(Omega).reference)
             assert point.converged
             rows = response.operating(p, point).outputs[:, 1]
@@ -182,9 +186,11 @@ def rubbing(phase: float, push: float, friction: float) -> Assembly:
     places, areas = grid(0.02, 0.01, (4, 3))
     n = len(areas)
     law = PointContact(Penalty(jnp.asarray(2e6 / n)), Coulomb(jnp.asarray(friction)), jnp.asarray(1e6 / n))
-    wall = preloaded_contact("wall", Patch("right", places, areas, law), Side("blade", "right"), None, normal=20.0)
+    wall = preloaded_contact(
+        "wall", Patch("right", places, areas, law), ContactFace("blade", "right"), None, normal=20.0
+    )
     one = sector(4, 0)
-    return Assembly(one.members, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.outputs)
+    return Assembly(one.components, (wall,), (Load("blade", "gas", push * np.exp(1j * phase)),), one.outputs)
 
 
 @pytest.mark.parametrize(

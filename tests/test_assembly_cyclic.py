@@ -22,8 +22,8 @@ from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.ring.neighbours import frame_change
 from microslip.ring.neighbours import stuck as stuck_neighbours
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from microslip.system.component import Member, Ring
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component, Ring
 from microslip.system.damping import structural
 from microslip.system.disc import whole
 from microslip.system.nodal import nodal
@@ -60,10 +60,12 @@ def sector(basis: ModalBasis, order: int, normal: float, push: float) -> Assembl
     law = PointContact(Penalty(jnp.asarray(2e7 / n)), Coulomb(jnp.asarray(0.1)), jnp.asarray(1e7 / n))
     facing = frame_change(basis, faces["right"], faces["left"])
     patch = Patch("right", places, areas, law)
-    contact = preloaded_contact("gap", patch, Side("disc", "right"), Side("disc", "left", facing, 1), normal=normal)
-    member = Member("disc", groups, N)
+    contact = preloaded_contact(
+        "gap", patch, ContactFace("disc", "right"), ContactFace("disc", "left", facing, 1), normal=normal
+    )
+    component = Component("disc", groups, N)
     loads, outputs = (Load("disc", "gas", push),), (Output("disc", "top", "u_y"),)
-    return Assembly((member,), (contact,), loads, outputs, Ring(N, order))
+    return Assembly((component,), (contact,), loads, outputs, Ring(N, order))
 
 
 FINE = {"harmonics": 3, "samples": 36, "cycles": 30, "periodicity": 1e-13, "length": 1e-7}
@@ -95,8 +97,8 @@ def test_loss_factors_and_stuck_damping_of_a_cyclic_sector(basis: ModalBasis, ki
     if kind == "stuck":
         one = replace(one, stuck_damping=(0.003,))
     else:
-        one = replace(one, members=(structural(one.members[0]),))
-        part = one.part(one.members[0], 1)
+        one = replace(one, components=(structural(one.components[0]),))
+        part = one.part(one.components[0], 1)
         np.testing.assert_allclose(part.loss, 0.004 * part.K, rtol=0, atol=1e-9 * np.abs(part.K).max())
     a, b = (balance.of(x, **FINE) for x in (one, one.unrolled()))
     x, y = (response.operating(p, solve(p, 2 * np.pi * 700.0, [])) for p in (a, b))
@@ -120,7 +122,7 @@ def test_the_whole_ring_has_the_modes_of_all_nodal_diameters(basis: ModalBasis) 
 
 def test_compliance_of_the_whole_ring_is_that_of_its_waves(basis: ModalBasis) -> None:
     """A force pattern of one wave on all sectors moves them as the nodal diameter's own compliance says; 1e-12."""
-    ring, k = whole(sector(basis, 1, 50.0, 1.0).members[0]), 2
+    ring, k = whole(sector(basis, 1, 50.0, 1.0).components[0]), 2
     c, wave = ring.groups[0].compliance, basis.groups[0, k].compliance
     r = len(wave.labels)
     turn = np.exp(2j * np.pi * k * np.arange(N) / N)
@@ -135,12 +137,12 @@ def test_a_patch_that_deforms_on_a_sector_and_on_the_whole_disc() -> None:
     """Node-wise patch between the blades of the sector, and of the disc: 1e-9 of the amplitude in all blades."""
     basis = made(gap=0.0)
     groups = {k: g for (_, k), g in basis.groups.items()}
-    faces, disc = groups[0].interfaces, Member("disc", groups, N)
+    faces, disc = groups[0].interfaces, Component("disc", groups, N)
     met = in_ring(faces["right"], faces["left"], basis.rotation_axis, basis.rotation_point, N, ("right", "left"))
     found = nodal((disc, "right"), (disc, "left"), met, range(N // 2 + 1), tolerance=0.3)  # few, to be fast
     share = found.areas / found.areas.sum()
     law = PointContact(Penalty(jnp.asarray(2e7 * share)), Coulomb(jnp.asarray(0.1)), jnp.asarray(1e7 * share))
-    sides = found.sides(Side("disc", "right"), Side("disc", "left", met.frame, 1))
+    sides = found.sides(ContactFace("disc", "right"), ContactFace("disc", "left", met.frame, 1))
     patch = Patch("right", found.points, found.areas, law, found.shapes)
     one = replace(sector(basis, 2, 50.0, 3e3), contacts=(preloaded_contact("gap", patch, *sides, normal=50.0),))
     lone, ring = (balance.of(a, **{**FINE, "harmonics": 1, "samples": 20}) for a in (one, one.unrolled()))

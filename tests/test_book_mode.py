@@ -31,7 +31,7 @@ MU, C_N0, C_R0, R_Z = 0.2, 840e6, 80e6, 7.5e-6
 
 
 def slow(value: object) -> object:
-    """A further member of a family of which others are tried by the quick tests."""
+    """A further component of a family of which others are tried by the quick tests."""
     return pytest.param(value, marks=pytest.mark.slow)
 
 

@@ -71,7 +71,7 @@ BETWEEN = two() | {"contacts": two()["contacts"] + two(interface="b:right", agai
 
 def built(raw: dict[str, Any]) -> Any:
     settings = made(raw)
-    return build(settings, {b.name: small.basis() for b in settings.members}, PATH)
+    return build(settings, {b.name: small.basis() for b in settings.components}, PATH)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_a_beam_whose_patch_deforms_on_the_ground(patch: str) -> None:
     """It converges, and says how many deformations there are."""
     result = run_case(made(table(**STIFF, patch=patch, law="smooth")), {"small": small.basis()}, PATH)
     assert result.responses[200.0].converged.all()
-    assert any("deformations of the bodies" in r for r in result.remarks) == (patch == "nodal")
+    assert any("deformations of the bodies" in r for r in result.messages) == (patch == "nodal")
 
 
 def test_patches_that_deform_between_two_beams() -> None:
@@ -118,7 +118,7 @@ def test_a_curved_face_is_fitted_to_hertz() -> None:
     k = foundation_of_line(line, 200.0, HEIGHT).stiffness
     assert found.springs[0][0] == pytest.approx(k * DEPTH * HEIGHT, rel=1e-12)
     assert found.springs[0][1] == pytest.approx(0.7 * found.springs[0][0], rel=1e-12)  # along the line: 1 - nu
-    assert any("agrees with Hertz in approach at 200 N" in r for r in found.remarks)
+    assert any("agrees with Hertz in approach at 200 N" in r for r in found.messages)
     contact = found.pressed(200.0).contacts[0]
     assert contact.offset[0] == pytest.approx(float(line.approach(200.0, HEIGHT)), rel=0.02)
     p = pressure(contact.patch, contact.offset)

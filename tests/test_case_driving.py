@@ -74,7 +74,7 @@ def built(tmp_path, more: str, ring: str = "", body: str = "") -> Built:
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(more=more, ring=ring, body=body))
     settings, _ = load_case(path)
-    return build(settings, {b.name: blade() for b in settings.members}, path)
+    return build(settings, {b.name: blade() for b in settings.components}, path)
 
 
 def loads(tmp_path, more: str, ring: str = "") -> dict[int, complex]:
@@ -103,7 +103,7 @@ phase = 90.0
     assert built(tmp_path, more).assembly.ring == Ring(12, 2)
     assert built(tmp_path, more, 'rotation = "-"').assembly.ring == Ring(12, -2)
     assert loads(tmp_path, more, "engine_order = 1") == {4: pytest.approx(10.0), 6: pytest.approx(3.0j)}
-    assert any("harmonic 6" in s for s in built(tmp_path, more, "engine_order = 1").remarks)
+    assert any("harmonic 6" in s for s in built(tmp_path, more, "engine_order = 1").messages)
 
 
 def test_magnets_give_their_engine_orders(tmp_path) -> None:
@@ -132,11 +132,13 @@ def test_damping_of_a_case(tmp_path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(text)
     made = build(load_case(path)[0], {"blade": blade()}, path)
-    (member,) = made.assembly.members
-    np.testing.assert_allclose(member.groups[0].damping_ratio, [0.02, *[0.01] * 5])
-    assert member.aerodynamic[3] == -0.03j and member.aerodynamic[9] == -0.03j and member.aerodynamic[4] == 0.01j
-    assert sum("has a total damping ratio of" in s for s in made.remarks) == 12  # six modes in both waves
-    assert "nodal diameter 3, backward" in " ".join(made.remarks)
+    (component,) = made.assembly.components
+    np.testing.assert_allclose(component.groups[0].damping_ratio, [0.02, *[0.01] * 5])
+    assert (
+        component.aerodynamic[3] == -0.03j and component.aerodynamic[9] == -0.03j and component.aerodynamic[4] == 0.01j
+    )
+    assert sum("has a total damping ratio of" in s for s in made.messages) == 12  # six modes in both waves
+    assert "nodal diameter 3, backward" in " ".join(made.messages)
 
 
 def flow(folder: Path, pressure: str) -> None:
@@ -189,13 +191,13 @@ def test_a_pressure_field_in_a_case(tmp_path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(BEAM)
     made = build(load_case(path)[0], {"small": small.basis()}, path)
-    part = made.assembly.part(made.assembly.members[0], 1)
+    part = made.assembly.part(made.assembly.components[0], 1)
     gas = small.basis().groups[0, 0].excitations["gas"].rows[0]
     np.testing.assert_allclose(part.load, 2 * (3 - 4j) * gas, rtol=1e-9)
-    assert any("on face 'contact_left'" in s for s in made.remarks)
+    assert any("on face 'contact_left'" in s for s in made.messages)
     path.write_text(BEAM.replace("amplitude", "harmonic = 0\namplitude"))
     made = build(load_case(path)[0], {"small": small.basis()}, path)  # Re(p exp(0)) of a steady one
-    part = made.assembly.part(made.assembly.members[0], 0)
+    part = made.assembly.part(made.assembly.components[0], 0)
     np.testing.assert_allclose(part.load, 2 * 3 * gas, rtol=1e-9)
     path.write_text(BEAM.replace('"mm"', '"m"'))
     with pytest.raises(UserError, match=r"case.toml: excitations.contact_left.field: .*length_unit mm instead of m"):

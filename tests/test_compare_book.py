@@ -78,7 +78,7 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     told = [json.loads((f / "response.json").read_text()) for f in (build, build / "book")]
     assert [summary["mode"] for summary in told] == ["aft", "book"]
     said = f"tables are off by at most {orbits()[1].error:.2g} of what friction holds (orbits)"
-    assert any("Book mode" in remark and said in remark for remark in modes[1].remarks)
+    assert any("Book mode" in remark and said in remark for remark in modes[1].messages)
     assert modes[1].series[0].converged.all()
     capsys.readouterr()
     assert main(["respond", "case.toml", "--compare-book"]) == 0  # up to date: nothing is computed again
@@ -122,8 +122,8 @@ def test_a_case_in_the_books_mode(folder: Path) -> None:
 def test_the_books_mode_says_where_contacts_would_lift_off(folder: Path, amplitude: float, told: bool) -> None:
     few = ['mode="book"', "sweep.start=325.0", "sweep.stop=345.0", "sweep.points=3", f"amplitude={amplitude}"]
     running.respond(folder / "case.toml", None, few)
-    remarks = json.loads((folder / "build/vane/response.json").read_text())["remarks"]
-    assert any("points of right would lift off" in r for r in remarks) == told
+    messages = json.loads((folder / "build/vane/response.json").read_text())["messages"]
+    assert any("points of right would lift off" in r for r in messages) == told
 
 
 def test_the_contact_of_a_whole_ring_that_lifts_off_is_named() -> None:

@@ -245,9 +245,9 @@ def blocks() -> dict[str, ModalBasis]:
 
 def test_counting_twice_is_told_for_every_basis_that_holds_the_bulk(blocks: dict[str, ModalBasis]) -> None:
     for method, basis in blocks.items():
-        remarks = " ".join(run_case(case(None, 1e9), basis, "case.toml").remarks)
-        assert ("counted twice" in remarks) == (method != "eigenmodes"), method
-        assert "counted twice" not in " ".join(run_case(case("surface", 1e9), basis, "case.toml").remarks)
+        messages = " ".join(run_case(case(None, 1e9), basis, "case.toml").messages)
+        assert ("counted twice" in messages) == (method != "eigenmodes"), method
+        assert "counted twice" not in " ".join(run_case(case("surface", 1e9), basis, "case.toml").messages)
 
 
 def test_bulk_is_taken_out_of_the_law_or_refused(blocks: dict[str, ModalBasis]) -> None:
@@ -264,7 +264,7 @@ def test_bulk_is_taken_out_of_the_law_or_refused(blocks: dict[str, ModalBasis]) 
         assert result.stuck[0] > twice, method
         if method in ("macneal", "rubin"):
             assert abs(result.stuck[0] - target) < 0.5 * abs(twice - target), method
-        assert any("become" in r for r in result.remarks)
+        assert any("become" in r for r in result.messages)
         bulk = contact_share(basis.groups[0, 0], method, "u_n", "tip").beyond
         with pytest.raises(UserError, match=r"contacts\.tip\.normal_stiffness.*bulk alone.*surface"):
             run_case(case("bulk+surface", 1.01 / bulk), basis, "case.toml")
@@ -275,7 +275,7 @@ def test_a_law_of_the_surface_gets_the_bulk_from_the_file(blocks: dict[str, Moda
     added = run_case(case("surface", 1e9), blocks["eigenmodes"], "case.toml")
     macneal = run_case(case("surface", 1e9), blocks["macneal"], "case.toml")
     np.testing.assert_allclose(added.stuck, macneal.stuck, rtol=1e-12)
-    assert any("added to it from the file" in r for r in added.remarks) and not macneal.remarks
+    assert any("added to it from the file" in r for r in added.messages) and not macneal.messages
     plain = run_case(case(None, 1e9), blocks["rubin"], "case.toml").stuck
     assert (run_case(case("surface", 1e9), blocks["rubin"], "case.toml").stuck == plain).all()
     without = run_case(case(None, 1e9), blocks["eigenmodes"], "case.toml").stuck[0]

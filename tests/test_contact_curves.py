@@ -114,7 +114,7 @@ def test_noise_that_is_stated_is_evened():
 FILES = {
     "comma": "gap_um,force_N\n10,0\n8,2\n6,9\n4,30\n2,70\n",
     "semicolon and decimal comma": "Weg;Kraft\n-10,0;0\n-8,0;2,0\n-6,0;9,0\n-4,0;30,0\n-2,0;70,0\n",
-    "blanks and remarks": "# rig 3\n-10 0\n-8 2  # first weight\n\n-6 9\n-4   30\n-2\t70\n",
+    "blanks and messages": "# rig 3\n-10 0\n-8 2  # first weight\n\n-6 9\n-4   30\n-2\t70\n",
     "blanks and decimal comma": "Weg Kraft\n-10,0 0\n-8,0 2,0\n-6,0 9,0\n-4,0 30,0\n-2,0 70,0\n",
     "comma and blanks": "-10, 0\n-8, 2\n-6, 9\n-4, 30\n-2, 70\n",
     "tabs": "-10\t0\n-8\t2\n-6\t9\n-4\t30\n-2\t70\n",

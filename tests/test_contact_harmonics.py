@@ -9,7 +9,7 @@ import pytest
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_alone, force_harmonics, waves
+from microslip.contact.harmonics import force_alone, force_harmonics, fourier
 from microslip.contact.heights import Polynomial, tabulated
 from microslip.contact.law import march
 from microslip.contact.normal import Preload, Rough
@@ -29,13 +29,13 @@ def some(n, harmonics=3, seed=0, example=ROUGH):
 
 
 def test_transform_is_the_inverse_of_the_waves() -> None:
-    values, transform = waves(4, 9)
+    values, transform = fourier(4, 9)
     assert np.allclose(transform @ values, np.eye(9), rtol=0, atol=1e-15)
 
 
 def test_too_few_samples_are_refused() -> None:
     with pytest.raises(ValueError, match="at least 9"):
-        waves(4, 8)
+        fourier(4, 8)
 
 
 def test_a_jenkins_element_has_its_closed_form() -> None:
@@ -115,7 +115,7 @@ def test_tables_are_not_taken_for_values_per_point() -> None:
 
 def test_harmonics_are_those_of_the_marched_cycle() -> None:
     u = some(4)
-    values, transform = waves(3, 64)
+    values, transform = fourier(3, 64)
     force, _ = periodic(ROUGH.law, jnp.einsum("sh,nkh->snk", values, u), ROUGH.period, 2)[:2]
     expected = jnp.einsum("hs,snk->nkh", transform, force)
     found = force_harmonics(ROUGH.law, u, ROUGH.period)[0]
@@ -161,7 +161,7 @@ def creeping(n):
     factor[:, 0, 0] = factor[0] = 1
     normal = Rough(jnp.asarray(76e6), jnp.asarray(7.5e-6), Polynomial())
     law = PointContact(normal, Coulomb(jnp.asarray(0.4)), jnp.asarray(29e6))
-    return law, jnp.einsum("sh,nkh->nsk", waves(1, 64)[0], factor * one)[:, :, None], 1 / 108
+    return law, jnp.einsum("sh,nkh->nsk", fourier(1, 64)[0], factor * one)[:, :, None], 1 / 108
 
 
 def test_sliders_are_solved_for_in_few_cycles_whatever_their_motion() -> None:
@@ -230,7 +230,7 @@ def test_sliders_are_remembered_one_by_one() -> None:
     """The sum of their forces says less: at its size, strips that are not yet periodic look as if they were."""
     example, u = swinging("rough strips", 1)
     state = example.law.init(1)
-    values, _ = waves(3, 64)
+    values, _ = fourier(3, 64)
     force, state = march(example.law, jnp.einsum("sh,nkh->snk", values, u), 1.0, state)
     memory = example.law.memory(force[-1], state)
     assert memory.shape == (example.law.count(), 2, 1)

@@ -16,7 +16,7 @@ from meshes import STEEL, body, brick
 from scipy.special import ellipe, ellipk, gamma
 
 from microslip.contact.hertz import Hertz, axis_ratio, ellipse_integrals, half_curvatures
-from microslip.contact.identification import Resonance, identify, joined, two_beams
+from microslip.contact.identification import MeasuredResonance, identify, joined, two_beams
 from microslip.contact.layer import BOUNDARIES, Layer, modal_stiffness, modes_needed, quasi_static_error
 from microslip.contact.partial_slip import PartialSlip
 from microslip.contact.profiles import Profile, RoundContact
@@ -654,7 +654,7 @@ def test_two_beams_against_a_sum_over_modes():
 def test_stiffnesses_of_the_rig_come_back_and_agree_with_the_explicit_inverse():
     k = np.array([82.5e6, 31.7e6])
     f = RIG(k)
-    found = identify(RIG, [Resonance(f[0], 0.1, 1), Resonance(f[1], 0.1, 2)])
+    found = identify(RIG, [MeasuredResonance(f[0], 0.1, 1), MeasuredResonance(f[1], 0.1, 2)])
     assert found.stiffness == pytest.approx(k, rel=1e-8)
     assert hinge_spring(BEAM, 2 * np.pi * f[0]) * 12 / 0.01**2 == pytest.approx(k[0], rel=1e-10)
     assert shear_spring(BEAM, 2 * np.pi * f[1]) == pytest.approx(k[1], rel=1e-10)
@@ -667,7 +667,7 @@ def test_stated_uncertainty_is_the_scatter_of_repeated_measurements():
     """400 draws tell a standard deviation to 1/sqrt(800) = 3.5 %; three times that."""
     k, sigma = np.array([82.5e6, 31.7e6]), 0.05
     f = RIG(k)
-    found = identify(RIG, [Resonance(f[0], sigma, 1), Resonance(f[1], sigma, 2)])
+    found = identify(RIG, [MeasuredResonance(f[0], sigma, 1), MeasuredResonance(f[1], sigma, 2)])
     rng = np.random.default_rng(1)
     draws = f + sigma * rng.normal(size=(400, 2))
     normal = [np.log(hinge_spring(BEAM, 2 * np.pi * a)) for a in draws[:, 0]]
@@ -678,7 +678,11 @@ def test_stated_uncertainty_is_the_scatter_of_repeated_measurements():
 def test_more_resonances_than_stiffnesses_are_averaged_by_their_uncertainty():
     k = np.array([82.5e6, 31.7e6])
     f = RIG(k)
-    two = [Resonance(f[0] + 0.1, 0.1, 1), Resonance(f[0] - 0.2, 0.2, 1), Resonance(f[1], 0.1, 2)]
+    two = [
+        MeasuredResonance(f[0] + 0.1, 0.1, 1),
+        MeasuredResonance(f[0] - 0.2, 0.2, 1),
+        MeasuredResonance(f[1], 0.1, 2),
+    ]
     found = identify(RIG, two)
     mean = f[0] + (0.1 / 0.01 - 0.2 / 0.04) / (1 / 0.01 + 1 / 0.04)
     assert found.frequency[0] == pytest.approx(mean, abs=1e-6)
@@ -692,16 +696,25 @@ GOOD = RIG(np.array([82.5e6, 31.7e6]))
 @pytest.mark.parametrize(
     ("resonances", "words"),
     [
-        ([Resonance(GOOD[0], 0.1, 1)], "1 measured for 2 stiffnesses"),
-        ([Resonance(GOOD[0], 0.1, 1), Resonance(GOOD[0], 0.2, 1)], "do not tell the tangential stiffness"),
-        ([Resonance(100.0, 0.1, 1), Resonance(GOOD[1], 0.1, 2)], "out of the contact's reach, 208"),
-        ([Resonance(GOOD[0], 0.1, 1), Resonance(2000.0, 0.1, 2)], "out of the contact's reach"),
-        ([Resonance(GOOD[0], 0.1, 1), Resonance(STIFF[1] + 0.05, 0.1, 2)], "of the rigid contact, so it only bounds"),
-        ([Resonance(FREE[0] - 0.1, 0.1, 1), Resonance(GOOD[1], 0.1, 2)], "of the open contact"),
-        ([Resonance(GOOD[0], 40.0, 1), Resonance(GOOD[1], 0.1, 2)], "do not tell the normal stiffness"),
-        ([Resonance(GOOD[0], 0.1, 1), Resonance(GOOD[1], 0.1, 3)], "mode 3 is none of the model's 1 to 2"),
-        ([Resonance(GOOD[0], 0.0, 1), Resonance(GOOD[1], 0.1, 2)], "greater than 0"),
-        ([Resonance(np.nan, 0.1, 1), Resonance(GOOD[1], 0.1, 2)], "greater than 0"),
+        ([MeasuredResonance(GOOD[0], 0.1, 1)], "1 measured for 2 stiffnesses"),
+        (
+            [MeasuredResonance(GOOD[0], 0.1, 1), MeasuredResonance(GOOD[0], 0.2, 1)],
+            "do not tell the tangential stiffness",
+        ),
+        ([MeasuredResonance(100.0, 0.1, 1), MeasuredResonance(GOOD[1], 0.1, 2)], "out of the contact's reach, 208"),
+        ([MeasuredResonance(GOOD[0], 0.1, 1), MeasuredResonance(2000.0, 0.1, 2)], "out of the contact's reach"),
+        (
+            [MeasuredResonance(GOOD[0], 0.1, 1), MeasuredResonance(STIFF[1] + 0.05, 0.1, 2)],
+            "of the rigid contact, so it only bounds",
+        ),
+        ([MeasuredResonance(FREE[0] - 0.1, 0.1, 1), MeasuredResonance(GOOD[1], 0.1, 2)], "of the open contact"),
+        ([MeasuredResonance(GOOD[0], 40.0, 1), MeasuredResonance(GOOD[1], 0.1, 2)], "do not tell the normal stiffness"),
+        (
+            [MeasuredResonance(GOOD[0], 0.1, 1), MeasuredResonance(GOOD[1], 0.1, 3)],
+            "mode 3 is none of the model's 1 to 2",
+        ),
+        ([MeasuredResonance(GOOD[0], 0.0, 1), MeasuredResonance(GOOD[1], 0.1, 2)], "greater than 0"),
+        ([MeasuredResonance(np.nan, 0.1, 1), MeasuredResonance(GOOD[1], 0.1, 2)], "greater than 0"),
     ],
 )
 def test_resonances_that_tell_nothing_are_refused(resonances, words):
@@ -725,7 +738,7 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
     f = joined(one, "face", two, "face")(np.array([k_n, k_t]))
     expected = np.sqrt(np.sort([1e6, 1e6 + 2 * k_n, 2e6, 2e6 + 2 * k_t])) / (2 * np.pi)
     assert f == pytest.approx(expected, rel=1e-12)
-    measured = [Resonance(f[3], 0.1, 4), Resonance(f[2], 0.1, 3)]
+    measured = [MeasuredResonance(f[3], 0.1, 4), MeasuredResonance(f[2], 0.1, 3)]
     with pytest.raises(UserError, match=r"alike: normal 1e\+06 N/m, tangential 2.5e\+06 N/m or normal 3e\+06"):
         identify(joined(one, "face", two, "face"), measured)  # the two modes may change places
     found = identify(joined(one, "face", two, "face"), measured, bounds={"tangential": (1e2, 1e6)})
@@ -733,7 +746,9 @@ def test_two_bodies_joined_by_a_contact_in_closed_form():
     with pytest.raises(UserError, match="bounds"):
         identify(joined(one, "face", two, "face"), measured, bounds={"tangential": (1e6, 1e2)})
     with pytest.raises(UserError, match="mode 1 .* does not move at the contact"):
-        identify(joined(one, "face", two, "face", given={"tangential": k_t}), [Resonance(f[0], 0.1, 1)], ["normal"])
+        identify(
+            joined(one, "face", two, "face", given={"tangential": k_t}), [MeasuredResonance(f[0], 0.1, 1)], ["normal"]
+        )
     with pytest.raises(UserError, match="no interface 'side'; the body has face"):
         joined(one, "side")
     with pytest.raises(UserError, match="includes must be"):
@@ -781,7 +796,7 @@ def test_the_rig_in_solid_elements_is_the_rig_in_closed_form(k):
     f = two_beams(section, 0.01)(np.array(k))
     model = joined(one, "tip", two, "tip", includes=SURFACE)
     assert model(np.array(k))[[0, 2]] == pytest.approx(f, rel=5e-4)
-    found = identify(model, [Resonance(f[0], 1e-4 * f[0], 1), Resonance(f[1], 1e-4 * f[1], 3)])
+    found = identify(model, [MeasuredResonance(f[0], 1e-4 * f[0], 1), MeasuredResonance(f[1], 1e-4 * f[1], 3)])
     assert found.stiffness == pytest.approx(k, rel=0.01)
 
 
@@ -807,8 +822,8 @@ def test_node_of_a_mode_at_the_contact_is_refused():
     model = joined(chain, "face", given={"tangential": 0.0})
     f = model(np.array([1e6]))
     with pytest.raises(UserError, match="mode 2 .* does not move at the contact"):
-        identify(model, [Resonance(f[1], 0.1, 2)], ["normal"])
-    assert identify(model, [Resonance(f[0], 0.1, 1)], ["normal"]).stiffness == pytest.approx([1e6], rel=1e-8)
+        identify(model, [MeasuredResonance(f[1], 0.1, 2)], ["normal"])
+    assert identify(model, [MeasuredResonance(f[0], 0.1, 1)], ["normal"]).stiffness == pytest.approx([1e6], rel=1e-8)
 
 
 def test_stiffness_found_is_the_surfaces_once_the_bulk_is_added():
@@ -823,7 +838,9 @@ def test_stiffness_found_is_the_surfaces_once_the_bulk_is_added():
     f = x / LENGTH * np.sqrt(STEEL["young"] / STEEL["density"]) / (2 * np.pi)
     g = bar("eigenmodes", 2)
     known = {"tangential": 0.0}
-    surface = identify(joined(g, "right", includes=SURFACE, given=known), [Resonance(f, 1e-4 * f, 1)], ["normal"])
+    surface = identify(
+        joined(g, "right", includes=SURFACE, given=known), [MeasuredResonance(f, 1e-4 * f, 1)], ["normal"]
+    )
     assert surface.stiffness[0] == pytest.approx(k, rel=0.01)
-    both = identify(joined(g, "right", given=known), [Resonance(f, 1e-4 * f, 1)], ["normal"])
+    both = identify(joined(g, "right", given=known), [MeasuredResonance(f, 1e-4 * f, 1)], ["normal"])
     assert both.stiffness[0] < 0.9 * k

@@ -25,8 +25,8 @@ from microslip.contact.sliders import Iwan, rough_strips, uniform
 from microslip.contact.solids import Solid
 from microslip.data import Array, UserError
 from microslip.reference.half_space import mean_inverse_distance
-from microslip.system.assembly import Side
-from microslip.system.component import Member
+from microslip.system.assembly import ContactFace
+from microslip.system.component import Component
 from microslip.system.nodal import nodal, static_compliance
 
 STEEL = Solid(2.1e11, 0.3)
@@ -196,11 +196,11 @@ def test_a_pin_that_is_tilted_finds_its_moments() -> None:
 def test_elastic_bodies_under_a_curved_face_against_full_matrices() -> None:
     """A block under a cylinder: body elasticity by its modes, gaps by the law, 1e-8 of the largest pressure."""
     body = block(brick("hexahedron20", (3, 4, 2), (0.02, 0.016, 0.012)), {"top": ("z1", (0.0, 1.0, 0.0))}, "z0")
-    made, k = Member("low", {0: body.group}), 2e13
+    made, k = Component("low", {0: body.group}), 2e13
     found = nodal((made, "top"), tolerance=0.0)
     h = gap(found.points, (math.inf, 5.0))
     patch = Patch("top", found.points, found.areas, apart(springs(found.areas, k), h), found.shapes)
-    side, _ = found.sides(Side("low", "top"), None)
+    side, _ = found.sides(ContactFace("low", "top"), None)
     p = pressure(patch, pressed_by(patch, 3e-6, static_compliance([(made, side, 1.0)])))
     face = body.group.interfaces["top"]
     N = np.einsum("i,pid->pd", face.rotation[0], body.motion["top"])

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from microslip.case.edges import remarks, rising
+from microslip.case.edges import messages, rising
 from microslip.harmonic_balance import FrequencyResponse
 from microslip.harmonic_balance.sweeps import brackets, inside, overhanging, resonances
 
@@ -48,7 +48,7 @@ def test_the_range_to_add_holds_the_resonance(damping: float, away: float) -> No
         low, high = sorted((one.frequency, one.to))
         assert low < top < high and one.normal_force == 7.0
         assert one.amplitude == np.abs(r.monitor).max()
-        (said,) = remarks([one])
+        (said,) = messages([one])
         assert f"sweep.{key}" in said and one.add in said
 
 

@@ -40,10 +40,10 @@ def bodies(draw: st.DrawFn) -> ModalBasis:
     points = rng.normal(size=(n, 3))
     A, B = rng.normal(size=(2, 3 * n, 3 * n))
     K, C = scale * 1e6 * (A @ A.T + np.eye(3 * n)), scale * B @ B.T
-    members = [Body(f"m{i}", m, x) for i, (m, x) in enumerate(zip(masses, points, strict=True))]
+    components = [Body(f"m{i}", m, x) for i, (m, x) in enumerate(zip(masses, points, strict=True))]
     contacts = [Contact(name, f"m{i}", rng.normal(size=3)) for i, name in enumerate(faces)]
     basis = System(
-        draw(NAMES), members, contacts=contacts, forces=[Force(force, "m1", rng.normal(size=3))],
+        draw(NAMES), components, contacts=contacts, forces=[Force(force, "m1", rng.normal(size=3))],
         monitors=[Monitor(probe, "m0")], stiffness=K, damping=C,
     ).basis()  # fmt: skip
     g = basis.groups[0, 0]

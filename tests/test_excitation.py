@@ -22,7 +22,7 @@ from microslip.modes import modal_basis
 from microslip.ring.expansion import aliased
 from microslip.system import damping, excitation, pressure
 from microslip.system.assembly import Assembly, Load, Output
-from microslip.system.component import Member, Ring
+from microslip.system.component import Component, Ring
 
 # ---------------------------------------------------------------- engine orders and patterns
 
@@ -36,14 +36,14 @@ def test_engine_orders_against_the_force_that_every_blade_feels(blades: int, tur
     ring = excitation.ring_of(blades, pattern.orders(), turning)
     place = 0.3
     loads = excitation.pattern_loads("blade", "gas", pattern, ring, place, turning)
-    one = Assembly((Member("blade", {0: blade().groups[0, 0]}),), (), loads, (), ring)
+    one = Assembly((Component("blade", {0: blade().groups[0, 0]}),), (), loads, (), ring)
     t = 2 * np.pi * np.arange(64) / 64  # Omega t over one turn; the base order is 1
     for j in range(blades):
         felt = pattern.at(place + 2 * np.pi * j / blades + turning * t)
         expected = np.fft.rfft(felt)[:9] * np.r_[1, np.full(8, 2)] / 64
         told = np.zeros(9, dtype=complex)
         for x in one.unrolled().loads:
-            if x.member == f"blade_{j}":
+            if x.component == f"blade_{j}":
                 told[x.harmonic] += x.amplitude
         np.testing.assert_allclose(told, expected, rtol=0, atol=1e-13)
 
@@ -128,8 +128,8 @@ def test_a_centrifugal_load_moves_a_loose_body_by_its_statics() -> None:
     changes = {"excitations": rows, "reduction": "rubin", **axis}
     g = modal_basis(small.beam(), small.BodySettings.model_validate(small.table(**changes))).groups[0, 0]
     load = Load("beam", "spin", 100.0**2, 0)
-    one = Assembly((Member("beam", {0: g}),), (), (load,), (Output("beam", "tip-probe", "u_z"),))
-    part = one.part(one.members[0], 0)
+    one = Assembly((Component("beam", {0: g}),), (), (load,), (Output("beam", "tip-probe", "u_z"),))
+    part = one.part(one.components[0], 0)
     tip = part.output @ np.linalg.solve(part.K, part.load)
     E, rho, L, r0 = 2.1e11, 7850.0, small.SIZE[2], 0.2
     bar = 100.0**2 * rho / E * (r0 * L**2 / 2 + L**3 / 3)  # integral of the force outside, over E A
@@ -170,8 +170,8 @@ def disc() -> ModalBasis:
 
 
 @pytest.fixture(scope="module")
-def beam() -> Member:
-    return Member("beam", {0: small.basis().groups[0, 0]})
+def beam() -> Component:
+    return Component("beam", {0: small.basis().groups[0, 0]})
 
 
 def grid(count: int = 30) -> np.ndarray:
@@ -185,7 +185,7 @@ def field(function, count: int = 30) -> pressure.PressureField:
     return pressure.PressureField(points, function(*points.T).astype(complex), "field")
 
 
-def test_a_uniform_field_is_the_unit_pressure(beam: Member) -> None:
+def test_a_uniform_field_is_the_unit_pressure(beam: Component) -> None:
     """Modal force of p = 3 + 4i everywhere: that of the row `gas` times p; the resultant is - area times normal."""
     found = pressure.on_face(field(lambda x, y, z: 3 + 4j + 0 * x), pressure.load_face(beam, "contact_left"), "left")
     np.testing.assert_allclose(found.force, [(3 + 4j) * 0.03 * 0.12, 0, 0], rtol=0, atol=1e-15)  # the normal is -x
@@ -194,11 +194,11 @@ def test_a_uniform_field_is_the_unit_pressure(beam: Member) -> None:
     np.testing.assert_allclose(part, modal_force(beam, (Load("beam", "gas", 3 + 4j),)), rtol=1e-12)
 
 
-def modal_force(member: Member, loads: tuple[Load, ...], ring: Ring | None = None) -> np.ndarray:
-    return Assembly((member,), (), loads, (), ring).part(member, 1).load
+def modal_force(component: Component, loads: tuple[Load, ...], ring: Ring | None = None) -> np.ndarray:
+    return Assembly((component,), (), loads, (), ring).part(component, 1).load
 
 
-def test_a_linear_field_is_exact_and_a_wavy_one_converges(beam: Member) -> None:
+def test_a_linear_field_is_exact_and_a_wavy_one_converges(beam: Component) -> None:
     """Resultants against integrals in closed form: 1e-12 for a linear pressure on scattered points, second order in
     the field's spacing for a sine; the error told is above the true one, and below thirty times it."""
     face = pressure.load_face(beam, "contact_left")
@@ -225,7 +225,7 @@ def test_a_linear_field_is_exact_and_a_wavy_one_converges(beam: Member) -> None:
     assert errors[-1] < 1e-3
 
 
-def test_the_other_side_of_a_thin_blade_does_not_mix_in(beam: Member) -> None:
+def test_the_other_side_of_a_thin_blade_does_not_mix_in(beam: Component) -> None:
     """A field on both sides of a plate nine spacings wide and two thick, of opposite sign: each face takes its own."""
     near, count = grid(20), 20 * 40
     spacing = 0.032 / 19
@@ -239,20 +239,20 @@ def test_the_other_side_of_a_thin_blade_does_not_mix_in(beam: Member) -> None:
 def test_a_complex_field_on_a_sector_of_complex_shapes(disc: ModalBasis, order: int) -> None:
     """Modal force of every wave of six sectors, those of the conjugate groups too: phi^H against the pressure, point by
     point, with the shapes of the wave itself. A field of one order excites its own wave on the whole ring only."""
-    member = Member("disc", {k: g for (_, k), g in disc.groups.items()}, sectors=N)
-    face = pressure.load_face(member, "contact_right")
+    component = Component("disc", {k: g for (_, k), g in disc.groups.items()}, sectors=N)
+    face = pressure.load_face(component, "contact_right")
     p = np.exp(1j * 20 * face.points[:, 0]) * (1 + face.points[:, 2])
     found = pressure.FacePressure(p, np.zeros(3, complex), 0.0, 0.0, "field", "contact_right")
-    loaded = pressure.with_pressure(member, "flow", found)
+    loaded = pressure.with_pressure(component, "flow", found)
     f = modal_force(loaded, pressure.field_loads("disc", "flow", 1, 2.0), Ring(N, order))
     k = min(order, N - order)
-    shapes = member.groups[k].interfaces["contact_right"].shapes
+    shapes = component.groups[k].interfaces["contact_right"].shapes
     phi = shapes.conj() if order > N / 2 else shapes
     direct = -2.0 * np.einsum("p,p,pi,pim->m", face.areas, p, face.normals, phi.conj())
     np.testing.assert_allclose(f, direct, rtol=0, atol=1e-12 * np.abs(direct).max())
 
 
-def test_files_of_a_field(tmp_path, beam: Member) -> None:
+def test_files_of_a_field(tmp_path, beam: Component) -> None:
     """The same field from .csv in millimetres, .npz and .vtu: the same modal force; exp(-i Omega t) is conjugated."""
     meshio = pytest.importorskip("meshio")
     points, face = grid(15), pressure.load_face(beam, "contact_left")
@@ -272,7 +272,7 @@ def test_files_of_a_field(tmp_path, beam: Member) -> None:
     np.testing.assert_allclose(turned.pressure, p.conj(), rtol=1e-9)
 
 
-def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Member) -> None:
+def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Component) -> None:
     face = pressure.load_face(beam, "contact_left")
     good = "x,y,z,p_real,p_imag\n" + "\n".join(f"0,{y},{z},1,0" for y in (0, 15, 30) for z in (0, 60, 120))
     path = tmp_path / "field.csv"
@@ -306,7 +306,7 @@ def test_bad_fields_are_refused_in_a_sentence(tmp_path, beam: Member) -> None:
     group = replace(beam.groups[0], interfaces={"contact_left": bare})
     with pytest.raises(UserError, match="output.patch_shapes"):
         pressure.with_pressure(
-            Member("beam", {0: group}), "flow", pressure.on_face(field(lambda x, y, z: z), bare, "contact_left")
+            Component("beam", {0: group}), "flow", pressure.on_face(field(lambda x, y, z: z), bare, "contact_left")
         )
 
 
@@ -337,17 +337,17 @@ def test_aerodynamic_damping_is_the_half_power_width(tmp_path, disc: ModalBasis)
     path.write_text("\n".join(rows))
     flow = damping.read_aerodynamics(path, N)
     groups = {k: damping.with_ratios(g, 0.003) for (_, k), g in disc.groups.items()}
-    member = Member("disc", groups, sectors=N, aerodynamic=flow)
+    component = Component("disc", groups, sectors=N, aerodynamic=flow)
     expected = {0: 0.01, 1: -0.001 + 0.004j, 5: 0.002 + 0.03j, 2: 0.02j, 4: 0.02j, 3: 0.01 + 0.005j}
     for index, value in (expected | {0: 0.01j}).items():
         assert flow[index] == value
-        M, K, C = (np.diag(A) for A in member.at(index).matrices)
-        for j, omega in enumerate(member.at(index).group.omega[:3]):
+        M, K, C = (np.diag(A) for A in component.at(index).matrices)
+        for j, omega in enumerate(component.at(index).group.omega[:3]):
             D, shifted = 0.003 + value.imag, omega * np.sqrt(1 + 2 * value.real)
             low, high = half_power(M[j], K[j], C[j])
             D = D * omega / shifted  # C keeps the frequency that the modal file holds
             assert (high**2 - low**2) / shifted**2 == pytest.approx(4 * D * np.sqrt(1 - D**2), rel=1e-6)
-        np.testing.assert_allclose(damping.total_damping(member, index), 0.003 + value.imag, rtol=1e-12)
+        np.testing.assert_allclose(damping.total_damping(component, index), 0.003 + value.imag, rtol=1e-12)
 
 
 def test_the_rotors_sense_decides_which_wave_is_forward(tmp_path) -> None:
@@ -362,10 +362,10 @@ def test_the_rotors_sense_decides_which_wave_is_forward(tmp_path) -> None:
 def test_flutter_is_told_by_mode_and_wave(disc: ModalBasis) -> None:
     flow = {k: -0.004j if k == 5 else 0.001j for k in range(N)}
     groups = {k: damping.with_ratios(g, [0.003, 0.005]) for (_, k), g in disc.groups.items()}
-    told = damping.unstable(Member("disc", groups, sectors=N, aerodynamic=flow), N)
+    told = damping.unstable(Component("disc", groups, sectors=N, aerodynamic=flow), N)
     assert len(told) == 1
     assert "disc: mode 1" in told[0] and "nodal diameter 1, forward" in told[0] and "-0.001" in told[0]
-    M, K, C = Member("disc", groups, sectors=N, aerodynamic=flow).at(5).matrices
+    M, K, C = Component("disc", groups, sectors=N, aerodynamic=flow).at(5).matrices
     zero, one = np.zeros_like(M), np.eye(len(M))
     roots = scipy.linalg.eigvals(np.block([[zero, one], [-K, -C]]), scipy.linalg.block_diag(one, M))
     assert (roots.real > 0).sum() == 2  # the mode and its conjugate
@@ -373,10 +373,10 @@ def test_flutter_is_told_by_mode_and_wave(disc: ModalBasis) -> None:
 
 def test_a_whole_ring_refuses_what_differs_from_wave_to_wave() -> None:
     one = sector(6, 1)
-    flown = [replace(one.members[0], aerodynamic=dict.fromkeys(range(6), 0.01j) | more) for more in ({}, {5: 0.02j})]
-    assert replace(one, members=(flown[0],)).unrolled().members[3].at(0).aerodynamic == 0.01j
+    flown = [replace(one.components[0], aerodynamic=dict.fromkeys(range(6), 0.01j) | more) for more in ({}, {5: 0.02j})]
+    assert replace(one, components=(flown[0],)).unrolled().components[3].at(0).aerodynamic == 0.01j
     with pytest.raises(UserError, match="differs from wave to wave"):
-        replace(one, members=(flown[1],)).unrolled()
+        replace(one, components=(flown[1],)).unrolled()
 
 
 @pytest.mark.parametrize("reduction", ["eigenmodes", "craig-bampton"])

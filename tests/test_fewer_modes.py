@@ -73,7 +73,7 @@ def test_a_case_takes_as_many_modes_as_it_says(sample: ModalBasis) -> None:
 def test_the_free_response_has_its_true_peak_on_any_grid(sample: ModalBasis, points: int) -> None:
     """Against 20001 frequencies about the resonance, within 0.2 %; the ends of the sweep stay the ends."""
     settings, _ = load_case(SAMPLES / "case.toml", [f"sweep.points={points}"])
-    built = build(settings, {settings.members[0].name: sample}, "case.toml")
+    built = build(settings, {settings.components[0].name: sample}, "case.toml")
     free = free_response(built, np.linspace(settings.sweep.start, settings.sweep.stop, points))
     assert free.frequency[0] == settings.sweep.start and free.frequency[-1] == settings.sweep.stop
     assert np.all(np.diff(free.frequency) > 0)

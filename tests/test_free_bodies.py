@@ -19,9 +19,9 @@ from microslip.harmonic_balance import pseudo_transient, response
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.solver import from_rest, solve
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Output, Side
+from microslip.system.assembly import Assembly, ContactFace, Load, Output
 from microslip.system.assembly import Contact as Touching
-from microslip.system.component import Member
+from microslip.system.component import Component
 
 Array = np.ndarray
 Omega = 2 * np.pi * 97.0
@@ -59,7 +59,7 @@ def wedge(push: float, friction: float = 0.3, hold: float = 0.0, axial: float = 
     ]  # fmt: skip
     loads = Load("a", "push", push), Load("b", "push", -push)
     outputs = [Output(name, "tip", "u_y") for name in groups] + [Output("damper", "tip", "u_z")]
-    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), tuple(contacts), loads, tuple(outputs))
+    return Assembly(tuple(Component(n, {0: g}) for n, g in groups.items()), tuple(contacts), loads, tuple(outputs))
 
 
 def free_body(mass: float, springs: list[Any], faces: list[Contact], free: str = "x y z") -> ModalGroup:
@@ -69,11 +69,11 @@ def free_body(mass: float, springs: list[Any], faces: list[Contact], free: str =
     ).basis().groups[0, 0]  # fmt: skip
 
 
-def sides(groups: dict[str, ModalGroup], name: str) -> tuple[Side, Side]:
+def sides(groups: dict[str, ModalGroup], name: str) -> tuple[ContactFace, ContactFace]:
     """The face of a blade, and what meets it of the damper, in the frame of the blade's."""
     first, second = groups[name].interfaces["face"], groups["damper"].interfaces[name]
     turned = first.rotation @ second.rotation.T @ second.rows[:3]
-    return Side(name, "face", rows={0: first.rows[:3]}), Side("damper", name, rows={0: turned})
+    return ContactFace(name, "face", rows={0: first.rows[:3]}), ContactFace("damper", name, rows={0: turned})
 
 
 def rider(push: float, gas: float) -> Assembly:
@@ -85,7 +85,7 @@ def rider(push: float, gas: float) -> Assembly:
     contact = Touching("seat", patch, *sides(groups, "a"), np.zeros(3), np.array([PRESSED, 0, 0]))
     loads = Load("a", "push", push), Load("damper", "gas", gas, harmonic=0)
     outputs = Output("a", "tip", "u_y"), Output("damper", "tip", "u_y")
-    return Assembly(tuple(Member(n, {0: g}) for n, g in groups.items()), (contact,), loads, outputs)
+    return Assembly(tuple(Component(n, {0: g}) for n, g in groups.items()), (contact,), loads, outputs)
 
 
 def coarse(assembly: Assembly, harmonics: int = 5, samples: int = 128) -> Problem:

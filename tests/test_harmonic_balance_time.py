@@ -13,7 +13,7 @@ import scipy.linalg
 from integrator import Start, Steady, extrapolated, steady
 
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import waves
+from microslip.contact.harmonics import fourier
 from microslip.contact.law import Law, settings
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch, grid
@@ -25,8 +25,8 @@ from microslip.harmonic_balance.response import Operating
 from microslip.harmonic_balance.solver import solve
 from microslip.system import Body, Force, Monitor, Spring, System
 from microslip.system import Contact as Face
-from microslip.system.assembly import Assembly, Contact, Load, Output, Side, across, preloaded_contact
-from microslip.system.component import Member, Ring
+from microslip.system.assembly import Assembly, Contact, ContactFace, Load, Output, across, preloaded_contact
+from microslip.system.component import Component, Ring
 
 Array = np.ndarray
 
@@ -71,10 +71,10 @@ def held(body: ModalGroup, law: Law, directions: list[int], preload: Array, offs
     """A body on one point contact that moves in some of the directions n, t1, t2."""
     shape = np.eye(3)[None][:, :, directions]
     patch = Patch("face", np.zeros((1, 2)), np.ones(1), law, shape)
-    side = Side("body", "face", rows={0: body.interfaces["face"].rows[directions]})
+    side = ContactFace("body", "face", rows={0: body.interfaces["face"].rows[directions]})
     contact = Contact("face", patch, side, None, offset, preload)
     load, output = Load("body", "push", force), Output("body", "tip", "u")
-    return Assembly((Member("body", {0: body}),), (contact,), (load,), (output,))
+    return Assembly((Component("body", {0: body}),), (contact,), (load,), (output,))
 
 
 def duffing() -> Assembly:
@@ -141,9 +141,11 @@ def ring_of_four() -> Assembly:
     law = PointContact(Penalty(jnp.asarray(1e6)), Coulomb(jnp.asarray(0.2)), jnp.asarray(5e5))
     facing = across(np.diag([1.0, 1, 1]), np.diag([-1.0, -1, 1]))
     patch = Patch("right", places, areas, law)
-    contact = preloaded_contact("shroud", patch, Side("blade", "right"), Side("blade", "left", facing, 1), normal=20.0)
-    member, load = Member("blade", {0: blade.groups[0, 0]}), Load("blade", "gas", 30.0)
-    return Assembly((member,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(4, 1)).unrolled()
+    contact = preloaded_contact(
+        "shroud", patch, ContactFace("blade", "right"), ContactFace("blade", "left", facing, 1), normal=20.0
+    )
+    component, load = Component("blade", {0: blade.groups[0, 0]}), Load("blade", "gas", 30.0)
+    return Assembly((component,), (contact,), (load,), (Output("blade", "tip", "u_x"),), Ring(4, 1)).unrolled()
 
 
 def balanced(assembly: Assembly, Omega: float, near: Steady | None = None, **fine: Any) -> Operating:
@@ -159,16 +161,19 @@ def unknowns(problem: balance.Problem, motion: Steady) -> Array:
     """x of the harmonics of a motion in time, its relative motions as unknowns."""
     moved = [u - c.offset for u, c in zip(motion.relative, problem.assembly.contacts, strict=True)]
     a = motion.harmonics(np.hstack(moved), problem.harmonics)
-    x = np.zeros((problem.waves, problem.count))
+    x = np.zeros((problem.coefficients, problem.count))
     x[0], x[1::2], x[2::2] = a[:, 0].real, a[:, 1:].real.T, -a[:, 1:].imag.T
     return (x / problem.scale).ravel()
 
 
 def begun(assembly: Assembly, found: Operating, samples: int) -> Start:
     """The state at t = 0 of a solution of the balance."""
-    q = [np.concatenate([member[h] for member in found.q.values()]) for h in range(len(next(iter(found.q.values()))))]
+    q = [
+        np.concatenate([component[h] for component in found.q.values()])
+        for h in range(len(next(iter(found.q.values()))))
+    ]
     speed = sum(1j * h * found.Omega * one for h, one in enumerate(q))
-    values = np.asarray(waves(len(q) - 1, samples)[0])
+    values = np.asarray(fourier(len(q) - 1, samples)[0])
     paths = [np.einsum("sw,kw,nik->sni", np.roll(values, -1, axis=0), u, c.patch.kinematics)
              for c, u in zip(assembly.contacts, found.relative.values(), strict=True)]  # fmt: skip
     return Start(np.real(sum(q)), np.real(speed), paths)

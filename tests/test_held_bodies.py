@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from microslip.case.assemble import held
+from microslip.case.assemble import on_weak_springs
 from microslip.data import UserError
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
@@ -25,12 +25,12 @@ def pair(grounded: bool) -> System:
 def test_hold_gives_every_rigid_motion_one_frequency_and_leaves_the_elastic_ones() -> None:
     """Eigenvalues of K and M: six of (2 pi f)^2, the others as before to rounding."""
     group = pair(False).basis().groups[0, 0]
-    after = held(group, 3.0, "hold")
+    after = on_weak_springs(group, 3.0, "weak_springs")
     omega = np.sqrt(np.abs(scipy.linalg.eigh(after.K_r, after.M_r, eigvals_only=True)))
     np.testing.assert_allclose(omega[:6], 2 * np.pi * 3.0, rtol=1e-9)
     np.testing.assert_allclose(omega[6:], group.omega[6:], rtol=1e-9)
 
 
 def test_what_is_held_already_is_not_held_again() -> None:
-    with pytest.raises(UserError, match="bodies.pin.hold: the body is held already"):
-        held(pair(True).basis().groups[0, 0], 3.0, "bodies.pin.hold")
+    with pytest.raises(UserError, match="bodies.pin.weak_springs: the body is held already"):
+        on_weak_springs(pair(True).basis().groups[0, 0], 3.0, "bodies.pin.weak_springs")

@@ -21,8 +21,8 @@ from microslip.harmonic_balance.identification import Measured
 from microslip.modes import modal_basis
 from microslip.ring.expansion import phase
 from microslip.ring.neighbours import frame_change, stuck
-from microslip.system.assembly import Assembly, Contact, Side
-from microslip.system.component import Member, Ring
+from microslip.system.assembly import Assembly, Contact, ContactFace
+from microslip.system.component import Component, Ring
 
 SHROUD = (0.02, 0.03)  # m, of the patch whose springs are spread
 
@@ -36,10 +36,10 @@ def ring(basis: ModalBasis) -> Assembly:
     """A sector whose right shroud meets the left one of the next sector; its law does not matter here."""
     faces = basis.groups[0, 0].interfaces
     patch = Patch("right", *grid(*SHROUD, (6, 4)), None)
-    second = Side("disc", "left", frame_change(basis, faces["right"], faces["left"]), 1)
-    contact = Contact("shroud", patch, Side("disc", "right"), second, np.zeros(6), np.zeros(6))
-    member = Member("disc", {k: g for (_, k), g in basis.groups.items()}, sectors=N)
-    return Assembly((member,), (contact,), (), (), Ring(N, 1))
+    second = ContactFace("disc", "left", frame_change(basis, faces["right"], faces["left"]), 1)
+    contact = Contact("shroud", patch, ContactFace("disc", "right"), second, np.zeros(6), np.zeros(6))
+    component = Component("disc", {k: g for (_, k), g in basis.groups.items()}, sectors=N)
+    return Assembly((component,), (contact,), (), (), Ring(N, 1))
 
 
 def six(normal: float, tangential: float) -> np.ndarray:
@@ -175,10 +175,10 @@ def test_a_band_without_a_resonance_says_so() -> None:
 
 def shaken(damping: float, load: float, normal: float) -> balance.Problem:
     one = sector(6, 1, normal=normal, push=load)
-    member = one.members[0]
-    g = member.groups[0]
+    component = one.components[0]
+    g = component.groups[0]
     damped = replace(g, C_r=g.C_r * (damping / 0.01))
-    return balance.of(replace(one, members=(Member("blade", {0: damped}),)), **{**FINE, "harmonics": 1})
+    return balance.of(replace(one, components=(Component("blade", {0: damped}),)), **{**FINE, "harmonics": 1})
 
 
 @pytest.mark.slow

@@ -14,8 +14,8 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import harmonic_response
 from microslip.reference.one_harmonic import JenkinsContact, frequency_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from microslip.system.component import Member
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component
 
 SPRINGS, SIZE = (3e6, 2e6, 5e6), (0.08, 0.03)
 LAW = Example(Jenkins(value(3e6), value(2e6), value(5e6), value(4.0), 2), 1e-5, 1e-5)
@@ -57,9 +57,9 @@ def test_one_harmonic_is_the_closed_form(slider: int) -> None:
     assert closed.converged.all() and (np.abs(closed.contact[:, slider]) > 2 * held / k).any()
     errors = []
     for samples in (64, 256):
-        contact = preloaded_contact("rub", four(held, slider), Side("block", "rub"), None, normal=2.0)
+        contact = preloaded_contact("rub", four(held, slider), ContactFace("block", "rub"), None, normal=2.0)
         loads, outputs = (Load("block", "push"),), (Output("block", "tip", "u_y" if slider == 1 else "u_x"),)
-        problem = balance.of(Assembly((Member("block", {0: group}),), (contact,), loads, outputs), 1, samples)
+        problem = balance.of(Assembly((Component("block", {0: group}),), (contact,), loads, outputs), 1, samples)
         found = harmonic_response(problem, f, np.array([held]))
         assert found.converged.all()
         errors.append(np.abs(found.monitor - closed.monitor).max() / np.abs(closed.monitor).max())

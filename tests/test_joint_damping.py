@@ -202,7 +202,7 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
     np.testing.assert_allclose([r["damping_ratio"] for r in rows], (RATIO * (1 - joint))[: len(rows)], rtol=1e-9)
     width = 2 * RATIO * (1 - joint[0]) * f[0]
     assert rows[0]["half_power_width_Hz"] == pytest.approx(width, rel=1e-9)
-    assert any("half-power width" in s and f"{width:.3g} Hz" in s for s in summary["remarks"])
+    assert any("half-power width" in s and f"{width:.3g} Hz" in s for s in summary["messages"])
     assert list(read_response(tmp_path / "build/strips/response.h5").stuck_modes) == rows
     for key, value in (("damping", "stuck"), ("damping", "viscous"), ("damping_ratio", "-0.1")):
         assert main(["respond", "case.toml", "--set", f"{key}={value}", "-q"]) == 2

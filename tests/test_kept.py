@@ -21,21 +21,21 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.harmonic_balance import kept, refinement, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.checkpoint import kept_response, labels, record, restored
+from microslip.harmonic_balance.checkpoint import labels, record, restored, resumed_response
 from microslip.harmonic_balance.checks import forces_on
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.harmonic_balance.sweeps import overhanging
 from microslip.modes import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
-from microslip.reduced.compliance import statics_beside
+from microslip.reduced.compliance import has_residual
 from microslip.reduced.coordinates import in_modes
 from microslip.results import open_journal, response_of
 from microslip.settings.body import BodySettings
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.assembly import Contact as Rub
-from microslip.system.component import Member
+from microslip.system.component import Component
 
 FREQUENCY = np.linspace(180.0, 270.0, 16)
 SERIES = "normal force 20 N"
@@ -72,7 +72,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
     for _ in range(4):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
             try:
-                found, peaks = kept_response(problem, FREQUENCY, np.ones(1), journal, SERIES, impatient)
+                found, peaks = resumed_response(problem, FREQUENCY, np.ones(1), journal, SERIES, impatient)
             except Stop:
                 continue
     whole = refinement.filled_response(problem, FREQUENCY, np.ones(1))
@@ -90,7 +90,7 @@ def test_nothing_is_computed_twice(tmp_path: Path) -> None:
     problem, told = balance.of(cantilever(), 1, 64, length=0.0125), list[str]()
     for series in (SERIES, SERIES, "normal force 30 N"):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            kept_response(problem, np.linspace(0.5, 0.8, 3), np.ones(1), journal, series, told.append)
+            resumed_response(problem, np.linspace(0.5, 0.8, 3), np.ones(1), journal, series, told.append)
     computed = [t.split(": ")[1] for t in told if " of 3 frequencies" in t]
     assert computed == 2 * ["0.5 Hz", "0.65 Hz", "0.8 Hz"]
     assert len([t for t in told if "a mode at" in t]) == 2
@@ -107,7 +107,7 @@ def test_a_peak_on_a_point_of_the_sweep_is_a_point_still(tmp_path: Path, monkeyp
     monkeypatch.setattr(kept, "highest", top)
     for frequency in 2 * [np.array([2.0, 2.125, 2.25, 2.375])]:
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            found, peaks = kept_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
     assert peaks[0][0] in found.frequency and found.converged.all()
     assert len([t for t in told if " of 4 frequencies" in t]) == 4 and len([t for t in told if "peak near" in t]) == 1
 
@@ -118,7 +118,7 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     problem, told = balance.of(free(2.2), 1, 16, length=0.01), []
     for _ in range(2):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
-            found, peaks = kept_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
+            found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
         np.testing.assert_allclose(peaks, [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
     assert len([t for t in told if "peak near" in t]) == 1
     alone = response.harmonic_response(problem, frequency, np.ones(0))
@@ -162,22 +162,22 @@ def test_displacement_by_residual_shapes_is_what_the_monitor_reads() -> None:
     settings = BodySettings.model_validate(table(reduction="macneal"))
     basis = modal_basis(beam(), settings)
     stored = basis.groups[0, 0]
-    assert statics_beside(stored, basis.reduction)
+    assert has_residual(stored, basis.reduction)
     group = in_modes(stored)
     from test_operating import linear_patch
 
     patch, _ = linear_patch()
-    contact = preloaded_contact("rub", patch, Side("small", "right"), None, normal=100.0)
-    member = Member("small", {0: group}, brings=np.ones(len(group.compliance.labels)))
+    contact = preloaded_contact("rub", patch, ContactFace("small", "right"), None, normal=100.0)
+    component = Component("small", {0: group}, residual_share=np.ones(len(group.compliance.labels)))
     outputs = tuple(Output("small", "tip-probe", f"u_{x}") for x in "xyz")
-    assembly = Assembly((member,), (contact,), (Load("small", "shaker", 300.0),), outputs)
+    assembly = Assembly((component,), (contact,), (Load("small", "shaker", 300.0),), outputs)
     problem = balance.of(assembly, harmonics=3, samples=64)
     point = solve(problem, 2 * np.pi * 400.0, [])
     assert point.converged
     found = response.operating(problem, point)
     assert 0 < found.cycles["rub"].slipping.mean()
     labels_of = group.residual.labels
-    forces = np.array([sum(forces_on(problem, member, h, found, labels_of)) for h in range(4)])
+    forces = np.array([sum(forces_on(problem, component, h, found, labels_of)) for h in range(4)])
     motion = motion_of(point.Omega, np.array(found.q["small"]), group, forces=forces)
     node, away = nearest_point(basis, group.monitors["tip-probe"].point)
     assert away < 1e-12
@@ -202,14 +202,14 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
     law = PointContact(Preload(jnp.asarray(1e4)), Coulomb(jnp.asarray(0.5)), jnp.asarray(5e3))  # which sticks
     along, T = np.array([[[0.0], [1.0], [0.0]]]), group.interfaces["sole"].rows[1:2]
     patch, none = Patch("sole", np.zeros((1, 2)), np.ones(1), law, along), np.zeros(1)
-    rub = Rub("rub", patch, Side("pair", "sole", np.eye(6)[1:2], rows={0: T}), None, none, none)
+    rub = Rub("rub", patch, ContactFace("pair", "sole", np.eye(6)[1:2], rows={0: T}), None, none, none)
     outputs = tuple(Output("pair", name, label) for name, label in READ)
-    pair = Assembly((Member("pair", {0: group}),), (rub,), (Load("pair", "f"),), outputs)
+    pair = Assembly((Component("pair", {0: group}),), (rub,), (Load("pair", "f"),), outputs)
     problem = balance.of(pair, harmonics=1, samples=16)
     head = HEAD | {"labels": labels(problem)}
     for count in (2, 4):
         with open_journal(tmp_path / "points", "abc", head) as journal:
-            found, _ = kept_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
+            found, _ = resumed_response(problem, np.linspace(9.0, 12.0, count), np.ones(1), journal, SERIES)
             told = response_of(journal.head, journal.series)
     assert told.labels == {"monitors/p0": ("u_x", "u_y"), "monitors/p1": ("u_x",)}
     for f, watched in zip(found.frequency, found.outputs, strict=True):
@@ -225,12 +225,12 @@ def test_directions_of_a_monitor_that_are_not_neighbours(tmp_path: Path) -> None
 
 
 def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
-    """Read in turns, they are kept under the member's name and come back in the order of the assembly."""
+    """Read in turns, they are kept under the component's name and come back in the order of the assembly."""
     held = [Spring("ground", "m", [1e4, 3e4, 0.0])]
     group = System("one", [Body("m", 1.0, free="xy")], held, monitors=[Monitor("tip", "m")]).basis().groups[0, 0]
-    members = tuple(Member(name, {0: group}) for name in ("left", "right"))
+    components = tuple(Component(name, {0: group}) for name in ("left", "right"))
     asked = [("left", "u_x"), ("right", "u_x"), ("left", "u_y"), ("right", "u_y")]
-    assembly = Assembly(members, (), (), tuple(Output(m, "tip", label) for m, label in asked))
+    assembly = Assembly(components, (), (), tuple(Output(m, "tip", label) for m, label in asked))
     problem: Any = SimpleNamespace(assembly=assembly, harmonics=1)
     watched = np.arange(8.0).reshape(4, 2) + 0j
     row = {name: watched[list(rows.values())] for name, rows in kept._outputs(problem).items()}

@@ -336,8 +336,8 @@ def linear_patch(counts=(6, 2), normal=100.0, friction=0.3):
 
 def marched_map(patch, side, u, samples=256):
     """The map of a patch whose law is marched through the cycle of its coordinates, 0.01 s long."""
-    from microslip.harmonic_balance.patch import traced
-    from microslip.operating.patches import contact_map
+    from microslip.harmonic_balance.point_cycles import traced
+    from microslip.operating.contact_maps import contact_map
 
     force, cycle = traced(patch.law, patch.kinematics, u, 0.01, samples, 4)
     return contact_map(patch, side, np.asarray(force), cycle.dissipated, cycle.slipping, cycle.open, u.shape[1] // 2)
@@ -384,7 +384,7 @@ def test_tractions_of_a_contact_map_add_up_to_the_forces_of_its_group():
     """Also where the wave leads by a phase, at whose zero the samples begin: mean and first harmonic, 1e-12."""
     from microslip.harmonic_balance.forces import AFT
     from microslip.harmonic_balance.problem import Group
-    from microslip.operating.patches import contact_map
+    from microslip.operating.contact_maps import contact_map
 
     patch, u0 = linear_patch()
     zero, u = np.zeros((1, 6)), np.zeros((1, 6, 3))
@@ -403,7 +403,7 @@ def test_contact_map_as_vtu(tmp_path):
     """Rectangles lie on the face and tile it; the mean traction on the body pushes it back, along minus its normal."""
     import meshio
 
-    from microslip.operating.patches import grid_of, on_grid, write_contact_vtu
+    from microslip.operating.contact_maps import grid_of, on_grid, write_contact_vtu
 
     patch, u0 = linear_patch()
     side = small_basis().groups[0, 0].interfaces["right"]

@@ -57,16 +57,16 @@ def test_rigid_motion_of_both_bodies_together_is_no_relative_motion() -> None:
 
     np.testing.assert_allclose(met.frame @ six(beside), six(first), rtol=0, atol=1e-12)
     np.testing.assert_allclose(met.offset, [0.006, -0.001], rtol=0, atol=1e-15)
-    assert abs(met.gap) < 1e-15 and not met.remarks
+    assert abs(met.gap) < 1e-15 and not met.messages
 
 
 def test_gap_is_measured_along_the_first_normal() -> None:
     first = face([1, 0, 0], [0, 0, 1], [0, 0, 0])
     assert facing(first, face([-1, 0, 0], [0, 0, 1], [2e-4, 0, 0])).gap == pytest.approx(2e-4, rel=1e-14)
     near = facing(first, face([-1, 0, 0], [0, 0, 1], [-2e-5, 0, 0]))
-    assert near.gap == pytest.approx(-2e-5, rel=1e-14) and not near.remarks
+    assert near.gap == pytest.approx(-2e-5, rel=1e-14) and not near.messages
     for x, words in ((1e-3, "1 mm apart"), (-1e-3, "1 mm inside each other")):
-        assert words in facing(first, face([-1, 0, 0], [0, 0, 1], [x, 0, 0])).remarks[0]
+        assert words in facing(first, face([-1, 0, 0], [0, 0, 1], [x, 0, 0])).messages[0]
 
 
 def test_neighbours_of_a_cyclic_sector_meet_as_their_image() -> None:
@@ -77,7 +77,7 @@ def test_neighbours_of_a_cyclic_sector_meet_as_their_image() -> None:
     n, _, t2 = right.rotation
     left = face(-(back @ n), back @ t2, back @ right.origin)
     met = in_ring(right, left, Y, np.zeros(3), N, ("right", "left"))
-    assert not met.own_frames and not met.remarks
+    assert not met.own_frames and not met.messages
     assert max(abs(met.gap), met.angle, *np.abs(met.offset)) < 1e-12
     behind = in_ring(left, right, Y, np.zeros(3), N, ("left", "right"), sector=-1)
     np.testing.assert_allclose(behind.frame @ met.frame, np.eye(6), rtol=0, atol=1e-12)
@@ -87,7 +87,7 @@ def test_flat_faces_of_single_blades_use_their_own_frames() -> None:
     """The test blade of section 5.3, normals +-x: 24 of them miss by 15 degrees, so its own frames are used."""
     right, left = face([1, 0, 0], [0, 0, 1], [0.044, 0, 0.4775]), face([-1, 0, 0], [0, 0, 1], [-0.044, 0, 0.4775])
     met = in_ring(right, left, Y, np.zeros(3), 24, ("blade:right", "blade:left"))
-    assert met.own_frames and math.isnan(met.gap) and "own contact frame" in met.remarks[0]
+    assert met.own_frames and math.isnan(met.gap) and "own contact frame" in met.messages[0]
     np.testing.assert_array_equal(met.frame, np.diag([-1.0, -1, 1, -1, -1, 1]))
     many = in_ring(right, left, Y, np.zeros(3), 300, ("blade:right", "blade:left"))  # 1.2 degrees, but 78 mm inside
     assert many.own_frames
@@ -134,7 +134,7 @@ def test_a_ring_of_faces_that_never_meet_is_refused() -> None:
 def test_a_slight_angle_is_told() -> None:
     first = face([1, 0, 0], [0, 0, 1], [0, 0, 0])
     met = facing(first, face([-1, 0.02, 0], [0, 0, 1], [0, 0, 0]))
-    assert met.angle == pytest.approx(math.atan(0.02), rel=1e-12) and "1.1 degrees" in met.remarks[0]
+    assert met.angle == pytest.approx(math.atan(0.02), rel=1e-12) and "1.1 degrees" in met.messages[0]
 
 
 def test_points_are_cut_at_the_outline() -> None:

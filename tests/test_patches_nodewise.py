@@ -23,8 +23,8 @@ from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
 from microslip.modes import modal_basis
 from microslip.settings.body import BodySettings
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from microslip.system.component import Member, Ring
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component, Ring
 from microslip.system.nodal import interpolation, nodal, static_compliance
 from microslip.system.pairing import facing, rigid_points
 
@@ -51,16 +51,16 @@ def high(n: tuple[int, int, int] = (2, 2, 2), young: float = 2.1e11) -> Block:
     return block(body, {"foot": ("z0", T2)}, "z1", young=young)
 
 
-def member(name: str, body: Block) -> Member:
-    return Member(name, {0: body.group})
+def component(name: str, body: Block) -> Component:
+    return Component(name, {0: body.group})
 
 
 def on_ground(body: Block, tolerance: float = 0.0) -> tuple[Patch, Array, float]:
     """Patch, compliance along its coordinates, displacement that they do not follow."""
-    found = nodal((member("low", body), "top"), tolerance=tolerance)
-    side, _ = found.sides(Side("low", "top"), None)
+    found = nodal((component("low", body), "top"), tolerance=tolerance)
+    side, _ = found.sides(ContactFace("low", "top"), None)
     patch = Patch("top", found.points, found.areas, law(found.areas), found.shapes)
-    return patch, static_compliance([(member("low", body), side, 1.0)]), found.lost
+    return patch, static_compliance([(component("low", body), side, 1.0)]), found.lost
 
 
 def directly(body: Block, closing: Array, asked: float | None = None) -> tuple[Array, Array]:
@@ -141,7 +141,7 @@ def test_what_is_left_out_is_what_the_tolerance_says() -> None:
         found, count = bar_pressed(bar, tolerance)
         counts.append(count)
         errors.append(np.abs(found - expected).max() / expected.max())
-        lost.append(nodal((Member("bar", {0: bar}), "right"), tolerance=tolerance).lost)
+        lost.append(nodal((Component("bar", {0: bar}), "right"), tolerance=tolerance).lost)
     assert counts == sorted(counts) and counts[0] < 5
     assert errors == sorted(errors, reverse=True) and lost == sorted(lost, reverse=True)
     assert errors[0] > 0.3 and errors[-1] < 1e-9 and lost[-1] == 0
@@ -160,7 +160,7 @@ def test_a_body_that_does_not_deform_has_the_rigid_patch() -> None:
     omega = body.group.omega[:5]
     stiff = replace(body.group, interfaces={"top": replace(face, rows=six, shapes=moved)}, omega=omega, M_r=np.eye(5),
                     K_r=np.diag(omega**2), C_r=np.eye(5), G_r=np.zeros((5, 5)))  # fmt: skip
-    found = nodal((Member("stiff", {0: stiff}), "top"))
+    found = nodal((Component("stiff", {0: stiff}), "top"))
     assert found.count == 6 and found.lost == 0
     np.testing.assert_allclose(found.first[0], six, rtol=0, atol=1e-13 * np.abs(six).max())
     points, areas = rigid_points(face)
@@ -194,9 +194,9 @@ def test_interpolation_is_exact_for_quadratics_and_of_third_order_else() -> None
 
 def bar_pressed(group: ModalGroup, tolerance: float = 1e-4) -> tuple[Array, int]:
     """Pressure of the right face under 3 kN through the surface of section 5.3, and the number of deformations."""
-    bar = Member("bar", {0: group})
+    bar = Component("bar", {0: group})
     found = nodal((bar, "right"), tolerance=tolerance)
-    side, _ = found.sides(Side("bar", "right"), None)
+    side, _ = found.sides(ContactFace("bar", "right"), None)
     k = jnp.asarray(2.3e12 * found.areas)
     patch = Patch("right", found.points, found.areas, PointContact(Penalty(k), Coulomb(jnp.asarray(0.3)), k),
                   found.shapes)  # fmt: skip
@@ -223,12 +223,12 @@ def test_what_a_basis_knows_of_its_patch(reduction: str, shapes: int, deformatio
     assert np.sqrt(np.mean((expected / expected.mean() - 1) ** 2)) == pytest.approx(1.25, abs=0.006)  # rigid patch
 
 
-def pair(a: Block, b: Block, tolerance: float = 1e-4) -> tuple[Patch, Side, Side, Array]:
+def pair(a: Block, b: Block, tolerance: float = 1e-4) -> tuple[Patch, ContactFace, ContactFace, Array]:
     """`low` below `high`: patch, sides, compliance."""
-    one, two = member("low", a), member("high", b)
+    one, two = component("low", a), component("high", b)
     met = facing(a.group.interfaces["top"], b.group.interfaces["foot"])
     found = nodal((one, "top"), (two, "foot"), met, tolerance=tolerance)
-    first, second = found.sides(Side("low", "top", np.eye(6)), Side("high", "foot", met.frame))
+    first, second = found.sides(ContactFace("low", "top", np.eye(6)), ContactFace("high", "foot", met.frame))
     assert second is not None
     C = static_compliance([(one, first, 1.0), (two, second, -1.0)])
     return Patch("top", found.points, found.areas, law(found.areas), found.shapes), first, second, C
@@ -254,7 +254,7 @@ def test_meshes_that_do_not_match_agree_with_those_that_do() -> None:
 def problem_of(a: Block, b: Block, push: float = 60.0, **settings: float) -> balance.Problem:
     patch, first, second, C = pair(a, b)
     contact = preloaded_contact("joint", patch, first, second, normal=100.0, compliance=C)
-    whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", push),),
+    whole = Assembly((component("low", a), component("high", b)), (contact,), (Load("low", "push", push),),
                      (Output("low", "end", "u_x"),))  # fmt: skip
     return balance.of(whole, **{"harmonics": 1, "samples": 24, "cycles": 20, "periodicity": 1e-12, "length": 1e-7,
                                 **settings})  # fmt: skip
@@ -308,7 +308,7 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
     by_balance = preloaded_contact("joint", patch, first, second, interference=float(far[0]))
     found = []
     for contact in (by_force, by_balance):
-        whole = Assembly((member("low", a), member("high", b)), (contact,), (Load("low", "push", 60.0),),
+        whole = Assembly((component("low", a), component("high", b)), (contact,), (Load("low", "push", 60.0),),
                          (Output("low", "end", "u_z"),))  # fmt: skip
         problem = balance.of(whole, harmonics=1, samples=32, cycles=4, periodicity=1e-12, length=1e-7)
         point = solve(problem, 2 * np.pi * 3000.0, [])
@@ -322,10 +322,10 @@ def test_preload_by_a_force_is_the_interference_that_makes_it() -> None:
 def test_coordinates_serve_all_waves_of_a_ring() -> None:
     """Complex shapes of three nodal diameters in one set of real coordinates: each wave's motion is found again."""
     basis = sector.basis(6, 5)
-    whole = Member("sector", {k: g for (_, k), g in basis.groups.items()}, 6)
+    whole = Component("sector", {k: g for (_, k), g in basis.groups.items()}, 6)
     indices = [Ring(6, 1).index(h) for h in range(6)]
     found = nodal((whole, "rim"), indices=indices, tolerance=0.0)
-    side, _ = found.sides(Side("sector", "rim"), None)
+    side, _ = found.sides(ContactFace("sector", "rim"), None)
     for index in indices:
         wave = whole.at(index)
         face = wave.group.interfaces["rim"]
@@ -343,6 +343,6 @@ def test_a_file_without_patch_shapes_is_refused() -> None:
     face = low().group.interfaces["top"]
     bare = replace(low().group, interfaces={"top": replace(face, shapes=face.shapes[:0])})
     with pytest.raises(UserError, match="output.patch_shapes"):
-        nodal((Member("low", {0: bare}), "top"))
+        nodal((Component("low", {0: bare}), "top"))
     with pytest.raises(UserError, match="no interface 'bottom'; it has top"):
-        nodal((member("low", low()), "bottom"))
+        nodal((component("low", low()), "bottom"))

@@ -338,7 +338,7 @@ def test_a_setting_that_hardly_matters_is_said_to():
     """The highest resonance changes by 0.45 % over the range, or by 5 %."""
     for most, word in ((4.23, True), (4.42, False)):
         heights = {1.0: most, 2.0: 4.2133, 3.0: 4.2109}
-        tops = {p: peaks.Resonance(1.0, a, np.zeros(1), "converged") for p, a in heights.items()}
+        tops = {p: peaks.HighestPeak(1.0, a, np.zeros(1), "converged") for p, a in heights.items()}
         found = peaks.Optimum(3.0, tops[3.0], NO_OPTIMUM, tops, {})
         assert found.spread == pytest.approx(most / 4.2109 - 1)
         assert ("hardly matters" in told(found, "normal_force")) is word

@@ -12,7 +12,7 @@ from microslip.case.curves import Followed
 from microslip.harmonic_balance.envelope import Envelope, OverOrders
 from microslip.harmonic_balance.readout import measured
 from microslip.system.assembly import Assembly, Output
-from microslip.system.component import Member
+from microslip.system.component import Component
 from microslip.units import METRES, Quantity, amplitude_of, counted, percent
 
 STRAIN = Quantity("1")
@@ -34,9 +34,9 @@ def test_shares_and_numbers_in_words() -> None:
 
 def test_what_an_assembly_reads() -> None:
     """By the row: a gauge's strain, a monitor's metres; nothing read is in metres."""
-    member = Member("beam", {0: small_basis().groups[0, 0]})
+    component = Component("beam", {0: small_basis().groups[0, 0]})
     probe, gauge = Output("beam", "tip-probe", "u_x"), Output("beam", "root", "strain")
-    a = Assembly((member,), (), (), (probe, gauge))
+    a = Assembly((component,), (), (), (probe, gauge))
     assert measured(a) == METRES and measured(a, 1) == STRAIN
     assert measured(replace(a, outputs=(gauge, probe))) == STRAIN and measured(replace(a, outputs=())) == METRES
 

@@ -78,7 +78,7 @@ def test_order_and_the_side_that_is_named_first_say_nothing(place: Path, seed: i
     another order."""
     _, case, answer = plain(place, seed, kind)
     which = exchangeable(case)
-    assert len(which) == len(case.settings.members) - 1
+    assert len(which) == len(case.settings.components) - 1
     raw, change = exchanged(case, which[:: 1 + seed % 2])
     raw = shuffled(raw, np.random.default_rng(seed))
     assert [c["interface"] for c in raw["contacts"]] != [c["interface"] for c in case.raw["contacts"]]

@@ -18,7 +18,7 @@ from random_systems import HARD, Verdict, compared, drawn, integrated, right, to
 
 from microslip.harmonic_balance import accuracy, reduced, response
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.patch import Cycle
+from microslip.harmonic_balance.point_cycles import Cycle
 from microslip.results.checks import COUNTED
 from microslip.system.assembly import Assembly
 

@@ -12,7 +12,7 @@ from test_harmonic_balance_time import Cubic, group, held
 from microslip.contact.law import settings
 from microslip.data import Array, UserError
 from microslip.harmonic_balance import problem as balance
-from microslip.harmonic_balance.checkpoint import kept_response, labels
+from microslip.harmonic_balance.checkpoint import labels, resumed_response
 from microslip.harmonic_balance.refinement import HALVINGS, filled_response
 from microslip.harmonic_balance.sweeps import hidden
 from microslip.results import open_journal
@@ -78,7 +78,7 @@ def test_added_points_are_kept(tmp_path: Path) -> None:
     for count in range(3):
         with open_journal(tmp_path / "points", "abc", head) as journal:
             try:
-                found, _ = kept_response(problem, frequency, ONE, journal, "one", impatient)
+                found, _ = resumed_response(problem, frequency, ONE, journal, "one", impatient)
             except UserError:
                 assert count == 0
                 continue

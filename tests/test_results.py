@@ -202,7 +202,7 @@ def test_a_writer_killed_at_random_instants_leaves_readable_files(tmp_path):
 
 
 def response(*frequencies: float) -> Response:
-    head = {**HEAD, "inputs": "abc", "finished": True, "remarks": ["beware"], "resonances": [{"frequency_Hz": 2.0}]}
+    head = {**HEAD, "inputs": "abc", "finished": True, "messages": ["beware"], "resonances": [{"frequency_Hz": 2.0}]}
     return response_of(head, {"normal_force = 10": {f: point(f) for f in frequencies}})
 
 
@@ -214,7 +214,7 @@ def test_response_round_trip(tmp_path):
     for name, value in written.series[0].arrays.items():
         np.testing.assert_array_equal(one.arrays[name], value)
     assert one.status == ("converged",) * 3 and one.converged.all() and list(one.key) == [1.0, 2.0, 3.0]
-    for name in ("case", "mode", "inputs", "bodies", "labels", "resonances", "remarks", "finished"):
+    for name in ("case", "mode", "inputs", "bodies", "labels", "resonances", "messages", "finished"):
         assert getattr(found, name) == getattr(written, name), name
     with h5py.File(tmp_path / "response.h5") as file:
         assert file["series_0000/bodies/blade/q"].attrs["unit"] == "m kg^1/2"

@@ -15,8 +15,8 @@ from microslip.data import ModalGroup
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response
 from microslip.modes import modal_basis
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from microslip.system.component import Member
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component
 
 TIP = {"name": "tip", "face": "x1", "t2": [0.0, 0.0, 1.0]}
 PUSH = {"name": "push", "face": "z1", "direction": [0.0, 0.3, 1.0]}
@@ -36,9 +36,11 @@ def rubbing(group: ModalGroup, frequency: np.ndarray) -> HarmonicResponse:
     """Pressed on a wall by 2000 N, six points, pushed until they slide."""
     places, areas = grid(0.03, 0.02, (3, 2))
     law = PointContact(Penalty(jnp.asarray(5e8 / 6)), Coulomb(jnp.asarray(0.15)), jnp.asarray(3e8 / 6))
-    contact = preloaded_contact("wall", Patch("tip", places, areas, law), Side("beam", "tip"), None, normal=2000.0)
+    contact = preloaded_contact(
+        "wall", Patch("tip", places, areas, law), ContactFace("beam", "tip"), None, normal=2000.0
+    )
     loads, outputs = (Load("beam", "push", 250.0),), (Output("beam", "look", "u_z"),)
-    assembly = Assembly((Member("beam", {0: group}),), (contact,), loads, outputs)
+    assembly = Assembly((Component("beam", {0: group}),), (contact,), loads, outputs)
     problem = balance.of(assembly, 3, 64, length=3e-6)
     return harmonic_response(problem, frequency, np.array([300.0]))
 

@@ -19,8 +19,8 @@ from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
 from microslip.modes.campbell import crossings, track_basis
 from microslip.modes.speed_range import basis_at
-from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from microslip.system.component import Member
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component
 
 FINE = {"harmonics": 2, "samples": 32, "cycles": 30}
 ORDER = 4
@@ -30,9 +30,9 @@ def rubbing(push: float = 1e4) -> Assembly:
     """A blade whose tip rubs on a wall, pushed by a pressure."""
     places, areas = grid(0.02, 0.003, (3, 1))
     law = PointContact(Penalty(jnp.asarray(1e6 / 3)), Coulomb(jnp.asarray(0.3)), jnp.asarray(5e5 / 3))
-    wall = preloaded_contact("wall", Patch("tip", places, areas, law), Side("blade", "tip"), None, normal=1.0)
-    member = Member("blade", {0: ranged().groups[0, 0]})
-    return Assembly((member,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))
+    wall = preloaded_contact("wall", Patch("tip", places, areas, law), ContactFace("blade", "tip"), None, normal=1.0)
+    component = Component("blade", {0: ranged().groups[0, 0]})
+    return Assembly((component,), (wall,), (Load("blade", "gas", push),), (Output("blade", "end", "u_x"),))
 
 
 def pressed(rpm: float) -> float:
@@ -44,11 +44,11 @@ def at_speed(rpm: float) -> Assembly:
     """The blade of the range at a speed, and the wall as it is pressed there."""
     still = rubbing()
     (wall,) = still.contacts
-    return replace(still, members=(turning(rpm),), contacts=(wall.pressed(pressed(rpm)),))
+    return replace(still, components=(turning(rpm),), contacts=(wall.pressed(pressed(rpm)),))
 
 
-def turning(rpm: float) -> Member:
-    return Member("blade", {0: basis_at(ranged(), rpm).groups[0, 0]})
+def turning(rpm: float) -> Component:
+    return Component("blade", {0: basis_at(ranged(), rpm).groups[0, 0]})
 
 
 def speeds(count: int = 12) -> np.ndarray:
@@ -78,12 +78,12 @@ def test_a_free_blade_resonates_where_the_campbell_diagram_crosses() -> None:
     step of the speeds (0.05 %); a body held at rest's modes would resonate elsewhere."""
     tracks = track_basis(ranged())
     meets = [c for c in crossings(tracks, [ORDER]) if c.curve == 0][0]
-    free = Assembly(rubbing().members, (), rubbing().loads, rubbing().outputs)
+    free = Assembly(rubbing().components, (), rubbing().loads, rubbing().outputs)
     near = meets.speed * 30 / np.pi * (1 + np.linspace(-0.01, 0.01, 41))
     amplitude = []
     for n in near:
-        at = replace(free, members=(turning(float(n)),))
-        part = at.part(at.members[0], 1)
+        at = replace(free, components=(turning(float(n)),))
+        part = at.part(at.components[0], 1)
         w = 2 * np.pi * float(speed_line.frequency(ORDER, n))
         amplitude.append(abs((part.output @ np.linalg.solve(part.K - w**2 * part.M + 1j * w * part.C, part.load))[0]))
     assert near[int(np.argmax(amplitude))] == pytest.approx(meets.speed * 30 / np.pi, rel=5e-4)

@@ -14,7 +14,8 @@ from microslip.data import ModalBasis, UserError
 from microslip.linalg import eigen
 from microslip.modes import modal_basis
 from microslip.modes.campbell import track_basis
-from microslip.modes.common import (
+from microslip.modes.equilibrium import equilibrium, stiffness_slope
+from microslip.modes.range_basis import (
     Interpolant,
     Settled,
     Solved,
@@ -27,7 +28,6 @@ from microslip.modes.common import (
     refined,
     variable,
 )
-from microslip.modes.equilibrium import equilibrium, stiffness_slope
 from microslip.modes.speed_range import basis_at, dense_pencil, frequencies_over, group_at
 from microslip.settings.body import Rotation
 

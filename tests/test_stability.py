@@ -24,7 +24,7 @@ from microslip.harmonic_balance.forces import AFT
 from microslip.harmonic_balance.problem import Group, Problem
 from microslip.harmonic_balance.solver import newton
 from microslip.harmonic_balance.stability import Orbit, Settings, _carrier, hill, judged, multipliers, orbit, stability
-from microslip.system.assembly import Assembly, Contact, Linear, Side
+from microslip.system.assembly import Assembly, Contact, ContactFace, Linear
 
 
 @settings
@@ -91,7 +91,7 @@ def one_mode(law, preload, load, K, C, directions=(1,), **more) -> Problem:
     offset, forces = more.pop("offset", zero(6)), np.append(preload, zero(5))
     fine = [more.pop(key, usual) for key, usual in (("samples", 64), ("cycles", 100))]
     patch = more.pop("patch", None) or Patch("face", zero((1, 2)), np.ones(1), law)
-    contact = Contact("face", patch, Side("body", "face"), None, offset, forces)
+    contact = Contact("face", patch, ContactFace("body", "face"), None, offset, forces)
     nothing, unit, f = zero((1, 6)), np.eye(m), np.array(load, dtype=complex)
     parts = tuple(
         (Linear(unit, np.diag(K), np.diag(C), along(*directions), zero((6, 6)), f * (h == 1),

@@ -190,8 +190,8 @@ def test_matrices_in_a_file(tmp_path: Path) -> None:
         ("mass = 1.0", "mass = 0.0", "no mass"),
         ("stiffness = 1e4", "stiffness = -1e4", "not negative"),
         ("stiffness = 1e4", "stiffness = [1.0, 2.0]", "one, three or six"),
-        ('"m2", "m3"', '"m2", "m7"', "no member 'm7'"),
-        ('on = "m3"', 'on = "m4"', "no member 'm4'"),
+        ('"m2", "m3"', '"m2", "m7"', "no component 'm7'"),
+        ('on = "m3"', 'on = "m4"', "no component 'm4'"),
         ("[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]", "parallel to the normal"),
         ('name = "m2"', 'name = "m1"', "masses: .*'m1'"),
         ('name = "m2"', 'name = "m2"\nwheight = 2', "wheight"),
@@ -329,7 +329,7 @@ def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
         assert main(["respond", "three-masses", *more, *few]) == 0
         found = json.loads(summary.read_text())
         assert found["resonances"] == [] and found["rising_at_the_edge"] == []
-        assert any("does not move" in remark for remark in found["remarks"])
+        assert any("does not move" in remark for remark in found["messages"])
     assert main(["respond", "three-masses", "--set", "contacts=[]", *few]) == 0
     omega = np.sqrt(scipy.linalg.eigvalsh(*reversed(load_system("three-masses/system.toml").matrices()[::2])))
     tops = {round(one["frequency_Hz"], 3) for one in json.loads(summary.read_text())["resonances"]}
@@ -362,14 +362,14 @@ def rubbed(g=None, law=None, **changed):
     pytest.importorskip("jax")
     from microslip.contact.patch import Patch
     from microslip.contact.sliders import jenkins
-    from microslip.system.assembly import Assembly, Load, Output, Side, preloaded_contact
-    from microslip.system.component import Member
+    from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+    from microslip.system.component import Component
 
     g = g or chain().basis().groups[0, 0]
     patch = Patch("rub", np.zeros((1, 2)), np.ones(1), law or jenkins(2e3, 0.3, 1.0))
     parts = {
-        "members": (Member("m", {0: g}),),
-        "contacts": (preloaded_contact("rub", patch, Side("m", "rub"), None, normal=1.0),),
+        "components": (Component("m", {0: g}),),
+        "contacts": (preloaded_contact("rub", patch, ContactFace("m", "rub"), None, normal=1.0),),
         "loads": (Load("m", "shaker", 2.0),),
         "outputs": (Output("m", "end", "u_x"),),
     }
@@ -410,10 +410,10 @@ def shaken(**changed):
         (swept, {"length": -1.0}, "length"),
         (shaken, {"amplitude": np.nan}, "amplitude"),
         (shaken, {"amplitude": complex(0, np.inf)}, "amplitude"),
-        (shaken, {"members": ()}, "member"),
-        (shaken, {"loads": ("member", "x")}, "x"),
+        (shaken, {"components": ()}, "component"),
+        (shaken, {"loads": ("component", "x")}, "x"),
         (shaken, {"loads": ("row", "x")}, "x"),
-        (shaken, {"outputs": ("member", "x")}, "x"),
+        (shaken, {"outputs": ("component", "x")}, "x"),
         (shaken, {"outputs": ("monitor", "x")}, "x"),
         *[(one, {key: bad}, key) for key in ("mass", "ratio") for bad in (np.nan, np.inf, -1.0)],
         (one, {"ratio": 5.0}, "ratio"),

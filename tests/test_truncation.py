@@ -78,7 +78,7 @@ def test_squeezing_is_held_less_than_pushing() -> None:
     assert right.share > 0.9 > squeezed.share
     found = verdict(chain(2))
     assert "eigenmodes cannot hold" in found.sentence
-    assert any("both contacts (right + left)" in r and "0.2 N/m" in r for r in found.remarks)
+    assert any("both contacts (right + left)" in r and "0.2 N/m" in r for r in found.messages)
 
 
 def test_the_sentence_says_how_many_modes_are_enough() -> None:

@@ -469,7 +469,7 @@ def _check_response(file: Path, short: bool, quiet: bool) -> None:
 
 
 def _modal_files(response: Response) -> tuple[dict[str, ModalBasis], list[str]]:
-    """Member -> modal file that a response was computed with, and the members whose files are gone or others."""
+    """Member -> modal file that a response was computed with, and the components whose files are gone or others."""
     from .basis import read_basis
     from .files.store import hash_file
 

@@ -138,7 +138,7 @@ class Matrices:
         mesh: the nodes, and cells and sets if they are known. node: (m,) point of each row, -1 for a generalised
             coordinate of a superelement. component: (m,) 0 to 2: displacement along x, y, z; 3 to 5: rotation about
             them; -1 for a generalised coordinate.
-        grounded: whether the supports are in the matrices already. remarks: what the reader had to assume.
+        grounded: whether the supports are in the matrices already. messages: what the reader had to assume.
     """
 
     stiffness: csr_matrix
@@ -149,7 +149,7 @@ class Matrices:
     node: Indices
     component: Indices
     grounded: bool = False
-    remarks: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:

@@ -42,7 +42,7 @@ def meshed(case: str, folder: Path) -> tuple[Path, CaseSettings, dict[str, Modal
     files |= {"blade-second": "blade/second", "rig-neighbour-second": "rig-neighbour/second"}
     files |= {"rig-neighbour-second-left": "rig-neighbour/second-left"}
     bodies = {}
-    for b in settings.members:
+    for b in settings.components:
         name = b.body or b.name
         coarse = ["mesh.size=16"] if "blade" in name else ["mesh.size=30", "mesh.local={contact=8}"]
         job = open_job(ROOT / f"geometry/{files[name]}.toml", ["output.gauss=false", *coarse], folder)

@@ -10,8 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..contact.composed import Contact as Composed
-from ..contact.composed import compose
+from ..contact.composed import ContactModel, compose
 from ..contact.law import Law
 from ..contact.settings import ContactLaw, load_contact
 from ..contact.stiffness import Given
@@ -21,15 +20,15 @@ from ..frames import rotation
 from ..harmonic_balance.accuracy import more
 from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
 from ..modes.speed_range import basis_at
-from ..reduced.compliance import SURFACE, statics_beside
+from ..reduced.compliance import SURFACE, has_residual
 from ..reduced.coordinates import first_modes, in_modes, of_density
-from ..system.assembly import Assembly, Contact, Load, Output, Side, preloaded_contact
-from ..system.component import Member, Ring
+from ..system.assembly import Assembly, Contact, ContactFace, Load, Output, preloaded_contact
+from ..system.component import Component, Ring
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
-from .counting import Face, Springs, brought, counted_once
-from .driving import as_asked, damped, flow_of, loads_of, remarks_of, with_field
-from .patches import (
+from .compliance import Face, Springs, counted_once, residual_share
+from .driving import as_asked, damped, flow_of, loads_of, messages_of, with_field
+from .points import (
     curved_springs,
     fitting_forces,
     follows_the_force,
@@ -65,8 +64,8 @@ class Loaded:
         return self.groups[min(self.groups)]
 
     @property
-    def beside(self) -> bool:
-        return statics_beside(self.stored[min(self.stored)], self.basis.reduction)
+    def has_residual(self) -> bool:
+        return has_residual(self.stored[min(self.stored)], self.basis.reduction)
 
     def face(self, name: str, path: Path | str, key: str) -> Interface:
         if name not in self.group.interfaces:
@@ -84,7 +83,7 @@ class Built:
     Attributes:
         settings. bodies: by name. contacts: with their sizes, in the assembly's order. springs: of
             each along n, t1, t2, N/m, without what the bodies hold. assembly: its contacts pressed by
-            nothing where the sweep presses them. remarks: what a reader must know.
+            nothing where the sweep presses them. messages: what a reader must know.
         fitted: number of a curved contact that is fitted at the force (N) which presses it -> the contact fitted at a
             force; `springs` and `assembly` have it as fitted at the largest of the sweep.
     """
@@ -94,7 +93,7 @@ class Built:
     contacts: tuple[ContactSettings, ...]
     springs: tuple[Springs, ...]
     assembly: Assembly
-    remarks: tuple[str, ...]
+    messages: tuple[str, ...]
     fitted: Mapping[int, Callable[[float], Contact]] = field(default_factory=dict)
     _pressed: dict[float | None, Assembly] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -133,7 +132,7 @@ def load_bodies(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: P
     Raises:
         UserError: a speed that a modal file does not have; a cyclic sector without a ring.
     """
-    return {b.name: _loaded(settings, b, bases[b.name], path) for b in settings.members}
+    return {b.name: _loaded(settings, b, bases[b.name], path) for b in settings.components}
 
 
 def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path | str) -> Loaded:
@@ -148,16 +147,16 @@ def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path
         raise UserError(f"{path}: ring.blades: {ring.blades}, but '{basis.name}' is one of {basis.sectors} sectors")
     key = "" if settings.body else f"bodies.{b.name}."
     stored = _at_speed(b, basis, path, key)
-    beside = statics_beside(stored[min(stored)], basis.reduction)
-    groups = {k: in_modes(g) for k, g in stored.items()} if beside else stored
+    own_modes = has_residual(stored[min(stored)], basis.reduction)
+    groups = {k: in_modes(g) for k, g in stored.items()} if own_modes else stored
     if b.mass is not None:
         groups, stored = (_of_mass(g, b.mass, basis, f"{path}: {key}mass") for g in (groups, stored))
     ratios, whose = (b.damping_ratio, key) if b.damping_ratio is not None else (settings.damping_ratio, "")
     viscous = ratios is None and basis.damping_source.startswith(("rayleigh", "matrix"))
     if ratios is not None:
         groups = damped(groups, ratios, f"{path}: {whose}damping_ratio")
-    if b.hold is not None:
-        groups = {k: held(g, b.hold, f"{path}: {key}hold") for k, g in groups.items()}
+    if b.weak_springs is not None:
+        groups = {k: on_weak_springs(g, b.weak_springs, f"{path}: {key}weak_springs") for k, g in groups.items()}
     return Loaded(b, basis, stored, groups, viscous)
 
 
@@ -175,7 +174,7 @@ def _of_mass(groups: dict[int, ModalGroup], mass: float, basis: ModalBasis, key:
         raise UserError(f"{key}: {error}") from error
 
 
-def held(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
+def on_weak_springs(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
     """The group on springs that give each of its rigid motions a frequency (Hz); elastic modes are left alone.
 
     Raises:
@@ -183,7 +182,9 @@ def held(group: ModalGroup, frequency: float, key: str) -> ModalGroup:
     """
     rigid = group.omega == 0
     if not rigid.any():
-        raise UserError(f"{key}: the body is held already; hold is for bodies with free = true, leave it out")
+        raise UserError(
+            f"{key}: the body is held already; weak_springs are for bodies with free = true, leave them out"
+        )
     V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
     P = group.M_r @ V[:, rigid]
     return replace(group, K_r=group.K_r + (2 * np.pi * frequency) ** 2 * P @ P.conj().T)
@@ -221,15 +222,15 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
 
     settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
-    members = {name: _member(settings, b) for name, b in bodies.items()}
-    contacts, springs, made, remarks = [], [], [], list[str]()
+    components = {name: _component(settings, b) for name, b in bodies.items()}
+    contacts, springs, made, messages = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
     for i, c in enumerate(settings.contacts):
         pressed = fitting_forces(settings, c)
         own, k, said = _stiffness(settings, bodies, c, pressed[-1], path)
         contacts.append(own)
         springs.append(k)
-        at, more = _contact(settings, bodies, members, own, k, path)
+        at, more = _contact(settings, bodies, components, own, k, path)
         said += more
         for force in pressed:
             contact, more = at(force)
@@ -237,24 +238,24 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         made.append(contact)
         if follows_the_force(c):
             fitted[i] = partial(_of_force, at)
-        remarks += said
-    flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in members.values())
+        messages += said
+    flowing = tuple(_in_flow(settings, m, bodies[m.name], path) for m in components.values())
     flowing, loads, said = _loads(settings, bodies, flowing, path)
-    remarks += [*said, *remarks_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
+    messages += [*said, *messages_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
     assembly = Assembly(flowing, tuple(made), loads, _outputs(settings, bodies, path), ring, settings.stuck_ratios)
-    said = list(dict.fromkeys(remarks))
+    said = list(dict.fromkeys(messages))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
 
 
-def _member(settings: CaseSettings, b: Loaded) -> Member:
+def _component(settings: CaseSettings, b: Loaded) -> Component:
 
     name, groups = b.settings.name, dict(b.groups) if b.basis.sectors > 1 else {0: b.group}
-    member = Member(name, groups, b.basis.sectors, _brings(settings, name, b))
-    return as_asked(member, settings.damping_as, b.viscous)
+    component = Component(name, groups, b.basis.sectors, _residual_share(settings, name, b))
+    return as_asked(component, settings.damping_as, b.viscous)
 
 
-def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:
+def _residual_share(settings: CaseSettings, name: str, b: Loaded) -> Array | None:
     faces = {
         i: SURFACE if c.is_curved else c.includes
         for c in settings.contacts
@@ -262,7 +263,7 @@ def _brings(settings: CaseSettings, name: str, b: Loaded) -> Array | None:
         if body == name
     }
     first = min(b.groups)
-    return brought(b.groups[first], b.basis.reduction, b.beside, faces)
+    return residual_share(b.groups[first], b.basis.reduction, b.has_residual, faces)
 
 
 def _ends(settings: CaseSettings, c: ContactSettings) -> list[tuple[str, str]]:
@@ -279,11 +280,11 @@ def _body(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str) -
 def _stiffness(
     settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, load: float | None, path: Path | str
 ) -> tuple[ContactSettings, Springs, list[str]]:
-    """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and remarks."""
+    """A contact's settings with the size of its patch, its springs (of a curved one at a load, N), and messages."""
     loaded, faces = _sides(settings, bodies, c, path)
     own = sized(c, faces[0], path)
     if c.is_curved:
-        springs, remark = _told(path, c, lambda: curved_springs(own, load))
+        springs, remark = _in_contact(path, c, lambda: curved_springs(own, load))
     else:
         springs, remark = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
     return own, springs, [remark] if remark else []
@@ -299,40 +300,42 @@ def _sides(
 
 
 At = Callable[[float | None], tuple["Contact", list[str]]]
-"""Load (N) that a contact is fitted for, or None -> the contact, and remarks."""
+"""Load (N) that a contact is fitted for, or None -> the contact, and messages."""
 
 
 def _contact(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], members: Mapping[str, Member], c: ContactSettings,
+    settings: CaseSettings, bodies: Mapping[str, Loaded], components: Mapping[str, Component], c: ContactSettings,
     springs: Springs, path: Path | str,
 ) -> tuple[At, list[str]]:  # fmt: skip
-    """A contact for any load, and remarks. springs: of one that is not curved."""
+    """A contact for any load, and messages. springs: of one that is not curved."""
 
     ends = _ends(settings, c)
     loaded, faces = _sides(settings, bodies, c, path)
-    first, second, met = Side(*ends[0]), None, None
+    first, second, met = ContactFace(*ends[0]), None, None
     if len(ends) == 2:
-        met = _told(path, c, lambda: _met(settings, c, loaded, faces))
-        second = Side(*ends[1], met.frame, c.against_sector)
-    said, found, compliance = [f"{c.interface}: {words}" for words in met.remarks] if met else [], None, None
+        met = _in_contact(path, c, lambda: _met(settings, c, loaded, faces))
+        second = ContactFace(*ends[1], met.frame, c.against_sector)
+    said, found, compliance = [f"{c.interface}: {words}" for words in met.messages] if met else [], None, None
     if c.patch == "nodal":
-        found, first, second, compliance = _told(path, c, lambda: _nodal(settings, members, c, (first, second), met))
+        found, first, second, compliance = _in_contact(
+            path, c, lambda: _nodal(settings, components, c, (first, second), met)
+        )
         said.append(f"{c.interface}: the patch of {len(found.points)} points moves with {found.count - 6} deformations "
                     "of the bodies besides its six rigid coordinates.")  # fmt: skip
 
     @lru_cache(maxsize=64)
     def at(load: float | None) -> tuple[Contact, list[str]]:
-        _told(path, c, lambda: _refuse_too_many(settings, c, load, found))
-        k, words = _told(path, c, lambda: curved_springs(c, load)) if c.is_curved else (springs, "")
+        _in_contact(path, c, lambda: _refuse_too_many(settings, c, load, found))
+        k, words = _in_contact(path, c, lambda: curved_springs(c, load)) if c.is_curved else (springs, "")
         if c.fit == "exact":
-            patch = _told(path, c, lambda: pieces(c, load))
+            patch = _in_contact(path, c, lambda: pieces(c, load))
         elif found is not None:
             patch = nodal_patch(c, _law(c, path, k, load), found)
         else:
-            patch = _told(path, c, lambda: patch_of(c, _law(c, path, k, load), c.what, faces[0], load))
-        more = [words] * bool(words) + _told(path, c, lambda: resolved(c, patch, load))
+            patch = _in_contact(path, c, lambda: patch_of(c, _law(c, path, k, load), c.what, faces[0], load))
+        more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
-        return _told(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
+        return _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
 
     return at, said
 
@@ -365,25 +368,25 @@ def _of_force(at: At, normal: float) -> Contact:
 
 
 def _nodal(
-    settings: CaseSettings, members: Mapping[str, Member], c: ContactSettings, sides: tuple[Side, Side | None],
-    met: Pairing | None,
-) -> tuple[Nodal, Side, Side | None, Array]:  # fmt: skip
+    settings: CaseSettings, components: Mapping[str, Component], c: ContactSettings,
+    sides: tuple[ContactFace, ContactFace | None], met: Pairing | None,
+) -> tuple[Nodal, ContactFace, ContactFace | None, Array]:  # fmt: skip
     """A patch that deforms, its sides, and the compliance of the bodies along its coordinates."""
 
-    faces = [(members[s.member], s.interface) for s in sides if s]
-    for member, name in faces:
-        if member.brings is not None:
+    faces = [(components[s.component], s.interface) for s in sides if s]
+    for component, name in faces:
+        if component.residual_share is not None:
             raise UserError(
-                f'patch: "nodal" needs the shapes of all that a body yields, but what {member.name} lacks stands in '
+                f'patch: "nodal" needs the shapes of all that a body yields, but what {component.name} lacks stands in '
                 f'the six rows of {name} alone; reduce it by "rubin" or "craig-bampton", or take a rigid patch'
             )
     found = nodal(faces[0], faces[1] if len(faces) > 1 else None, met, waves(settings))
     first, second = found.sides(*sides)
-    ends = [(members[s.member], s, sign) for s, sign in ((first, 1.0), (second, -1.0)) if s]
+    ends = [(components[s.component], s, sign) for s, sign in ((first, 1.0), (second, -1.0)) if s]
     return found, first, second, static_compliance(ends, 0, settings.ring.blades if settings.ring else 0)
 
 
-def _told(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
+def _in_contact(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> T:
     """What is made, or its mistake with the contact's place in the case file."""
     try:
         return make()
@@ -461,7 +464,9 @@ def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
     return load_contact(file), file
 
 
-def _composed(c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None) -> Composed:
+def _composed(
+    c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None
+) -> ContactModel:
     """The laws of a whole contact under a load, N. given: stiffnesses instead of its own."""
 
     said, file = _source(c, path)
@@ -473,7 +478,7 @@ def _composed(c: ContactSettings, path: Path | str, load: float | None = None, g
         raise UserError(str(error).replace(f"{path}: ", f"{path}: contacts.{c.interface}.", 1)) from error
 
 
-def _given(found: Composed) -> Springs:
+def _given(found: ContactModel) -> Springs:
     """Stiffnesses along n, t1, t2, N/m."""
     assert found.stiffness is not None
     return (found.normal_0, *found.stiffness.tangential)
@@ -519,20 +524,20 @@ def _blades(settings: CaseSettings) -> int:
     return settings.ring.blades if settings.ring else 0
 
 
-def _in_flow(settings: CaseSettings, member: Member, b: Loaded, path: Path | str) -> Member:
-    """The member with what the flow adds to its waves."""
+def _in_flow(settings: CaseSettings, component: Component, b: Loaded, path: Path | str) -> Component:
+    """The component with what the flow adds to its waves."""
     if b.settings.aerodynamics is None:
-        return member
+        return component
     file, where = Path(path).parent / b.settings.aerodynamics, f"{path}: bodies.{b.settings.name}.aerodynamics"
-    return replace(member, aerodynamic=flow_of(file, _blades(settings), settings.turning, where))
+    return replace(component, aerodynamic=flow_of(file, _blades(settings), settings.turning, where))
 
 
 def _loads(
-    settings: CaseSettings, bodies: Mapping[str, Loaded], members: tuple[Member, ...], path: Path | str
-) -> tuple[tuple[Member, ...], tuple[Load, ...], list[str]]:
+    settings: CaseSettings, bodies: Mapping[str, Loaded], components: tuple[Component, ...], path: Path | str
+) -> tuple[tuple[Component, ...], tuple[Load, ...], list[str]]:
     """Members with the rows of pressure fields, all loads, and what a reader should know."""
     found: list[Load] = []
-    said, named = [], {m.name: m for m in members}
+    said, named = [], {m.name: m for m in components}
     base, blades, turning = settings.base_order, _blades(settings), settings.turning
     for i, x in enumerate(settings.loads):
         body, row = settings.address(x.row or x.face or "")

@@ -16,7 +16,7 @@ from ..data import UserError
 from ..files.store import fingerprint
 from ..harmonic_balance.checkpoint import restored
 from ..harmonic_balance.response import traced
-from ..operating.patches import ContactMap, contact_map
+from ..operating.contact_maps import ContactMap, contact_map
 from ..results import Body
 from ..results.names import exact
 from .assemble import Built, Loaded
@@ -45,9 +45,9 @@ def of_points(built: Built) -> str:
     rest = replace(a, contacts=tuple(a.contacts[i] for i in as_they_are))
     settings = tuple(built.contacts[i] for i in as_they_are)
     problem = problem_of(replace(built, assembly=rest, contacts=settings, fitted={}), None)
-    members = tuple(replace(m, groups={}) for m in problem.assembly.members)
+    components = tuple(replace(m, groups={}) for m in problem.assembly.components)
     fitted = [[built.contacts[i].model_dump(), a.contacts[i].first, a.contacts[i].second] for i in own]
-    return fingerprint(replace(problem, assembly=replace(problem.assembly, members=members)), fitted)
+    return fingerprint(replace(problem, assembly=replace(problem.assembly, components=components)), fitted)
 
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
@@ -75,9 +75,9 @@ def head_of(
     """
     s = built.settings
     bodies = {
-        member: vars(_body(built, name, hashes[name], files[name]))
+        component: vars(_body(built, name, hashes[name], files[name]))
         for name in built.bodies
-        for member in _standing(built, name)
+        for component in _standing(built, name)
     }
     return {
         "case": s.name, "description": s.description, "mode": s.mode, "settings": dict(raw), "bodies": bodies,
@@ -119,7 +119,7 @@ def _body(built: Built, name: str, sha256: str, file: str) -> Body:
     b = built.bodies[name]
     harmonics = tuple(_wave(built, b, h) for h in range(built.settings.balanced + 1))
     speed = b.settings.speed if b.settings.speed_rpm is None else -1
-    return Body(b.basis.name, sha256, file, speed, b.group.speed * 30 / np.pi, harmonics, b.beside)
+    return Body(b.basis.name, sha256, file, speed, b.group.speed * 30 / np.pi, harmonics, b.has_residual)
 
 
 def _wave(built: Built, b: Loaded, harmonic: int) -> tuple[int, bool]:
@@ -131,13 +131,14 @@ def _wave(built: Built, b: Loaded, harmonic: int) -> tuple[int, bool]:
 
 
 def drawn_monitor(built: Built) -> tuple[str, str] | None:
-    """Member and array name of the first read-out; None where the member's coordinates are not those of its file."""
+    """Component and array name of the first read-out; None where the component's coordinates are not those of its
+    file."""
     output = built.assembly.outputs[0]
-    if _joined(built, output.member):
+    if _joined(built, output.component):
         return None
-    member = _standing(built, output.member)[0]
-    several = len(built.bodies) > 1 or member != output.member
-    return member, f"{member}:{output.monitor}" if several else output.monitor
+    component = _standing(built, output.component)[0]
+    several = len(built.bodies) > 1 or component != output.component
+    return component, f"{component}:{output.monitor}" if several else output.monitor
 
 
 # contacts ----------------------------------------------------------------------------------------------------------
@@ -159,8 +160,8 @@ def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[Contact
     _, found = restored(problem, dict(row))
     seen, maps = traced(problem, found), []
     for contact in problem.assembly.contacts[:MOST_MAPS]:
-        member = next(m for m in problem.assembly.members if m.name == contact.first.member)
-        side = next(iter(member.groups.values())).interfaces[contact.first.interface]
+        component = next(m for m in problem.assembly.components if m.name == contact.first.component)
+        side = next(iter(component.groups.values())).interfaces[contact.first.interface]
         c, force = seen[contact.name].cycle, np.asarray(seen[contact.name].force)
         what = c.dissipated, c.slipping, c.open
         maps.append(contact_map(contact.patch, side, force, *what, problem.harmonics, contact.phase))

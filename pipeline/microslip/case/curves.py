@@ -14,7 +14,7 @@ import numpy as np
 from ..continuation import Settings
 from ..data import Array, UserError
 from ..harmonic_balance import families
-from ..harmonic_balance.checkpoint import kept_curve, labels, points_of_curve
+from ..harmonic_balance.checkpoint import labels, points_of_curve, resumed_curve
 from ..harmonic_balance.envelope import largest
 from ..harmonic_balance.families import Family
 from ..harmonic_balance.problem import Problem
@@ -44,7 +44,7 @@ class Followed:
     Attributes:
         over: of `OVER`. normal: N of the contacts that the sweep presses; None where it presses none, or is what
             varies. frequency: Hz at which the others vary, or None. ends: of the parameter, as asked for. name: of its
-            series. rows: points in order, see `harmonic_balance.checkpoint.kept_curve`. status: why it ended.
+            series. rows: points in order, see `harmonic_balance.checkpoint.resumed_curve`. status: why it ended.
             quantity: what is read; m stands for its unit.
     """
 
@@ -166,7 +166,7 @@ def curves(
                 told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
                 journal.say({**journal.head, "parameters": told, "labels": labels(problem)})
                 report(f"curve over the {over.replace('_', ' ')}, {one.label}")
-                branch, rows = kept_curve(_family(built, problem, one), journal, one.name, report, how)
+                branch, rows = resumed_curve(_family(built, problem, one), journal, one.name, report, how)
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
             found.append(replace(one, rows=rows, status=branch.status))

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from ..data import ModalGroup, UserError
 from ..settings.body import Model, NotNegative, Number, Numbers, Positive
 from ..system.assembly import Load
-from ..system.component import Member, Ring
+from ..system.component import Component, Ring
 from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
 from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
 from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure
@@ -146,9 +146,9 @@ def base_of(excitations: Sequence[ExcitationOfCase], given: int | None, turning:
 
 
 def loads_of(
-    x: ExcitationOfCase, member: str, row: str, base: int, blades: int, turning: Turning
+    x: ExcitationOfCase, component: str, row: str, base: int, blades: int, turning: Turning
 ) -> tuple[Load, ...]:  # fmt: skip
-    """The loads of one excitation on a row of a member.
+    """The loads of one excitation on a row of a component.
 
     Args:
         base: see `base_of`. blades: N of a ring, else 0.
@@ -159,17 +159,17 @@ def loads_of(
 
     wave = Ring(blades, base) if blades else abs(base)
     if x.magnets is not None:
-        return pattern_loads(member, row, pattern_of(x.magnets), wave, float(np.radians(x.magnets.place)), turning)
+        return pattern_loads(component, row, pattern_of(x.magnets), wave, float(np.radians(x.magnets.place)), turning)
     if x.speed_rpm is not None:
-        return (Load(member, row, (x.speed_rpm * np.pi / 30) ** 2, 0),)
+        return (Load(component, row, (x.speed_rpm * np.pi / 30) ** 2, 0),)
     h = x.harmonic if x.engine_order is None else harmonic_of(x.engine_order, wave, turning)
-    return field_loads(member, row, h, x.size) if x.field is not None else (Load(member, row, x.size, h),)
+    return field_loads(component, row, h, x.size) if x.field is not None else (Load(component, row, x.size, h),)
 
 
 def with_field(
-    member: Member, x: ExcitationOfCase, name: str, face: str, path: Path | str
-) -> tuple[Member, str]:  # fmt: skip
-    """A member with the rows of a pressure field, and what a reader should know of it.
+    component: Component, x: ExcitationOfCase, name: str, face: str, path: Path | str
+) -> tuple[Component, str]:  # fmt: skip
+    """A component with the rows of a pressure field, and what a reader should know of it.
 
     Raises:
         UserError: a file, a face or a unit that does not fit.
@@ -178,8 +178,8 @@ def with_field(
     file = Path(path).parent / str(x.field)
     try:
         field = read_field(file, str(x.length_unit), x.time_factor == "-")
-        found = on_face(field, load_face(member, face), face)
-        return with_pressure(member, name, found), found.sentence()
+        found = on_face(field, load_face(component, face), face)
+        return with_pressure(component, name, found), found.sentence()
     except UserError as error:
         raise UserError(f"{path}: excitations.{x.face}.field: {error}") from error
 
@@ -197,16 +197,16 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
         raise UserError(f"{where}: {error}") from error
 
 
-def as_asked(member: Member, kind: str, viscous: bool) -> Member:
-    """A member with its damping as a case asks, see `CaseSettings.damping_as`.
+def as_asked(component: Component, kind: str, viscous: bool) -> Component:
+    """A component with its damping as a case asks, see `CaseSettings.damping_as`.
 
     Args:
         viscous: its damping is that of dampers or Rayleigh's, which make no loss factor.
     """
 
     if kind == "stuck":
-        return replace(member, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in member.groups.items()})
-    return structural(member) if kind == "structural" and not viscous else member
+        return replace(component, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in component.groups.items()})
+    return structural(component) if kind == "structural" and not viscous else component
 
 
 def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, complex]:
@@ -222,9 +222,9 @@ def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, 
         raise UserError(f"{where}: {error}") from error
 
 
-def remarks_of(
-    members: Iterable[Member], loads: Sequence[Load], harmonics: int, blades: int, turning: Turning
+def messages_of(
+    components: Iterable[Component], loads: Sequence[Load], harmonics: int, blades: int, turning: Turning
 ) -> list[str]:
     """Modes that the flow feeds, and loads beyond the harmonics that are balanced."""
 
-    return [s for m in members if m.aerodynamic for s in unstable(m, blades, turning)] + unheard(loads, harmonics)
+    return [s for m in components if m.aerodynamic for s in unstable(m, blades, turning)] + unheard(loads, harmonics)

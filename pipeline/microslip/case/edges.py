@@ -87,7 +87,7 @@ def _rounded(f: float, up: bool) -> float:
     return float((np.ceil if up else np.floor)(f / unit) * unit)
 
 
-def remarks(found: Sequence[Rising]) -> list[str]:
+def messages(found: Sequence[Rising]) -> list[str]:
     """A sentence for each end that says what to add."""
     said = []
     for end in sorted({(one.to > one.frequency, one.frequency) for one in found}):

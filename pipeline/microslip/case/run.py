@@ -14,7 +14,7 @@ from ..data import Array, ComplexArray, ModalBasis, UserError
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.accuracy import FLOOR, Error, enough, judged
 from ..harmonic_balance.book import normal_law
-from ..harmonic_balance.checkpoint import kept_response, labels
+from ..harmonic_balance.checkpoint import labels, resumed_response
 from ..harmonic_balance.cost import GIB
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
@@ -45,7 +45,7 @@ class CaseResult:
     stuck_damping: ratio D of each of them, so that its half-power width is 2 D f.
 
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
-    sweep. speed: rad/s. remarks: sentences a reader must know. built: the assembly. rising: ends of the band at which
+    sweep. speed: rad/s. messages: sentences a reader must know. built: the assembly. rising: ends of the band at which
     responses still rise. truncation: largest estimated error of an amplitude for want of harmonics and samples, over
     it; None where it is not estimated.
     """
@@ -56,7 +56,7 @@ class CaseResult:
     stuck: Array
     resonances: dict[float, list[tuple[float, float]]]
     speed: float
-    remarks: tuple[str, ...]
+    messages: tuple[str, ...]
     built: Built
     rising: tuple[Rising, ...] = ()
     truncation: float | None = None
@@ -109,7 +109,7 @@ def _run(
     report: Callable[[str], None], keep: Keep | None, tolerance: float | None,
 ) -> CaseResult:  # fmt: skip
     """`run_case` with a number of harmonics; tolerance: of their error, if it is looked at."""
-    bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.members}
+    bases = basis if isinstance(basis, Mapping) else {b.name: basis for b in settings.components}
     built = build(settings, bases, path)
     sweep = settings.sweep
     frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
@@ -118,25 +118,25 @@ def _run(
     _book_can(built, path)
     _can_be_pressed(built, forces, path)
     with keep(built) if keep else nullcontext() as journal:
-        responses, resonances, stuck, remarks = _answered(built, forces, frequency, report, journal, left)
+        responses, resonances, stuck, messages = _answered(built, forces, frequency, report, journal, left)
     free = free_response(built, frequency)
     idle = [normal for normal, r in responses.items() if _still(r)]
     resonances |= {normal: [] for normal in idle}
     at_the_ends = edges.rising({n: r for n, r in responses.items() if n not in idle}, resonances)
-    remarks = [
-        *built.remarks,
+    messages = [
+        *built.messages,
         *_by_the_book(built),
         *_between(built),
         *_of_stuck_modes(built, max(forces, default=None)),
-        *remarks,
+        *messages,
         *_too_coarse(settings, *stuck),
         *_not_converged(responses),
         *_idle(idle),
         *_overhanging(responses, resonances),
-        *edges.remarks(at_the_ends),
+        *edges.messages(at_the_ends),
     ]
     return CaseResult(
-        settings, responses, free, stuck[0], resonances, built.speed, tuple(remarks), built,
+        settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
         tuple(at_the_ends), left.most, stuck[1],
     )  # fmt: skip
 
@@ -181,10 +181,10 @@ def _answered(
     built: Built, forces: tuple[float, ...], frequency: Array, report: Callable[[str], None], journal: Journal | None,
     left: _Left,
 ) -> Answer:  # fmt: skip
-    """Responses and resonances by normal force, sticking frequencies and their damping, remarks."""
+    """Responses and resonances by normal force, sticking frequencies and their damping, messages."""
     responses: dict[float, HarmonicResponse] = {}
-    resonances, stiff, remarks = {}, (np.zeros(0), np.zeros(0)), []
-    _say_what_it_takes(built, report)
+    resonances, stiff, messages = {}, (np.zeros(0), np.zeros(0)), []
+    _report_memory(built, report)
     for normal in forces or (None,):
         problem = problem_of(built, normal)
         key = pressed_by(built, problem) if normal is None else normal
@@ -192,15 +192,15 @@ def _answered(
         limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
         found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
         responses[key] = found
-        remarks += _not_periodic(key, found.unsteady, built.settings)
-        remarks += _lifting(built, problem, found, key) + _pulling(built, found, key)
-        remarks += [] if _still(found) else left.out(problem, found, resonances[key], key)
+        messages += _not_periodic(key, found.unsteady, built.settings)
+        messages += _lifting(built, problem, found, key) + _pulling(built, found, key)
+        messages += [] if _still(found) else left.out(problem, found, resonances[key], key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
-    return responses, resonances, stiff, remarks
+    return responses, resonances, stiff, messages
 
 
-def _say_what_it_takes(built: Built, report: Callable[[str], None]) -> None:
+def _report_memory(built: Built, report: Callable[[str], None]) -> None:
     """The memory of the contacts' points, where it is more than a GiB."""
 
     s, patches = built.settings, [c.patch for c in built.assembly.contacts]
@@ -229,7 +229,7 @@ def _swept(
     name = series_name(normal)
     parameters = {**journal.head.get("parameters", {}), name: {"normal_force": normal}}
     journal.say({**journal.head, "parameters": parameters, "labels": labels(problem)})
-    return kept_response(problem, frequency, limits, journal, name, report)
+    return resumed_response(problem, frequency, limits, journal, name, report)
 
 
 def _can_be_pressed(built: Built, forces: Sequence[float | None], path: Path | str) -> None:
@@ -283,10 +283,10 @@ def free_response(built: Built, frequency: Array) -> FrequencyResponse:
     """The first read-out without any contact, over frequency (Hz) and, between its ends, over every resonance."""
     a = replace(built.assembly, contacts=())
     output = a.outputs[0]
-    member = next(m for m in a.members if m.name == output.member)
+    component = next(m for m in a.components if m.name == output.component)
     part = replace(
-        a, members=(member,), loads=tuple(x for x in a.loads if x.member == member.name),
-        outputs=tuple(w for w in a.outputs if w.member == member.name),
+        a, components=(component,), loads=tuple(x for x in a.loads if x.component == component.name),
+        outputs=tuple(w for w in a.outputs if w.component == component.name),
     ).joined(1)  # fmt: skip
     frequency = np.union1d(frequency, _about_resonances(part, frequency))
     portions = np.array_split(2 * np.pi * frequency, len(frequency) // 256 + 1)

@@ -67,8 +67,9 @@ class BodyOfCase(Model):
     direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
     modes: how many of the stored eigenmodes are used, all if not given.
     mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
-    hold: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body that
-    slides in all of its contacts has no place of its own; without hold it slides away where mean forces do not balance.
+    weak_springs: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body
+    that slides in all of its contacts has no place of its own; without hold it slides away where mean forces do not
+    balance.
     """
 
     name: Name
@@ -81,7 +82,7 @@ class BodyOfCase(Model):
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
     mass: Positive | None = None
     turn: Number = 0.0
-    hold: Positive | None = None
+    weak_springs: Positive | None = None
     shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)
 
 
@@ -273,7 +274,7 @@ class CaseSettings(Model):
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)):
                 raise ValueError(f"{short}: give {short}, or one or more [[{many}]], and not both")
-        names = [b.name for b in self.members]
+        names = [b.name for b in self.components]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
         if said := self._whose():
@@ -301,7 +302,7 @@ class CaseSettings(Model):
     @property
     def damping_as(self) -> str:
         """``modal``, ``structural`` or ``stuck``."""
-        return self.damping or ("modal" if len(self.members) == 1 else "structural")
+        return self.damping or ("modal" if len(self.components) == 1 else "structural")
 
     @property
     def stuck_ratios(self) -> tuple[float, ...] | None:
@@ -323,10 +324,12 @@ class CaseSettings(Model):
         named += [("excitations", x.row or x.face or "") for x in self.loads]
         named += [("monitors", m.monitor) for m in self.outputs]
         open_ = [(key, name) for key, name in named if ":" not in name]
-        if not open_ or len(self.members) == 1:
+        if not open_ or len(self.components) == 1:
             return ""
         key, name = open_[0]
-        choices = ", ".join(f"{b.name}:{name}" for b in self.members[:3]) + (", ..." if len(self.members) > 3 else "")
+        choices = ", ".join(f"{b.name}:{name}" for b in self.components[:3]) + (
+            ", ..." if len(self.components) > 3 else ""
+        )
         return f"{key}: '{name}' says not of which body; write one of {choices}"
 
     def _met_twice(self) -> str:
@@ -391,7 +394,7 @@ class CaseSettings(Model):
         return {"samples": self.samples, "cycles": self.cycles, "periodicity": self.periodicity}
 
     @property
-    def members(self) -> tuple[BodyOfCase, ...]:
+    def components(self) -> tuple[BodyOfCase, ...]:
         """The bodies; one that the short form names."""
         return self.bodies or (
             BodyOfCase(name=self.body or "", speed=self.speed, speed_rpm=self.speed_rpm, modes=self.modes),
@@ -408,7 +411,7 @@ class CaseSettings(Model):
         named = (
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
-            + [b.aerodynamics for b in self.members]
+            + [b.aerodynamics for b in self.components]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 
@@ -430,7 +433,7 @@ class CaseSettings(Model):
     def address(self, text: str) -> tuple[str, str]:
         """Body and row of ``body:row``; the only body of the case where none is named."""
         body, _, row = text.rpartition(":")
-        return body or self.members[0].name, row
+        return body or self.components[0].name, row
 
 
 def load_case(path: Path | str, assignments: list[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:

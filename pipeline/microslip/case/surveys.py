@@ -111,7 +111,7 @@ def over_speeds(
     named = settings.ring is not None and settings.ring.engine_order is not None
     if not named and not any(x.orders for x in settings.loads):
         raise UserError(f"{path}: speeds: no engine order is named; give engine_order in the excitations or in [ring]")
-    turning = [b.name for b in settings.members if bases[b.name].ranges]
+    turning = [b.name for b in settings.components if bases[b.name].ranges]
 
     def at(rpm: float) -> Assembly:
         built = build(_at_speed(settings, turning, rpm), bases, path)
@@ -124,7 +124,7 @@ def over_speeds(
 
 
 def _at_speed(settings: CaseSettings, turning: list[str], rpm: float) -> CaseSettings:
-    bodies = tuple(b.model_copy(update={"speed_rpm": rpm}) if b.name in turning else b for b in settings.members)
+    bodies = tuple(b.model_copy(update={"speed_rpm": rpm}) if b.name in turning else b for b in settings.components)
     loads = tuple(x if x.speed_rpm is None else x.model_copy(update={"speed_rpm": rpm}) for x in settings.loads)
     return settings.model_copy(update={"bodies": bodies, "excitations": loads})
 
@@ -166,7 +166,7 @@ def over_ranges(
             if settings.damping_as == "stuck":
                 changed |= every
             else:
-                changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.members)
+                changed["bodies"] = tuple(b.model_copy(update=every) for b in settings.components)
         if friction is not None:
             changed["contacts"] = tuple(
                 c.model_copy(update={"friction": OfCoulomb(kind="coulomb", mu=friction)}) for c in settings.contacts

@@ -18,7 +18,7 @@ from .settings import ContactFile, ContactLaw
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactModel:
     """What the settings of a contact describe.
 
     Attributes:
@@ -89,7 +89,7 @@ class Contact:
         return deepest
 
 
-def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> Contact:
+def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> ContactModel:
     """The laws of a contact.
 
     Args:
@@ -112,7 +112,7 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> Contact:
         law = Rough(value(source.normal), value(roughness), heights)
     if settings.friction is not None:
         friction = settings.friction.friction(path, settings.temperature, source.area)
-    found = Contact(
+    found = ContactModel(
         settings, path, source.normal, source.stiffness, source.area, heights, roughness, law, friction, pressed,
         source.layer, source.hertz,
     )  # fmt: skip
@@ -120,7 +120,7 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> Contact:
     return replace(found, law=_law(found))
 
 
-def _law(c: Contact) -> Law | None:
+def _law(c: ContactModel) -> Law | None:
     if c.friction is None or c.stiffness is None:
         return None
     try:

@@ -230,7 +230,7 @@ def read_curve(
 ) -> NormalCurve:  # fmt: skip
     """A curve from a file of columns, measured or of ``microslip closure``.
 
-    Comma, semicolon, tab or blanks between the columns, ``#`` before remarks.
+    Comma, semicolon, tab or blanks between the columns, ``#`` before messages.
 
     Args:
         displacement, force: columns, counted from 1 or named as in the file's heading. length_unit: one of

@@ -20,7 +20,7 @@ CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
 
 
-def waves(harmonics: int, samples: int) -> tuple[Array, Array]:
+def fourier(harmonics: int, samples: int) -> tuple[Array, Array]:
     """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform.
 
     Raises:
@@ -69,7 +69,7 @@ def force_alone(
     periodicity: Array | float = 0.0,
 ) -> Array:  # fmt: skip
     """The force of `force_harmonics` without its derivative, after the same number of cycles of every chunk."""
-    values, transform = waves(u.shape[2] // 2, samples)
+    values, transform = fourier(u.shape[2] // 2, samples)
 
     def one(law: Law, u: Array) -> tuple[Array]:
         path = jnp.einsum("sh,nkh->snk", values, u)
@@ -109,7 +109,7 @@ def _with_derivative(
     law: Law, u: Array, period: Array | float, samples: int, count: int, periodicity: Array | float
 ) -> tuple[Array, Array]:
     """With the tangents along every harmonic of every direction."""
-    values, transform = waves(u.shape[2] // 2, samples)
+    values, transform = fourier(u.shape[2] // 2, samples)
     path = jnp.einsum("sh,nkh->snk", values, u)
     found, slope = with_slopes(law, path, period, count, periodicity, values, transform)
     return jnp.einsum("hs,snk->nkh", transform, found.force), jnp.einsum("hzjnk->nkhjz", slope)

@@ -35,7 +35,7 @@ UNCERTAIN = 1.0
 
 
 @dataclass(frozen=True)
-class Resonance:
+class MeasuredResonance:
     """A measured one. frequency: Hz. uncertainty: its standard deviation, Hz. mode: which of the model's, from 1."""
 
     frequency: float
@@ -73,7 +73,7 @@ class Identified:
 
 
 def identify(
-    model: Model, resonances: Sequence[Resonance], names: Sequence[str] = ("normal", "tangential"),
+    model: Model, resonances: Sequence[MeasuredResonance], names: Sequence[str] = ("normal", "tangential"),
     bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identified:  # fmt: skip
     """Stiffnesses (as many as `names`) from at least as many resonances, by least squares in ln(k).
@@ -104,7 +104,7 @@ def identify(
     return _judged(picked, resonances, tuple(names), _best(picked, resonances, tuple(names), ends))
 
 
-def _picked(model: Model, resonances: Sequence[Resonance], count: int) -> Callable[[Array], Array]:
+def _picked(model: Model, resonances: Sequence[MeasuredResonance], count: int) -> Callable[[Array], Array]:
     """ln(k) -> frequencies (r,) of the measured modes."""
     modes = np.array([r.mode for r in resonances]) - 1
     known = len(model(np.full(count, 1e6)))
@@ -114,7 +114,7 @@ def _picked(model: Model, resonances: Sequence[Resonance], count: int) -> Callab
     return lambda x: model(np.exp(x))[modes]
 
 
-def _within_reach(picked: Callable[[Array], Array], resonances: Sequence[Resonance], ends: Ends) -> None:
+def _within_reach(picked: Callable[[Array], Array], resonances: Sequence[MeasuredResonance], ends: Ends) -> None:
     low, high = (picked(np.log([e[side] for e in ends])) for side in (0, 1))
     for r, a, b in zip(resonances, low, high, strict=True):
         if b - a <= 1e-9 * b:
@@ -133,7 +133,7 @@ def _within_reach(picked: Callable[[Array], Array], resonances: Sequence[Resonan
 
 
 def _best(
-    picked: Callable[[Array], Array], resonances: Sequence[Resonance], names: tuple[str, ...], ends: Ends
+    picked: Callable[[Array], Array], resonances: Sequence[MeasuredResonance], names: tuple[str, ...], ends: Ends
 ) -> Array:  # fmt: skip
     """(k,) ln(k): least squares from the low points of a grid; modes are flat far from where they feel a spring."""
     f, s = np.array([r.frequency for r in resonances]), np.array([r.uncertainty for r in resonances])
@@ -172,7 +172,7 @@ def _apart(residual: Callable[[Array], Array], a: Array, b: Array) -> bool:
 
 
 def _judged(
-    picked: Callable[[Array], Array], resonances: Sequence[Resonance], names: tuple[str, ...], x: Array
+    picked: Callable[[Array], Array], resonances: Sequence[MeasuredResonance], names: tuple[str, ...], x: Array
 ) -> Identified:  # fmt: skip
     f, s = np.array([r.frequency for r in resonances]), np.array([r.uncertainty for r in resonances])
     found, k = picked(x), len(names)
@@ -192,7 +192,7 @@ def _judged(
     return Identified(names, np.exp(x), deviation, correlation, J / found[:, None], found, misfit)
 
 
-def _not_told(names: tuple[str, ...], resonances: Sequence[Resonance], scaled: Array, direction: Array) -> str:
+def _not_told(names: tuple[str, ...], resonances: Sequence[MeasuredResonance], scaled: Array, direction: Array) -> str:
     modes = ", ".join(str(r.mode) for r in resonances)
     column = np.linalg.norm(scaled, axis=0)
     blind = [n for n, c in zip(names, column, strict=True) if c * UNCERTAIN < 1]

@@ -18,7 +18,7 @@ from .law import Array, Law, Step, number, ratio, settings, static, value
 from .stiffness import Given
 
 if TYPE_CHECKING:
-    from .composed import Contact
+    from .composed import ContactModel
     from .settings import ContactLaw
 
 
@@ -111,7 +111,7 @@ class OfJenkins(LawKind):
         if not contact.is_pressed:
             raise ValueError('law: "jenkins" holds mu F_N of a given force; give a normal_force')
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         """A contact that nothing presses has no stiffness."""
         t1, t2 = contact.springs
         both = (t1, t1 if t2 is None else t2)

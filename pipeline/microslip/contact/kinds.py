@@ -23,7 +23,7 @@ from ..files.store import ordinary
 from ..settings.body import Model, load_toml
 
 if TYPE_CHECKING:
-    from .composed import Contact
+    from .composed import ContactModel
     from .law import Law
     from .normal import Normal
     from .settings import ContactLaw
@@ -58,7 +58,7 @@ class LawKind(Kind):
 
     Attributes:
         partly: whether some of it may slip while the rest sticks. opens: whether it carries no pull. of_the_force:
-            whether its numbers are those of the very force that presses it, `Contact.pressed`.
+            whether its numbers are those of the very force that presses it, `ContactModel.pressed`.
     """
 
     partly: ClassVar[bool] = False
@@ -72,7 +72,7 @@ class LawKind(Kind):
             ValueError: the section's name, a colon and what is wrong.
         """
 
-    def normal(self, contact: Contact) -> Normal | None:
+    def normal(self, contact: ContactModel) -> Normal | None:
         """A normal law of its own, in place of the one that stiffness and roughness make."""
         return None
 
@@ -80,7 +80,7 @@ class LawKind(Kind):
         """(n, 2) m and areas (n,) m2 of its points on a patch of width x height, where it is particular about them."""
         return None
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         """Of the full area.
 
         Raises:

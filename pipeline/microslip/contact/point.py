@@ -21,7 +21,7 @@ from .law import Array, Law, Step, norm, number, ratio, root, settings, static, 
 from .normal import Hyperbolic, Normal, Preload
 
 if TYPE_CHECKING:
-    from .composed import Contact
+    from .composed import ContactModel
     from .settings import ContactLaw
 
 
@@ -354,7 +354,7 @@ class OwnNormal(LawKind):
         if self.length is not None and contact.roughness is None:
             raise ValueError("law.length: the hyperbolic law needs a rough surface; add [roughness]")
 
-    def normal(self, contact: Contact) -> Normal | None:
+    def normal(self, contact: ContactModel) -> Normal | None:
         if self.length is None or contact.heights is None or contact.roughness is None:
             return None
         return Hyperbolic(value(contact.normal_0), value(contact.roughness), contact.heights, value(self.length))
@@ -378,9 +378,9 @@ class OfPoint(OwnNormal):
                 "and the other force"
             )
 
-    def normal(self, contact: Contact) -> Normal | None:
+    def normal(self, contact: ContactModel) -> Normal | None:
         return super().normal(contact) if self.preload is None else Preload(value(self.preload))
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         damping = value(self.damping) if self.damping else None
         return PointContact(contact.normal, contact.sliding, *contact.springs, damping)

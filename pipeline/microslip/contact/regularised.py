@@ -26,7 +26,7 @@ from .normal import Normal
 from .point import OwnNormal, met, touching
 
 if TYPE_CHECKING:
-    from .composed import Contact
+    from .composed import ContactModel
 
 
 class MassState(NamedTuple):
@@ -216,7 +216,7 @@ def integrate(
 ) -> Course:  # fmt: skip
     """One element under a prescribed motion, by an integrator for stiff equations with the exact Jacobian.
 
-    Contact opens and closes at times that the motion alone decides: they are found first, and each interval is
+    ContactModel opens and closes at times that the motion alone decides: they are found first, and each interval is
     integrated on its own. In an open one P moves with M; what is stretched at lift-off stays so with ``printed``.
     What is compiled is kept for other numbers of the law and the same ``motion``.
 
@@ -359,6 +359,6 @@ class WithMass(OwnNormal):
     damping: NotNegative = 0.0
     printed: bool = False
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         mass, damping, slope = map(value, (self.mass, self.damping, self.slope))
         return MassContact(contact.normal, contact.sliding, *contact.springs, mass, damping, slope, self.printed)

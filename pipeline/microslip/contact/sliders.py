@@ -29,7 +29,7 @@ from .series import BULK
 from .stiffness import OfHertz
 
 if TYPE_CHECKING:
-    from .composed import Contact
+    from .composed import ContactModel
     from .settings import ContactLaw
 
 
@@ -440,7 +440,7 @@ class OfStrips(_Parallel):
         if contact.roughness is None:
             raise ValueError("law: strips are those of a rough surface; add [roughness]")
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         assert contact.heights is not None and contact.roughness is not None and contact.stiffness is not None
         first, mu = contact.stiffness.tangential[0], contact.mu
         strips = rough_strips(contact.normal_0, contact.roughness, contact.heights, first, mu, self.count)
@@ -456,7 +456,7 @@ class OfIwan(_Parallel):
     exponent: Annotated[Number, Field(gt=-1, le=0)] | None = None
     ratio: NotNegative = 0.0
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         shares = uniform(self.count, self.weakest)
         if self.exponent is not None:
             shares = segalman(self.count, self.exponent, self.ratio)
@@ -474,7 +474,7 @@ class OfMindlin(_Parallel):
         if not isinstance(contact.stiffness, OfHertz):
             raise ValueError('law: "mindlin" is the partial slip of curved bodies; write stiffness.kind = "hertz"')
 
-    def law(self, contact: Contact) -> Law:
+    def law(self, contact: ContactModel) -> Law:
         given = contact.settings.stiffness
         assert contact.hertz is not None and isinstance(given, OfHertz)
         return mindlin(contact.hertz, contact.mu, contact.deepest, self.count, given.axis)

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import UserError
 from . import microslip
 from . import settings as S
-from .composed import Contact, compose
+from .composed import ContactModel, compose
 from .friction import FASTEST, OfLubricated, lubricated, smoothed
 from .jenkins import Jenkins
 from .law import history
@@ -45,7 +45,7 @@ class Study:
         working: approach, m, and normal force, N, of the working point; None if the file has none.
     """
 
-    contact: Contact
+    contact: ContactModel
     tables: dict[str, Columns]
     told: list[tuple[str, str]]
     sentences: list[str]
@@ -86,7 +86,7 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
 # working point and normal law --------------------------------------------------------------------------------------
 
 
-def _working(c: Contact) -> tuple[float, float] | None:
+def _working(c: ContactModel) -> tuple[float, float] | None:
     """Approach and force of the static state."""
     motion = c.file.motion
     if motion is None:
@@ -98,7 +98,7 @@ def _working(c: Contact) -> tuple[float, float] | None:
     return motion.normal[0], float(c.normal.force(jnp.array([motion.normal[0]]))[0])
 
 
-def approach_under(c: Contact, force: float) -> float:
+def approach_under(c: ContactModel, force: float) -> float:
     """Approach (m) at a normal force (N), by bisection down to rounding."""
     one = jax.jit(lambda law, u: law.force(u[None])[0])
     low, high = -1e-9, force / c.normal_0 + (c.roughness or 1e-6)
@@ -114,7 +114,7 @@ def approach_under(c: Contact, force: float) -> float:
     return high
 
 
-def _normal(c: Contact, working: tuple[float, float] | None, found: _Findings) -> None:
+def _normal(c: ContactModel, working: tuple[float, float] | None, found: _Findings) -> None:
     if c.stiffness is not None:
         t1, t2 = c.stiffness.tangential
         both = _engineering(t1, "N/m") if t1 == t2 else f"{_engineering(t1, 'N/m')} and {_engineering(t2, 'N/m')}"
@@ -138,7 +138,7 @@ def _normal(c: Contact, working: tuple[float, float] | None, found: _Findings) -
         _at_working_point(c, working, found)
 
 
-def _at_working_point(c: Contact, working: tuple[float, float], found: _Findings) -> None:
+def _at_working_point(c: ContactModel, working: tuple[float, float], found: _Findings) -> None:
     u = jnp.array([working[0]])
     share = float(c.normal.share(u)[0])
     found.told.append(("working point", f"{_engineering(working[0], 'm')}, {_engineering(working[1], 'N')}"))
@@ -150,14 +150,14 @@ def _at_working_point(c: Contact, working: tuple[float, float], found: _Findings
         found.told.append(("share of the area in contact there", f"{touching:.4g} %"))
 
 
-def _area(c: Contact, u: np.ndarray) -> np.ndarray:
+def _area(c: ContactModel, u: np.ndarray) -> np.ndarray:
     """Share of the nominal area in contact at approaches (m), between 0 and 1."""
     if c.heights is None or c.roughness is None:
         return np.clip(np.array(c.normal.share(jnp.asarray(u))), 0.0, 1.0)
     return np.array(c.heights.area(jnp.asarray(u / c.roughness)))
 
 
-def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, float]:
+def _reach(c: ContactModel, working: tuple[float, float] | None) -> tuple[float, float]:
     """Approaches that show the law: a little open, and beyond the full area or the motion."""
     motion = c.file.motion
     top = 0.0 if c.roughness is None else 1.4 * c.roughness
@@ -173,7 +173,7 @@ def _reach(c: Contact, working: tuple[float, float] | None) -> tuple[float, floa
 # friction over the speed -------------------------------------------------------------------------------------------
 
 
-def _characteristic(c: Contact, working: tuple[float, float] | None, found: _Findings) -> None:
+def _characteristic(c: ContactModel, working: tuple[float, float] | None, found: _Findings) -> None:
     assert c.friction is not None
     if isinstance(c.settings.friction, OfLubricated):
         return _lubricated(c, c.settings.friction, found)
@@ -185,7 +185,7 @@ def _characteristic(c: Contact, working: tuple[float, float] | None, found: _Fin
     found.tables["friction"] = table
 
 
-def _lubricated(c: Contact, given: OfLubricated, found: _Findings) -> None:
+def _lubricated(c: ContactModel, given: OfLubricated, found: _Findings) -> None:
     """Dry and fluid part over the speed at four approaches (Fig. 3.6-5)."""
     heat = c.settings.temperature
     assert heat is not None and c.heights is not None and c.roughness is not None and c.area is not None
@@ -203,7 +203,7 @@ def _lubricated(c: Contact, given: OfLubricated, found: _Findings) -> None:
 # motion ------------------------------------------------------------------------------------------------------------
 
 
-def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -> None:
+def _motion(c: ContactModel, working: tuple[float, float] | None, found: _Findings) -> None:
     motion = c.file.motion
     assert motion is not None and working is not None and c.friction is not None and c.law is not None
     time = np.arange(motion.cycles * motion.samples + 1) / (motion.samples * motion.frequency)
@@ -237,7 +237,7 @@ def _motion(c: Contact, working: tuple[float, float] | None, found: _Findings) -
     _of_a_cycle(c, working, u, force, state, motion, found)
 
 
-def _point(c: Contact, u: np.ndarray, force: np.ndarray, slip: np.ndarray, dt: float) -> np.ndarray:
+def _point(c: ContactModel, u: np.ndarray, force: np.ndarray, slip: np.ndarray, dt: float) -> np.ndarray:
     """(s, 2) place of P, m: M less the stretch e of the springs (the mean over the area in contact), which follows
     from force = share k (e + beta e'); where the contact is open the springs are released and P stands at M.
 
@@ -273,7 +273,7 @@ def _path(motion: S.Motion, mean: float) -> Callable[[jax.Array], jax.Array]:
     return path
 
 
-def _amplitudes(c: Contact, working: tuple[float, float]) -> tuple[float, ...]:
+def _amplitudes(c: ContactModel, working: tuple[float, float]) -> tuple[float, ...]:
     """Of the hysteresis loops: those of the file, or about the displacement at which a stuck contact slides."""
     motion = c.file.motion
     assert motion is not None and c.friction is not None and c.stiffness is not None
@@ -313,7 +313,7 @@ def _work(u: np.ndarray, force: np.ndarray) -> float:
     return float(0.5 * np.sum((force[1:] + force[:-1]) * np.diff(u, axis=0)))
 
 
-def _slips(c: Contact, force: np.ndarray, slip: np.ndarray, time: np.ndarray) -> np.ndarray:
+def _slips(c: ContactModel, force: np.ndarray, slip: np.ndarray, time: np.ndarray) -> np.ndarray:
     """(s,) whether P slides: of sliders in parallel, whether all of them do."""
     assert c.friction is not None
     if isinstance(c.law, PointContact | Jenkins):
@@ -324,8 +324,8 @@ def _slips(c: Contact, force: np.ndarray, slip: np.ndarray, time: np.ndarray) ->
 
 
 def _of_a_cycle(
-    c: Contact, working: tuple[float, float], u: np.ndarray, force: np.ndarray, state: np.ndarray, motion: S.Motion,
-    found: _Findings,
+    c: ContactModel, working: tuple[float, float], u: np.ndarray, force: np.ndarray, state: np.ndarray,
+    motion: S.Motion, found: _Findings,
 ) -> None:  # fmt: skip
     last = slice(len(u) - motion.samples - 1, None)
     assert c.friction is not None
@@ -343,7 +343,7 @@ def _of_a_cycle(
 # microslip ---------------------------------------------------------------------------------------------------------
 
 
-def _first_loading(c: Contact, given: S.Microslip, found: _Findings) -> None:
+def _first_loading(c: ContactModel, given: S.Microslip, found: _Findings) -> None:
     """Tangential force over displacement (3.8), one curve an approach or a normal force."""
     assert c.heights is not None and c.roughness is not None and c.area is not None and c.stiffness is not None
     mu = given.mu if given.mu is not None else getattr(c.settings.friction, "mu", 0.0)
@@ -381,7 +381,7 @@ SHOWN = 6
 """Height distributions drawn over the course of wear."""
 
 
-def _wear(c: Contact, found: _Findings) -> None:
+def _wear(c: ContactModel, found: _Findings) -> None:
     given = c.file.wear
     assert given is not None and c.heights is not None and c.roughness is not None and c.area is not None
     mu = given.mu if given.mu is not None else _sliding_friction(c, given)
@@ -410,7 +410,7 @@ def _wear(c: Contact, found: _Findings) -> None:
     found.told.append(("area in contact, new and worn", f"{100 * share[0]:.4g} % and {100 * share[-1]:.4g} %"))
 
 
-def _sliding_friction(c: Contact, given: S.Wear) -> float:
+def _sliding_friction(c: ContactModel, given: S.Wear) -> float:
     assert c.friction is not None
     mean = c.friction.without_scatter()
     return float(mean.coefficient(jnp.array([given.speed]), jnp.array([given.normal_force]))[0])
@@ -426,7 +426,7 @@ def _wear_coefficient(given: S.Wear, mu: float) -> float:
 # limits ------------------------------------------------------------------------------------------------------------
 
 
-def _limits(c: Contact, found: _Findings) -> None:
+def _limits(c: ContactModel, found: _Findings) -> None:
     motion, limits = c.file.motion, c.file.limits
     if motion is not None:
         if c.layer is not None and c.layer.density is not None:
@@ -448,7 +448,7 @@ def _element_margin(law: MassContact, frequency: float, tolerance: float) -> str
     )
 
 
-def _yields(c: Contact, yield_shear: float, found: _Findings) -> None:
+def _yields(c: ContactModel, yield_shear: float, found: _Findings) -> None:
     """Tresca at the mean pressure and shear of the area in contact, at every sample of the last cycle."""
     table, motion = found.tables["motion"], c.file.motion
     assert motion is not None and c.area is not None

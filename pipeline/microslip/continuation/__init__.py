@@ -21,7 +21,7 @@ from .extremum import lowest as lowest
 from .extremum import peak as peak
 from .extremum import rated as rated
 from .newton import CONVERGED as CONVERGED
+from .newton import Equations as Equations
 from .newton import NewtonSettings as NewtonSettings
-from .newton import Problem as Problem
 from .newton import Solution as Solution
 from .newton import newton as newton

@@ -22,14 +22,14 @@ import numpy as np
 import scipy.optimize
 
 from ..data import Array
-from .newton import Corrected, NewtonSettings, Problem, Scaled, correct, norm, tangent, unit
+from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm, tangent, unit
 
 Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a curve is followed. Lengths are in scaled units, see `Problem`.
+    """How a curve is followed. Lengths are in scaled units, see `Equations`.
 
     Attributes:
         direction: +1 or -1, how lambda changes at the start. low, high: bounds of lambda. points: at most that many.
@@ -127,7 +127,7 @@ class Branch:
         return [p for p in self.points if p.kind == kind]
 
 
-def start(problem: Problem, x: Array, lam: float, settings: Settings | None = None) -> State:
+def start(problem: Equations, x: Array, lam: float, settings: Settings | None = None) -> State:
     """The first point: Newton's method at fixed lambda from a guess x (n,), then the tangent.
 
     A start that fails is a state without points whose `status` says what to try.
@@ -150,7 +150,7 @@ def start(problem: Problem, x: Array, lam: float, settings: Settings | None = No
     return State(y, t, orientation, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
 
 
-def follow(problem: Problem, state: State, settings: Settings | None = None) -> Iterator[State]:
+def follow(problem: Equations, state: State, settings: Settings | None = None) -> Iterator[State]:
     """The state given and all that follow, until one has a status. The points of each are in its `found`."""
     settings = settings or Settings()
     yield state
@@ -159,7 +159,7 @@ def follow(problem: Problem, state: State, settings: Settings | None = None) -> 
         yield state
 
 
-def trace(problem: Problem, x: Array, lam: float, settings: Settings | None = None) -> Branch:
+def trace(problem: Equations, x: Array, lam: float, settings: Settings | None = None) -> Branch:
     """The whole curve from a guess x (n,) at lambda."""
     states = list(follow(problem, start(problem, x, lam, settings), settings))
     return Branch(tuple(p for s in states for p in s.found), states[-1].status, states[-1])
@@ -209,7 +209,7 @@ class Segment:
         return [self.a + u * chord + bend]
 
 
-def advance(problem: Problem, state: State, settings: Settings) -> State:
+def advance(problem: Equations, state: State, settings: Settings) -> State:
     """The next state: one step along the curve, with the folds, targets and branch points it passes.
 
     The step is shortened while the corrector fails, the tangent turns too much, or the determinant says that another

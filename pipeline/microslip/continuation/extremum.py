@@ -21,10 +21,10 @@ import numpy as np
 
 from ..data import Array
 from .curve import Lost, Segment, Settings, State, advance, root
-from .newton import CONVERGED, Problem, Scaled, correct, norm, unit
+from .newton import CONVERGED, Equations, Scaled, correct, norm, unit
 
 
-class Rated(Problem, Protocol):
+class Rated(Equations, Protocol):
     """A problem with an output: positive, its logarithm is looked at."""
 
     def output(self, x: Array, lam: float) -> tuple[float, Array, float]:

@@ -19,7 +19,7 @@ from ..data import Array
 CONVERGED = "converged"
 
 
-class Problem(Protocol):
+class Equations(Protocol):
     """R(x, lambda) = 0 for n unknowns and one parameter; R continuous, its derivatives may jump.
 
     Attributes:
@@ -73,7 +73,7 @@ class Solution:
     error: float
 
 
-def newton(problem: Problem, x: Array, lam: float, settings: NewtonSettings | None = None) -> Solution:
+def newton(problem: Equations, x: Array, lam: float, settings: NewtonSettings | None = None) -> Solution:
     """Solve R(x, lam) = 0 for x, from a guess (n,): steps halved until the residual falls, kinks allowed for."""
     scaled = Scaled(problem)
     y = scaled.pack(x, lam)
@@ -86,7 +86,7 @@ def newton(problem: Problem, x: Array, lam: float, settings: NewtonSettings | No
 class Scaled:
     """The problem in scaled coordinates; counts evaluations."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Equations) -> None:
         self.problem, self.count = problem, 0
         self.x_scale = np.asarray(problem.x_scale, dtype=float)
         self.lam_scale = float(problem.lam_scale)

@@ -136,21 +136,21 @@ def _solved(A: Array, B: Array) -> Array:
         return np.full_like(B, np.nan)
 
 
-def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], waves: int) -> Matrix:
+def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int) -> Matrix:
     """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest."""
     n = len(sizes)
-    diagonal = [np.eye(waves * s) for s in sizes]
+    diagonal = [np.eye(coefficients * s) for s in sizes]
     for i in range(n):
         if (i, i) in pieces:
             diagonal[i] = diagonal[i] + pieces[i, i]
     if n == 1:
         return Dense(diagonal[0])
-    whole = Cyclic(diagonal, [None] * n, [None] * n, _order(sizes, waves))
+    whole = Cyclic(diagonal, [None] * n, [None] * n, _order(sizes, coefficients))
     if n > 2 and all((i - j) % n in (0, 1, n - 1) for i, j in pieces):
         whole.behind[:] = [pieces.get((i, (i + 1) % n)) for i in range(n)]
         whole.before[:] = [pieces.get((i, (i - 1) % n)) for i in range(n)]
         return whole
-    begins = np.cumsum([0, *(waves * s for s in sizes)])
+    begins = np.cumsum([0, *(coefficients * s for s in sizes)])
     A = np.zeros((begins[-1], begins[-1]))
     for i in range(n):
         A[begins[i] : begins[i + 1], begins[i] : begins[i + 1]] = diagonal[i]
@@ -162,12 +162,12 @@ def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], waves: int)
     return Dense(out)
 
 
-def _order(sizes: list[int], waves: int) -> Array:
+def _order(sizes: list[int], coefficients: int) -> Array:
     """Places in a vector ordered by harmonics, then parts, of one ordered by parts, then harmonics."""
     total, begins = sum(sizes), np.cumsum([0, *sizes])
     return np.concatenate(
         [
-            (np.arange(waves)[:, None] * total + np.arange(b, e)).ravel()
+            (np.arange(coefficients)[:, None] * total + np.arange(b, e)).ravel()
             for b, e in zip(begins[:-1], begins[1:], strict=True)
         ]
     )

@@ -31,7 +31,7 @@ from ..contact.portion import Portion
 from ..contact.sliders import Iwan, Strips
 from ..data import Array, ComplexArray, UserError
 from .orbits import TOLERANCE, Orbits, orbits
-from .patch import Cycle, Traced
+from .point_cycles import Cycle, Traced
 from .tables import Spline, Table, in_chunks, kept, law_hash, refined
 
 NORMAL_TOLERANCE = 1e-3
@@ -511,8 +511,8 @@ class BookPatch:
     def traced(self, u: Array, period: float = 1.0) -> list[Traced]:
         """`point_cycles` and the points' forces in time: mean and first harmonic, all that the mode knows."""
         angle = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
-        waves = np.stack([np.ones(SAMPLES), np.cos(angle), np.sin(angle)])
-        forces = np.einsum("hs,cnih->csni", waves, np.asarray(_of_points(self.points, self.kinematics, u)))
+        values = np.stack([np.ones(SAMPLES), np.cos(angle), np.sin(angle)])
+        forces = np.einsum("hs,cnih->csni", values, np.asarray(_of_points(self.points, self.kinematics, u)))
         return [Traced(f, one) for f, one in zip(forces, self.point_cycles(u), strict=True)]
 
     def stiffness(self, u: Array) -> ComplexArray:

@@ -15,10 +15,10 @@ from ..data import Array, ComplexArray
 from ..results.checks import Checks
 from ..results.journal import Journal
 from ..system.assembly import Assembly, Output
-from ..system.component import Member
+from ..system.component import Component
 from .checks import forces_on, judged
 from .families import Family, followed
-from .patch import Cycle
+from .point_cycles import Cycle
 from .problem import Problem
 from .refinement import Solved, filled_response
 from .response import HarmonicResponse, Operating, highest, operating
@@ -26,7 +26,7 @@ from .solver import CONVERGED, Point, Report
 from .sweeps import brackets, resonances
 
 
-def kept_response(
+def resumed_response(
     problem: Problem, frequency: Array, limit: Array, journal: Journal, series: str, report: Report = lambda _: None
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:
     """`refinement.filled_response` and its refined peaks; what a series of the journal holds already is not computed.
@@ -77,7 +77,7 @@ OF_THE_WAY = "curve/"
 """Names, in a point of a curve, of what it takes to go on from there."""
 
 
-def kept_curve(
+def resumed_curve(
     family: Family, journal: Journal, series: str, report: Report = lambda _: None, settings: Settings | None = None
 ) -> tuple[Branch, list[dict[str, Any]]]:
     """The curve of a family, from where a series of the journal ends, and its points as `points_of_curve` tells them.
@@ -159,11 +159,11 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
     for name, rows in _outputs(problem).items():
         kept[name] = found.outputs[list(rows.values())]
-    for member in problem.assembly.members:
-        kept[f"bodies/{member.name}/q"] = _rectangle(found.q[member.name])
-        forces = [_beside(problem, member, h, found) for h in range(problem.harmonics + 1)]
+    for component in problem.assembly.components:
+        kept[f"bodies/{component.name}/q"] = _rectangle(found.q[component.name])
+        forces = [_beside(problem, component, h, found) for h in range(problem.harmonics + 1)]
         if any(len(f) for f in forces):
-            kept[f"bodies/{member.name}/forces"] = _rectangle(forces)
+            kept[f"bodies/{component.name}/forces"] = _rectangle(forces)
     for name, cycle in found.cycles.items():
         kept |= _of_contact(f"contacts/{name}", found.relative[name], found.force[name], cycle)
     return kept
@@ -193,7 +193,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         cycles[name] = Cycle(d, s, lost, slips, opened, row[f"contacts/{name}/unsteady"])
     found = Operating(
         point.Omega,
-        {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.members},
+        {m.name: _ragged(problem, m, row[f"bodies/{m.name}/q"]) for m in problem.assembly.components},
         _outputs_of(problem, row),
         {name: row[f"contacts/{name}/displacement"] for name in names},
         {name: row[f"contacts/{name}/force"] for name in names},
@@ -207,10 +207,10 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
 
 
 def _named(a: Assembly, w: Output) -> str:
-    """Name of the array of a read-out: the member's name stands before the monitor's where there are several."""
-    group = next(iter(next(m for m in a.members if m.name == w.member).groups.values()))
+    """Name of the array of a read-out: the component's name stands before the monitor's where there are several."""
+    group = next(iter(next(m for m in a.components if m.name == w.component).groups.values()))
     kind = "monitors" if w.monitor in group.monitors else "gauges"
-    return f"{kind}/" + (f"{w.member}:{w.monitor}" if len(a.members) > 1 else w.monitor)
+    return f"{kind}/" + (f"{w.component}:{w.monitor}" if len(a.components) > 1 else w.monitor)
 
 
 def _outputs(problem: Problem) -> dict[str, dict[str, int]]:
@@ -244,14 +244,14 @@ def _rectangle(rows: list[ComplexArray]) -> ComplexArray:
     return out
 
 
-def _ragged(problem: Problem, member: Member, q: ComplexArray) -> list[ComplexArray]:
-    return [row[: member.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
+def _ragged(problem: Problem, component: Component, q: ComplexArray) -> list[ComplexArray]:
+    return [row[: component.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
 
 
-def _beside(problem: Problem, member: Member, harmonic: int, found: Operating) -> ComplexArray:
-    """(r,) amplitudes of the forces on the rows of a member's residual shapes, N and N m; (0,) where it has none."""
-    residual = member.at(problem.assembly.index(harmonic)).group.residual
+def _beside(problem: Problem, component: Component, harmonic: int, found: Operating) -> ComplexArray:
+    """(r,) amplitudes of the forces on the rows of a component's residual shapes, N and N m; (0,) where it has none."""
+    residual = component.at(problem.assembly.index(harmonic)).group.residual
     if residual is None:
         return np.zeros(0, dtype=complex)
-    touched, loaded = forces_on(problem, member, harmonic, found, residual.labels)
+    touched, loaded = forces_on(problem, component, harmonic, found, residual.labels)
     return touched + loaded

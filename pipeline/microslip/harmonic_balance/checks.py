@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import ComplexArray
 from ..results.checks import Checks, shares, work
-from ..system.component import Member
+from ..system.component import Component
 from .problem import Problem
 from .solver import Point
 
@@ -34,7 +34,7 @@ def checks(problem: Problem, found: Operating) -> Checks:
 def _apart(problem: Problem, found: Operating) -> float:
     """See `Checks.motion`."""
     away = largest = 0.0
-    each = [_moving(problem, m, found) for m in problem.assembly.members]
+    each = [_moving(problem, m, found) for m in problem.assembly.components]
     sides: dict[tuple[int, int], ComplexArray] = {key: moved for one in each for key, moved in one.items()}
     for i, contact in enumerate(problem.assembly.contacts):
         G, u = contact.patch.kinematics, found.relative[contact.name]
@@ -45,17 +45,17 @@ def _apart(problem: Problem, found: Operating) -> float:
     return away / largest if largest else 0.0
 
 
-def _moving(problem: Problem, member: Member, found: Operating) -> dict[tuple[int, int], ComplexArray]:
-    """(contact, side) of a member -> (k, H + 1) its motion there, from its coordinates and the forces on it."""
+def _moving(problem: Problem, component: Component, found: Operating) -> dict[tuple[int, int], ComplexArray]:
+    """(contact, side) of a component -> (k, H + 1) its motion there, from its coordinates and the forces on it."""
     a, moved = problem.assembly, []
-    sides = a.sides(member.name)
+    sides = a.sides(component.name)
     for h in range(problem.harmonics + 1):
-        index, q = a.index(h), found.q[member.name][h]
-        at = member.at(index)
+        index, q = a.index(h), found.q[component.name][h]
+        at = component.at(index)
         labels = at.group.compliance.labels
-        touched, loaded = forces_on(problem, member, h, found, labels)
+        touched, loaded = forces_on(problem, component, h, found, labels)
         if h and at.loss is not None:
-            touched = (1 - 1j * member.residual_loss) * touched
+            touched = (1 - 1j * component.residual_loss) * touched
         row = []
         for _, _, s in sides:
             own = s.motion(at, index, a.blades) @ q
@@ -67,9 +67,9 @@ def _moving(problem: Problem, member: Member, found: Operating) -> dict[tuple[in
 
 
 def forces_on(
-    problem: Problem, member: Member, harmonic: int, found: Operating, labels: Sequence[str]
+    problem: Problem, component: Component, harmonic: int, found: Operating, labels: Sequence[str]
 ) -> tuple[ComplexArray, ComplexArray]:
-    """(r,) amplitudes of the forces that the contacts and that the loads put on some rows of a member, N and N m.
+    """(r,) amplitudes of the forces that the contacts and that the loads put on some rows of a component, N and N m.
 
     From a contact a body gets minus what acts on the first side of it, and what acts on the second side.
 
@@ -79,7 +79,7 @@ def forces_on(
     a, index = problem.assembly, problem.assembly.index(harmonic)
     place = {label: i for i, label in enumerate(labels)}
     touched, loaded = np.zeros((2, len(labels)), dtype=complex)
-    for i, second, side in a.sides(member.name):
+    for i, second, side in a.sides(component.name):
         if side.rows is not None:  # a patch that deforms has no rows of the compliance
             continue
         contact, F = a.contacts[i], found.force[a.contacts[i].name]
@@ -89,7 +89,7 @@ def forces_on(
             if label in place:
                 touched[place[label]] += value
     for load in a.loads:
-        if load.member == member.name and load.harmonic == harmonic:
+        if load.component == component.name and load.harmonic == harmonic:
             for label, i in place.items():  # none of them for a pressure field, which has no shape beside
                 if label.startswith(f"excitation:{load.row}:"):
                     loaded[i] += load.amplitude * (problem.share if harmonic else 1.0)

@@ -49,7 +49,7 @@ class OverNormal:
     eliminated stays: any gives the same answer.
 
     Attributes:
-        problem: at the factor 1. Omega: rad/s. x_scale, lam_scale: see `continuation.Problem`. contacts: numbers of
+        problem: at the factor 1. Omega: rad/s. x_scale, lam_scale: see `continuation.Equations`. contacts: numbers of
             those whose force changes; None: all that have one. What an interference presses stays as it is.
     """
 
@@ -92,11 +92,11 @@ class Family:
     """A balance over a parameter, to be followed from one value to another.
 
     Attributes:
-        equations: see `continuation.Problem`. begin, end: of its lambda. unit: lambda of one unit of the parameter that
-            people read. words: "Hz", ... problem, Omega: the balance and the frequency (rad/s) at a lambda.
+        equations: see `continuation.Equations`. begin, end: of its lambda. unit: lambda of one unit of the parameter
+            that people read. words: "Hz", ... problem, Omega: the balance and the frequency (rad/s) at a lambda.
     """
 
-    equations: continuation.Problem
+    equations: continuation.Equations
     begin: float
     end: float
     unit: float

@@ -19,7 +19,7 @@ from ..contact.harmonics import CHUNK, force_alone, force_harmonics
 from ..contact.law import Law, point_axes, program
 from ..contact.patch import Patch
 from ..data import Array
-from .patch import Cycle, Traced, needs_rate, traced
+from .point_cycles import Cycle, Traced, needs_rate, traced
 
 
 class Forces(Protocol):

@@ -154,7 +154,7 @@ class _Curve:
             raise UserError(f"mode: number {at} does not move the read-out; take another")
         C = part.viscous(float(omega[mode]))
         xi = float((q.conj() @ C @ q).real / (q.conj() @ part.M @ q).real)
-        z = np.zeros((self.problem.waves, self.problem.count))
+        z = np.zeros((self.problem.coefficients, self.problem.count))
         z[1], z[2] = (d / seen).real, -(d / seen).imag
         z *= self.problem.length / self.problem.scale
         self.x_scale[:-2] = np.abs(z).max()

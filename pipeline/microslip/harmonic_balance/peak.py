@@ -29,7 +29,7 @@ Make = Callable[[float], Problem]
 
 
 @dataclass(frozen=True)
-class Resonance:
+class HighestPeak:
     """A peak. Attributes: Omega: rad/s. amplitude: m. x: see `Problem`. status: "converged", or what went wrong."""
 
     Omega: float
@@ -49,9 +49,9 @@ class Optimum:
     """
 
     parameter: float
-    resonance: Resonance
+    resonance: HighestPeak
     status: str
-    found: dict[float, Resonance]
+    found: dict[float, HighestPeak]
     rising: dict[float, float]
 
     @property
@@ -98,14 +98,14 @@ def checked(problem: Problem, peak: Peak) -> Peak:
     return replace(peak, status=failure or peak.status)
 
 
-def resonance(peak: Peak) -> Resonance:
+def resonance(peak: Peak) -> HighestPeak:
     """A peak of a squared amplitude in the words of vibrations."""
-    return Resonance(peak.lam, float(np.sqrt(peak.value)), peak.x, peak.status)
+    return HighestPeak(peak.lam, float(np.sqrt(peak.value)), peak.x, peak.status)
 
 
 def optimum(
     make: Make, values: Sequence[float], Omega: Array, output: int = 0, report: Report = lambda _: None,
-    keep: Callable[[dict[float, Resonance]], None] = lambda found: None,
+    keep: Callable[[dict[float, HighestPeak]], None] = lambda found: None,
 ) -> Optimum:  # fmt: skip
     """The value between the first and the last one at which the highest resonance in a band is lowest.
 
@@ -114,7 +114,7 @@ def optimum(
             resonances. keep: is given all resonances found so far, by value, whenever there is one more.
     """
     rising: dict[float, float] = {}
-    found: dict[float, Resonance] = {}
+    found: dict[float, HighestPeak] = {}
 
     def family(value: float) -> WithOutput:
         return WithOutput(make(value), output)

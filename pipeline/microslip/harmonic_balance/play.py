@@ -15,13 +15,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.friction import Coulomb
-from ..contact.harmonics import waves
+from ..contact.harmonics import fourier
 from ..contact.normal import Preload
 from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..data import Array, Indices
 from .forces import AFT, Forces
-from .patch import Cycle, Traced, above_rounding, derivative
+from .point_cycles import Cycle, Traced, above_rounding, derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class JenkinsPlay(AFT):
 
 @lru_cache(maxsize=8)
 def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
-    values, transform = waves(harmonics, samples)
+    values, transform = fourier(harmonics, samples)
     return np.asarray(values), np.asarray(transform)
 
 

@@ -22,7 +22,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, play, reduced
 from .blocks import Matrix
 from .forces import Forces
-from .patch import Cycle, Traced
+from .point_cycles import Cycle, Traced
 from .reduced import Eliminated, Seen, View
 
 SOFTER = 0.7
@@ -91,11 +91,11 @@ class Group:
     def _ahead(self, F: Array) -> Array:
         return np.matmul(F, self._turns(F.shape[2])) if self.phase.any() else F
 
-    def _turns(self, waves: int) -> Array:
+    def _turns(self, coefficients: int) -> Array:
         """(n, W, W) from harmonics of a signal to those of the same signal later by the phase."""
-        out = np.zeros((len(self.phase), waves, waves))
+        out = np.zeros((len(self.phase), coefficients, coefficients))
         out[:, 0, 0] = 1.0
-        for h in range(1, waves // 2 + 1):
+        for h in range(1, coefficients // 2 + 1):
             cos, sin = np.cos(h * self.phase), np.sin(h * self.phase)
             a, b = 2 * h - 1, 2 * h
             out[:, a, a], out[:, a, b], out[:, b, a], out[:, b, b] = cos, -sin, sin, cos
@@ -129,7 +129,7 @@ class Problem:
     lam_scale: float = 100.0
 
     @property
-    def waves(self) -> int:
+    def coefficients(self) -> int:
         """2 H + 1."""
         return 2 * self.harmonics + 1
 
@@ -141,7 +141,7 @@ class Problem:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.count * self.waves
+        return self.count * self.coefficients
 
     @cached_property
     def scale(self) -> Array:
@@ -188,7 +188,7 @@ class Problem:
 
     def displacement(self, x: Array) -> Array:
         """(W, c) harmonics of the contact coordinates from the preloaded state, m and rad."""
-        return x.reshape(self.waves, -1) * self.scale
+        return x.reshape(self.coefficients, -1) * self.scale
 
     def relative(self, x: Array) -> dict[int, Array]:
         """Contact -> (k, W) relative displacement as the law measures it, with the preloaded state."""
@@ -281,12 +281,12 @@ class AtFrequency:
         for g, S in zip(p.groups, slopes, strict=True):
             _add_slopes(pieces, g, S, p)
         for i, k in enumerate(p.stiffness):
-            block = pieces.setdefault((i, i), np.zeros((p.waves, len(k), p.waves, len(k))))
-            for w in range(p.waves):
+            block = pieces.setdefault((i, i), np.zeros((p.coefficients, len(k), p.coefficients, len(k))))
+            for w in range(p.coefficients):
                 block[w, :, w] -= k
         where = p.slices()
         D = {(i, j): self._scaled(self._applied(i, P), where[i], where[j]) for (i, j), P in pieces.items()}
-        return blocks.one_plus(D, [s.stop - s.start for s in where], p.waves)
+        return blocks.one_plus(D, [s.stop - s.start for s in where], p.coefficients)
 
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
@@ -297,7 +297,7 @@ class AtFrequency:
             out[:, s] += _harmonics(self.views[i].compliance_rate, excess[:, s])
         rates = [g.rate(g.relative(v), self.period) for g in p.groups]
         if any(r is not None for r in rates):
-            zero = [np.zeros((len(g.first), g.first.shape[1], p.waves)) for g in p.groups]
+            zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
             given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
             out += self._compliant(self.along(given, preload=False))
         driven = self._stacked([view.reference_rate for view in self.views])
@@ -343,7 +343,7 @@ class AtFrequency:
     def along(self, forces: list[Array], preload: bool = True) -> Array:
         """(W, c) forces of the groups (n, k, W) along the coordinates."""
         p = self.problem
-        out = np.zeros((p.waves, p.count))
+        out = np.zeros((p.coefficients, p.count))
         for g, F in zip(p.groups, forces, strict=True):
             F = F.transpose(2, 0, 1).copy()
             if preload:
@@ -372,7 +372,7 @@ class AtFrequency:
     def _stacked(self, amplitudes: list[ComplexArray]) -> Array:
         """(size,) x of complex amplitudes (H + 1, c_i) under the loads, a standing for Re(a exp(i h Omega t))."""
         p, a = self.problem, np.concatenate(amplitudes, axis=1)
-        out = np.empty((p.waves, p.count))
+        out = np.empty((p.coefficients, p.count))
         out[0], out[1::2], out[2::2] = a[0].real, p.share * a[1:].real, -p.share * a[1:].imag
         return (out / p.scale).ravel()
 
@@ -396,7 +396,7 @@ def _add_slopes(pieces: dict[tuple[int, int], Array], g: Group, S: Array, p: Pro
             for column, minus in sides:
                 a, b = row[n], column[n]
                 i, j = (int(np.searchsorted(begins, at[0], "right")) - 1 for at in (a, b))
-                block = pieces.setdefault((i, j), np.zeros((p.waves, sizes[i], p.waves, sizes[j])))
+                block = pieces.setdefault((i, j), np.zeros((p.coefficients, sizes[i], p.coefficients, sizes[j])))
                 at, to = slice(a[0] - begins[i], a[-1] + 1 - begins[i]), slice(b[0] - begins[j], b[-1] + 1 - begins[j])
                 block[:, at, :, to] += plus * minus * slope
 
@@ -410,11 +410,11 @@ def of(
     Args:
         harmonics: H. samples: of a cycle. cycles: marched at most. periodicity: see `forces.AFT`. length: m, see
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
-            the number of members if not given; always relative where damping couples them. models: first contact of a
-            group of equal ones -> its force model, if it is not the marched law.
+            the number of components if not given; always relative where damping couples them. models: first contact of
+            a group of equal ones -> its force model, if it is not the marched law.
 
     Raises:
-        UserError: no harmonic or cycle, a length or a share that is none, a name that no member has.
+        UserError: no harmonic or cycle, a length or a share that is none, a name that no component has.
     """
     assembly.check_names()
     for name, value, bounds in (
@@ -425,7 +425,7 @@ def of(
     ):
         if value is not None:
             bounded(name, value, **bounds)
-    together = len(assembly.members) <= RELATIVE_AT_MOST if form is None else form == "relative"
+    together = len(assembly.components) <= RELATIVE_AT_MOST if form is None else form == "relative"
     together = together or assembly.stuck_damping is not None
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
@@ -444,7 +444,7 @@ def of(
         stiffness: tuple[Array, ...] = (scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)),)
     else:
         stiffness = tuple(
-            scipy.linalg.block_diag(*[k[i] for i, _, _ in assembly.sides(m.name)]) for m in assembly.members
+            scipy.linalg.block_diag(*[k[i] for i, _, _ in assembly.sides(m.name)]) for m in assembly.components
         )
     return Problem(assembly, parts, begins, stiffness, tuple(groups), harmonics, length or moves_by(assembly))
 
@@ -453,7 +453,7 @@ def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linea
     """What is eliminated in one harmonic: all bodies together, or each by itself."""
     if together:
         return (assembly.joined(harmonic),)
-    return tuple(assembly.part(m, harmonic) for m in assembly.members)
+    return tuple(assembly.part(m, harmonic) for m in assembly.components)
 
 
 def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict[tuple[int, int], Array]]:
@@ -462,7 +462,7 @@ def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict
         starts = np.cumsum([0, *(c.patch.count for c in assembly.contacts)])
         return (0,), {(i, 0): np.arange(a, b) for i, (a, b) in enumerate(zip(starts[:-1], starts[1:], strict=True))}
     where = {(i, j): np.arange(start, start + k) for i, j, start, k in assembly.coordinates}
-    counts = [sum(assembly.contacts[i].patch.count for i, *_ in assembly.sides(m.name)) for m in assembly.members]
+    counts = [sum(assembly.contacts[i].patch.count for i, *_ in assembly.sides(m.name)) for m in assembly.components]
     return tuple(int(b) for b in np.cumsum([0, *counts[:-1]])), where
 
 

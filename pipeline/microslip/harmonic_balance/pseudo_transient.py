@@ -68,7 +68,7 @@ def unbalanced(at: AtFrequency, before: Places, after: Places) -> tuple[float, s
         travel = np.abs(part.rows @ free) * (p.length / p.scale[s])[:, None]
         for force, way, motion in zip(forces, travel.T, free.T, strict=True):
             if force > most * way.max():
-                most, whom = float(force / way.max()), _member(p, i, motion)
+                most, whom = float(force / way.max()), _component(p, i, motion)
     return most, whom
 
 
@@ -126,11 +126,11 @@ def _tied(at: AtFrequency, springs: list[list[Array]], q: Places) -> AtFrequency
     return replace(at, problem=replace(p, parts=parts), views=views)
 
 
-def _member(problem: Problem, part: int, motion: Array) -> str:
-    """Name of the member that moves most."""
-    members = problem.assembly.members
+def _component(problem: Problem, part: int, motion: Array) -> str:
+    """Name of the component that moves most."""
+    components = problem.assembly.components
     if len(problem.parts[0]) > 1:
-        return members[part].name
-    ends = np.cumsum([0, *(len(problem.assembly.part(m, 0).M) for m in members)])
+        return components[part].name
+    ends = np.cumsum([0, *(len(problem.assembly.part(m, 0).M) for m in components)])
     size = [float(np.abs(motion[a:b]).max(initial=0.0)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-    return members[int(np.argmax(size))].name
+    return components[int(np.argmax(size))].name

@@ -17,7 +17,7 @@ def measured(assembly: Assembly, output: int = 0) -> Quantity:
     if output >= len(assembly.outputs):
         return METRES
     w = assembly.outputs[output]
-    group = next(iter(next(m for m in assembly.members if m.name == w.member).groups.values()))
+    group = next(iter(next(m for m in assembly.components if m.name == w.component).groups.values()))
     of_gauge = w.monitor in group.gauges and w.label in group.gauges[w.monitor].labels
     rows = (group.gauges if of_gauge else group.monitors).get(w.monitor)
     return METRES if rows is None else Quantity(rows.unit)
@@ -71,7 +71,7 @@ def _waves(harmonic: int) -> list[tuple[int, complex]]:
 
 def _through(p: Problem, weights: ComplexArray, slopes: list[Array], harmonic: int) -> ComplexArray:
     """(W, c) derivative of weights (c,) times the forces' amplitude."""
-    out = np.zeros((p.waves, p.count), dtype=complex)
+    out = np.zeros((p.coefficients, p.count), dtype=complex)
     for g, S in zip(p.groups, slopes, strict=True):
         own = weights[g.first] - (0.0 if g.second is None else weights[g.second])
         found = sum(unit * np.einsum("nk,nklz->znl", own, S[:, :, wave]) for wave, unit in _waves(harmonic))
@@ -90,7 +90,7 @@ def _force_rates(at: AtFrequency, x: Array, harmonic: int) -> list[tuple[tuple[i
     rates = [g.rate(g.relative(v), at.period) for g in p.groups]
     if all(r is None for r in rates):
         return []
-    zero = [np.zeros((*g.first.shape, p.waves)) for g in p.groups]
+    zero = [np.zeros((*g.first.shape, p.coefficients)) for g in p.groups]
     given = [z if r is None else r * (-at.period / at.Omega) for r, z in zip(rates, zero, strict=True)]
     whole = at.along(given, preload=False)
     return [((wave, unit), whole[wave]) for wave, unit in _waves(harmonic)]

@@ -14,12 +14,12 @@ from ..continuation import SEARCH
 from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Compliance, ModalGroup, Rows
 from ..results.checks import UNCHECKED, Checks, exchanged
-from ..system.assembly import Assembly, Load, Output, Side, preloaded_contact
-from ..system.component import Member
+from ..system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from ..system.component import Component
 from . import problem as balance
 from . import reduced
 from .checks import checks, judged
-from .patch import Cycle, Traced
+from .point_cycles import Cycle, Traced
 from .problem import Problem
 from .readout import WithOutput, measured
 from .solver import CONVERGED as CONVERGED
@@ -34,7 +34,7 @@ class Operating:
     """A periodic motion of an assembly.
 
     Attributes:
-        Omega: rad/s. q: member -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
+        Omega: rad/s. q: component -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
             mean from the preloaded state. outputs: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
             the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J per cycle.
         exchanged: J that loads and contacts would do and take were they in phase with the speed.
@@ -71,7 +71,7 @@ def operating(problem: Problem, point: Point) -> Operating:
             work += np.sum([reduced.work(part, at.Omega, h, own, F, share) for part, own, F in each], axis=0)
     found = Operating(
         at.Omega,
-        {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.members)},
+        {m.name: [_own(p, i, h, q[h]) for h in range(p.harmonics + 1)] for i, m in enumerate(p.assembly.components)},
         np.array(outputs).T,
         _by_contact(p, relative),
         _by_contact(p, forces),
@@ -96,13 +96,13 @@ def _by_contact(p: Problem, values: Sequence[Any]) -> dict[str, Any]:
     return {c.name: found[i] for i, c in enumerate(p.assembly.contacts)}
 
 
-def _own(p: Problem, member: int, harmonic: int, q: list[ComplexArray]) -> ComplexArray:
-    """(m,) coordinates of one member out of those of the parts."""
-    members = p.assembly.members
-    if len(q) == len(members):
-        return q[member]
-    sizes = [len(m.at(p.assembly.index(harmonic)).group.M_r) for m in members]
-    return np.split(q[0], np.cumsum(sizes)[:-1])[member]
+def _own(p: Problem, component: int, harmonic: int, q: list[ComplexArray]) -> ComplexArray:
+    """(m,) coordinates of one component out of those of the parts."""
+    components = p.assembly.components
+    if len(q) == len(components):
+        return q[component]
+    sizes = [len(m.at(p.assembly.index(harmonic)).group.M_r) for m in components]
+    return np.split(q[0], np.cumsum(sizes)[:-1])[component]
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _looked_at(problem: Problem, found: Operating) -> dict[str, Any]:
         "outputs": found.outputs,
         "slip": [max(d[1:3] if len(d) > 2 else d, key=abs) for d in first],
         "normal_swing": [np.hypot(one[0, 1], one[0, 2]) for one in F],
-        "contact": np.vstack(u) if u else np.zeros((0, problem.waves)),
+        "contact": np.vstack(u) if u else np.zeros((0, problem.coefficients)),
         "dissipated": sum(float(c.dissipated.sum()) for c in cycles),
         "by_slip": sum(float(c.by_slip.sum()) for c in cycles),
         "supplied": found.supplied,
@@ -228,12 +228,12 @@ def of_body(
         compliance=empty,
     )
     contacts = tuple(
-        preloaded_contact(p.interface, p, Side("body", p.interface), None, normal=float(n))
+        preloaded_contact(p.interface, p, ContactFace("body", p.interface), None, normal=float(n))
         for p, n in zip(patches, np.asarray(normal, dtype=float), strict=True)
     )
-    member = Member("body", {0: named})
+    component = Component("body", {0: named})
     loads, read = (Load("body", "force"),), (Output("body", "output", "u"),)
-    return balance.of(Assembly((member,), contacts, loads, read), **settings)
+    return balance.of(Assembly((component,), contacts, loads, read), **settings)
 
 
 def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:

@@ -309,8 +309,8 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
     """Of one law: place and speed (s, n, 3), states before every step, derivatives (s, b, b) of the forces on its rows
     with respect to place and speed."""
     dt = period / steps
-    waves, rates = _waves(d.shape[1] // 2, steps)
-    u = jnp.einsum("sk,nia,ak->sni", waves, G, d)
+    values, rates = _fourier(d.shape[1] // 2, steps)
+    u = jnp.einsum("sk,nia,ak->sni", values, G, d)
     v = jnp.einsum("sk,nia,ak->sni", rates, G, d) * (2 * np.pi / period)
 
     def one(state: State, sample: tuple[jax.Array, jax.Array]) -> tuple[State, tuple[Any, ...]]:
@@ -323,15 +323,15 @@ def _marched(law: Law, G: jax.Array, d: jax.Array, period: float, steps: int, co
     return u, v, states, slope, drag
 
 
-def _waves(harmonics: int, steps: int) -> tuple[Array, Array]:
+def _fourier(harmonics: int, steps: int) -> tuple[Array, Array]:
     """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... in the middles of the steps, and their derivatives."""
     t = 2 * np.pi * (np.arange(steps) + 0.5) / steps
     turns = [h * t for h in range(1, harmonics + 1)]
-    waves = [np.ones(steps), *(f(x) for x in turns for f in (np.cos, np.sin))]
+    coefficients = [np.ones(steps), *(f(x) for x in turns for f in (np.cos, np.sin))]
     rates = [np.zeros(steps)]
     for h, x in enumerate(turns, 1):
         rates += [-h * np.sin(x), h * np.cos(x)]
-    return np.column_stack(waves), np.column_stack(rates)
+    return np.column_stack(coefficients), np.column_stack(rates)
 
 
 def _tangents(law: Law, dt: float, state: State, u: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -446,17 +446,17 @@ def hill(orbit: Orbit, slope: Array, settings: Settings | None = None) -> Stabil
             `Orbit.displacement`, the c rows of each together.
     """
     s = settings or Settings()
-    waves, m = orbit.displacement.shape[1], len(orbit.M)
-    D = orbit.Omega * _derivative(waves // 2)
-    unit = np.eye(waves)
+    coefficients, m = orbit.displacement.shape[1], len(orbit.M)
+    D = orbit.Omega * _derivative(coefficients // 2)
+    unit = np.eye(coefficients)
     T = np.kron(unit, orbit.rows)
     k = np.linalg.solve(np.eye(len(T)) + slope @ np.kron(unit, orbit.compliance), slope)
     A = np.kron(D @ D, orbit.M) + np.kron(D, orbit.C) + np.kron(unit, orbit.K) + T.T @ k @ T
     B = 2 * np.kron(D, orbit.M) + np.kron(unit, orbit.C)
     inverse = np.kron(unit, np.linalg.inv(orbit.M))
     exponents, shapes = np.linalg.eig(np.block([[np.zeros_like(A), np.eye(len(A))], [-inverse @ A, -inverse @ B]]))
-    size = (np.abs(shapes[: len(A)].reshape(waves, m, -1)) ** 2).sum(axis=1)
-    order = np.array([0] + [h for h in range(1, waves // 2 + 1) for _ in range(2)])
+    size = (np.abs(shapes[: len(A)].reshape(coefficients, m, -1)) ** 2).sum(axis=1)
+    order = np.array([0] + [h for h in range(1, coefficients // 2 + 1) for _ in range(2)])
     values: list[complex] = []
     for i in np.argsort(order @ size / size.sum(axis=0), kind="stable"):
         value = complex(np.exp(exponents[i] * orbit.period))

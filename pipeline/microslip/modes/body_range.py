@@ -13,9 +13,9 @@ from ..reduction import Reduced
 from ..settings.body import BodySettings
 from ..units import from_rpm, rpm_text
 from .body_rows import BodyRows
-from .common import Common, Guess, Settled, Solved, common_coordinates, lagrange
 from .equilibrium import BodyModel, StaticState, equilibrium, stiffness_slope
 from .group import assemble_group, searched_state
+from .range_basis import Common, Guess, Settled, Solved, common_coordinates, lagrange
 from .sector import HarmonicUnknowns, Sector, sector_pencils
 from .solution import Searched, Solution, Unknowns, reduced_solution, with_spares
 from .spectrum import leading_rows, make_pencil

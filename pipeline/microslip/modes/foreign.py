@@ -42,14 +42,14 @@ def foreign_basis(
     report(f"matrices of {body.count} rows, {body.mesh.n_points} nodes")
     layout = _layout(body)
     motions = _rigid_rows(body)
-    remarks = [*body.remarks, *_refuse_other_positions(body, motions)]
+    messages = [*body.messages, *_refuse_other_positions(body, motions)]
     mass, centre, inertia, told = _inertia(body, motions)
-    remarks += told + _implausible(body.mesh, mass)
+    messages += told + _implausible(body.mesh, mass)
     free = _free(body, settings)
     unknowns = Unknowns(layout.column[free], layout.width)
     _refuse_missing_nodes(body, settings)
     rows, odd = _padded(body_rows(body.mesh, settings), settings, body, layout)
-    remarks += odd
+    messages += odd
     solver = eigen.new_solver(settings.modes.solver)
     try:
         pencil = _pencil(body.stiffness[free][:, free], body.mass[free][:, free], solver)
@@ -76,7 +76,7 @@ def foreign_basis(
         np.array(settings.rotation.point), damping, bool(R.shape[1]), settings.reduction, dict(provenance or {}),
         source="matrices",
     )  # fmt: skip
-    return basis, remarks
+    return basis, messages
 
 
 # what the rows mean ------------------------------------------------------------------------------------------------

@@ -14,13 +14,13 @@ from ..fem.discretise import FreeUpper
 from ..linalg import canonical, eigen
 from ..mesh import longest_over_shortest
 from ..reduced.coordinates import held
-from ..reduction import METHODS, Problem, Reduced, stuck
+from ..reduction import METHODS, Reduced, Substructure, stuck
 from ..settings.body import BodySettings
 from ..units import rpm_text
 from . import rigid
 from .body_rows import BodyRows
-from .common import SPARE
 from .equilibrium import BodyModel, what_loads
+from .range_basis import SPARE
 from .spectrum import leading_rows, rigid_shift, static_answers
 from .unconstrained import refuse_unconstrained_parts, refuse_unresolved
 
@@ -169,7 +169,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     vectors = vectors * canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
     keep = _band(s.found.values, settings)
     exact = [i for i, label in enumerate(s.labels) if not label.startswith("monitor:")]
-    problem = Problem(
+    problem = Substructure(
         s.pencil, s.found.values[:keep], vectors[:, :keep], zero, s.B[np.array(exact, dtype=int)],
         tuple(s.labels[i] for i in exact), s.answers[:, exact], settings.modes.certify, s.shift,
     )  # fmt: skip

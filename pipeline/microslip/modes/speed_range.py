@@ -29,10 +29,10 @@ from ..data import (
 from ..linalg import canonical, eigen
 from ..linalg.gyroscopic import gyroscopic_modes, hermitian_modes
 from ..reduced.coordinates import compliance_rows, in_coordinates
-from ..reduction import METHODS, Problem, Reduced
+from ..reduction import METHODS, Reduced, Substructure
 from ..units import from_rpm, rpm_text, to_rpm
-from .common import Interpolant, lagrange
 from .group import modal_damping, without_massless
+from .range_basis import Interpolant, lagrange
 from .solution import held_compliance
 
 
@@ -248,7 +248,7 @@ class _Evaluated:
         T = self.T[exact]
         values, Y = self.modes
         values, Y = values[: self.range.count] ** 2, self._definite(Y[:, : self.range.count], values)
-        self.problem = Problem(
+        self.problem = Substructure(
             dense_pencil(self.K), values, Y, 0, sp.csr_matrix(T), tuple(labels[i] for i in exact),
             np.linalg.solve(self.K, T.conj().T),
         )  # fmt: skip

@@ -54,7 +54,7 @@ def mac_plot(found: Comparison, names: tuple[str, str], path: Path) -> Path:
 
 
 @dataclass(frozen=True)
-class Side:
+class ContactFace:
     """One of the two bodies: its group in its own modes, where it is measured, and what it is drawn from."""
 
     basis: ModalBasis
@@ -73,7 +73,7 @@ def pair_sheet(bodies: Both, seen: Both, found: Comparison, key: tuple[int, int]
     if not found.pairs:
         return None
     first, second = bodies
-    sides = [Side(b, in_modes(b.groups[key]), _solid(b)) for b in bodies]
+    sides = [ContactFace(b, in_modes(b.groups[key]), _solid(b)) for b in bodies]
     signs = _factors([in_modes(b.groups[key]) for b in seen], seen, found)
     stage = Stage()
     try:
@@ -118,7 +118,7 @@ def _common(first: ModalBasis, second: ModalBasis, found: Comparison) -> tuple[A
     return (at, own) if swapped else (own, at)
 
 
-def _pair(stage: Stage, sides: Sequence[Side], p: Pair, factors: tuple[Any, Any], axes: Array) -> Picture:
+def _pair(stage: Stage, sides: Sequence[ContactFace], p: Pair, factors: tuple[Any, Any], axes: Array) -> Picture:
     """Both shapes of a pair under their frequencies."""
     images = []
     for s, factor, j, f in zip(sides, factors, (p.first, p.second), p.frequency, strict=True):
@@ -130,7 +130,7 @@ def _pair(stage: Stage, sides: Sequence[Side], p: Pair, factors: tuple[Any, Any]
     return captioned(side_by_side(images), f"MAC {p.mac:.3f}, {change}", size=15)
 
 
-def _draw(stage: Stage, side: Side, shape: Array, axes: Array) -> Picture:
+def _draw(stage: Stage, side: ContactFace, shape: Array, axes: Array) -> Picture:
     """One shape of one body, not captioned."""
     basis = side.basis
     extent = float(np.ptp(basis.mesh.points, axis=0).max())

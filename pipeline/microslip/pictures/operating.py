@@ -27,7 +27,7 @@ from .plots import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..operating.patches import ContactMap
+    from ..operating.contact_maps import ContactMap
     from .lettering import Picture
     from .views import Studio
 
@@ -221,7 +221,7 @@ def _map_panel(
 ) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    from ..operating.patches import grid_of, on_grid
+    from ..operating.contact_maps import grid_of, on_grid
 
     values, places = scale * getattr(m, name), m.places if lies else m.places[:, ::-1]
     how: dict[str, Any] = {"vmin": 0.0, "vmax": 100.0 if unit.startswith("%") else max(float(values.max()), 1e-12)}

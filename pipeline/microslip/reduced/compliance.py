@@ -118,7 +118,7 @@ def contact_share(group: ModalGroup, reduction: str, row: str, a: str, b: str = 
     return _share(group, reduction, *describe(group, label), pick, 1)
 
 
-def statics_beside(group: ModalGroup, reduction: str) -> bool:
+def has_residual(group: ModalGroup, reduction: str) -> bool:
     """Whether static compliance stands beside the modes, so that a solver in modal coordinates must add it.
 
     True of MacNeal's method and of coordinates that no mode carries (massless ones, interface forces).

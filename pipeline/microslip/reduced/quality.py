@@ -27,13 +27,13 @@ def sentences(group: ModalGroup, reduction: str) -> list[str]:
     return [s for s in found if s]
 
 
-def _statics(checks: Mapping[str, float], beside: bool) -> str:
+def _statics(checks: Mapping[str, float], has_residual: bool) -> str:
     parts = []
     for key, what in (("interface", "contacts"), ("excitation", "loads"), ("monitor", "monitors")):
         error = checks.get(f"static_error_{key}")
         if error is not None:
             parts.append(f"{what} {'exact' if error < 1e-6 else f'up to {percent_off(error)} missing'}")
-    tail = "; the solver adds the rest, which stands in the file" if beside and parts else ""
+    tail = "; the solver adds the rest, which stands in the file" if has_residual and parts else ""
     return f"static answers at single rows: {', '.join(parts)}{tail}" if parts else ""
 
 

@@ -60,10 +60,10 @@ class Verdict:
 
     coordinates: tuple[Coordinate, ...]
     sentence: str
-    remarks: tuple[str, ...]
+    messages: tuple[str, ...]
 
 
-def verdict(group: ModalGroup, beside: bool = False, sectors: int = 1) -> Verdict:
+def verdict(group: ModalGroup, has_residual: bool = False, sectors: int = 1) -> Verdict:
     """Examine a group's static compliance.
 
     Args:
@@ -72,10 +72,10 @@ def verdict(group: ModalGroup, beside: bool = False, sectors: int = 1) -> Verdic
 
     Returns:
         One `Coordinate` per interface, excitation and monitor row, one more for each pair of interfaces of this
-        body that face each other round the ring, the sentence and the remarks.
+        body that face each other round the ring, the sentence and the messages.
     """
     found = coordinates(group, sectors)
-    return Verdict(found, _sentence(found, group.n_modes, beside), _remarks(found, sectors))
+    return Verdict(found, _sentence(found, group.n_modes, has_residual), _messages(found, sectors))
 
 
 def coordinates(group: ModalGroup, sectors: int = 1) -> tuple[Coordinate, ...]:
@@ -148,7 +148,7 @@ def percent(share: float) -> str:
     return f"{value:.1f} %" if value >= 0.1 or value <= 0 else f"{value:.1g} %"
 
 
-def _sentence(found: tuple[Coordinate, ...], count: int, beside: bool) -> str:
+def _sentence(found: tuple[Coordinate, ...], count: int, has_residual: bool) -> str:
     """How many modes are enough, or that eigenmodes cannot hold the compliance: one sentence."""
     single = [c for c in found if c.kind == "translation"]
     what = "a force on one contact"
@@ -158,7 +158,7 @@ def _sentence(found: tuple[Coordinate, ...], count: int, beside: bool) -> str:
     if not single:
         return "The body has no interface, excitation or monitor, so there is no compliance to check."
     held, good = _held(single, count, what)
-    outlook = _SUPPLIED if beside else _OUTLOOK
+    outlook = _SUPPLIED if has_residual else _OUTLOOK
     squeezed = [c for c in found if c.kind == "squeeze" and c.share < 0.9]
     if not squeezed:
         return held + ("." if good else f"; {outlook}.")
@@ -185,7 +185,7 @@ def _held(single: list[Coordinate], count: int, what: str) -> tuple[str, bool]:
     return f"{count} modes are not enough: they hold {percent(worst.share)} at {worst.label} ({trend})", False
 
 
-def _remarks(found: tuple[Coordinate, ...], sectors: int) -> tuple[str, ...]:
+def _messages(found: tuple[Coordinate, ...], sectors: int) -> tuple[str, ...]:
     out = []
     turning = [c for c in found if c.kind == "rotation"]
     if turning and (worst := min(turning, key=lambda c: c.share)).share < 0.9:

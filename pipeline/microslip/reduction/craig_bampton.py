@@ -17,10 +17,10 @@ import scipy.sparse as sp
 from ..data import Array, UserError
 from ..linalg import eigen
 from ..linalg.canonical import signs
-from .problem import Problem, Reduced, diagonalised, hermitian, own_modes, without_modes
+from .problem import Reduced, Substructure, diagonalised, hermitian, own_modes, without_modes
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """Interface coordinates first (6 a patch, in the order of the rows), then fixed-interface modes.
 
     A body with rigid motions gets as many inertia-relief shapes between the two: how it yields, held at its

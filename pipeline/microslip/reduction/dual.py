@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .problem import Problem, Reduced, frequencies, hermitian
+from .problem import Reduced, Substructure, frequencies, hermitian
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """Interface forces first, then the kept eigenmodes.
 
     Raises:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .problem import Problem, Reduced, diagonal
+from .problem import Reduced, Substructure, diagonal
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """Nothing is added."""
     return diagonal(problem.vectors, problem.kind, problem.values, problem.rigid)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from . import eigenmodes
-from .problem import Problem, Reduced
+from .problem import Reduced, Substructure
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """The eigenmodes as they are, with the residual attachment modes beside."""
     return replace(eigenmodes.reduce(problem), residual=problem.residual(slice(None)))

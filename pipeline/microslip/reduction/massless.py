@@ -18,10 +18,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import UserError
-from .problem import Problem, Reduced, frequencies, hermitian, refuse_dependent
+from .problem import Reduced, Substructure, frequencies, hermitian, refuse_dependent
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """Interface coordinates first (without mass), then the kept eigenmodes.
 
     Raises:

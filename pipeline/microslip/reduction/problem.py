@@ -14,7 +14,7 @@ from ..linalg.eigen import Pencil
 
 
 @dataclass(frozen=True)
-class Problem:
+class Substructure:
     """The unreduced body on its free degrees of freedom and the answers that are known of it.
 
     Real and symmetric, or complex and Hermitian (a sector at a nodal diameter); rows read ``rows @ u`` and load

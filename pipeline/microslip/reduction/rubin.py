@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .problem import Problem, Reduced, diagonal, own_modes
+from .problem import Reduced, Substructure, diagonal, own_modes
 
 
-def reduce(problem: Problem) -> Reduced:
+def reduce(problem: Substructure) -> Reduced:
     """Eigenmodes and pseudo-modes, all M-orthonormal and K-orthogonal."""
     values, vectors = own_modes(problem.pencil, problem.residual(slice(None)))
     return diagonal(

@@ -13,7 +13,7 @@ from ..basis import check_basis
 from ..data import ModalBasis, ModalGroup
 from ..linalg.gyroscopic import stability_sentence
 from ..modes.campbell import crossings, engine_orders, track_basis
-from ..reduced.compliance import SUPPLIED, Share, sentence, shares, statics_beside
+from ..reduced.compliance import SUPPLIED, Share, has_residual, sentence, shares
 from ..reduced.coordinates import basis_in_modes
 from ..reduced.quality import sentences
 from ..reduced.truncation import percent, verdict
@@ -27,14 +27,14 @@ from .words import certificate, contact_sentence, fit_sentence, fit_summary, her
 
 
 def report_html(
-    basis: ModalBasis, pictures: Mapping[str, Path], remarks: Sequence[str] = (),
+    basis: ModalBasis, pictures: Mapping[str, Path], messages: Sequence[str] = (),
     response: Mapping[str, Any] | None = None,
 ) -> str:  # fmt: skip
     """The page of a body.
 
     Args:
         basis: what it is about. pictures: name -> file, the names of `pictures.draw_all`; others are shown with
-            the response. remarks: sentences that a reader must know. response: a summary of a case, name -> text,
+            the response. messages: sentences that a reader must know. response: a summary of a case, name -> text,
             number, list of numbers or list of rows (each a mapping of the same names).
     """
     stored, basis = basis, basis_in_modes(basis)
@@ -54,7 +54,7 @@ def report_html(
         "Checks": _checks(basis),
         "Provenance": _provenance(basis),
     }
-    told = [say(_lead(basis), tone="lead"), say(*remarks, tone="warn")]
+    told = [say(_lead(basis), tone="lead"), say(*messages, tone="warn")]
     return page(f"{basis.name}: modal basis", told, sections)
 
 
@@ -244,7 +244,7 @@ def _contacts(basis: ModalBasis, album: Album) -> list[Piece]:
 
 def _truncation(stored: ModalBasis, basis: ModalBasis, album: Album) -> list[Piece]:
     group = _groups(basis)[0]
-    found = verdict(group, statics_beside(_groups(stored)[0], basis.reduction), basis.sectors)
+    found = verdict(group, has_residual(_groups(stored)[0], basis.reduction), basis.sectors)
     if not found.coordinates:
         return [say(found.sentence, tone="note")]
     rows = [
@@ -255,7 +255,7 @@ def _truncation(stored: ModalBasis, basis: ModalBasis, album: Album) -> list[Pie
     head = ["coordinate", "static compliance", "held by the modes", "left out", "modes for 90 %", "modes for 99 %"]
     return [
         say(found.sentence, tone="note"),
-        say(*found.remarks),
+        say(*found.messages),
         Piece("paragraph", "inertia relief" if group.compliance.inertia_relief else ""),
         fold("Every coordinate", table(head, rows)),
         album.take("compliance"),

@@ -23,10 +23,10 @@ def response_html(summary: Mapping[str, Any], pictures: Mapping[str, Path]) -> s
     """The page of a case alone.
 
     Args:
-        summary: the response of `body.report_html`; its remarks stand on top. pictures: name -> file.
+        summary: the response of `body.report_html`; its messages stand on top. pictures: name -> file.
     """
-    told = {k: v for k, v in summary.items() if k not in ("remarks", "pictures")}
-    pieces = [say(*summary.get("remarks", []), tone="warn"), *response_pieces(told, Album(pictures))]
+    told = {k: v for k, v in summary.items() if k not in ("messages", "pictures")}
+    pieces = [say(*summary.get("messages", []), tone="warn"), *response_pieces(told, Album(pictures))]
     return page(f"{summary.get('case', 'case')}: friction response", pieces)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..basis.checks import Check
 from ..data import Array, ModalBasis
 from ..operating.motion import read_out
-from ..reduced.compliance import statics_beside
+from ..reduced.compliance import has_residual
 from ..units import counted, percent
 from .files import CONVERGED, Response, Series
 
@@ -152,7 +152,7 @@ def check_response(response: Response, bases: Mapping[str, ModalBasis]) -> list[
     """A response verified from its own content and the modal files it was computed with.
 
     Args:
-        bases: member -> its modal file, of those that are at hand.
+        bases: component -> its modal file, of those that are at hand.
     """
     found: list[Check] = []
     for s in response.series:
@@ -192,15 +192,15 @@ def _read_again(response: Response, s: Series, bases: Mapping[str, ModalBasis]) 
     found = []
     for name in (n for n in s.arrays if n.startswith(("monitors/", "gauges/"))):
         kind, rows = name.split("/", 1)
-        member, monitor = rows.split(":", 1) if ":" in rows else (next(iter(response.bodies), ""), rows)
-        basis = bases.get(member)
-        if basis is None or statics_beside(next(iter(basis.groups.values())), basis.reduction):
+        component, monitor = rows.split(":", 1) if ":" in rows else (next(iter(response.bodies), ""), rows)
+        basis = bases.get(component)
+        if basis is None or has_residual(next(iter(basis.groups.values())), basis.reduction):
             continue
         labels = next(iter(basis.groups.values()))
         held: Any = (labels.monitors if kind == "monitors" else labels.gauges).get(monitor)
         if held is None:
             continue
-        read = read_out(response.motion(s, basis, member), monitor, kind)[s.converged]
+        read = read_out(response.motion(s, basis, component), monitor, kind)[s.converged]
         mine = [list(held.labels).index(label) for label in response.labels.get(name, held.labels)]
         kept = np.moveaxis(s.arrays[name][s.converged], -1, 1)
         off = np.abs(read[:, : kept.shape[1], mine] - kept).max(initial=0.0)

@@ -96,10 +96,11 @@ class Response:
 
     Attributes:
         case: its name. description. mode: how the contacts were treated (``marched`` or ``book``).
-            settings: the case file. inputs: hash of all that a point depends on. bodies: member -> `Body`. labels: name
-            of an array -> its rows. series: in the order they were computed. resonances: rows of a table.
+            settings: the case file. inputs: hash of all that a point depends on. bodies: component -> `Body`. labels:
+            name of an array -> its rows. series: in the order they were computed. resonances: rows of a table.
             estimated: largest estimated error of an amplitude for want of harmonics and samples, over it; None: not
-            estimated. finished: whether every point that was asked for is there. remarks: sentences a reader must know.
+            estimated. finished: whether every point that was asked for is there. messages: sentences a reader must
+            know.
             stuck_modes: rows of the modes with sticking contacts and their damping.
     """
 
@@ -113,7 +114,7 @@ class Response:
     description: str = ""
     resonances: tuple[Mapping[str, Any], ...] = ()
     finished: bool = True
-    remarks: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
     stuck_modes: tuple[Mapping[str, float], ...] = ()
     estimated: float | None = None
 
@@ -129,19 +130,19 @@ class Response:
             raise UserError(f"{self.case}: {len(found)} series have {asked}; there are {_names(self.series)}")
         return found[0]
 
-    def motion(self, series: Series, basis: ModalBasis, member: str = "", sha256: str = "") -> Motion:
-        """The motion of a member in a series, for `operating`.
+    def motion(self, series: Series, basis: ModalBasis, component: str = "", sha256: str = "") -> Motion:
+        """The motion of a component in a series, for `operating`.
 
         Args:
-            basis: its modal file. member: may be left out where there is one. sha256: of the modal file's bytes, to be
-                compared with the one that the response was computed with.
+            basis: its modal file. component: may be left out where there is one. sha256: of the modal file's bytes, to
+                be compared with the one that the response was computed with.
 
         Raises:
-            UserError: another body, another file, no such member.
+            UserError: another body, another file, no such component.
         """
-        name = member or (next(iter(self.bodies)) if len(self.bodies) == 1 else member)
+        name = component or (next(iter(self.bodies)) if len(self.bodies) == 1 else component)
         if name not in self.bodies:
-            raise UserError(f"{self.case}: member '{name}': the response has {', '.join(self.bodies) or 'none'}")
+            raise UserError(f"{self.case}: component '{name}': the response has {', '.join(self.bodies) or 'none'}")
         body = self.bodies[name]
         if body.basis != basis.name or (sha256 and sha256 != body.sha256):
             what = f"'{basis.name}'" if body.basis != basis.name else "another state of it"
@@ -188,7 +189,7 @@ def response_of(head: Mapping[str, Any], series: Mapping[str, Mapping[float, Map
         description=str(head.get("description", "")),
         resonances=tuple(head.get("resonances", ())),
         finished=bool(head.get("finished", False)),
-        remarks=tuple(head.get("remarks", ())),
+        messages=tuple(head.get("messages", ())),
         stuck_modes=tuple(head.get("stuck_modes", ())),
         estimated=head.get("estimated"),
     )
@@ -249,7 +250,7 @@ def _write(file: h5py.File, r: Response) -> None:
     for name in _TEXTS:
         file.attrs[name] = getattr(r, name)
     file.attrs["finished"] = int(r.finished)
-    for name in ("settings", "labels", "resonances", "remarks", "stuck_modes", "estimated"):
+    for name in ("settings", "labels", "resonances", "messages", "stuck_modes", "estimated"):
         _put_text(file, name, json.dumps(getattr(r, name)))
     bodies = {k: {**vars(b), "harmonics": [[n, int(c)] for n, c in b.harmonics]} for k, b in r.bodies.items()}
     _put_text(file, "bodies", json.dumps(bodies))
@@ -317,7 +318,8 @@ def _read(path: Path) -> Response:
 
 def _response(file: h5py.File) -> Response:
     told = {
-        name: json.loads(file[name][()].tobytes()) for name in ("settings", "labels", "resonances", "remarks", "bodies")
+        name: json.loads(file[name][()].tobytes())
+        for name in ("settings", "labels", "resonances", "messages", "bodies")
     }
     names = sorted(n for n in file if n.startswith("series_"))
     return Response(
@@ -328,7 +330,7 @@ def _response(file: h5py.File) -> Response:
         settings=told["settings"],
         resonances=tuple(told["resonances"]),
         finished=bool(file.attrs["finished"]),
-        remarks=tuple(told["remarks"]),
+        messages=tuple(told["messages"]),
         stuck_modes=tuple(json.loads(file["stuck_modes"][()].tobytes())) if "stuck_modes" in file else (),
         estimated=json.loads(file["estimated"][()].tobytes()) if "estimated" in file else None,
     )

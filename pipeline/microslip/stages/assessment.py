@@ -24,7 +24,7 @@ from ..units import METRES, Quantity
 from .stage import Report
 
 if TYPE_CHECKING:
-    from ..operating.patches import ContactMap
+    from ..operating.contact_maps import ContactMap
     from ..progress import Report
 
 ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
@@ -32,7 +32,7 @@ ENDLESS = MaterialLimits(fatigue_strength=1e29, tensile_strength=1e30)
 
 
 @dataclass(frozen=True)
-class Resonance:
+class StressedResonance:
     """A local maximum of a sweep, and the range about it, between the lowest points next to it.
 
     Attributes:
@@ -59,24 +59,24 @@ class Assessment:
     """Stresses of one body in a response.
 
     Attributes:
-        member: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
+        component: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
             places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
             None. quantity: what the read-out measures.
     """
 
-    member: str
+    component: str
     sweeps: Mapping[float, tuple[Series, Motion, Array, StressPeaks]]
-    resonances: tuple[Resonance, ...]
+    resonances: tuple[StressedResonance, ...]
     limits: MaterialLimits | None
     quantity: Quantity = METRES
 
     @property
-    def highest(self) -> Resonance | None:
+    def highest(self) -> StressedResonance | None:
         """The resonance with the least margin (without limits, the most stressed one)."""
         key = (lambda r: r.worst.vibration) if self.limits else (lambda r: -r.worst.amplitude)
         return min(self.resonances, key=key, default=None)
 
-    def at(self, r: Resonance) -> tuple[Motion, CycleStress]:
+    def at(self, r: StressedResonance) -> tuple[Motion, CycleStress]:
         """Motion and stress where a resonance stresses the body most."""
         motion = self.sweeps[r.normal_force][1].at(r.stressed)
         return motion, cycle_stress(motion)
@@ -85,7 +85,7 @@ class Assessment:
         """Rows for the terminal and the report; lengths in m, stresses in Pa."""
         return [self._row(r) for r in self.resonances]
 
-    def _row(self, r: Resonance) -> dict[str, Any]:
+    def _row(self, r: StressedResonance) -> dict[str, Any]:
         row: dict[str, Any] = {
             "normal_force_N": r.normal_force,
             "frequency_Hz": r.frequency,
@@ -99,21 +99,21 @@ class Assessment:
 
 
 def assess(
-    response: Response, basis: ModalBasis, monitor: str, member: str = "", limits: MaterialLimits | None = None,
+    response: Response, basis: ModalBasis, monitor: str, component: str = "", limits: MaterialLimits | None = None,
     report: Report = lambda _: None,
 ) -> Assessment:  # fmt: skip
     """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
     where the read-out is largest: another mode may stress the body on its flank.
 
     Args:
-        monitor: name of the array whose first row says where resonances are. member: whose stresses; may be left out
+        monitor: name of the array whose first row says where resonances are. component: whose stresses; may be left out
             where there is one body.
 
     Raises:
         UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
     """
-    name = member or next(iter(response.bodies))
-    sweeps, found = {}, list[Resonance]()
+    name = component or next(iter(response.bodies))
+    sweeps, found = {}, list[StressedResonance]()
     for series in response.series:
         if not len(series.key):
             continue
@@ -132,7 +132,7 @@ def assess(
         for i, r, j in zip(at, ranges, most, strict=True):
             worst = endurance(cycle_stress(motion, j), limits or ENDLESS)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
-            found.append(Resonance(normal, f, float(size[i]), (low, high), j, there, worst))
+            found.append(StressedResonance(normal, f, float(size[i]), (low, high), j, there, worst))
     return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
 
 
@@ -197,8 +197,8 @@ def tops(series: Series, size: Array) -> Indices:
 
 
 def over_engine_order(
-    responses: Mapping[int, Response], basis: ModalBasis, member: str = "", gauge: str = "", only: Array | None = None,
-    first_harmonic: bool = False,
+    responses: Mapping[int, Response], basis: ModalBasis, component: str = "", gauge: str = "",
+    only: Array | None = None, first_harmonic: bool = False,
 ) -> dict[float, tuple[Array, Array]]:  # fmt: skip
     """Largest alternating stress of a body over the engine order, for every normal force (Sextro Figs. 5.5-4, 5.5-5).
 
@@ -213,7 +213,7 @@ def over_engine_order(
     found: dict[float, list[tuple[int, float]]] = {}
     for order, response in sorted(responses.items()):
         for series in response.series:
-            motion = response.motion(series, basis, member or next(iter(response.bodies)))
+            motion = response.motion(series, basis, component or next(iter(response.bodies)))
             if gauge:
                 size = 1e6 * amplitude(read_out(motion, gauge, "gauges"))[:, 0]
             else:
@@ -224,9 +224,9 @@ def over_engine_order(
     return {n: (np.array([o for o, _ in rows]), np.array([v for _, v in rows])) for n, rows in found.items()}
 
 
-def has_stresses(basis: ModalBasis, response: Response, member: str = "") -> bool:
+def has_stresses(basis: ModalBasis, response: Response, component: str = "") -> bool:
     """Whether every group that a response needs has stress modes at the nodes and shapes."""
-    body = response.bodies[member or next(iter(response.bodies))]
+    body = response.bodies[component or next(iter(response.bodies))]
     for k in {k for k, _ in body.harmonics}:
         group = next((g for (s, h), g in basis.groups.items() if h == k and s in (body.speed, 0)), None)
         if group is None or "nodes" not in group.stresses:
@@ -275,14 +275,14 @@ def draw(
     return drawn
 
 
-def families(found: Assessment) -> dict[str, list[Resonance]]:
+def families(found: Assessment) -> dict[str, list[StressedResonance]]:
     """Resonances followed over the normal force, from the largest down.
 
     A resonance goes on in one that lies in its range, or in whose range it lies: none other of its sweep is meant by
     that part of the band, however far the normal force has moved it. Of several the nearest in frequency; what is left
     begins a line of its own.
     """
-    lines: list[list[Resonance]] = []
+    lines: list[list[StressedResonance]] = []
     for normal in sorted({r.normal_force for r in found.resonances}, reverse=True):
         new = [r for r in found.resonances if r.normal_force == normal]
         pairs = [
@@ -313,7 +313,7 @@ def over_force(found: Assessment) -> dict[str, list[tuple[float, float]]]:
 
 
 def _at_worst(
-    found: Assessment, top: Resonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
+    found: Assessment, top: StressedResonance, basis: ModalBasis, case: str, folder: Path, scenes: bool
 ) -> dict[str, Path]:
     from ..files.store import complete_or_absent
     from ..pictures import operating

@@ -32,7 +32,7 @@ from .stage import Report
 
 if TYPE_CHECKING:
     from ..harmonic_balance.nonlinear_modes import Backbone
-    from ..harmonic_balance.peak import Optimum, Resonance
+    from ..harmonic_balance.peak import HighestPeak, Optimum
     from ..harmonic_balance.problem import Problem
     from ..harmonic_balance.stability import Stability
 
@@ -199,7 +199,7 @@ def optimum_over(
     sweep = built.settings.sweep
     band = 2 * np.pi * np.linspace(sweep.start, sweep.stop, sweep.points)
 
-    def keep(found: Mapping[float, Resonance]) -> None:
+    def keep(found: Mapping[float, HighestPeak]) -> None:
         _optimum_table(found, over, case)
 
     values = np.linspace(low, high, points) if signed else np.geomspace(low, high, points)
@@ -219,7 +219,7 @@ def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
     return files
 
 
-def _optimum_table(found: Mapping[float, Resonance], over: str, case: Case, best: Optimum | None = None) -> Path:
+def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, best: Optimum | None = None) -> Path:
     shown = [(v, r, "highest resonance" if r.status == "converged" else r.status) for v, r in found.items()]
     if best is not None:
         what = f"optimum: {best.status}" if is_optimum(best) else f"lowest: {best.status}"

@@ -75,11 +75,11 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
 
     try:
         body = read_matrices(given, job.folder, job.settings.length_unit)
-        basis, remarks = foreign_basis(body, job.settings, report, provenance(job, job.path))
+        basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
     except UserError as error:
         text = str(error)
         raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
-    warnings = [f"{job.path}: {remark}" for remark in remarks]
+    warnings = [f"{job.path}: {remark}" for remark in messages]
     for warning in warnings:
         report(f"warning: {warning}")
     return basis, warnings

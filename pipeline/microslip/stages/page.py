@@ -23,11 +23,11 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
     from ..report.body import report_html
 
     stage = Stage(job.build_folder / "report.html", ("stages.page",), force, report)
-    folder, remarks, shown = job.build_folder / "pictures", _remarks(job), dict[str, str]()
+    folder, messages, shown = job.build_folder / "pictures", _messages(job), dict[str, str]()
     if response is not None:
-        remarks += response.get("remarks", [])
+        messages += response.get("messages", [])
         shown = dict(response.get("pictures", {}))
-        response = {k: v for k, v in response.items() if k not in ("remarks", "pictures")}
+        response = {k: v for k, v in response.items() if k not in ("messages", "pictures")}
     engine_orders = list(job.settings.rotation.engine_orders)
 
     def work() -> Made:
@@ -37,7 +37,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         reason = pictures.can_draw()
         if reason is not None:
             report(f"warning: no pictures of the body: {reason}")
-            remarks.append(f"The pictures of the body are missing: {reason}")
+            messages.append(f"The pictures of the body are missing: {reason}")
         drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
         tables: list[Path] = []
         if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
@@ -45,23 +45,23 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
             store.write_text(tables[0], resonance_csv(resonances(basis, engine_orders)))
         drawn |= {title: folder / name for title, name in shown.items()}
         report("writing the report")
-        store.write_text(stage.product, report_html(basis, drawn, remarks, response))
+        store.write_text(stage.product, report_html(basis, drawn, messages, response))
         return Made([*drawn.values(), *tables], whole=reason is None)
 
     inputs = {
         "basis": store.hash_file(job.basis_file),
         "response": response,
         "engine_orders": engine_orders,
-        "remarks": list(remarks),
+        "messages": list(messages),
     }
     stage.make(inputs, work)
     return stage.product
 
 
-def _remarks(job: Job) -> list[str]:
-    remarks = [job.settings.note] if job.settings.note else []
+def _messages(job: Job) -> list[str]:
+    messages = [job.settings.note] if job.settings.note else []
     try:
-        remarks += json.loads(store.sidecar_path(job.basis_file).read_text()).get("warnings", [])
+        messages += json.loads(store.sidecar_path(job.basis_file).read_text()).get("warnings", [])
     except (OSError, ValueError):
         pass
-    return remarks
+    return messages

@@ -33,7 +33,7 @@ def modal_files(
         UserError: a body that is nowhere.
     """
     found = dict(known or {})
-    for b in case.members:
+    for b in case.components:
         if b.name in found:
             continue
         body = b.body or b.name
@@ -60,15 +60,15 @@ def _lumped(case_path: Path, name: str) -> Path | None:
 def existing_files(case: CaseSettings, path: Path, basis_file: Path | None, root: Path) -> dict[str, Path]:
     """Body of a case -> a modal file that exists."""
     beside = path.with_name("basis.h5")
-    if len(case.members) == 1 and case.members[0].file is None and (basis_file is not None or beside.is_file()):
-        return {case.members[0].name: basis_file or beside}
+    if len(case.components) == 1 and case.components[0].file is None and (basis_file is not None or beside.is_file()):
+        return {case.components[0].name: basis_file or beside}
     if basis_file is not None:
-        raise UserError(f"{path}: has {len(case.members)} bodies; name their modal files in it (bodies.<name>.file)")
+        raise UserError(f"{path}: has {len(case.components)} bodies; name their modal files in it (bodies.<name>.file)")
     found = {}
-    for b in case.members:
+    for b in case.components:
         found[b.name] = _named(path, b) if b.file else root / "build" / (b.body or b.name) / "basis.h5"
         if not found[b.name].is_file():
-            own = [beside] if len(case.members) == 1 else []
+            own = [beside] if len(case.components) == 1 else []
             raise UserError(_nowhere(case, path, b, [*own, found[b.name]], root))
     return found
 
@@ -97,7 +97,7 @@ def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], 
         if by_hand is None:
             find_body(path, name, root)
         return f"{begun}; microslip run {shlex.quote(str(by_hand.parent if by_hand else path))} makes it"
-    give = "give it after the case" if len(case.members) == 1 else f"name one in bodies.{b.name}.file"
+    give = "give it after the case" if len(case.components) == 1 else f"name one in bodies.{b.name}.file"
     return f"{begun}; {_elsewhere(path, name, root) or f'correct the name, or {give}'}"
 
 

@@ -28,7 +28,7 @@ from .checkpoint import Checkpoint, hashes_of
 from .stage import Made, Report, Stage
 
 if TYPE_CHECKING:
-    from ..operating.patches import ContactMap
+    from ..operating.contact_maps import ContactMap
 
 
 def response_stage(
@@ -109,7 +109,7 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
         f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
         report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
     report(summary["checked"])
-    for remark in summary["remarks"]:
+    for remark in summary["messages"]:
         report(f"warning: {remark}")
 
 
@@ -131,7 +131,7 @@ def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[st
     if more is not None:
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
-        summary["remarks"] += more.remarks
+        summary["messages"] += more.messages
     summary["checked"] = sentence(response, response.estimated)
     if result.rising:
         summary["checked"] += f"; still rising at {counted(len(result.rising), 'end')} of the band"
@@ -150,7 +150,7 @@ def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]
     found = {name: {k: p for k, p in held.get(name, {}).items() if low <= k <= high} for name in names}
     told = {"parameters": {name: {"normal_force": n} for name, n in names.items()}, "finished": True}
     told["estimated"] = result.truncation
-    told |= {key: summary[key] for key in ("resonances", "stuck_modes", "remarks")}
+    told |= {key: summary[key] for key in ("resonances", "stuck_modes", "messages")}
     return response_of({**head, **told}, found)
 
 
@@ -159,23 +159,23 @@ class _Assessed:
     rows: list[dict[str, Any]]
     drawn: dict[str, Path]
     files: list[Path]
-    remarks: list[str]
+    messages: list[str]
 
 
 def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
     """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
     first = checkpoint.drawn_monitor(result.built)
-    basis = result.built.bodies[result.built.assembly.outputs[0].member].basis
+    basis = result.built.bodies[result.built.assembly.outputs[0].component].basis
     if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
-    member, monitor = first
+    component, monitor = first
     limits = result.settings.material_limits
-    found = assessment.assess(response, basis, monitor, member, limits, report=report)
-    maps, remarks = ({}, []) if found.highest is None else _maps(result, found, report)
+    found = assessment.assess(response, basis, monitor, component, limits, report=report)
+    maps, messages = ({}, []) if found.highest is None else _maps(result, found, report)
     report("pictures of stresses")
     scenes = _can_draw() is None
     drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
-    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), remarks)
+    return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 
 def _maps(
@@ -201,7 +201,7 @@ def _for_paraview(
     """The operating shape and the contacts at the worst resonance as VTU; nothing without meshio."""
     if not _is_there("meshio"):
         return []
-    from ..operating.patches import write_contact_vtu
+    from ..operating.contact_maps import write_contact_vtu
 
     files = []
     if assessment.write_shape(found, basis, folder / "operating_shape.vtu") is not None:
@@ -266,7 +266,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
             for r in result.rising
         ],
         "failed_points": failed,
-        "remarks": list(result.remarks),
+        "messages": list(result.messages),
     }
 
 

@@ -34,14 +34,14 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
     response, converged = None, True
     if job.case_file is not None:
         case, _ = load_case(job.case_file)
-        if job.settings.name not in {b.body or b.name for b in case.members}:
+        if job.settings.name not in {b.body or b.name for b in case.components}:
             raise UserError(
-                f"{job.case_file}: body: it names '{case.members[0].name}', but the body beside it is "
+                f"{job.case_file}: body: it names '{case.components[0].name}', but the body beside it is "
                 f"'{job.settings.name}'; make them agree"
             )
     modes_stage(job, force=force, report=report)
     if job.case_file is not None:
-        files = {b.name: job.basis_file for b in case.members if (b.body or b.name) == job.settings.name}
+        files = {b.name: job.basis_file for b in case.components if (b.body or b.name) == job.settings.name}
         files |= modal_files(case, job.case_file, job.root, report, known=files)
     with response_of_case(job.build_folder, report=report).making():
         if job.case_file is not None:
@@ -99,7 +99,7 @@ def respond(
     """
     case, _ = load_case(case_path, assignments)
     files = existing_files(case, case_path, basis_file, root)
-    for b in case.members:
+    for b in case.components:
         name = read_basis(files[b.name]).name
         if (b.body or b.name) != name and b.file is None:
             raise UserError(

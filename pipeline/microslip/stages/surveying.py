@@ -164,7 +164,7 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     drawn = r.rpm, r.frequency, amplitude, r.normal
     size = f"{amplitude[top]:.4g} {r.quantity.said}"
     said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
-    if still := [b.name for b in settings.members if not bases[b.name].ranges]:
+    if still := [b.name for b in settings.components if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
     return Survey(
         tables(r),

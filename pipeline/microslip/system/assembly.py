@@ -1,12 +1,12 @@
 """Bodies that touch each other or the ground, and what drives them: the equation of motion of every analysis.
 
-With the coordinates q of all members and their relative motions d = T q at the contacts (Sextro Eqs. (5.1-4) to
+With the coordinates q of all components and their relative motions d = T q at the contacts (Sextro Eqs. (5.1-4) to
 (5.1-13)),
 
     M q'' + (C + G) q' + K q + T^T (F(u_0 + d) - F_0) = f(t)
 
 F are the contact forces by their laws, u_0 and F_0 displacement and force of a preloaded contact, from which d counts.
-Everything linear is handed out harmonic by harmonic, because a member of a ring has other matrices in each of them:
+Everything linear is handed out harmonic by harmonic, because a component of a ring has other matrices in each of them:
 the harmonic h of a travelling wave whose base engine order is e moves the N sectors with the nodal diameter
 h e mod N.
 """
@@ -23,7 +23,7 @@ import scipy.linalg
 
 from ..data import INTERFACE_ROWS, Array, ComplexArray, UserError
 from ..settings.mistakes import bounded
-from .component import InWave, Member, Ring
+from .component import Component, InWave, Ring
 from .disc import spread, whole
 
 if TYPE_CHECKING:
@@ -31,24 +31,24 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class ContactFace:
     """One of the two faces of a contact.
 
     Attributes:
-        member, interface: names. frame: (k, 6) motion along the contact's coordinates, in the contact's frame, per
-            unit of the interface's six rows. shift: the member stands that many sectors further than the one whose
+        component, interface: names. frame: (k, 6) motion along the contact's coordinates, in the contact's frame, per
+            unit of the interface's six rows. shift: the component stands that many sectors further than the one whose
             coordinates are used (of a sector that stands for a ring).
         rows: index of a ring -> (k, m) motion along the contact's coordinates, of a patch that deforms; else None.
     """
 
-    member: str
+    component: str
     interface: str
     frame: Array = field(default_factory=lambda: np.eye(6))
     shift: int = 0
     rows: Mapping[int, Array] | None = None
 
     def motion(self, linear: InWave, index: int, blades: int) -> Array:
-        """(k, m) motion per unit of the member's coordinates, with the phase of the sector it stands in."""
+        """(k, m) motion per unit of the component's coordinates, with the phase of the sector it stands in."""
         if self.rows is None:
             own = self.frame @ linear.interface(self.interface)
         elif index in self.rows:
@@ -58,7 +58,7 @@ class Side:
         return own * self.phase(index, blades)
 
     def phase(self, index: int, blades: int) -> complex | float:
-        """Of the sector that the member stands in, against the one whose coordinates are used."""
+        """Of the sector that the component stands in, against the one whose coordinates are used."""
         steps = (self.shift * index) % blades if blades else 0
         if 2 * steps in (0, blades):
             return -1.0 if steps else 1.0
@@ -89,8 +89,8 @@ class Contact:
 
     name: str
     patch: Patch
-    first: Side
-    second: Side | None
+    first: ContactFace
+    second: ContactFace | None
     offset: Array
     preload: Array
     phase: float = 0.0
@@ -119,8 +119,8 @@ class Contact:
 
 
 def preloaded_contact(
-    name: str, patch: Patch, first: Side, second: Side | None, normal: float | None = None, interference: float = 0.0,
-    compliance: Array | None = None,
+    name: str, patch: Patch, first: ContactFace, second: ContactFace | None, normal: float | None = None,
+    interference: float = 0.0, compliance: Array | None = None,
 ) -> Contact:  # fmt: skip
     """A contact pressed by a given normal force (N), or as near as an interference (m; negative: a gap) makes it.
 
@@ -146,41 +146,41 @@ def preloaded_contact(
 
 @dataclass(frozen=True)
 class Load:
-    """A harmonic force on a member.
+    """A harmonic force on a component.
 
     Attributes:
-        member. row: name of an excitation. amplitude: complex 0-peak number that multiplies the row, N for a unit
+        component. row: name of an excitation. amplitude: complex 0-peak number that multiplies the row, N for a unit
             force, Pa for a unit pressure. harmonic: of the base frequency; 0 for a steady load.
     """
 
-    member: str
+    component: str
     row: str
     amplitude: complex = 1.0
     harmonic: int = 1
 
     def __post_init__(self) -> None:
-        bounded(f"load on '{self.member}': amplitude", [complex(self.amplitude).real, complex(self.amplitude).imag])
+        bounded(f"load on '{self.component}': amplitude", [complex(self.amplitude).real, complex(self.amplitude).imag])
 
 
 @dataclass(frozen=True)
 class Output:
-    """A read-out of a member: a row of a monitor or a gauge."""
+    """A read-out of a component: a row of a monitor or a gauge."""
 
-    member: str
+    component: str
     monitor: str
     label: str
 
 
 @dataclass(frozen=True)
 class Linear:
-    """What is linear in one harmonic, of one member or of several together.
+    """What is linear in one harmonic, of one component or of several together.
 
     Attributes:
         M, K, C: (m, m); C with the gyroscopic matrix. rows: (c, m) motion along the contact coordinates.
         residual: (c, c) static compliance along them that the coordinates leave out, m/N.
         load: (m,) amplitude of the generalised force. given: (c,) motion by the loads beside the coordinates, m.
-        output: (w, m) all read-outs of the assembly in its order, zero where another member is read; those of several
-            parts add up. output_residual: (w, c) and output_given: (w,) of them beside the coordinates.
+        output: (w, m) all read-outs of the assembly in its order, zero where another component is read; those of
+            several parts add up. output_residual: (w, c) and output_given: (w,) of them beside the coordinates.
         loss: (m, m) H of bodies with a loss factor, residual_loss: (c, c) S: a vibration meets the stiffness K + i H
             and the compliance residual - i S. None: nothing, as in the mean.
     """
@@ -223,12 +223,12 @@ class Assembly:
     """Members, contacts, loads and read-outs.
 
     Attributes:
-        members, contacts, loads, outputs. ring: if the members are one sector that stands for N, or N sectors.
+        components, contacts, loads, outputs. ring: if the components are one sector that stands for N, or N sectors.
         stuck_damping: ratios of the modes with sticking contacts, one for all or one a mode from the lowest, the last
-            one for all that follow; None: what the members bring. It couples them, so they are eliminated together.
+            one for all that follow; None: what the components bring. It couples them, so they are eliminated together.
     """
 
-    members: tuple[Member, ...]
+    components: tuple[Component, ...]
     contacts: tuple[Contact, ...]
     loads: tuple[Load, ...]
     outputs: tuple[Output, ...]
@@ -236,38 +236,40 @@ class Assembly:
     stuck_damping: tuple[float, ...] | None = None
 
     def check_names(self) -> None:
-        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no member."""
-        if not self.members:
-            raise UserError("an assembly needs a member")
-        has = {m.name: next(iter(m.groups.values())) for m in self.members}
+        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no component."""
+        if not self.components:
+            raise UserError("an assembly needs a component")
+        has = {m.name: next(iter(m.groups.values())) for m in self.components}
         sides = [s for c in self.contacts for s in (c.first, c.second) if s]
-        named = [("interface", s.member, s.interface, lambda g: g.interfaces) for s in sides if s.rows is None]
-        named += [("load", x.member, x.row, lambda g: g.excitations) for x in self.loads]
-        named += [("read-out", w.member, w.monitor, lambda g: {**g.monitors, **g.gauges}) for w in self.outputs]
-        for what, member, row, known in named:
-            if member not in has:
-                raise UserError(f"{what} '{row}': there is no member '{member}'; the assembly has {', '.join(has)}")
-            if row not in (rows := known(has[member])):
-                raise UserError(f"{what} '{row}': '{member}' has none of this name, but {', '.join(rows) or 'none'}")
+        named = [("interface", s.component, s.interface, lambda g: g.interfaces) for s in sides if s.rows is None]
+        named += [("load", x.component, x.row, lambda g: g.excitations) for x in self.loads]
+        named += [("read-out", w.component, w.monitor, lambda g: {**g.monitors, **g.gauges}) for w in self.outputs]
+        for what, component, row, known in named:
+            if component not in has:
+                raise UserError(
+                    f"{what} '{row}': there is no component '{component}'; the assembly has {', '.join(has)}"
+                )
+            if row not in (rows := known(has[component])):
+                raise UserError(f"{what} '{row}': '{component}' has none of this name, but {', '.join(rows) or 'none'}")
 
     def index(self, harmonic: int) -> int:
-        """Index of the wave that the members move in, see `Ring.index`; 0 without a ring."""
+        """Index of the wave that the components move in, see `Ring.index`; 0 without a ring."""
         return self.ring.index(harmonic) if self.ring else 0
 
     @property
     def blades(self) -> int:
         return self.ring.blades if self.ring else 0
 
-    def sides(self, member: str) -> list[tuple[int, int, Side]]:
-        """(contact, 0 for its first or 1 for its second side, side) of all sides of a member, by contact."""
+    def sides(self, component: str) -> list[tuple[int, int, ContactFace]]:
+        """(contact, 0 for its first or 1 for its second side, side) of all sides of a component, by contact."""
         both = [(i, j, s) for i, c in enumerate(self.contacts) for j, s in enumerate((c.first, c.second)) if s]
-        return [found for found in both if found[2].member == member]
+        return [found for found in both if found[2].component == component]
 
-    def part(self, member: Member, harmonic: int) -> Linear:
-        """One member in one harmonic; its contact coordinates are the motions of its sides, one after the other."""
-        index, at = self.index(harmonic), member.at(self.index(harmonic))
-        sides = [s for _, _, s in self.sides(member.name)]
-        loads = [x for x in self.loads if x.member == member.name and x.harmonic == harmonic]
+    def part(self, component: Component, harmonic: int) -> Linear:
+        """One component in one harmonic; its contact coordinates are the motions of its sides, one after the other."""
+        index, at = self.index(harmonic), component.at(self.index(harmonic))
+        sides = [s for _, _, s in self.sides(component.name)]
+        loads = [x for x in self.loads if x.component == component.name and x.harmonic == harmonic]
         M, K, C = at.matrices
         m = len(M)
         T = [s.motion(at, index, self.blades) for s in sides]
@@ -281,14 +283,14 @@ class Assembly:
         A = scipy.linalg.block_diag(*frames) if frames else np.zeros((0, 0))
         labels = [label for s in sides for label in s.labels]
         forced = [f"excitation:{x.row}:{at.group.excitations[x.row].labels[0]}" for x in loads]
-        own = [w.member == member.name for w in self.outputs]
+        own = [w.component == component.name for w in self.outputs]
         seen = [f"monitor:{w.monitor}:{w.label}" if mine else "" for w, mine in zip(self.outputs, own, strict=True)]
         zero = np.zeros(m)
         output = np.array(
             [at.monitor(w.monitor, w.label) if mine else zero for w, mine in zip(self.outputs, own, strict=True)]
         ).reshape(-1, m)
         B = A @ at.residual(labels, labels) @ A.conj().T
-        lost = (at.loss, member.residual_loss * B) if harmonic and at.loss is not None else (None, None)
+        lost = (at.loss, component.residual_loss * B) if harmonic and at.loss is not None else (None, None)
         return Linear(
             M, K, C, rows, B, f, A @ (at.residual(labels, forced) @ amplitudes), output,
             at.residual(seen, labels) @ A.conj().T, at.residual(seen, forced) @ amplitudes, *lost,
@@ -303,26 +305,28 @@ class Assembly:
         """
         if self.ring is None:
             return self
-        flown = [m.name for m in self.members if m.sectors == 1 and len(set(m.aerodynamic.values())) > 1]
+        flown = [m.name for m in self.components if m.sectors == 1 and len(set(m.aerodynamic.values())) > 1]
         if flown:
             raise UserError(
                 f"{flown[0]}: what the flow adds differs from wave to wave, which couples the blades of a whole ring: "
                 "let one sector stand for it"
             )
         N, ring = self.ring.blades, self.ring
-        cyclic = {m.name for m in self.members if m.sectors > 1}
+        cyclic = {m.name for m in self.components if m.sectors > 1}
 
         def body(name: str, j: int) -> str:
             return name if name in cyclic else f"{name}_{j % N}"
 
-        def row(member: str, name: str, j: int) -> str:
-            return f"{name}@{j % N}" if member in cyclic else name
+        def row(component: str, name: str, j: int) -> str:
+            return f"{name}@{j % N}" if component in cyclic else name
 
-        def side(s: Side, j: int) -> Side:
+        def side(s: ContactFace, j: int) -> ContactFace:
             at, rows = j + s.shift, s.rows
-            if rows is not None and s.member in cyclic:
+            if rows is not None and s.component in cyclic:
                 rows = _rows_all_round(s, at, N)
-            return replace(s, member=body(s.member, at), interface=row(s.member, s.interface, at), shift=0, rows=rows)
+            return replace(
+                s, component=body(s.component, at), interface=row(s.component, s.interface, at), shift=0, rows=rows
+            )
 
         def met(c: Contact, j: int) -> Contact:
             second = side(c.second, j) if c.second else None
@@ -331,13 +335,13 @@ class Assembly:
 
         def load(x: Load, j: int) -> Load:
             turn = complex(np.exp(2j * np.pi * (j * ring.index(x.harmonic) % N) / N))
-            return Load(body(x.member, j), row(x.member, x.row, j), x.amplitude * turn, x.harmonic)
+            return Load(body(x.component, j), row(x.component, x.row, j), x.amplitude * turn, x.harmonic)
 
         def output(w: Output, j: int) -> Output:
-            return Output(body(w.member, j), row(w.member, w.monitor, j), w.label)
+            return Output(body(w.component, j), row(w.component, w.monitor, j), w.label)
 
         return Assembly(
-            _all_round(self.members, N),
+            _all_round(self.components, N),
             tuple(met(c, j) for j in range(N) for c in self.contacts),
             tuple(load(x, j) for j in range(N) for x in self.loads),
             tuple(output(w, j) for j in range(N) for w in self.outputs),
@@ -346,8 +350,8 @@ class Assembly:
         )
 
     def joined(self, harmonic: int) -> Linear:
-        """All members in one harmonic; the contact coordinates are the relative motions, contact by contact."""
-        part = join([self.part(m, harmonic) for m in self.members], self.signs)
+        """All components in one harmonic; the contact coordinates are the relative motions, contact by contact."""
+        part = join([self.part(m, harmonic) for m in self.components], self.signs)
         return part if self.stuck_damping is None else _damped(part, self.stiffness, self.stuck_damping)
 
     @property
@@ -358,10 +362,10 @@ class Assembly:
 
     @cached_property
     def coordinates(self) -> list[tuple[int, int, int, int]]:
-        """(contact, side, where its coordinates begin, how many) of all sides, member by member."""
+        """(contact, side, where its coordinates begin, how many) of all sides, component by component."""
         found, start = [], 0
-        for member in self.members:
-            for i, j, _ in self.sides(member.name):
+        for component in self.components:
+            for i, j, _ in self.sides(component.name):
                 k = self.contacts[i].patch.count
                 found.append((i, j, start, k))
                 start += k
@@ -377,13 +381,13 @@ class Assembly:
         return out
 
 
-def _all_round(members: Sequence[Member], blades: int) -> tuple[Member, ...]:
-    """The members of every sector, sector by sector; a cyclic body once, as a whole ring."""
-    rings = [whole(m) for m in members if m.sectors > 1]
-    return (*rings, *(replace(m, name=f"{m.name}_{j}") for j in range(blades) for m in members if m.sectors == 1))
+def _all_round(components: Sequence[Component], blades: int) -> tuple[Component, ...]:
+    """The components of every sector, sector by sector; a cyclic body once, as a whole ring."""
+    rings = [whole(m) for m in components if m.sectors > 1]
+    return (*rings, *(replace(m, name=f"{m.name}_{j}") for j in range(blades) for m in components if m.sectors == 1))
 
 
-def _rows_all_round(side: Side, sector: int, N: int) -> Mapping[int, Array]:
+def _rows_all_round(side: ContactFace, sector: int, N: int) -> Mapping[int, Array]:
     """Rows of a patch that deforms on the coordinates of a whole ring.
 
     Raises:
@@ -392,7 +396,7 @@ def _rows_all_round(side: Side, sector: int, N: int) -> Mapping[int, Array]:
     rows = side.rows or {}
     if missing := [k for k in range(N // 2 + 1) if k not in rows]:
         raise UserError(
-            f"{side.member}:{side.interface}: a whole ring needs the patch's shapes in every wave; that of nodal "
+            f"{side.component}:{side.interface}: a whole ring needs the patch's shapes in every wave; that of nodal "
             f"diameter {missing[0]} was not asked for"
         )
     return {0: spread([rows[k] for k in range(N // 2 + 1)], sector, N)}

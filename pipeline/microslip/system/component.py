@@ -33,23 +33,23 @@ class Ring:
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class Component:
     """A body of an assembly.
 
     Attributes:
         name. groups: index of a ring (see `Ring.index`) -> group; a body that is not cyclic has one, under 0. What the
             conjugate of a stored group gives need not be there. sectors: N of a cyclic body, else 1.
-        brings: (r,) share of each compliance label's residual that is added to the modes; None: nothing.
+        residual_share: (r,) share of each compliance label's residual that is added to the modes; None: nothing.
         aerodynamic: index of a ring -> relative frequency shift + i times damping ratio that the flow adds to every
             mode, in the travelling wave of that index.
         loss: index of a ring -> (m, m) H of a body with a loss factor, whose stiffness is K + i H in every harmonic but
-            the mean (see `damping.as_loss`). residual_loss: loss factor of the compliance that `brings` adds.
+            the mean (see `damping.as_loss`). residual_loss: loss factor of the compliance that `residual_share` adds.
     """
 
     name: str
     groups: Mapping[int, ModalGroup]
     sectors: int = 1
-    brings: Array | None = None
+    residual_share: Array | None = None
     aerodynamic: Mapping[int, complex] = field(default_factory=dict)
     loss: Mapping[int, Array] = field(default_factory=dict)
     residual_loss: float = 0.0
@@ -75,16 +75,16 @@ class Member:
 
     def _wave(self, stored: int, conjugate: bool, index: int) -> InWave:
         loss = self.loss.get(stored)
-        return InWave(self.groups[stored], conjugate, self.brings, self.aerodynamic.get(index, 0.0), loss)
+        return InWave(self.groups[stored], conjugate, self.residual_share, self.aerodynamic.get(index, 0.0), loss)
 
 
 @dataclass(frozen=True)
 class InWave:
-    """A member in one wave: its group, or the conjugate of it. See `Member`."""
+    """A component in one wave: its group, or the conjugate of it. See `Component`."""
 
     group: ModalGroup
     conjugate: bool
-    brings: Array | None
+    residual_share: Array | None
     aerodynamic: complex
     own_loss: Array | None = None
 
@@ -105,7 +105,7 @@ class InWave:
 
     @property
     def loss(self) -> Array | None:
-        """(m, m) H, see `Member`."""
+        """(m, m) H, see `Component`."""
         return None if self.own_loss is None else self._moving(self.own_loss)
 
     def interface(self, name: str) -> Array:
@@ -124,10 +124,10 @@ class InWave:
     def residual(self, rows: Sequence[str], columns: Sequence[str]) -> Array:
         """(rows, columns) residual compliance among labels; zero for those that the compliance does not know."""
         out = np.zeros((len(rows), len(columns)), dtype=self.group.compliance.static.dtype)
-        if self.brings is None or not len(rows) or not len(columns):
+        if self.residual_share is None or not len(rows) or not len(columns):
             return out
         names = {label: i for i, label in enumerate(self.group.compliance.labels)}
-        left = self.group.compliance.residual * np.outer(self.brings, self.brings)
+        left = self.group.compliance.residual * np.outer(self.residual_share, self.residual_share)
         a = [(i, names[r]) for i, r in enumerate(rows) if r in names]
         b = [(j, names[c]) for j, c in enumerate(columns) if c in names]
         if a and b:

@@ -1,4 +1,5 @@
-"""Damping of members: ratios by mode, as a loss factor, of stuck modes, what the flow adds to each travelling wave."""
+"""Damping of components: ratios by mode, as a loss factor, of stuck modes, what the flow adds to each travelling
+wave."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ import numpy as np
 from ..data import Array, ModalGroup, UserError
 from ..files.store import ordinary
 from ..ring.expansion import BACKWARD, FORWARD
-from .component import Member
+from .component import Component
 from .excitation import Turning, direction, index_of
 
 BOTH = "both"
@@ -58,12 +59,12 @@ def last_ratio(group: ModalGroup) -> float:
     return float(group.damping_ratio[-1]) if len(group.damping_ratio) and group.omega[-1] else 0.0
 
 
-def structural(member: Member) -> Member:
-    """The member with loss factors in the place of its modal damping, in every wave; see `as_loss`."""
-    both = {k: as_loss(g) for k, g in member.groups.items()}
-    last = 2 * last_ratio(member.groups[min(member.groups)])
+def structural(component: Component) -> Component:
+    """The component with loss factors in the place of its modal damping, in every wave; see `as_loss`."""
+    both = {k: as_loss(g) for k, g in component.groups.items()}
+    last = 2 * last_ratio(component.groups[min(component.groups)])
     loss = {k: H for k, (_, H) in both.items()}
-    return replace(member, groups={k: g for k, (g, _) in both.items()}, loss=loss, residual_loss=last)
+    return replace(component, groups={k: g for k, (g, _) in both.items()}, loss=loss, residual_loss=last)
 
 
 def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> dict[int, complex]:
@@ -73,7 +74,7 @@ def read_aerodynamics(path: Path | str, blades: int, turning: Turning = 1) -> di
     direction (``forward``: with the rotation, ``backward`` or ``both``).
 
     Returns:
-        See `Member.aerodynamic`.
+        See `Component.aerodynamic`.
 
     Raises:
         UserError: a file that cannot be read, a wave that is missing, given twice or does not exist.
@@ -134,24 +135,24 @@ def _wave(index: int, blades: int, turning: Turning) -> str:
     return f"nodal diameter {k}, {sense}"
 
 
-def total_damping(member: Member, index: int) -> Array:
+def total_damping(component: Component, index: int) -> Array:
     """(modes,) damping ratios in the wave of a ring's index, the body's own and the flow's."""
-    at = member.at(index)
+    at = component.at(index)
     return np.where(at.group.omega > 0, at.group.damping_ratio + at.aerodynamic.imag, 0.0)
 
 
-def unstable(member: Member, blades: int, turning: Turning = 1) -> list[str]:
+def unstable(component: Component, blades: int, turning: Turning = 1) -> list[str]:
     """A sentence for every mode and wave to which the flow gives more energy than the body's damping takes."""
     found = []
     for index in range(max(blades, 1)):
         try:
-            D = total_damping(member, index)
+            D = total_damping(component, index)
         except UserError:  # a wave that the modal file does not hold is not asked for
             continue
         for j in np.flatnonzero(D < 0):
-            f = member.at(index).group.omega[j] / (2 * np.pi)
+            f = component.at(index).group.omega[j] / (2 * np.pi)
             found.append(
-                f"{member.name}: mode {j + 1} ({f:.5g} Hz) of {_wave(index, blades, turning)}, has a total damping "
+                f"{component.name}: mode {j + 1} ({f:.5g} Hz) of {_wave(index, blades, turning)}, has a total damping "
                 f"ratio of {D[j]:.3g}: without friction it grows by itself."
             )
     return found

@@ -1,4 +1,4 @@
-"""The whole ring of a cyclic body as one member in real coordinates, from the groups of its nodal diameters.
+"""The whole ring of a cyclic body as one component in real coordinates, from the groups of its nodal diameters.
 
 Sector j moves as w_j = sum over kappa of T_kappa a_kappa exp(i j kappa 2 pi / N), each vector in the axes of its own
 sector, kappa from 0 to N - 1 and a_(N - kappa) the conjugate of a_kappa. With a = (c + i s) / sqrt(2 N), and
@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, Compliance, Interface, ModalGroup, Rows, UserError
-from .component import InWave, Member
+from .component import Component, InWave
 
 
 def at_sector(name: str, sector: int) -> str:
@@ -24,21 +24,21 @@ def at_sector(name: str, sector: int) -> str:
     return f"{name}@{sector}"
 
 
-def whole(member: Member) -> Member:
-    """The member of N sectors that a cyclic member stands for; its rows are named ``right@0``, ``right@1``, ...
+def whole(component: Component) -> Component:
+    """The component of N sectors that a cyclic component stands for; its rows are named ``right@0``, ``right@1``, ...
 
     Raises:
         UserError: a nodal diameter is not in the file, or the flow damps the two directions of a wave differently.
     """
-    N = member.sectors
-    waves = [member.at(k) for k in range(N // 2 + 1)]
-    if any(member.aerodynamic.get(k) != member.aerodynamic.get(N - k) for k in range(1, (N + 1) // 2)):
+    N = component.sectors
+    waves = [component.at(k) for k in range(N // 2 + 1)]
+    if any(component.aerodynamic.get(k) != component.aerodynamic.get(N - k) for k in range(1, (N + 1) // 2)):
         raise UserError(
-            f"{member.name}: a whole ring needs the same aerodynamic damping for both directions of a nodal diameter; "
-            'use ring.model = "sector"'
+            f"{component.name}: a whole ring needs the same aerodynamic damping for both directions of a nodal "
+            'diameter; use ring.model = "sector"'
         )
     M, K, C = (scipy.linalg.block_diag(*[_real(w.matrices[i], k, N) for k, w in enumerate(waves)]) for i in range(3))
-    first = member.at(0).group
+    first = component.at(0).group
     named: Any = {
         "interfaces": _faces(first, waves, N),
         "excitations": _rows(first.excitations, lambda w, name: w.group.excitations[name].rows, waves, N),
@@ -50,10 +50,10 @@ def whole(member: Member) -> Member:
         phi=np.zeros((0, 3, len(M))), stresses={}, residual=None, compliance=_compliance(first, waves, N),
         omega=np.sqrt(np.maximum(scipy.linalg.eigvalsh(K, M), 0.0)), damping_ratio=np.zeros(len(M)), **named,
     )  # fmt: skip
-    brings = None if member.brings is None else np.tile(member.brings, N)
+    residual_share = None if component.residual_share is None else np.tile(component.residual_share, N)
     H = [_real(w.loss, k, N) for k, w in enumerate(waves) if w.loss is not None]
     loss = {0: scipy.linalg.block_diag(*H)} if H else {}
-    return Member(member.name, {0: group}, 1, brings, loss=loss, residual_loss=member.residual_loss)
+    return Component(component.name, {0: group}, 1, residual_share, loss=loss, residual_loss=component.residual_loss)
 
 
 def _single(k: int, N: int) -> bool:

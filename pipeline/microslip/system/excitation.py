@@ -190,21 +190,21 @@ def _cleared(P: ComplexArray) -> ComplexArray:
 
 
 def engine_order(
-    member: str, row: str, amplitude: complex, order: int, base: int | Ring, phase: float = 0.0, turning: Turning = 1
+    component: str, row: str, amplitude: complex, order: int, base: int | Ring, phase: float = 0.0, turning: Turning = 1
 ) -> Load:
-    """An engine order on a row of a member.
+    """An engine order on a row of a component.
 
     Args:
         amplitude: 0-peak, N of a unit force, Pa of a unit pressure. phase: rad, by which it leads on the first sector.
             base: see `harmonic_of`.
     """
-    return Load(member, row, amplitude * complex(np.exp(1j * phase)), harmonic_of(order, base, turning))
+    return Load(component, row, amplitude * complex(np.exp(1j * phase)), harmonic_of(order, base, turning))
 
 
 def pattern_loads(
-    member: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1
+    component: str, row: str, pattern: Pattern, base: int | Ring, place: float = 0.0, turning: Turning = 1
 ) -> tuple[Load, ...]:
-    """The engine orders of a pattern on a row of a member, its mean as a steady load.
+    """The engine orders of a pattern on a row of a component, its mean as a steady load.
 
     Args:
         place: angle at which the loaded spot of the first sector stands at t = 0, rad.
@@ -212,16 +212,16 @@ def pattern_loads(
     found = []
     for e in pattern.orders():
         P = complex(pattern.amplitudes[e] * np.exp(1j * e * place))
-        found.append(Load(member, row, P if turning > 0 else P.conjugate(), harmonic_of(e, base, turning)))
+        found.append(Load(component, row, P if turning > 0 else P.conjugate(), harmonic_of(e, base, turning)))
     mean = float(pattern.amplitudes[0].real)
-    return (*found, Load(member, row, mean, 0)) if mean else tuple(found)
+    return (*found, Load(component, row, mean, 0)) if mean else tuple(found)
 
 
 def unheard(loads: Sequence[Load], harmonics: int) -> list[str]:
     """A sentence for each load whose harmonic is above those that are balanced."""
     return [
-        f"The load '{x.row}' on '{x.member}' is harmonic {x.harmonic} of the base frequency, but only {harmonics} are "
-        f"balanced: raise harmonics to {x.harmonic} or more, or leave it out."
+        f"The load '{x.row}' on '{x.component}' is harmonic {x.harmonic} of the base frequency, but only {harmonics} "
+        f"are balanced: raise harmonics to {x.harmonic} or more, or leave it out."
         for x in loads
         if x.harmonic > harmonics
     ]

@@ -2,7 +2,7 @@
 
     M x'' + C x' + K x = f
 
-A system has members, each with the directions it is free to move in; links between them; and named contacts, forces
+A system has components, each with the directions it is free to move in; links between them; and named contacts, forces
 and monitors on them, as a body of finite elements has. `System.basis` returns all its modes, so nothing is truncated,
 and whatever reads a modal file goes on from there. SI throughout. The same stands in a file, `load_system`.
 """
@@ -54,11 +54,12 @@ _RIGID = 1e-11
 
 @dataclass(frozen=True)
 class Body:
-    """A member: a point mass, or a rigid body if it has inertia.
+    """A component: a point mass, or a rigid body if it has inertia.
 
     Attributes:
-        name: of the member. mass: kg. at: (3,) centre of mass, m. inertia: (3,) or (3, 3) about it, body axes, kg m2;
-            None: a point, which does not turn. free: directions it can move in, e.g. ``x`` or ``x z ry``; None: all.
+        name: of the component. mass: kg. at: (3,) centre of mass, m. inertia: (3,) or (3, 3) about it, body axes, kg
+            m2; None: a point, which does not turn. free: directions it can move in, e.g. ``x`` or ``x z ry``; None:
+            all.
     """
 
     name: str
@@ -97,13 +98,13 @@ class Body:
 
 @dataclass(frozen=True)
 class Link:
-    """A spring and a damper in parallel between two members, or a member and the ground.
+    """A spring and a damper in parallel between two components, or a component and the ground.
 
     Attributes:
         first, second: names; ``ground`` is the ground. stiffness, damping: one number along `axis`, three along
             x, y, z, or six with those about x, y, z (N/m, N m/rad; N s/m, N m s/rad). axis: (3,) of one number; the
-            line between the members' centres, else the one direction a member is free in, if it is None.
-        at: (3,) where it acts on both, m; None: at each member's centre.
+            line between the components' centres, else the one direction a component is free in, if it is None.
+        at: (3,) where it acts on both, m; None: at each component's centre.
     """
 
     first: str
@@ -130,11 +131,11 @@ def Damper(
 
 @dataclass(frozen=True)
 class Contact:
-    """A place of a member where it rubs: six rows in the frame n (out of the member), t1, t2; see `Interface`.
+    """A place of a component where it rubs: six rows in the frame n (out of the component), t1, t2; see `Interface`.
 
     Attributes:
-        name. on: member. normal: (3,). t2: (3,) hint of the second tangent; an axis at right angles if None. at: (3,)
-            m, the member's centre if None. width, height: extents b0, h0 of the patch, m. role, partner,
+        name. on: component. normal: (3,). t2: (3,) hint of the second tangent; an axis at right angles if None. at:
+            (3,) m, the component's centre if None. width, height: extents b0, h0 of the patch, m. role, partner,
             sector_shift: see `Interface`.
     """
 
@@ -182,7 +183,7 @@ def _across(n: Array) -> int:
 
 @dataclass(frozen=True)
 class Force:
-    """A unit force (N) on a member along a direction. at: (3,) m; the member's centre if None."""
+    """A unit force (N) on a component along a direction. at: (3,) m; the component's centre if None."""
 
     name: str
     on: str
@@ -192,7 +193,7 @@ class Force:
 
 @dataclass(frozen=True)
 class Monitor:
-    """The displacement along x, y, z that is read at a member. at: (3,) m; the member's centre if None."""
+    """The displacement along x, y, z that is read at a component. at: (3,) m; the component's centre if None."""
 
     name: str
     on: str
@@ -204,13 +205,13 @@ class System:
     """Members, what joins them, and what is asked of them.
 
     Attributes:
-        name. members. links. contacts, forces, monitors: named rows. mass, stiffness, damping: (d, d) matrices over
-            the free directions of the members in their order, added to what members and links give. ratio: damping
-            ratio of every mode, added to the dampers'.
+        name. components. links. contacts, forces, monitors: named rows. mass, stiffness, damping: (d, d) matrices over
+            the free directions of the components in their order, added to what components and links give. ratio:
+            damping ratio of every mode, added to the dampers'.
     """
 
     name: str
-    members: Sequence[Body]
+    components: Sequence[Body]
     links: Sequence[Link] = ()
     contacts: Sequence[Contact] = ()
     forces: Sequence[Force] = ()
@@ -222,28 +223,28 @@ class System:
     settings: Mapping[str, Any] = field(default_factory=dict)  # as written, for the modal file
 
     @staticmethod
-    def of_matrices(name: str, M: Any, K: Any, C: Any = None, members: Sequence[Body] = (), **more: Any) -> System:
+    def of_matrices(name: str, M: Any, K: Any, C: Any = None, components: Sequence[Body] = (), **more: Any) -> System:
         """A system given by its matrices.
 
         Args:
-            M, K, C: (d, d) mass, stiffness and damping. members: whose free directions, in their order, are the d
+            M, K, C: (d, d) mass, stiffness and damping. components: whose free directions, in their order, are the d
                 coordinates (their own mass is added, so give it as 0); if none are given, the coordinates are the
                 displacements along x of points ``1``, ``2``, ... one metre apart on the x axis.
             more: contacts, forces, monitors, ratio.
         """
         count = len(np.atleast_1d(M))
-        points = members or [Body(str(i + 1), 0.0, (float(i), 0.0, 0.0), free="x") for i in range(count)]
+        points = components or [Body(str(i + 1), 0.0, (float(i), 0.0, 0.0), free="x") for i in range(count)]
         return System(name, points, mass=M, stiffness=K, damping=C, **more)
 
     @cached_property
     def _columns(self) -> dict[str, Array]:
-        """Member -> (6, d) its motion per unit of each coordinate."""
-        names = [m.name for m in self.members]
+        """Component -> (6, d) its motion per unit of each coordinate."""
+        names = [m.name for m in self.components]
         twice = {n for n in names if names.count(n) > 1}
         if twice or GROUND in names:
-            raise UserError(f"{self.name}: the name '{min(twice or {GROUND})}' is taken; give every member its own")
-        places = [(m.name, d) for m in self.members for d in m.directions]
-        found = {m.name: np.zeros((6, len(places))) for m in self.members}
+            raise UserError(f"{self.name}: the name '{min(twice or {GROUND})}' is taken; give every component its own")
+        places = [(m.name, d) for m in self.components for d in m.directions]
+        found = {m.name: np.zeros((6, len(places))) for m in self.components}
         for column, (name, direction) in enumerate(places):
             found[name][direction, column] = 1.0
         return found
@@ -251,19 +252,19 @@ class System:
     @property
     def count(self) -> int:
         """Number of coordinates."""
-        return sum(len(m.directions) for m in self.members)
+        return sum(len(m.directions) for m in self.components)
 
-    def _member(self, name: str, what: str) -> Body:
-        found = next((m for m in self.members if m.name == name), None)
+    def _component(self, name: str, what: str) -> Body:
+        found = next((m for m in self.components if m.name == name), None)
         if found is None:
-            known = ", ".join(m.name for m in self.members)
-            raise UserError(f"{self.name}: {what}: there is no member '{name}'; choose one of {known}")
+            known = ", ".join(m.name for m in self.components)
+            raise UserError(f"{self.name}: {what}: there is no component '{name}'; choose one of {known}")
         return found
 
     def rows_at(self, name: str, at: Sequence[float] | None, what: str) -> tuple[Array, Array]:
-        """(6, d) translations and rotations of the point `at` fixed to a member, and the point, m."""
-        member = self._member(name, what)
-        centre = np.asarray(member.at, dtype=float)
+        """(6, d) translations and rotations of the point `at` fixed to a component, and the point, m."""
+        component = self._component(name, what)
+        centre = np.asarray(component.at, dtype=float)
         point = centre if at is None else np.asarray(at, dtype=float)
         columns = self._columns[name]
         return np.vstack([columns[:3] - skew(point - centre) @ columns[3:], columns[3:]]), point
@@ -272,9 +273,9 @@ class System:
         """(d, d) M, C, K.
 
         Raises:
-            UserError: matrices of another size or not symmetric, a link to no member.
+            UserError: matrices of another size or not symmetric, a link to no component.
         """
-        M = sum((self._columns[m.name].T @ m.mass_matrix @ self._columns[m.name] for m in self.members), np.zeros(1))
+        M = sum((self._columns[m.name].T @ m.mass_matrix @ self._columns[m.name] for m in self.components), np.zeros(1))
         parts = [self._linked(link) for link in self.links]
         K = sum((rows.T @ (k[:, None] * rows) for rows, k, _ in parts), np.zeros((self.count, self.count)))
         C = sum((rows.T @ (c[:, None] * rows) for rows, _, c in parts), np.zeros((self.count, self.count)))
@@ -290,8 +291,8 @@ class System:
             raise UserError(f"{self.name}: {key}: must be {d} lists of {d} numbers each") from error
         if A.shape != (d, d):
             raise UserError(
-                f"{self.name}: {key}: has the shape {' x '.join(map(str, A.shape))}, but the members are free to move "
-                f"in {d} directions; give {d} lists of {d} numbers each"
+                f"{self.name}: {key}: has the shape {' x '.join(map(str, A.shape))}, but the components are free to "
+                f"move in {d} directions; give {d} lists of {d} numbers each"
             )
         if not np.isfinite(A).all():
             raise UserError(f"{self.name}: {key}: holds numbers that are not finite; correct them")
@@ -331,7 +332,7 @@ class System:
         else:
             axis = np.zeros(3)
         if not np.linalg.norm(axis):
-            moving = {d for n in (link.first, link.second) if n != GROUND for d in self._member(n, what).directions}
+            moving = {d for n in (link.first, link.second) if n != GROUND for d in self._component(n, what).directions}
             if len(moving) != 1 or max(moving) > 2:
                 raise UserError(f"{self.name}: {what}: along which direction does it act? Give its axis, [1, 0, 0] say")
             axis = np.eye(3)[min(moving)]
@@ -368,8 +369,8 @@ class System:
         return self._body(replace(group, checks=checks), M, bool(rigid), "matrix" if C.any() else "ratio")
 
     def _shapes(self) -> Array:
-        """(n, 3, d) displacements of the members' centres."""
-        return np.array([self._columns[m.name][:3] for m in self.members])
+        """(n, 3, d) displacements of the components' centres."""
+        return np.array([self._columns[m.name][:3] for m in self.components])
 
     def _face(self, c: Contact) -> tuple[Array, Array]:
         rows, point = self.rows_at(c.on, c.at, f"contact {c.name}")
@@ -391,7 +392,7 @@ class System:
         return ModalGroup(
             0.0, omega, ("rigid",) * rigid + ("normal",) * (len(omega) - rigid), D, np.eye(len(omega)),
             np.diag(omega**2), C_r, np.zeros_like(C_r), self._shapes() @ X, interfaces, loads, reads, {},
-            _compliance(interfaces, loads, reads, omega), {}, np.zeros((len(self.members), 3)), {},
+            _compliance(interfaces, loads, reads, omega), {}, np.zeros((len(self.components), 3)), {},
         )  # fmt: skip
 
     def _interface(self, c: Contact, T: Array, point: Array, X: Array) -> Interface:
@@ -403,9 +404,9 @@ class System:
         )  # fmt: skip
 
     def _body(self, group: ModalGroup, M: Array, free: bool, damping: str) -> ModalBasis:
-        points = np.array([np.asarray(m.at, dtype=float) for m in self.members])
+        points = np.array([np.asarray(m.at, dtype=float) for m in self.components])
         mass, centre, inertia = self._inertia(points, M)
-        sets = {m.name: np.array([i]) for i, m in enumerate(self.members)}
+        sets = {m.name: np.array([i]) for i, m in enumerate(self.components)}
         mesh = Mesh(points, {}, {}, sets, np.arange(1, len(points) + 1))
         told = {"settings": json.dumps(self.settings, sort_keys=True, default=str)} if self.settings else {}
         return ModalBasis(
@@ -416,17 +417,17 @@ class System:
     def _inertia(self, points: Array, M: Array) -> tuple[float, Array, Array]:
         """Mass, centre and inertia about it: of the rigid motions in the directions that are free."""
         R = np.zeros((self.count, 6))
-        for m, x in zip(self.members, points, strict=True):
+        for m, x in zip(self.components, points, strict=True):
             R += self._columns[m.name].T @ np.block([[np.eye(3), -skew(x)], [np.zeros((3, 3)), np.eye(3)]])
         if self.mass is None:
-            own = np.array([m.mass for m in self.members])
+            own = np.array([m.mass for m in self.components])
         else:  # row sums of what one direction carries
-            carried = np.array([self._columns[m.name][:3] @ M @ R[:, :3] for m in self.members])
+            carried = np.array([self._columns[m.name][:3] @ M @ R[:, :3] for m in self.components])
             own = np.array([np.diag(c).max() for c in carried])
         mass = float(own.sum())
         centre = own @ points / mass if mass else np.zeros(3)
         r = points - centre
-        inertia = sum(m.mass_matrix[3:, 3:] for m in self.members) + np.einsum("n,nij->ij", own, _about(r))
+        inertia = sum(m.mass_matrix[3:, 3:] for m in self.components) + np.einsum("n,nij->ij", own, _about(r))
         return mass, centre, inertia
 
 
@@ -440,7 +441,7 @@ def _modes(name: str, M: Array, K: Array) -> tuple[Array, Array, int]:
     heaviest = np.abs(np.diag(M)).max(initial=0.0)
     if not len(M) or np.linalg.eigvalsh(M)[0] <= 1e-14 * heaviest:
         raise UserError(
-            f"{name}: a coordinate has no mass (M is not positive definite); give every member some, or hold it"
+            f"{name}: a coordinate has no mass (M is not positive definite); give every component some, or hold it"
         )
     values, X = scipy.linalg.eigh(K, M)
     top = max(float(np.abs(values).max()), 1e-300)
@@ -557,7 +558,7 @@ Square = Annotated[tuple[Numbers, ...], BeforeValidator(_tuple)]
 
 
 class MatrixSettings(Model):
-    """Rows of M, K and C over the free directions of the members, in their order."""
+    """Rows of M, K and C over the free directions of the components, in their order."""
 
     mass: Square
     stiffness: Square
@@ -586,7 +587,7 @@ class SystemSettings(Model):
 
 
 def load_system(path: Path | str, assignments: list[str] | None = None) -> System:
-    """Read and check a system file; members are its masses, then its bodies, in the order of the file.
+    """Read and check a system file; components are its masses, then its bodies, in the order of the file.
 
     Raises:
         UserError: with every mistake named by file and key.
@@ -594,20 +595,20 @@ def load_system(path: Path | str, assignments: list[str] | None = None) -> Syste
     path = Path(path)
     raw = override(load_toml(path), assignments or [], path)
     s = validate(SystemSettings, raw, path)
-    members = [Body(m.name, m.mass, m.at, None, m.free) for m in s.masses]
-    members += [Body(b.name, b.mass, b.at, b.inertia, b.free) for b in s.bodies]
+    components = [Body(m.name, m.mass, m.at, None, m.free) for m in s.masses]
+    components += [Body(b.name, b.mass, b.at, b.inertia, b.free) for b in s.bodies]
     links = [Spring(i.between[0], i.between[1], i.stiffness, i.axis, i.at) for i in s.springs]
     links += [Damper(i.between[0], i.between[1], i.damping, i.axis, i.at) for i in s.dampers]
     contacts = [Contact(**c.model_dump()) for c in s.contacts]
     forces, monitors = [Force(**f.model_dump()) for f in s.forces], [Monitor(**m.model_dump()) for m in s.monitors]
     more: dict[str, Any] = {"contacts": contacts, "forces": forces, "monitors": monitors, "ratio": s.damping_ratio}
-    if (m := s.matrices) is not None and not members:
+    if (m := s.matrices) is not None and not components:
         return replace(System.of_matrices(s.name, m.mass, m.stiffness, m.damping, **more), links=links, settings=raw)
     if m is not None:
         more |= {"mass": m.mass, "stiffness": m.stiffness, "damping": m.damping}
-    if not members:
-        raise UserError(f"{path}: the system has no members; add [[masses]], [[bodies]] or [matrices]")
-    return System(s.name, members, links, settings=raw, **more)
+    if not components:
+        raise UserError(f"{path}: the system has no components; add [[masses]], [[bodies]] or [matrices]")
+    return System(s.name, components, links, settings=raw, **more)
 
 
 def system_basis(path: Path | str, assignments: list[str] | None = None) -> ModalBasis:

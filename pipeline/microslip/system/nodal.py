@@ -15,8 +15,8 @@ import scipy.linalg
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from ..data import Array, Interface, UserError
-from .assembly import Side
-from .component import InWave, Member
+from .assembly import ContactFace
+from .component import Component, InWave
 from .pairing import Pairing
 
 NEIGHBOURS = 12
@@ -37,8 +37,8 @@ class Nodal:
     Attributes:
         points: (n, 2) places along t1 and t2 from the first face's origin, m. areas: (n,) m2.
         shapes: (n, 3, k) of `contact.patch.Patch`, the first six rigid. first, second: index of a ring -> (k, m)
-            motion along the coordinates, of `assembly.Side`. lost: displacement that the coordinates do not follow,
-            root mean square over that of the deformations at equal energy.
+            motion along the coordinates, of `assembly.ContactFace`. lost: displacement that the coordinates do not
+            follow, root mean square over that of the deformations at equal energy.
     """
 
     points: Array
@@ -53,13 +53,13 @@ class Nodal:
         """k."""
         return self.shapes.shape[2]
 
-    def sides(self, first: Side, second: Side | None) -> tuple[Side, Side | None]:
+    def sides(self, first: ContactFace, second: ContactFace | None) -> tuple[ContactFace, ContactFace | None]:
         """The two sides of a contact with the motion of the patch that deforms."""
         return replace(first, rows=self.first), None if second is None else replace(second, rows=self.second)
 
 
-Face = tuple[Member, str]
-"""A member and the name of one of its interfaces."""
+Face = tuple[Component, str]
+"""A component and the name of one of its interfaces."""
 
 
 def nodal(
@@ -92,19 +92,21 @@ def nodal(
     return Nodal(points, areas, shapes, rows[0], rows[1] if len(rows) > 1 else None, lost)
 
 
-def static_compliance(contact_sides: Sequence[tuple[Member, Side, float]], index: int = 0, blades: int = 0) -> Array:
+def static_compliance(
+    contact_sides: Sequence[tuple[Component, ContactFace, float]], index: int = 0, blades: int = 0
+) -> Array:
     """(k, k) displacement along a contact's coordinates per unit of force on them, m/N, all else free.
 
     Of a body that nothing holds its elastic part, the rest of it being pushed by its own inertia.
 
     Args:
-        contact_sides: member, side and sign (+1 first, -1 second). index, blades: of the wave, see `assembly.Ring`.
+        contact_sides: component, side and sign (+1 first, -1 second). index, blades: of the wave, see `assembly.Ring`.
     """
-    rows: dict[str, tuple[Member, Array]] = {}
-    for member, side, sign in contact_sides:
-        T = sign * side.motion(member.at(index), index, blades)
-        rows[member.name] = (member, rows[member.name][1] + T if member.name in rows else T)
-    return sum((_yield(member.at(index), T).real for member, T in rows.values()), np.zeros(()))
+    rows: dict[str, tuple[Component, Array]] = {}
+    for component, side, sign in contact_sides:
+        T = sign * side.motion(component.at(index), index, blades)
+        rows[component.name] = (component, rows[component.name][1] + T if component.name in rows else T)
+    return sum((_yield(component.at(index), T).real for component, T in rows.values()), np.zeros(()))
 
 
 def _yield(wave: InWave, T: Array) -> Array:
@@ -117,20 +119,20 @@ def _yield(wave: InWave, T: Array) -> Array:
     return elastic @ elastic.conj().T
 
 
-def _interface(member: Member, name: str) -> Interface:
-    group = member.groups[min(member.groups)]
+def _interface(component: Component, name: str) -> Interface:
+    group = component.groups[min(component.groups)]
     if name not in group.interfaces:
-        raise UserError(f"{member.name}: has no interface '{name}'; it has {', '.join(group.interfaces) or 'none'}")
+        raise UserError(f"{component.name}: has no interface '{name}'; it has {', '.join(group.interfaces) or 'none'}")
     found = group.interfaces[name]
     if not len(found.shapes):
         raise UserError(
-            f"{member.name}:{name}: a node-wise patch needs the shapes of the patch, which the modal file does not "
+            f"{component.name}:{name}: a node-wise patch needs the shapes of the patch, which the modal file does not "
             "hold; write it with output.patch_shapes = true, or take a rigid patch"
         )
     if "interface-force" in group.kind:
         raise UserError(
-            f"{member.name}:{name}: a node-wise patch needs displacements or modes as coordinates, but this modal file "
-            'keeps forces; use "rubin" or "craig-bampton", or take a rigid patch'
+            f"{component.name}:{name}: a node-wise patch needs displacements or modes as coordinates, but this modal "
+            'file keeps forces; use "rubin" or "craig-bampton", or take a rigid patch'
         )
     return found
 
@@ -190,10 +192,10 @@ def interpolation(known: Array, wanted: Array) -> Array:
 def _motions(face: Face, indices: Sequence[int], Q: Array, take: Array | None) -> dict[int, tuple[Array, Array]]:
     """Index -> (n, 3, m) motion of the points in the first face's frame per unit coordinate, and (m, m) the factor
     that makes it one per root of energy."""
-    member, name = face
+    component, name = face
     found = {}
-    for index in sorted(set(indices)) if member.sectors > 1 else (0,):
-        wave = member.at(index)
+    for index in sorted(set(indices)) if component.sectors > 1 else (0,):
+        wave = component.at(index)
         item = wave.group.interfaces[name]
         S = np.einsum("ab,pbm->pam", Q @ item.rotation, wave._moving(item.shapes))
         found[index] = (S if take is None else np.tensordot(take, S, axes=1)), _per_energy(wave)

@@ -33,10 +33,10 @@ class Pairing:
     """Two faces that meet.
 
     Attributes:
-        frame: (6, 6) six rows of the second face to motions in the first one's frame, see `assembly.Side.frame`.
+        frame: (6, 6) six rows of the second face to motions in the first one's frame, see `assembly.ContactFace.frame`.
         gap: m along the first one's normal from its origin to the second one's; negative where they overlap. NaN in
             own frames, where nobody knows. offset: (2,) m along t1, t2 from the first origin to the second one.
-        angle: rad by which the normals miss being opposite. own_frames: see `in_ring`. remarks: for a reader.
+        angle: rad by which the normals miss being opposite. own_frames: see `in_ring`. messages: for a reader.
     """
 
     frame: Array
@@ -44,7 +44,7 @@ class Pairing:
     offset: Array
     angle: float
     own_frames: bool = False
-    remarks: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,16 +137,16 @@ def _met(first: Interface, axes: Array, offset: Array, gap: float) -> Pairing:
     """axes: (3, 3) rows of the second face's frame in the first body's axes. offset: (2,) along t1, t2, gap: m."""
     arm = -offset @ first.rotation[1:]  # the faces touch, so what lies between them along n turns nothing
     angle = _degrees(axes[0], -first.rotation[0])
-    remarks: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
     if angle > NOTICED:
-        remarks = (
+        messages = (
             f"The normals of the faces miss being opposite by {angle:.2g} degrees; the contact is taken as "
             "flat, in the plane of the first.",
         )
     if abs(gap) > NOTICEABLE * np.max(first.extent, initial=0.0) > 0:
         words = "apart" if gap > 0 else "inside each other"
-        remarks += (f"The faces are drawn {1e3 * abs(gap):.3g} mm {words}; the contact counts from where they touch.",)
-    return Pairing(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), False, remarks)
+        messages += (f"The faces are drawn {1e3 * abs(gap):.3g} mm {words}; the contact counts from where they touch.",)
+    return Pairing(across(first.rotation, axes, arm), gap, offset, float(np.radians(angle)), False, messages)
 
 
 def _missing(met: Pairing, first: Interface, second: Interface, axes: Array) -> str:

@@ -1,4 +1,4 @@
-"""Complex pressure fields of another program on a named load face: read, interpolated, made into rows of a member.
+"""Complex pressure fields of another program on a named load face: read, interpolated, made into rows of a component.
 
 A field of one engine order stands for the pressure Re(p exp(i Omega t)) on the sector that the modal file holds; on
 the next sectors it acts with the phase of its order. Real and imaginary part become a row each, because a row serves
@@ -19,7 +19,7 @@ from ..data import Array, ComplexArray, Interface, ModalGroup, Rows, UserError
 from ..files.store import ordinary
 from ..mesh import UNITS, point_data
 from .assembly import Load
-from .component import Member
+from .component import Component
 
 COLUMNS = ("x", "y", "z", "p_real", "p_imag")
 
@@ -224,24 +224,26 @@ def _tangents(normals: Array) -> tuple[Array, Array]:
     return t1, np.cross(normals, t1)
 
 
-# --- rows of a member ------------------------------------------------------------------------------------------------
+# --- rows of a component ------------------------------------------------------------------------------------------
 
 
-def with_pressure(member: Member, name: str, found: FacePressure) -> Member:
-    """The member with rows ``name:real`` and ``name:imag`` of a pressure on one of its faces.
+def with_pressure(component: Component, name: str, found: FacePressure) -> Component:
+    """The component with rows ``name:real`` and ``name:imag`` of a pressure on one of its faces.
 
     Raises:
         UserError: no shapes of the face in the modal file.
     """
-    return replace(member, groups={k: _with_rows(g, member.name, name, found) for k, g in member.groups.items()})
+    return replace(
+        component, groups={k: _with_rows(g, component.name, name, found) for k, g in component.groups.items()}
+    )
 
 
-def _with_rows(group: ModalGroup, member: str, name: str, found: FacePressure) -> ModalGroup:
+def _with_rows(group: ModalGroup, component: str, name: str, found: FacePressure) -> ModalGroup:
     face = group.interfaces[found.face]
     if not len(face.shapes):
         raise UserError(
-            f"{member}: the modal file holds no shapes of face '{found.face}' (output.patch_shapes = false), which a "
-            "pressure field needs; write it with them"
+            f"{component}: the modal file holds no shapes of face '{found.face}' (output.patch_shapes = false), which "
+            "a pressure field needs; write it with them"
         )
     centre = face.areas @ face.points / face.areas.sum()
     rows = {}
@@ -251,24 +253,24 @@ def _with_rows(group: ModalGroup, member: str, name: str, found: FacePressure) -
     return replace(group, excitations={**group.excitations, **rows})
 
 
-def field_loads(member: str, name: str, harmonic: int, factor: complex = 1.0) -> tuple[Load, ...]:
-    """The two loads of a pressure field that `with_pressure` put into a member, times a factor; of one that is steady
-    the real part alone, Re(p exp(0))."""
-    real = Load(member, f"{name}:real", factor, harmonic)
-    return (real, Load(member, f"{name}:imag", 1j * factor, harmonic)) if harmonic else (real,)
+def field_loads(component: str, name: str, harmonic: int, factor: complex = 1.0) -> tuple[Load, ...]:
+    """The two loads of a pressure field that `with_pressure` put into a component, times a factor; of one that is
+    steady the real part alone, Re(p exp(0))."""
+    real = Load(component, f"{name}:real", factor, harmonic)
+    return (real, Load(component, f"{name}:imag", 1j * factor, harmonic)) if harmonic else (real,)
 
 
-def load_face(member: Member, name: str) -> Interface:
-    """A face of a member, by its name.
+def load_face(component: Component, name: str) -> Interface:
+    """A face of a component, by its name.
 
     Raises:
         UserError: there is none of that name.
     """
-    faces = next(iter(member.groups.values())).interfaces
+    faces = next(iter(component.groups.values())).interfaces
     if name not in faces:
         known = ", ".join(faces) or "none"
         raise UserError(
-            f"{member.name}: the modal file has no face '{name}' with points; it has {known}; name it in an interface "
-            '(role = "load") or in an excitation of body.toml'
+            f"{component.name}: the modal file has no face '{name}' with points; it has {known}; name it in an "
+            'interface (role = "load") or in an excitation of body.toml'
         )
     return faces[name]

@@ -67,14 +67,14 @@ def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrice
     mesh = _nodes(folder, given, length_unit)
     dofs, where = _dofs(folder, given, found, mesh)
     node, component = _meaning(dofs, mesh, found["stiffness"].matrix.shape[0], given.superelement, where)
-    made, remarks = {}, []
+    made, messages = {}, []
     for role, item in found.items():
         path = folder / split(getattr(given, role))[0]
         matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
         if matrix.shape[0] != len(node):
             raise UserError(f"{path}: has {matrix.shape[0]} rows, but there are {len(node)} of the stiffness")
         made[role], remark = _symmetric(matrix, role, path)
-        remarks += [remark] if remark else []
+        messages += [remark] if remark else []
     _check_mass(made["mass"], folder / split(given.mass)[0], dofs)
     system = given.units or usual_system(length_unit)
     if system is None:
@@ -85,7 +85,7 @@ def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrice
     scaled = {role: _in_si(matrix, role, system, component) for role, matrix in made.items()}
     return Matrices(
         scaled["stiffness"], scaled["mass"], scaled.get("damping"), scaled.get("gyroscopic"), mesh, node, component,
-        given.grounded, tuple(remarks),
+        given.grounded, tuple(messages),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from ..contact.solids import Solid
 from ..data import Array, Interface, UserError
 from ..system.nodal import Nodal
 from ..system.pairing import rigid_points
-from .counting import Springs
+from .compliance import Springs
 from .settings import CaseSettings, ContactSettings
 
 

@@ -101,16 +101,18 @@ def _what_is_counted(
     return ""
 
 
-def brought(group: ModalGroup, reduction: str, beside: bool, faces: Mapping[str, str | None]) -> Array | None:
+def residual_share(
+    group: ModalGroup, reduction: str, has_residual: bool, faces: Mapping[str, str | None]
+) -> Array | None:
     """Share of each compliance label's residual that is added: beside the modes, or for laws of the surface.
 
     Args:
-        beside: whether statics stand beside the modes (`compliance.statics_beside`). faces: interface of a contact ->
+        beside: whether statics stand beside the modes (`compliance.has_residual`). faces: interface of a contact ->
             which compliance its law includes.
     """
     names = list(group.compliance.labels)
     bring = np.ones(len(names))
-    if not beside:
+    if not has_residual:
         wanting = [i for i, includes in faces.items() if includes == SURFACE and _leaves(group, i, reduction)]
         if not wanting:
             return None

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.harmonics import waves
+from ..contact.harmonics import fourier
 from ..contact.law import Law, State, Step, program
 from ..contact.periodic import periodic
 from ..contact.point import PointContact
@@ -69,10 +69,10 @@ ROUNDING = 1e-13
 """Share of the work that goes to and fro in a cycle below which what is lost is not told from zero."""
 
 
-def derivative(waves: int) -> Array:
+def derivative(coefficients: int) -> Array:
     """(W, W) harmonics mean, cos, sin, cos 2, ... of a signal's derivative over Omega t from its own."""
-    out = np.zeros((waves, waves))
-    for h in range(1, waves // 2 + 1):
+    out = np.zeros((coefficients, coefficients))
+    for h in range(1, coefficients // 2 + 1):
         out[2 * h - 1, 2 * h], out[2 * h, 2 * h - 1] = h, -h
     return out
 
@@ -82,7 +82,7 @@ def _point_cycles(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
     periodicity: jax.Array | float,
 ) -> tuple[jax.Array, ...]:  # fmt: skip
-    values, _ = waves(u.shape[1] // 2, samples)
+    values, _ = fourier(u.shape[1] // 2, samples)
     path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, values @ derivative(u.shape[1])))
     before, state = periodic(law, path, period, count, periodicity)[:2]
     moved = path - jnp.roll(path, 1, axis=0)
