@@ -427,7 +427,7 @@ def test_files_without_a_seal_are_tried_in_a_process_of_their_own(copy: Path, mo
     assert trial("path.read_bytes()", copy) == ""
     assert trial("raise ValueError", copy) == ""
     assert trial("import os; os.abort()", copy) == "crashes"
-    package = "import os, sys; os.path.isfile(sys.path[0] + '/microslip/hostile.py') and os.abort()"
+    package = "import os, sys; os.path.isfile(sys.path[0] + '/microslip/files/hostile.py') and os.abort()"
     assert trial(package, copy) == "crashes"  # so the trial knows this package, installed or not
     assert trial("while True: pass", copy, seconds=1.0) == "does not come to an end"
     assert trial("raise MemoryError", copy) == "wants too much memory"
