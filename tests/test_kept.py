@@ -19,7 +19,7 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.harmonic_balance import kept, refinement, response
+from microslip.harmonic_balance import checkpoint, refinement, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.checkpoint import labels, record, restored, resumed_response
 from microslip.harmonic_balance.checks import forces_on
@@ -104,7 +104,7 @@ def test_a_peak_on_a_point_of_the_sweep_is_a_point_still(tmp_path: Path, monkeyp
         f, x = found.frequency[bracket[1]], found.x[bracket[1]]
         return Point(2 * np.pi * f, x, "converged", 0.0, 0), float(abs(found.monitor[bracket[1]]))
 
-    monkeypatch.setattr(kept, "highest", top)
+    monkeypatch.setattr(checkpoint, "highest", top)
     for frequency in 2 * [np.array([2.0, 2.125, 2.25, 2.375])]:
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
             found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
@@ -233,6 +233,6 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
     assembly = Assembly(components, (), (), tuple(Output(m, "tip", label) for m, label in asked))
     problem: Any = SimpleNamespace(assembly=assembly, harmonics=1)
     watched = np.arange(8.0).reshape(4, 2) + 0j
-    row = {name: watched[list(rows.values())] for name, rows in kept._outputs(problem).items()}
+    row = {name: watched[list(rows.values())] for name, rows in checkpoint._outputs(problem).items()}
     np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
-    np.testing.assert_array_equal(kept._outputs_of(problem, row), watched)
+    np.testing.assert_array_equal(checkpoint._outputs_of(problem, row), watched)
