@@ -247,6 +247,6 @@ def test_entries_are_set_by_their_names(tmp_path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(more=GAS, ring="", body=""))
     settings, _ = load_case(path, ["contacts.right.friction=0.4", "excitations.gas.amplitude=7.0"])
-    assert settings.contacts[0].friction == 0.4 and settings.loads[0].amplitude == 7.0
+    assert settings.contacts[0].coefficient == 0.4 and settings.loads[0].amplitude == 7.0
     with pytest.raises(UserError, match="has no entry 'left' there; choose one of right"):
         load_case(path, ["contacts.left.friction=0.4"])

@@ -303,9 +303,9 @@ def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more:
 
 def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Off by a hundred thousandth: neither picture nor VTU, a remark, and the response stays."""
-    from microslip.harmonic_balance import response
+    from microslip.case import checkpoint
 
-    seen = response.traced
+    seen = checkpoint.traced
 
     def other(problem: Any, found: Any) -> Any:
         return {
@@ -313,7 +313,7 @@ def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pyte
             for name, one in seen(problem, found).items()
         }
 
-    monkeypatch.setattr(response, "traced", other)
+    monkeypatch.setattr(checkpoint, "traced", other)
     told, converged = respond(folder, *SLIDES)
     summary = json.loads((folder / "build/vane/response.json").read_text())
     assert converged and "contacts at resonance" not in summary["pictures"]

@@ -39,7 +39,7 @@ class Face:
 def counted_once(
     c: ContactSettings, given: Springs, faces: Sequence[Face], path: Path | str
 ) -> tuple[Springs, str]:  # fmt: skip
-    """The springs of a contact without the bulk that the bodies hold on both of its sides, and a remark or nothing.
+    """The springs of a contact without the bulk that the bodies hold on both of its sides, and a message or nothing.
 
     Args:
         given: as the contact has them.

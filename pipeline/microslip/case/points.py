@@ -55,7 +55,7 @@ FEWEST, ENOUGH = 3, 6
 
 
 def resolved(c: ContactSettings, patch: Patch, load: float | None) -> list[str]:
-    """A remark where few points of a curved patch are pressed at the load that it is fitted for.
+    """A message where few points of a curved patch are pressed at the load that it is fitted for.
 
     Raises:
         UserError: so few that the contact falls between them.

@@ -155,7 +155,7 @@ def _still(response: FrequencyResponse) -> bool:
 def _overhanging(
     responses: Mapping[float, FrequencyResponse], resonances: Mapping[float, list[tuple[float, float]]]
 ) -> list[str]:  # fmt: skip
-    """A remark on resonances that a sweep jumps past."""
+    """A message on resonances that a sweep jumps past."""
     found = {normal: overhanging(r, resonances[normal]) for normal, r in responses.items()}
     return [
         f"At F_N = {normal:g} N the resonance at {', '.join(f'{f:.6g}' for f, _ in peaks)} Hz overhangs: beside it "
@@ -167,7 +167,7 @@ def _overhanging(
 
 
 def _idle(forces: Sequence[float]) -> list[str]:
-    """A remark where nothing moves the first read-out."""
+    """A message where nothing moves the first read-out."""
     if not forces:
         return []
     pressed = ", ".join(f"{normal:g}" for normal in forces)
@@ -337,7 +337,7 @@ class _Left:
     def out(
         self, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
     ) -> list[str]:
-        """A remark where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
+        """A message where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
 
         The book's mode is one harmonic by what it is, and of a whole ring its sector says the same: neither is judged.
 
@@ -387,7 +387,7 @@ OPEN = 0.01
 
 
 def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
-    """A remark where points would lift off in the book's mode, whose friction does not know of it."""
+    """A message where points would lift off in the book's mode, whose friction does not know of it."""
     share = np.where(found.converged[:, None], found.open, 0.0)
     if built.settings.mode != "book" or share.max(initial=0.0) <= OPEN:
         return []
@@ -400,10 +400,10 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
 
 
 def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
-    """A remark where contacts that do not open would."""
+    """A message where contacts that do not open would."""
     count = len(built.contacts)  # of a sector; the others of a ring follow
-    jenkins = [i for i in range(found.open.shape[1]) if built.contacts[i % count].law == "jenkins"]
-    pulls = ((found.open > 0) & found.converged[:, None])[:, jenkins].any(axis=1)
+    never = [i for i in range(found.open.shape[1]) if not built.contacts[i % count].what.opens]
+    pulls = ((found.open > 0) & found.converged[:, None])[:, never].any(axis=1)
     if not normal or not pulls.any():
         return []
     low, high = found.frequency[pulls][[0, -1]]
@@ -443,7 +443,7 @@ def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
 
 
 def _between(built: Built) -> list[str]:
-    """A remark where the static normal force is one between two equilibria of a speed range."""
+    """A message where the static normal force is one between two equilibria of a speed range."""
     error = max(b.group.checks.get("normal_force_error", 0.0) for b in built.bodies.values())
     if built.settings.sweep.normal_forces != "static" or not error:
         return []
@@ -484,7 +484,7 @@ REMEDIES = {
 
 
 def _not_converged(responses: Mapping[float, HarmonicResponse]) -> list[str]:
-    """A remark for each normal force and cause."""
+    """A message for each normal force and cause."""
     found = []
     for normal, r in responses.items():
         failed = {f: text for f, text, ok in zip(r.frequency, r.status, r.converged, strict=True) if not ok}

@@ -105,7 +105,9 @@ class OfJenkins(LawKind):
 
     def fits(self, contact: ContactLaw) -> None:
         if contact.roughness is not None or not isinstance(contact.stiffness, Given | None):
-            raise ValueError('law: "jenkins" has two linear springs; give their stiffnesses alone')
+            raise ValueError(
+                'law: "jenkins" has linear springs; leave out roughness, and give their stiffnesses as numbers'
+            )
         if not isinstance(contact.friction, OfCoulomb) or contact.friction.deviation:
             raise ValueError('law: "jenkins" slides by one coefficient; write a number as friction')
         if not contact.is_pressed:

@@ -211,7 +211,9 @@ def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
     if last.converged:
         return replace(last, iterations=spent)
     force, whom = pseudo_transient.unbalanced(at, q, held.modal(fixed.x, held.force(fixed.x)))
-    words = f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body weak_springs or a spring"
+    words = (
+        f"{whom} {AWAY}: nothing balances a mean force of {force:.2g} N on it; give the body weak_springs or a spring"
+    )
     return replace(last, status=words, iterations=spent)
 
 
