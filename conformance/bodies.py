@@ -133,7 +133,7 @@ def two_masses() -> ModalBasis:
     """The least a file can be: two points that slide along x, a force, a probe, no interface."""
     return System(
         "two-masses",
-        members=[Body("m1", 1.0, (1.0, 0.0, 0.0), free="x"), Body("m2", 2.0, (2.0, 0.0, 0.0), free="x")],
+        components=[Body("m1", 1.0, (1.0, 0.0, 0.0), free="x"), Body("m2", 2.0, (2.0, 0.0, 0.0), free="x")],
         links=[Spring("ground", "m1", 1e4), Spring("m1", "m2", 2e4), Damper("m1", "m2", 3.0)],
         forces=[Force("shaker", "m1", direction=(1.0, 0.0, 0.0))],
         monitors=[Monitor("end", "m2")],

@@ -20,7 +20,7 @@ from microslip.modes.equilibrium import make_model
 from microslip.modes.solution import held_compliance
 from microslip.modes.spectrum import make_pencil
 from microslip.reduced.quality import percent_off
-from microslip.reduction import METHODS, Problem
+from microslip.reduction import METHODS, Substructure
 from microslip.reduction.craig_bampton import fixed_interface_modes
 from microslip.stages.summary import basis_summary
 
@@ -310,7 +310,7 @@ class DenseSolver(eigen.DirectSolver):
         return int((np.linalg.eigvalsh(self.A) < 0).sum())
 
 
-def problems_with_turned_phases() -> tuple[Problem, Problem]:
+def problems_with_turned_phases() -> tuple[Substructure, Substructure]:
     """A real problem, and the same with every degree of freedom turned by a phase of its own: D K D^H, B D^H."""
     rng = np.random.default_rng(7)
     n, m = 40, 5
@@ -328,7 +328,7 @@ def problems_with_turned_phases() -> tuple[Problem, Problem]:
             dtype=A.dtype,
         )  # fmt: skip
         static = np.linalg.solve(A, rows.conj().T)
-        return Problem(pencil, values, D[:, None] * X, 0, sp.csr_matrix(rows), labels, static)
+        return Substructure(pencil, values, D[:, None] * X, 0, sp.csr_matrix(rows), labels, static)
 
     return problem(np.ones(n)), problem(phase)
 

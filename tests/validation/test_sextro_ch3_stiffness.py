@@ -11,7 +11,7 @@ from closed_forms.joined_beams import shear_spring
 from scipy.integrate import quad
 
 from microslip.contact.curves import curve
-from microslip.contact.identification import Resonance, identify, two_beams
+from microslip.contact.identification import MeasuredResonance, identify, two_beams
 from microslip.contact.layer import Layer, modal_stiffness, modes_needed
 from microslip.contact.solids import Solid
 from microslip.reference.beams import rectangle
@@ -84,7 +84,7 @@ def test_the_rig_tells_both_printed_stiffnesses():
     beam = rectangle(0.2, 0.02, 0.01, 2.1e11, 0.3, 7850)
     rig, printed = two_beams(beam, 0.01), np.array([82.5e6, 31.7e6])
     f = rig(printed)
-    found = identify(rig, [Resonance(f[0], 0.1, 1), Resonance(f[1], 0.1, 2)])
+    found = identify(rig, [MeasuredResonance(f[0], 0.1, 1), MeasuredResonance(f[1], 0.1, 2)])
     assert found.stiffness == pytest.approx(printed, rel=1e-6)
     assert found.deviation == pytest.approx([0.004, 0.011], rel=0.05)
     assert shear_spring(beam, 2 * np.pi * f[1]) == pytest.approx(31.7e6, rel=1e-9)
