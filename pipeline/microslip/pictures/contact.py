@@ -231,7 +231,7 @@ def _shade(axes: Any, time: np.ndarray, state: np.ndarray, stick: str) -> None:
     """Blue-grey where the contact sticks, white where it slips, hatched where it is open. stick: word for the first."""
     styles: tuple[tuple[int, dict[str, Any]], ...] = (
         (1, {"color": "#e3e8f0", "label": stick}),
-        (0, {"facecolor": "none", "edgecolor": "#c9ced8", "hatch": "///", "label": "open"}),
+        (0, {"facecolor": "none", "edgecolor": "#c9ced8", "hatch": "///", "label": "separated"}),
     )
     for value, style in styles:
         jumps = np.diff((state == value).astype(int), prepend=0, append=0)
