@@ -146,8 +146,8 @@ def test_harmonics_are_added_to_a_slider_and_too_few_are_told():
     assert not found.reached and [e.harmonics for e in found.errors] == [1, 5]
     assert found.errors[1].readout < found.errors[0].readout / 8
     assert enough(problem, start, tolerance=1.01 * found.errors[0].readout).reached
-    (remark,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
-    assert "At F_N = 8 N the amplitude at 17 Hz" in remark
+    (message,) = _Left(built, None).out(problem, harmonic_response(problem, np.array([17.0]), np.ones(1)), [], 8.0)
+    assert "At F_N = 8 N the amplitude at 17 Hz" in message
 
 
 @pytest.mark.slow

@@ -78,7 +78,7 @@ def test_both_modes_side_by_side(folder: Path, capsys: pytest.CaptureFixture[str
     told = [json.loads((f / "response.json").read_text()) for f in (build, build / "book")]
     assert [summary["mode"] for summary in told] == ["aft", "book"]
     said = f"tables are off by at most {orbits()[1].error:.2g} of what friction holds (orbits)"
-    assert any("Book mode" in remark and said in remark for remark in modes[1].messages)
+    assert any("Book mode" in message and said in message for message in modes[1].messages)
     assert modes[1].series[0].converged.all()
     capsys.readouterr()
     assert main(["respond", "case.toml", "--compare-book"]) == 0  # up to date: nothing is computed again

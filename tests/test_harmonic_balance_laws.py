@@ -484,7 +484,7 @@ def test_a_case_with_a_law_slides_and_its_table_says_how(answered: CaseResult) -
 
 
 def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
-    """None at all marches every cycle and finds the same; a wide share leaves its mark, and a remark says so."""
+    """None at all marches every cycle and finds the same; a wide share leaves its mark, and a message says so."""
     found = {}
     for periodicity in (0.0, 1e-10, 1e-2):
         settings = asked(tmp_path, ("samples = 32", f"samples = 32\ncycles = 8\nperiodicity = {periodicity}"))
@@ -494,8 +494,8 @@ def test_a_case_says_when_sliders_are_settled(tmp_path: Path) -> None:
         found[periodicity] = harmonic_response(problem, np.array([60.0]), np.ones(1)).monitor[0]
     assert found[1e-10] == pytest.approx(found[0.0], rel=1e-8)
     assert found[1e-2] == pytest.approx(found[0.0], rel=1e-2)
-    (remark,) = _not_periodic(5.0, np.array([4e-3]), settings)
-    assert "up to 0.4 % in the next one; lower periodicity." in remark
+    (message,) = _not_periodic(5.0, np.array([4e-3]), settings)
+    assert "up to 0.4 % in the next one; lower periodicity." in message
 
 
 @pytest.mark.parametrize(

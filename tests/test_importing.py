@@ -69,17 +69,17 @@ def test_a_surface_with_a_face_inside_matters_to_nobody_who_does_not_use_it(tmp_
     monkeypatch.chdir(tmp_path)
     lines = [*decks.mesh_lines(beam(), sets=("z0",)), "*SURFACE, NAME=CUT", "1, S1", "1, S2"]
     (tmp_path / "part.inp").write_text("\n".join([*lines, *decks.MATERIAL, decks.section()]) + "\n")
-    remark = "1 of 2 facets of the set 'CUT' are not on the surface"
+    message = "1 of 2 facets of the set 'CUT' are not on the surface"
     assert main(["info", "part.inp"]) == 0
     out, err = capsys.readouterr()
-    assert remark in err and "CUT" not in out
+    assert message in err and "CUT" not in out
     assert main(["import", "part.inp", "here"]) == 0
-    assert f"warning: {remark}" in capsys.readouterr().out
+    assert f"warning: {message}" in capsys.readouterr().out
     assert main(["modes", "here", "-q"]) == 0
     path = tmp_path / "here" / "body.toml"
     path.write_text(path.read_text().replace("free = true", "") + '\n[[supports]]\nface = "CUT"\n')
     assert main(["modes", "here", "-q"]) == 2
-    assert f"supports.CUT.face: {remark}" in capsys.readouterr().err
+    assert f"supports.CUT.face: {message}" in capsys.readouterr().err
 
 
 def clamped():

@@ -211,7 +211,7 @@ def test_what_the_command_line_says_of_it(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_stuck_damping_says_what_open_contacts_make_of_it(tmp_path: Path) -> None:
-    """phi^T C phi / (2 omega) of the bars without a joint, ten times what was asked for, stands in a remark."""
+    """phi^T C phi / (2 omega) of the bars without a joint, ten times what was asked for, stands in a message."""
     from microslip.case.run import _of_stuck_modes
 
     b = strips(tmp_path, 'damping = "stuck"\ndamping_ratio = 0.001', joint=100 * STIFF)

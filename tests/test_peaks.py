@@ -21,7 +21,7 @@ from microslip.harmonic_balance.peak import highest, optimum, resonance
 from microslip.harmonic_balance.readout import amplitude
 from microslip.harmonic_balance.response import of_body, operating
 from microslip.harmonic_balance.solver import solve, sweep
-from microslip.stages.following import missed, told
+from microslip.stages.following import missed, optimum_message
 
 
 @dataclass(frozen=True)
@@ -341,7 +341,7 @@ def test_a_setting_that_hardly_matters_is_said_to():
         tops = {p: peaks.HighestPeak(1.0, a, np.zeros(1), "converged") for p, a in heights.items()}
         found = peaks.Optimum(3.0, tops[3.0], NO_OPTIMUM, tops, {})
         assert found.spread == pytest.approx(most / 4.2109 - 1)
-        assert ("hardly matters" in told(found, "normal_force")) is word
+        assert ("hardly matters" in optimum_message(found, "normal_force")) is word
         assert "an end; look beyond it with --high above 3" in missed(found, "normal_force")
     one = peaks.Optimum(1.0, tops[1.0], NO_OPTIMUM, {1.0: tops[1.0]}, {})
     assert np.isinf(one.spread)

@@ -302,7 +302,7 @@ def test_the_energy_on_a_contact_map_is_that_of_the_response(folder: Path, more:
 
 
 def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Off by a hundred thousandth: neither picture nor VTU, a remark, and the response stays."""
+    """Off by a hundred thousandth: neither picture nor VTU, a message, and the response stays."""
     from microslip.case import checkpoint
 
     seen = checkpoint.traced
@@ -318,7 +318,7 @@ def test_no_map_is_drawn_whose_energy_is_another(folder: Path, monkeypatch: pyte
     summary = json.loads((folder / "build/vane/response.json").read_text())
     assert converged and "contacts at resonance" not in summary["pictures"]
     assert "contact_right.vtu" not in summary["files"] and "response.h5" in summary["files"]
-    assert any("right" in remark and "map" in remark for remark in summary["messages"])
+    assert any("right" in message and "map" in message for message in summary["messages"])
     assert any(t.startswith("warning") and "map" in t for t in told)
 
 
@@ -416,7 +416,7 @@ def test_a_resonance_beyond_the_band_is_told_with_the_range_to_add(folder: Path)
     assert any(end["add"] in t and not t.startswith("warning") for t in told)
     assert any(end["add"] in t and t.startswith("warning") for t in told)
     assert (build / "response.html").read_text().count(end["add"]) == 2
-    assert any(end["add"] in remark for remark in read_response(build / "response.h5").messages)
+    assert any(end["add"] in message for message in read_response(build / "response.h5").messages)
     respond(folder, f"sweep.stop={high}", "sweep.points=15")
     again = json.loads((build / "response.json").read_text())
     assert again["rising_at_the_edge"] == [] and len(again["resonances"]) == 1
@@ -569,7 +569,7 @@ def test_where_contacts_that_never_open_would_is_told(folder: Path) -> None:
     (said,) = [t for t in told if "does not follow" in t]
     assert said.startswith("warning: At F_N = 0.05 N the contacts would lift off between") and 'law = "smooth"' in said
     summary = json.loads((folder / "build/vane/response.json").read_text())
-    assert any("does not follow" in remark for remark in summary["messages"])
+    assert any("does not follow" in message for message in summary["messages"])
 
 
 def test_a_contact_is_named_by_its_interface(folder: Path) -> None:
@@ -585,6 +585,6 @@ def test_a_speed_that_is_not_stored(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_coarse_sweep_is_told_where_it_matters(folder: Path) -> None:
-    """A remark beside a resonance in the band, none where the band has none."""
+    """A message beside a resonance in the band, none where the band has none."""
     assert any("is wide against a resonance with sticking" in t for t in respond(folder, "sweep.points=3")[0])
     assert not any("is wide" in t for t in respond(folder, "sweep.points=3", "sweep.start=370.0")[0])

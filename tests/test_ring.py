@@ -177,7 +177,7 @@ def test_the_turn_is_right_handed() -> None:
 def test_a_missing_nodal_diameter_is_told() -> None:
     found = certify_ring(sector.basis(6, harmonics=(0, 2)))
     assert found.missing == (1, 3) and not found.certified
-    assert "without the nodal diameters 1, 3" in ring_checks(sector.basis(6, harmonics=(0, 2)))[-1].remark
+    assert "without the nodal diameters 1, 3" in ring_checks(sector.basis(6, harmonics=(0, 2)))[-1].message
 
 
 def test_without_certified_groups_nothing_is_proved() -> None:

@@ -329,7 +329,7 @@ def test_a_read_out_that_nothing_moves_and_a_case_without_contacts(
         assert main(["respond", "three-masses", *more, *few]) == 0
         found = json.loads(summary.read_text())
         assert found["resonances"] == [] and found["rising_at_the_edge"] == []
-        assert any("does not move" in remark for remark in found["messages"])
+        assert any("does not move" in message for message in found["messages"])
     assert main(["respond", "three-masses", "--set", "contacts=[]", *few]) == 0
     omega = np.sqrt(scipy.linalg.eigvalsh(*reversed(load_system("three-masses/system.toml").matrices()[::2])))
     tops = {round(one["frequency_Hz"], 3) for one in json.loads(summary.read_text())["resonances"]}

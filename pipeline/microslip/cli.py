@@ -404,7 +404,7 @@ def optimum(
         with making(opened.folder / "optimum.csv", report):
             found = following.optimum_over(opened, over, low, high, points, report)
             files = following.write_optimum(found, over, opened)
-    _say(following.told(found, over, opened.quantity), quiet)
+    _say(following.optimum_message(found, over, opened.quantity), quiet)
     for file in files:
         _say(file, quiet)
     if not following.is_optimum(found):
@@ -489,7 +489,7 @@ def _verdict(file: Path, findings: list[Check], short: bool, quiet: bool) -> Non
     failed = [c for c in findings if not c.passed]
     for c in failed if quiet else worst_of_each(failed) if short else findings:
         mark = "ok  " if c.passed else "FAIL"
-        print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.remark if c.remark else ''}")
+        print(f"{mark} {c.name}: {c.value:.3g} (limit {c.limit:.3g}){'  ' + c.message if c.message else ''}")
     _say_seal(file, quiet)
     if failed:
         raise NotConverged(f"{file}: {len(failed)} of {len(findings)} checks failed")

@@ -44,7 +44,7 @@ class Check:
     value: float
     limit: float
     passed: bool
-    remark: str = ""
+    message: str = ""
 
 
 def worst_of_each(findings: Iterable[Check]) -> list[Check]:
@@ -74,16 +74,16 @@ def check_basis(basis: ModalBasis) -> list[Check]:
 
 def _check_basis(basis: ModalBasis) -> list[Check]:
     out: list[Check] = []
-    for name, value, bound, remark in _mesh_checks(basis):
-        out.append(Check(name, float(value), bound, bool(value <= bound), remark))
+    for name, value, bound, message in _mesh_checks(basis):
+        out.append(Check(name, float(value), bound, bool(value <= bound), message))
     sound = all(c.passed for c in out)
     for (speed, harmonic), g in sorted(basis.groups.items()):
         where = f"speed_{speed}/nd_{harmonic}"
-        for name, value, bound, remark in _group_checks(basis, g, sound):
-            out.append(Check(f"{where}: {name}", float(value), bound, bool(value <= bound), remark))
+        for name, value, bound, message in _group_checks(basis, g, sound):
+            out.append(Check(f"{where}: {name}", float(value), bound, bool(value <= bound), message))
     for harmonic, r in sorted(basis.ranges.items()):
-        for name, value, bound, remark in _range_checks(basis, r, sound):
-            out.append(Check(f"range/nd_{harmonic}: {name}", float(value), bound, bool(value <= bound), remark))
+        for name, value, bound, message in _range_checks(basis, r, sound):
+            out.append(Check(f"range/nd_{harmonic}: {name}", float(value), bound, bool(value <= bound), message))
     return out
 
 
@@ -155,8 +155,8 @@ def _group_checks(basis: ModalBasis, g: ModalGroup, mesh_is_sound: bool) -> _Fin
         if key in g.checks:
             found.append((f"solver: {key.replace('_', ' ')}", g.checks[key], TOLERANCES[key], ""))
     if "certified" in g.checks:
-        remark = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
-        found.append(("solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, remark))
+        message = "" if g.checks["certified"] else "modes.certify was false; the spectrum may have gaps"
+        found.append(("solver: spectrum certified complete", 1.0 - g.checks["certified"], 0.0, message))
     return found
 
 
@@ -178,8 +178,8 @@ def _range_checks(basis: ModalBasis, r: SpeedRange, mesh_is_sound: bool) -> _Fin
     found.append(("interpolation error at held-out speeds is the one stated", _misstated(r), 0.0, ""))
     found.append(("frequency error at held-out speeds", _largest(r.total_error), r.tolerance, f"{h} speeds"))
     for i, g in enumerate(r.samples):
-        for name, value, bound, remark in _group_checks(basis, g, mesh_is_sound and i == 0):
-            found.append((f"sample_{i}: {name}", value, bound, remark))
+        for name, value, bound, message in _group_checks(basis, g, mesh_is_sound and i == 0):
+            found.append((f"sample_{i}: {name}", value, bound, message))
     return found
 
 
@@ -358,8 +358,8 @@ def _interface_checks(basis: ModalBasis, g: ModalGroup, name: str, item: Interfa
     found: _Findings = [(f"interface {name}: frame is right-handed", frame, 1e-9, "")]
     still = [label for label, row in zip(INTERFACE_ROWS, item.rows, strict=True) if not row.any()]
     if still:
-        remark = f"nothing moves it along {', '.join(still)}"
-        found.append((f"interface {name}: rows of zeros", float(len(still)), np.inf, remark))
+        message = f"nothing moves it along {', '.join(still)}"
+        found.append((f"interface {name}: rows of zeros", float(len(still)), np.inf, message))
     top = max(_largest(item.rows[:3]), 1e-300)
     if item.shapes.shape[0]:
         mean = R @ np.einsum("p,pim->im", item.areas, item.shapes) / item.areas.sum()

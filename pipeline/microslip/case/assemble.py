@@ -284,10 +284,10 @@ def _stiffness(
     loaded, faces = _sides(settings, bodies, c, path)
     own = sized(c, faces[0], path)
     if c.is_curved:
-        springs, remark = _in_contact(path, c, lambda: curved_springs(own, load))
+        springs, message = _in_contact(path, c, lambda: curved_springs(own, load))
     else:
-        springs, remark = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
-    return own, springs, [remark] if remark else []
+        springs, message = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
+    return own, springs, [message] if message else []
 
 
 def _sides(

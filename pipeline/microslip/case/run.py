@@ -319,7 +319,7 @@ def _about_resonances(part: Linear, frequency: Array) -> Array:
 
 
 TRUNCATION = 0.01
-"""Estimated error of the highest point of a response, by harmonics that are left out, above which a remark is made."""
+"""Estimated error of the highest point of a response, by harmonics that are left out, above which a message is made."""
 
 
 class _Left:
@@ -383,7 +383,7 @@ class _Left:
 
 
 OPEN = 0.01
-"""Share of points and time that may be open in the book's mode before a remark is made."""
+"""Share of points and time that may be open in the book's mode before a message is made."""
 
 
 def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:

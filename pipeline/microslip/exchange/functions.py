@@ -88,7 +88,7 @@ def _fit(f: Array, H: Array, residues: Array, g: ModalGroup, moved: int) -> tupl
     return float(abs(np.vdot(M, S)) ** 2 / (a * b)), float(np.sqrt(b / a))
 
 
-def told(found: list[Fit], count: int) -> list[str]:
+def fit_messages(found: list[Fit], count: int) -> list[str]:
     """What to say of them."""
     if not found:
         return [

@@ -21,8 +21,7 @@ from ..files.store import ordinary
 from ..linalg.canonical import signs
 from ..mesh import UNITS
 from ..reduced.correlation import DIRECTIONS, POINT
-from .functions import fits
-from .functions import told as functions_told
+from .functions import fit_messages, fits
 
 NORMAL = 2
 _KINDS = (NORMAL, 3, 7)
@@ -96,7 +95,7 @@ def read_measured(path: Path | str, unit: str = "m", name: str = "") -> tuple[Mo
     basis = _basis(name or path.stem, points, used, modes, phi, scaled)
     if others:
         functions = [s for s in sets if s["type"] == 58] if scaled else []
-        told += functions_told(fits(functions, basis.groups[0, 0], used, length / force), others)
+        told += fit_messages(fits(functions, basis.groups[0, 0], used, length / force), others)
     return basis, tuple(told)
 
 

@@ -301,9 +301,9 @@ def _checks(basis: ModalBasis) -> list[Piece]:
     found = [*check_basis(basis), *ring_checks(basis)]
     failed = [c.name for c in found if not c.passed]
     rows = [
-        [c.name, number(c.value, 3), number(c.limit, 3), "passed" if c.passed else "failed", c.remark] for c in found
+        [c.name, number(c.value, 3), number(c.limit, 3), "passed" if c.passed else "failed", c.message] for c in found
     ]
-    every = table(["check", "value", "limit", "", "remark"], rows)
+    every = table(["check", "value", "limit", "", "message"], rows)
     if failed:
         return [say(f"{len(failed)} of {len(found)} checks failed: {'; '.join(failed)}.", tone="bad"), every]
     return [say(f"All {len(found)} checks of the file passed.", tone="note"), fold("Every check", every)]

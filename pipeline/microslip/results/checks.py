@@ -168,8 +168,8 @@ def check_response(response: Response, bases: Mapping[str, ModalBasis]) -> list[
     return found
 
 
-def _held(s: Series, name: str, value: float, limit: float, remark: str = "") -> Check:
-    return Check(f"{s.name}: {name}", float(value), limit, bool(value <= limit), remark)
+def _held(s: Series, name: str, value: float, limit: float, message: str = "") -> Check:
+    return Check(f"{s.name}: {name}", float(value), limit, bool(value <= limit), message)
 
 
 def _energy(s: Series) -> list[Check]:

@@ -228,7 +228,7 @@ def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, be
     return case.table("optimum.csv", (over, "frequency_Hz", case.quantity.column("amplitude"), "what"), rows)
 
 
-def told(found: Optimum, over: str, of: Quantity = METRES) -> str:
+def optimum_message(found: Optimum, over: str, of: Quantity = METRES) -> str:
     """The optimum of what is read in a sentence."""
     best, unit = found.resonance, " N" if over == NORMAL_FORCE else ""
     if best.status != "converged":

@@ -79,7 +79,7 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     except UserError as error:
         text = str(error)
         raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
-    warnings = [f"{job.path}: {remark}" for remark in messages]
+    warnings = [f"{job.path}: {message}" for message in messages]
     for warning in warnings:
         report(f"warning: {warning}")
     return basis, warnings

@@ -109,8 +109,8 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
         f, D, width = (mode[key] for key in ("frequency_Hz", "damping_ratio", "half_power_width_Hz"))
         report(f"stuck mode {i}: {f:.6g} Hz, damping ratio {100 * D:.3g} %, half-power width {width:.3g} Hz")
     report(summary["checked"])
-    for remark in summary["messages"]:
-        report(f"warning: {remark}")
+    for message in summary["messages"]:
+        report(f"warning: {message}")
 
 
 def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[str, Any]:

@@ -180,12 +180,12 @@ def _own_frames(first: Interface, second: Interface, drawn: Place, sector: int, 
     axes = OWN_FRAME @ first.rotation
     if _missing(Pairing(np.eye(6), 0.0, offset, 0.0), first, second, axes):
         return None
-    remark = (
+    message = (
         f"Turned by {360 * sector / blades:.4g} degrees the faces of neighbours do not meet, as drawn they are "
         "opposite: each blade's own contact frame is used, as if the wedge between them were filled."
     )
     arm = -offset @ first.rotation[1:]
-    return Pairing(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), True, (remark,))
+    return Pairing(across(first.rotation, axes, arm), float("nan"), offset, float(np.radians(normal)), True, (message,))
 
 
 def rigid_points(interface: Interface, counts: tuple[int, int] | None = None) -> tuple[Array, Array]:

@@ -73,8 +73,8 @@ def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrice
         matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
         if matrix.shape[0] != len(node):
             raise UserError(f"{path}: has {matrix.shape[0]} rows, but there are {len(node)} of the stiffness")
-        made[role], remark = _symmetric(matrix, role, path)
-        messages += [remark] if remark else []
+        made[role], message = _symmetric(matrix, role, path)
+        messages += [message] if message else []
     _check_mass(made["mass"], folder / split(given.mass)[0], dofs)
     system = given.units or usual_system(length_unit)
     if system is None:
@@ -226,10 +226,10 @@ def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_mat
     sign = -1.0 if role == "gyroscopic" else 1.0
     lower, upper = (part(matrix, k, format="csr") for part, k in ((sp.tril, -1), (sp.triu, 1)))
     off = (matrix - sp.diags(matrix.diagonal())).tocsr()
-    remark = ""
+    message = ""
     if off.nnz and (not _largest(lower)) != (not _largest(upper)):
         matrix = (matrix + sign * off.T).tocsr()
-        remark = f"{path.name}: only a triangle of the {role} matrix is stored; the other one was completed"
+        message = f"{path.name}: only a triangle of the {role} matrix is stored; the other one was completed"
     top = _largest(matrix)
     if not top and role in ("stiffness", "mass"):
         raise UserError(f"{path}: the {role} matrix is zero; write it again")
@@ -240,7 +240,7 @@ def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_mat
             f"{path}: the {role} matrix is not {kind} (entries differ by {wrong / top:.2g} of the largest); rows and "
             "columns must be in the same order"
         )
-    return (0.5 * (matrix + sign * matrix.T)).tocsr(), remark
+    return (0.5 * (matrix + sign * matrix.T)).tocsr(), message
 
 
 def _largest(matrix: sp.csr_matrix) -> float:
