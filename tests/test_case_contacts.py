@@ -156,6 +156,20 @@ def test_no_force_fits_no_curve() -> None:
         curves(made(raw), {"small": small.basis()}, PATH, "normal_force", lambda _: nullcontext(), lambda _: None)
 
 
+def test_jenkins_elements_of_a_file_are_those_of_the_case(tmp_path: Path) -> None:
+    """Four elements that hold mu F_N of the case's force, which the file need not name; none on a patch that deforms."""
+    law = 'normal_stiffness = 1e9\ntangential_stiffness = 8e8\nfriction = 0.3\nlaw = "jenkins"\n'
+    (tmp_path / "contact.toml").write_text(f'name = "c"\n{law}')
+    raw, path, bases = table(file="contact.toml"), tmp_path / "case.toml", {"small": small.basis()}
+    del raw["contacts"][0]["friction"]
+    found = build(made(raw), bases, path).pressed(200.0).contacts[0].patch
+    own = build(made(table(**STIFF, law="jenkins")), bases, path).pressed(200.0).contacts[0].patch
+    assert len(found.points) == 4 and found.law == own.law
+    raw["contacts"][0]["patch"] = "nodal"
+    with pytest.raises(UserError, match="contact.toml: patch: law = "):
+        build(made(raw), bases, path)
+
+
 CURVE = "0 0\n1 10\n2 30\n3 60\n4 100\n"
 
 
@@ -290,6 +304,14 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "no stiffness": (table(), "normal_stiffness: is missing"),
     "twice": (table(**STIFF, **PIN), "young stands for both stiffnesses"),
     "young alone": (table(young=2e11), "young stands for both stiffnesses where a curvature is given"),
+    "young and a slip spring": (table(**PIN, tangential_stiffness=1e7), "young stands for both stiffnesses"),
+    "young and a table": (table(**PIN, friction={"kind": "static-sliding", "static": 0.3, "sliding": 0.2}),
+                          "friction: of a curved contact (young) is one coefficient"),
+    "young and heat": (table(**PIN, friction={"kind": "heated", "mu_0": 0.3}), "friction: of a curved contact"),
+    "young and a damper": (table(**PIN, law={"kind": "smooth", "damping": 1e-4}), "law: of a curved contact"),
+    "exact and rough": (table(**PIN, fit="exact", roughness=1e-5), "roughness: of a curved contact"),
+    "fitted springs": (table(**STIFF, fitted_at=5.0), "fitted_at: belongs to young"),
+    "warm": (table(**STIFF, temperature={"resistance": 1e-6, "limit": 900.0}), "temperature: belongs to friction"),
     "flat": (table(**STIFF, curvature=[float("inf"), float("inf")]), "inf, inf is flat"),
     "hollow": (table(**STIFF, curvature=[1.0, -2.0]), "curvature"),
     "no number": (table(**STIFF, curvature=[1.0, float("nan")]), "curvature"),

@@ -16,6 +16,7 @@ from microslip.contact.friction import Coulomb, Scattered
 from microslip.contact.harmonics import force_alone, force_harmonics
 from microslip.contact.law import Step, history, march
 from microslip.contact.periodic import periodic
+from microslip.contact.portion import portion
 from microslip.errors import UserError
 
 SAMPLES = 256
@@ -254,6 +255,15 @@ def test_the_derivative_of_a_periodic_cycle_matches_differences(example) -> None
 
 def test_a_state_that_holds_more_than_recalled_says_is_seen() -> None:
     assert error_of_periodic_derivative(wrong_laws.LAGGING) > 0.1
+
+
+@LAWS
+def test_points_that_share_a_contact_are_the_contact(example) -> None:
+    """Eight equal points that move alike, along a path that slides."""
+    u = path(5, example, 1)
+    whole = FORCES(example.law, u, example.period, 2).force
+    shared = FORCES(portion(example.law, jnp.asarray(0.125)), jnp.repeat(u, 8, axis=1), example.period, 2).force
+    np.testing.assert_allclose(shared.sum(axis=1), whole[:, 0], rtol=0, atol=1e-9 * scale(whole))
 
 
 @LAWS

@@ -272,10 +272,14 @@ def imported(module: str) -> set[str]:
     inside = module if source(module).name == "__init__.py" else module.rpartition(".")[0]
     found: set[str] = set()
     for node in ast.walk(ast.parse(source(module).read_text())):
-        if not isinstance(node, ast.ImportFrom) or not node.level:
+        if not isinstance(node, ast.ImportFrom):
             continue
         parts = inside.split(".") if inside else []
         base = ".".join([*parts[: len(parts) + 1 - node.level], *([node.module] if node.module else [])])
+        if not node.level:
+            base = "" if node.module == "microslip" else (node.module or "").removeprefix("microslip.")
+            if not (node.module or "").startswith("microslip"):
+                continue
         found |= {base, *(f"{base}.{a.name}".strip(".") for a in node.names)}
     return {m for m in found if m and source(m).is_file()}
 

@@ -329,10 +329,12 @@ def _contact(
         k, words = _in_contact(path, c, lambda: curved_springs(c, load)) if c.is_curved else (springs, "")
         if c.fit == "exact":
             patch = _in_contact(path, c, lambda: pieces(c, load))
-        elif found is not None:
-            patch = nodal_patch(c, _law(c, path, k, load), found)
         else:
-            patch = _in_contact(path, c, lambda: patch_of(c, _law(c, path, k, load), c.what, faces[0], load))
+            whole = _in_contact(path, c, lambda: _law(c, path, k, load))
+            if found is not None:
+                patch = nodal_patch(c, whole, found)
+            else:
+                patch = _in_contact(path, c, lambda: patch_of(c, whole, c.what, faces[0], load))
         more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
         return _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
@@ -440,6 +442,7 @@ def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
         c = c.model_copy(update={key: getattr(said, key) for key in ContactLaw.model_fields})
         try:
             c.what.fits(c)
+            c.fits_here()
         except ValueError as error:
             raise UserError(f"{path}: {where}.file: {file}: {error}") from error
     if c.is_curved:
@@ -495,8 +498,8 @@ def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | N
     if found is None or _given(found) != springs:
         if not isinstance(c.stiffness, Given | None):
             raise UserError(
-                f"{path}: contacts.{c.interface}.includes: bulk cannot be taken out of a stiffness of kind = "
-                f'"{c.stiffness.kind}"; give that of the surface alone, and includes = "surface" here'
+                f'includes: bulk cannot be taken out of a stiffness of kind = "{c.stiffness.kind}"; give that of the '
+                'surface alone, and includes = "surface" here'
             )
         area = None if c.stiffness is None else c.stiffness.area
         found = _composed(c, path, load, Given(kind="given", normal=springs[0], tangential=springs[1:], area=area))

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..contact.friction import OfCoulomb
+from ..contact.point import OfPoint
 from ..contact.settings import ContactLaw
 from ..operating.fatigue import MaterialLimits
 from ..reduced.compliance import BULK_AND_SURFACE
@@ -143,6 +145,10 @@ class ContactSettings(ContactLaw):
         return self.interference is None
 
     @property
+    def can_be_pressed(self) -> bool:
+        return self.interference is None
+
+    @property
     def is_elsewhere(self) -> bool:
         return self.file is not None or self.young is not None
 
@@ -169,16 +175,30 @@ class ContactSettings(ContactLaw):
             raise ValueError(f"{key}: is missing; add it")
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
+        if self.temperature is not None and not self.heated:
+            raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
+        self.fits_here()
+        return self._curved()
+
+    def fits_here(self) -> None:
+        """Refuse a law that cannot stand on such a patch.
+
+        Raises:
+            ValueError: with its key.
+        """
         if not self.what.opens and (self.patch == "nodal" or self.curvature is not None):
             key = "curvature" if self.curvature is not None else "patch"
             raise ValueError(f'{key}: law = "{self.what.kind}" belongs to flat, rigid patches; write law = "smooth"')
-        return self._curved()
 
     def _curved(self) -> ContactSettings:
-        if self.is_curved and (self.curvature is None or self.file or self.stiffness or self.normal_stiffness):
+        springs = self.stiffness or self.normal_stiffness or self.tangential_stiffness
+        if self.is_curved and (self.curvature is None or self.file or springs):
             raise ValueError("young stands for both stiffnesses where a curvature is given; give one or the other")
-        if self.is_curved and self.what.kind != "smooth":
-            raise ValueError(f'law: "{self.what.kind}" does not go with young; write law = "smooth"')
+        if self.is_curved:
+            self._plain()
+        for key in ("fit", "fitted_at", "poisson"):
+            if not self.is_curved and key in self.model_fields_set and not (key == "fit" and self.fit == "exact"):
+                raise ValueError(f"{key}: belongs to young, of a curved contact; leave it out")
         if self.fit == "exact" and (self.young is None or self.patch == "nodal"):
             raise ValueError('fit: "exact" needs curvature and young, and a rigid patch')
         if self.curvature is not None and min(self.curvature) == math.inf:
@@ -190,6 +210,16 @@ class ContactSettings(ContactLaw):
         if self.young is not None and self.includes == BULK_AND_SURFACE:
             raise ValueError('includes: Hertz\' contact beyond what the face yields is the "surface"; leave it out')
         return self
+
+    def _plain(self) -> None:
+        """Of a contact of two curved bodies: smooth or, of springs, rough points under one coefficient of friction."""
+        if not isinstance(self.friction, OfCoulomb) or self.friction.deviation:
+            raise ValueError("friction: of a curved contact (young) is one coefficient; write a number")
+        if self.roughness is not None and (self.roughness.kind != "polynomial" or self.fit == "exact"):
+            raise ValueError("roughness: of a curved contact is R_Z, of springs that agree with Hertz; write a number")
+        plain = OfPoint(kind="smooth" if self.roughness is None else "rough")
+        if self.what != plain:
+            raise ValueError(f'law: of a curved contact (young) is "{plain.kind}"; leave it out')
 
 
 class Sweep(Model):

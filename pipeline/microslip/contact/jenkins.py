@@ -110,7 +110,7 @@ class OfJenkins(LawKind):
             )
         if not isinstance(contact.friction, OfCoulomb) or contact.friction.deviation:
             raise ValueError('law: "jenkins" slides by one coefficient; write a number as friction')
-        if not contact.is_pressed:
+        if not contact.can_be_pressed:
             raise ValueError('law: "jenkins" holds mu F_N of a given force; give a normal_force')
 
     def law(self, contact: ContactModel) -> Law:

@@ -65,7 +65,8 @@ class PointContact(Law):
     includes: str = static(default=BULK_AND_SURFACE)
 
     def scaled(self, share: Array) -> PointContact | None:
-        if (normal := self.normal.scaled(share)) is None:
+        normal = self.normal.scaled(share)
+        if normal is None or not self.friction.constant:  # a coefficient may depend on the force of the whole
             return None
         second = None if self.stiffness_2 is None else self.stiffness_2 * share
         return replace(self, normal=normal, stiffness_1=self.stiffness_1 * share, stiffness_2=second)

@@ -182,6 +182,11 @@ class ContactLaw(Model):
         return False
 
     @property
+    def can_be_pressed(self) -> bool:
+        """Whether a normal force may press it."""
+        return True
+
+    @property
     def is_elsewhere(self) -> bool:
         """Whether something else says what the contact is."""
         return False
@@ -254,6 +259,10 @@ class ContactFile(ContactLaw):
     @property
     def is_pressed(self) -> bool:
         return self.motion is not None and self.motion.normal_force is not None
+
+    @property
+    def can_be_pressed(self) -> bool:
+        return self.motion is None or self.is_pressed
 
     @property
     def unit(self) -> float:

@@ -242,6 +242,8 @@ def _shade(axes: Any, time: np.ndarray, state: np.ndarray, stick: str) -> None:
 
 def _legend_above(axes: Axes) -> None:
     handles, _ = axes.get_legend_handles_labels()
+    if not handles:
+        return
     columns = min(len(handles), 5)
     where = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
     axes.legend(frameon=False, fontsize=8, columnspacing=1.0, handlelength=1.4, **where)

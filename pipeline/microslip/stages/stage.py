@@ -97,14 +97,15 @@ def _files(module: str) -> list[Path]:
     return sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
 
 
-_IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
+_IMPORT = re.compile(r"^[ \t]*from (\.+|microslip\.?)([\w.]*) import (\([^)]*\)|[^\n]*)", re.M)
 
 
 def _imported(file: Path) -> list[Path]:
     """Files of the package that a file imports, anywhere in its text."""
     found = []
-    for dots, module, names in _IMPORT.findall(file.read_text(encoding="utf-8")):
-        place = file.parents[len(dots) - 1].joinpath(*filter(None, module.split(".")))
+    for root, module, names in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        base = PACKAGE if root.startswith("microslip") else file.parents[len(root) - 1]
+        place = base.joinpath(*filter(None, module.split(".")))
         inside = [place / name for name in re.findall(r"(\w+)(?: as \w+)?", names)]
         found += [p.with_suffix(".py") for p in (place, *inside)] + [p / "__init__.py" for p in (place, *inside)]
     return [f for f in found if f.is_file()]
