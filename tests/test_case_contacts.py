@@ -157,7 +157,7 @@ def test_no_force_fits_no_curve() -> None:
 
 
 def test_jenkins_elements_of_a_file_are_those_of_the_case(tmp_path: Path) -> None:
-    """Four elements that hold mu F_N of the case's force, which the file need not name; none on a patch that deforms."""
+    """Four elements that hold mu F_N of the case's force, which the file need not name; none on a nodal patch."""
     law = 'normal_stiffness = 1e9\ntangential_stiffness = 8e8\nfriction = 0.3\nlaw = "jenkins"\n'
     (tmp_path / "contact.toml").write_text(f'name = "c"\n{law}')
     raw, path, bases = table(file="contact.toml"), tmp_path / "case.toml", {"small": small.basis()}
