@@ -31,7 +31,7 @@ import numpy as np
 
 from microslip.contact import EXAMPLES
 from microslip.contact.friction import Coulomb
-from microslip.contact.harmonics import force_harmonics, waves
+from microslip.contact.harmonics import force_harmonics, fourier
 from microslip.contact.law import Law
 from microslip.contact.normal import Penalty
 from microslip.contact.point import PointContact, mean_inverse
@@ -78,7 +78,7 @@ def ours(law: Law, u: np.ndarray, samples: int, count: int, rounds: int) -> dict
 def numpy_loop(u: np.ndarray, samples: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Penalty spring, Coulomb cone, straight ways (`point.dragged`); tangents of all harmonics carried by hand."""
     n, _, size = u.shape
-    values, transform = (np.array(x) for x in waves(size // 2, samples))
+    values, transform = (np.array(x) for x in fourier(size // 2, samples))
     path = np.einsum("sh,nkh->skn", values, u)
     force, slope = np.zeros((samples, 3, n)), np.zeros((samples, 3, 3, size, n))
     tangential, before, carried = np.zeros((2, n)), np.zeros((2, n)), np.zeros((2, 3, size, n))
