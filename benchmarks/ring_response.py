@@ -70,7 +70,7 @@ def run(settings: CaseSettings, basis: ModalBasis, rounds: int) -> tuple[float, 
         points = sweep(p, frequency)
         spent.append(time.perf_counter() - began)
         used.append(time.process_time() - before)
-    motion = [abs(q.x.reshape(p.waves, -1)[1:3]).max() * p.length for q in points]
+    motion = [abs(q.x.reshape(p.coefficients, -1)[1:3]).max() * p.length for q in points]
     top = int(np.argmax(motion))
     steps, failed = sum(q.iterations for q in points), sum(not q.converged for q in points)
     return min(spent[1:]), min(used[1:]), steps, failed, float(frequency[top]), float(motion[top])

@@ -138,7 +138,7 @@ def test_the_answer_under_one_force_knows_of_no_other(contact: dict[str, Any]) -
     assert found[1] == found[2] == found[3]
     stiff = [contact.stiffness[0, 0] for n in (150.0, 800.0) for contact in one.pressed(n).contacts]
     assert stiff[1] > 1.02 * stiff[0]
-    if "law" not in contact:
+    if "fit" not in contact:
         line = Line(Solid(2.1e11, 0.3), Solid(2.1e11, 0.3), RADIUS, DEPTH)
         k = foundation_of_line(line, 150.0, HEIGHT).stiffness * DEPTH * HEIGHT
         patch = one.pressed(150.0).contacts[0].patch

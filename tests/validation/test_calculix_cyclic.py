@@ -150,11 +150,13 @@ def complex_frequencies(dat: str) -> np.ndarray:
     return np.abs(np.array(rows, dtype=float))
 
 
-def test_coriolis_waves_of_the_full_ring(tmp_path):
+def test_coriolis_waves_of_the_full_ring(tmp_path, monkeypatch):
     """CalculiX refuses Coriolis forces with cyclic symmetry, so it gets the whole ring: *COMPLEX FREQUENCY, CORIOLIS.
 
-    It finds the waves among 60 modes of the ring and prints only some of them (one of most pairs). Every one is a wave
-    of ours: the first eight within 2e-6, the others as close as 60 modes allow, 1e-4.
+    It finds the waves among 60 modes of the ring and prints only some of them (one of most pairs), and between them
+    numbers that move by percent with the order of summation (4547, 4584 or 4623 rad/s): a wave is what it prints with
+    every kernel of its BLAS. Every one is a wave of ours: the first eight within 2e-6, the others as close as 60 modes
+    allow, 1e-4.
     """
     sector = rings.bladed_sector()
     load = centrifugal(600.0)
@@ -162,7 +164,11 @@ def test_coriolis_waves_of_the_full_ring(tmp_path):
     text = deck(rings.full_ring(sector, 6).mesh, held="bore") + silent
     text += f"*STEP, PERTURBATION\n*FREQUENCY, STORAGE=YES\n{MODES}\n*END STEP\n"
     text += f"*STEP, PERTURBATION\n*COMPLEX FREQUENCY, CORIOLIS\n{MODES}\n{load}*END STEP\n"
-    theirs = complex_frequencies(run(tmp_path, text))[:20]
+    printed = []
+    for kernel in ("Haswell", "Nehalem", "Sandybridge"):
+        monkeypatch.setenv("OPENBLAS_CORETYPE", kernel)
+        printed.append(complex_frequencies(run(tmp_path, text)))
+    theirs = np.array([f for f in printed[0] if all(np.abs(p / f - 1).min() < 2e-6 for p in printed[1:])])[:20]
     described = body(
         supports=[{"face": "bore"}], cyclic={"sectors": 6}, modes={"count": 60},
         rotation={"speeds_rpm": [600.0 * 30 / np.pi]},
@@ -174,7 +180,7 @@ def test_coriolis_waves_of_the_full_ring(tmp_path):
     def nearest(candidates):
         return np.abs(theirs[:, None] / candidates - 1).min(axis=1)
 
-    assert len(theirs) == 20
+    assert len(theirs) > 12
     assert nearest(ours)[:8].max() < 5e-6
     assert nearest(ours).max() < 3e-4
     assert nearest(still)[:8].max() > 5e-4  # without Coriolis forces they are no waves of ours
