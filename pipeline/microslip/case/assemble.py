@@ -219,7 +219,6 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
         UserError: names that no modal file holds, faces that do not face each other, stiffnesses that count the bulk
             twice.
     """
-
     settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
     components = {name: _component(settings, b) for name, b in bodies.items()}
@@ -308,7 +307,6 @@ def _contact(
     springs: Springs, path: Path | str,
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and messages. springs: of one that is not curved."""
-
     ends = _ends(settings, c)
     loaded, faces = _sides(settings, bodies, c, path)
     first, second, met = ContactFace(*ends[0]), None, None
@@ -353,7 +351,6 @@ def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
 
 def _refuse_too_many(settings: CaseSettings, c: ContactSettings, load: float | None, found: Nodal | None) -> None:
     """Raise `UserError` for points, harmonics and samples that would not fit into the memory."""
-
     points, coordinates = (number_of_points(c, load), 6) if found is None else (len(found.points), found.count)
     needed, given = memory_of(settings, points, coordinates) / GIB, settings.memory_limit
     has = of_this_machine() / GIB if given is None else given
@@ -374,7 +371,6 @@ def _nodal(
     sides: tuple[ContactFace, ContactFace | None], met: Pairing | None,
 ) -> tuple[Nodal, ContactFace, ContactFace | None, Array]:  # fmt: skip
     """A patch that deforms, its sides, and the compliance of the bodies along its coordinates."""
-
     faces = [(components[s.component], s.interface) for s in sides if s]
     for component, name in faces:
         if component.residual_share is not None:
@@ -413,7 +409,6 @@ def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> 
 
 def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Pairing:
     """How the two faces of a contact meet."""
-
     names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
     seen = two.seen_from(one)
     if not settings.ring or not c.against_sector:
@@ -458,7 +453,6 @@ def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
 
 def _source(c: ContactSettings, path: Path | str) -> tuple[ContactLaw, Path]:
     """Who says what a contact is, and its file: its contact.toml, or the case."""
-
     file = Path(path).parent / str(c.file)
     if c.file is None:
         return c, Path(path)
@@ -471,7 +465,6 @@ def _composed(
     c: ContactSettings, path: Path | str, load: float | None = None, given: Given | None = None
 ) -> ContactModel:
     """The laws of a whole contact under a load, N. given: stiffnesses instead of its own."""
-
     said, file = _source(c, path)
     if given is not None:
         said = said.model_copy(update={"stiffness": given, "normal_stiffness": None, "tangential_stiffness": None})
@@ -493,7 +486,6 @@ def _law(c: ContactSettings, path: Path | str, springs: Springs, load: float | N
     Raises:
         UserError: they are not its own, and its own are more than numbers.
     """
-
     found = None if c.is_curved else _composed(c, path, load)
     if found is None or _given(found) != springs:
         if not isinstance(c.stiffness, Given | None):

@@ -39,7 +39,6 @@ def of_points(built: Built) -> str:
     That is the balance itself, down to the last bit of its matrices, rows, loads and laws; what else the bodies hold is
     told by their files. For a contact that is fitted at the force of each sweep stands what fits it.
     """
-
     a, own = built.assembly, built.fitted
     as_they_are = [i for i in range(len(a.contacts)) if i not in own]
     rest = replace(a, contacts=tuple(a.contacts[i] for i in as_they_are))
@@ -52,7 +51,6 @@ def of_points(built: Built) -> str:
 
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
-
     found = {name: path.parent / name for name in settings.files}
     found |= sources_of_others()
     for name in [c.file for c in settings.contacts if c.file is not None]:
@@ -155,7 +153,6 @@ def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[Contact
     Raises:
         UserError: a map whose energy is not the one kept.
     """
-
     problem = problem_of(built, normal)
     _, found = restored(problem, dict(row))
     seen, maps = traced(problem, found), []

@@ -148,7 +148,6 @@ def curves(
     Raises:
         UserError: ends that are missing, no resonance to begin at.
     """
-
     asked, built = settings.curve or CurveOfCase(), build(settings, bases, path)
     of = measured(built.assembly)
     ends, how = _ends(built, asked, over, path), _settings(asked)
@@ -211,7 +210,6 @@ def _resonance(
     built: Built, problem: Problem, normal: float | None, journal: Journal, path: Path | str, report: Report
 ) -> float:  # fmt: skip
     """Hz of the highest resonance in the sweep's band, kept before or searched for now."""
-
     known = dict(journal.head.get("at", {}))
     s = built.settings.sweep
     key = f"{normal}, {s.start} to {s.stop} Hz by {s.points}"

@@ -124,7 +124,6 @@ class ExcitationOfCase(Model):
 
 def pattern_of(m: MagnetsOfCase):  # type: ignore[no-untyped-def]  # noqa: ANN201 - its room needs jax
     """The pattern of magnets around the rotor."""
-
     return magnets(np.radians(m.angles), np.array(m.force), float(np.radians(m.width)), m.highest, m.pulse)
 
 
@@ -137,7 +136,6 @@ def base_of(excitations: Sequence[ExcitationOfCase], given: int | None, turning:
     Raises:
         UserError: orders that run both ways.
     """
-
     named = [e for x in excitations for e in x.orders]
     if given is not None or not named:
         return turning * (given if given is not None else 1)
@@ -156,7 +154,6 @@ def loads_of(
     Raises:
         UserError: an engine order that is no multiple of the base, or runs the other way round.
     """
-
     wave = Ring(blades, base) if blades else abs(base)
     if x.magnets is not None:
         return pattern_loads(component, row, pattern_of(x.magnets), wave, float(np.radians(x.magnets.place)), turning)
@@ -174,7 +171,6 @@ def with_field(
     Raises:
         UserError: a file, a face or a unit that does not fit.
     """
-
     file = Path(path).parent / str(x.field)
     try:
         field = read_field(file, str(x.length_unit), x.time_factor == "-")
@@ -190,7 +186,6 @@ def damped(groups: Mapping[int, ModalGroup], ratios: float | Sequence[float], wh
     Raises:
         UserError: no ratio.
     """
-
     try:
         return {k: with_ratios(g, ratios) for k, g in groups.items()}
     except UserError as error:
@@ -203,7 +198,6 @@ def as_asked(component: Component, kind: str, viscous: bool) -> Component:
     Args:
         viscous: its damping is that of dampers or Rayleigh's, which make no loss factor.
     """
-
     if kind == "stuck":
         return replace(component, groups={k: replace(g, C_r=np.zeros_like(g.C_r)) for k, g in component.groups.items()})
     return structural(component) if kind == "structural" and not viscous else component
@@ -215,7 +209,6 @@ def flow_of(file: Path, blades: int, turning: Turning, where: str) -> dict[int, 
     Raises:
         UserError: a file that does not fit the ring.
     """
-
     try:
         return read_aerodynamics(file, blades, turning)
     except UserError as error:
@@ -226,5 +219,4 @@ def messages_of(
     components: Iterable[Component], loads: Sequence[Load], harmonics: int, blades: int, turning: Turning
 ) -> list[str]:
     """Modes that the flow feeds, and loads beyond the harmonics that are balanced."""
-
     return [s for m in components if m.aerodynamic for s in unstable(m, blades, turning)] + unheard(loads, harmonics)

@@ -29,7 +29,6 @@ def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, loa
         whole: law of the full area. what: its settings. face: of the first side. load: N that the contact is about
             pressed by.
     """
-
     own = None if c.points else what.places(c.width or 0.0, c.height or 0.0)
     points, areas = own or _points(c, face, _counts(c, load))
     return Patch(c.interface, points, areas, _curved(c, _shared(whole, areas), points))
@@ -37,7 +36,6 @@ def patch_of(c: ContactSettings, whole: Law, what: LawKind, face: Interface, loa
 
 def nodal_patch(c: ContactSettings, whole: Law, found: Nodal) -> Patch:
     """The points of a patch that deforms. whole: law of the full area."""
-
     law_of_points = _curved(c, _shared(whole, found.areas), found.points)
     return Patch(c.interface, found.points, found.areas, law_of_points, found.shapes)
 
@@ -60,7 +58,6 @@ def resolved(c: ContactSettings, patch: Patch, load: float | None) -> list[str]:
     Raises:
         UserError: so few that the contact falls between them.
     """
-
     if c.curvature is None or not load or len(patch.points) == 1 or c.fit == "exact":
         return []
     pressed = patch.points[pressure(patch, equilibrium(patch, load)) > 0]
@@ -96,7 +93,6 @@ def number_of_points(c: ContactSettings, load: float | None) -> int:
 
 def _points(c: ContactSettings, face: Interface, asked: tuple[int, int]) -> tuple[Array, Array]:
     """Places and areas: a rectangle as the settings have it, or what the outline leaves of it."""
-
     width, height = c.width or 0.0, c.height or 0.0
     counts = (asked[0] if width else 1, asked[1] if height else 1)
     if len(face.polygon) > 2 and width and height:
@@ -147,7 +143,6 @@ def _tangential(c: ContactSettings, around: float, along: float) -> tuple[float,
 
 def _foundation(c: ContactSettings, load: float) -> tuple[Foundation, float, float]:
     """The foundation, and tangential over normal stiffness around and along the line."""
-
     fit = "approach" if c.fit == "exact" else c.fit
     if (line := _line(c)) is not None:
         return foundation_of_line(line, load, _strip(c), fit), *line.tangential_ratio
@@ -210,7 +205,6 @@ def _strip(c: ContactSettings) -> float:
 
 def _line(c: ContactSettings) -> Line | None:
     """The line of contact, or None where both directions are curved."""
-
     assert c.curvature is not None and c.young is not None
     if np.isfinite(max(c.curvature)):
         return None

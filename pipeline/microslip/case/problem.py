@@ -19,7 +19,6 @@ from .settings import CaseSettings, ContactSettings
 
 def problem_of(built: Built, normal: float | None, **finer: Any) -> Problem:
     """The balance of a case whose swept contacts a normal force (N) presses. finer: other settings of `problem.of`."""
-
     s, assembly = built.settings, built.pressed(normal)
     asked: dict[str, Any] = {"harmonics": s.balanced, **s.marching, "models": models_of(s, assembly)}
     return balance.of(assembly, **{**asked, **finer})
@@ -32,7 +31,6 @@ def models_of(settings: CaseSettings, assembly: Assembly) -> dict[int, Forces] |
 
 def book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
     """The book's contact for every contact; equal patches share one."""
-
     made: dict[int, BookPatch] = {}
     for c in assembly.contacts:
         if id(c.patch) not in made:
@@ -42,7 +40,6 @@ def book_models(assembly: Assembly, strips: int) -> dict[int, BookPatch]:
 
 def pressed_by(built: Built, problem: Problem) -> float:
     """Normal force (N) in the first contact of the resting assembly, which names a response that no sweep presses."""
-
     given = [c.normal_force for c in built.contacts if c.normal_force is not None]
     if given or not built.contacts:
         return float(given[0]) if given else 0.0

@@ -202,7 +202,6 @@ def _answered(
 
 def _report_memory(built: Built, report: Callable[[str], None]) -> None:
     """The memory of the contacts' points, where it is more than a GiB."""
-
     s, patches = built.settings, [c.patch for c in built.assembly.contacts]
     needed = max((memory_of(s, len(p.points), p.count) for p in patches), default=0.0) / GIB
     if needed > 1:
@@ -212,7 +211,6 @@ def _report_memory(built: Built, report: Callable[[str], None]) -> None:
 
 def _stuck(assembly: Assembly) -> tuple[Array, Array]:
     """(m,) eigenfrequencies in Hz with sticking contacts, and their damping ratios."""
-
     part = assembly.joined(1)
     return stuck(part, assembly.stiffness), stuck_damping(part, assembly.stiffness)
 
@@ -222,7 +220,6 @@ def _swept(
     normal: float,
 ) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
     """One sweep and its peaks, from what a journal holds of it and what is computed now."""
-
     if journal is None:
         found = filled_response(problem, frequency, limits, report)
         return found, refined_peaks(problem, found)
@@ -426,7 +423,6 @@ def _not_periodic(normal: float, unsteady: Array, settings: CaseSettings) -> lis
 
 def _of_stuck_modes(built: Built, normal: float | None) -> list[str]:
     """How much more damping of the stuck modes takes where contacts slide or open. normal: N, see `Built.pressed`."""
-
     asked = built.settings.stuck_ratios
     if asked is None or not built.settings.contacts:
         return []

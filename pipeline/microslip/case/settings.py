@@ -70,7 +70,7 @@ class BodyOfCase(Model):
     modes: how many of the stored eigenmodes are used, all if not given.
     mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
     weak_springs: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body
-    that slides in all of its contacts has no place of its own; without hold it slides away where mean forces do not
+    that slides in all of its contacts has no place of its own; without them it slides away where mean forces do not
     balance.
     """
 
@@ -146,7 +146,7 @@ class ContactSettings(ContactLaw):
 
     @property
     def can_be_pressed(self) -> bool:
-        return self.interference is None
+        return self.is_pressed
 
     @property
     def is_elsewhere(self) -> bool:
@@ -196,11 +196,11 @@ class ContactSettings(ContactLaw):
             raise ValueError("young stands for both stiffnesses where a curvature is given; give one or the other")
         if self.is_curved:
             self._plain()
-        for key in ("fit", "fitted_at", "poisson"):
-            if not self.is_curved and key in self.model_fields_set and not (key == "fit" and self.fit == "exact"):
-                raise ValueError(f"{key}: belongs to young, of a curved contact; leave it out")
         if self.fit == "exact" and (self.young is None or self.patch == "nodal"):
             raise ValueError('fit: "exact" needs curvature and young, and a rigid patch')
+        alone = [key for key in ("fit", "fitted_at", "poisson") if key in self.model_fields_set]
+        if alone and not self.is_curved:
+            raise ValueError(f"{alone[0]}: belongs to young, of a curved contact; leave it out")
         if self.curvature is not None and min(self.curvature) == math.inf:
             raise ValueError("curvature: inf, inf is flat; leave it out, or give the radius of the curved direction")
         if self.patch == "nodal" and self.points is not None:

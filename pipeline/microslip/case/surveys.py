@@ -38,7 +38,6 @@ def _asked(settings: CaseSettings, key: str, path: Path | str) -> Any:
 
 def _one_force(built: Built, path: Path | str, key: str) -> float | None:
     """The one normal force of the sweep; None where it presses nothing."""
-
     forces = normal_forces(built, path)
     if len(forces) > 1:
         raise UserError(
@@ -59,7 +58,6 @@ def over_orders(
     Raises:
         UserError: no ring, or excitations that name their own engine orders.
     """
-
     asked, ring = _asked(settings, "orders", path), settings.ring
     if ring is None:
         raise UserError(f"{path}: orders: engine orders need a ring; add [ring] with its blades")
@@ -106,7 +104,6 @@ def over_speeds(
     Raises:
         UserError: no engine order, or a speed outside of a body's range.
     """
-
     asked = _asked(settings, "speeds", path)
     named = settings.ring is not None and settings.ring.engine_order is not None
     if not named and not any(x.orders for x in settings.loads):
@@ -152,7 +149,6 @@ def over_ranges(
     Raises:
         UserError: friction of a contact whose tables say it.
     """
-
     asked = _asked(settings, "ranges", path)
     told = [c.interface for c in settings.contacts if not isinstance(c.friction, OfCoulomb)]
     if asked.friction and told:
@@ -194,7 +190,6 @@ def identification(settings: CaseSettings, bases: Bases, path: Path | str) -> tu
     Raises:
         UserError: a frequency that no stiffness gives, a nodal diameter that the ring or the modal file does not have.
     """
-
     asked = _asked(settings, "identification", path)
     a = build(settings, bases, path).assembly
     most = a.blades // 2

@@ -199,9 +199,9 @@ class ContactLaw(Model):
     @property
     def springs(self) -> Stiffness:
         """Where the stiffness comes from."""
-        if self.stiffness is not None or self.normal_stiffness is None:
-            assert self.stiffness is not None
+        if self.stiffness is not None:
             return self.stiffness
+        assert self.normal_stiffness is not None  # one of them is, see `_fits`
         return Given(kind="given", normal=self.normal_stiffness, tangential=self.tangential_stiffness)
 
     @property

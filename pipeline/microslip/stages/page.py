@@ -8,11 +8,7 @@ from typing import Any
 
 from ..basis import read_basis
 from ..files import store
-from ..ring.resonances import (
-    resonance_csv,
-    resonances,
-    speeds_of,
-)
+from ..ring.resonances import resonance_csv, resonances, speeds_of
 from .job import Job
 from .stage import Made, Report, Stage
 
