@@ -10,8 +10,8 @@ from microslip.contact.friction import Coulomb
 from microslip.contact.normal import Penalty, Preload
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
+from microslip.harmonic_balance.by_hand import JenkinsPlay, model
 from microslip.harmonic_balance.forces import AFT
-from microslip.harmonic_balance.play import JenkinsPlay, model
 
 
 def patch(along: tuple[float, float, float] = (0.0, 0.6, -1.6), **more: object) -> Patch:

@@ -1,6 +1,34 @@
 """microslip: modal bases of elastic bodies for vibration with friction contacts.
 
 After W. Sextro, Dynamical Contact Problems with Friction, 2nd edition, Springer 2007.
+
+    import microslip as ms
+
+gives the names below; each is loaded when it is first used. `docs/python.md` shows them at work.
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
 __version__ = "0.1.0"
+
+PUBLIC = {
+    "system.structure": "structure polynomial jenkins stop Element",
+}
+"""Module -> the names of it that are public."""
+
+_HOME = {name: module for module, names in PUBLIC.items() for name in names.split()}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'microslip' has no attribute '{name}'")
+    return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -24,6 +24,9 @@ import scipy.optimize
 from ..data import Array
 from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm, tangent, unit
 
+TURN = 0.5
+"""Share of the angle by which the tangent may turn in a step that the next step is chosen for."""
+
 Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
 
 
@@ -36,7 +39,7 @@ class Settings:
         step, step_min, step_max: length of the first, the shortest, the longest step.
         angle: radians by which the tangent may turn in a step. kink_step: a step shorter than this that still turns
             more is searched for a kink. contraction: of Newton's first two corrections that the step is chosen for.
-        predictor: along the tangent, or through the last two points.
+        predictor: along the tangent, or the cubic through the last two points and their tangents.
         targets: values of lambda to be hit exactly, wherever the curve passes them.
         folds, branch_points: locate them. resolution: branches nearer to each other than this count as crossing.
         newton: settings of the corrector.
@@ -52,7 +55,7 @@ class Settings:
     angle: float = 0.35
     kink_step: float = 1e-2
     contraction: float = 0.05
-    predictor: Literal["tangent", "secant"] = "tangent"
+    predictor: Literal["tangent", "cubic"] = "cubic"
     targets: tuple[float, ...] = ()
     folds: bool = True
     branch_points: bool = True
@@ -85,7 +88,8 @@ class State:
 
     Attributes:
         y: (n + 1,) scaled point. tangent: (n + 1,) unit vector. orientation: sign of det [D; tangent].
-        step: length to try next. before: the point before, or None. sense: last sign of lambda's change.
+        step: length to try next. before, before_tangent: of the point before, or None; no tangent across a kink.
+        sense: last sign of lambda's change.
         origin, origin_tangent: where the curve began. count: points so far. arclength.
         found: the points of the last advance, in order. status: "" while under way, else why it ended.
     """
@@ -102,6 +106,7 @@ class State:
     arclength: float
     found: tuple[Point, ...]
     status: str = ""
+    before_tangent: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -253,15 +258,23 @@ def _angle(a: Array, b: Array) -> float:
 
 def _tried(scaled: Scaled, state: State, length: float, settings: Settings) -> _Trial:
     """Predict, correct, judge."""
-    ahead = state.tangent
-    if settings.predictor == "secant" and state.before is not None:
-        secant = (state.y - state.before) / norm(state.y - state.before)
-        ahead = secant if _angle(secant, state.tangent) < settings.angle else ahead
-    guess = state.y + length * ahead
+    guess = predicted(state, length, settings)
     found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton)
     if not found.ok:
         return _Trial(False, 0.5)
     return _judged(state, found, length, settings)
+
+
+def predicted(state: State, length: float, settings: Settings) -> Array:
+    """A guess of the point a length beyond: along the tangent, wrong by the square of the length, or by the cubic
+    through the last two points and their tangents, wrong by its fourth power; not where that leaves the tangent by
+    much."""
+    ahead = state.y + length * state.tangent
+    if settings.predictor == "tangent" or state.before is None or state.before_tangent is None:
+        return ahead
+    last = Segment(state.before, state.y, state.before_tangent, state.tangent, False)
+    (guess,) = last.guesses(1.0 + length / norm(state.y - state.before))
+    return guess if norm(guess - ahead) <= 0.3 * length else ahead
 
 
 def _judged(state: State, found: Corrected, length: float, settings: Settings) -> _Trial:
@@ -487,7 +500,8 @@ def _taken(
             status = f"points: {settings.points} are found; allow more to go on"
     return replace(
         state, y=trial.y, tangent=trial.tangent, step=_next_step(state, trial, length, settings), before=state.y,
-        sense=sense, count=state.count + len(found), arclength=arclength, found=tuple(found), status=status,
+        before_tangent=None if trial.kink else state.tangent, sense=sense, count=state.count + len(found),
+        arclength=arclength, found=tuple(found), status=status,
     )  # fmt: skip
 
 
@@ -537,13 +551,14 @@ def _closed(state: State, y: Array, t: Array) -> bool:
 
 
 def _next_step(state: State, trial: _Trial, length: float, settings: Settings) -> float:
-    """From the contraction (proportional to the predictor's error, the square of the step) and the turn (to the step).
+    """From the contraction (proportional to the predictor's error, a power of the step) and the turn (to the step).
 
     A kink says nothing about the curve beyond it: half of what was used before.
     """
     if trial.kink:
         return max(0.5 * state.step, settings.step_min)
     turned = max(_angle(state.tangent, trial.tangent), 1e-6)
-    by_turn = 0.5 * settings.angle / turned
-    by_newton = np.sqrt(settings.contraction / max(trial.contraction, 1e-12))
+    by_turn = TURN * settings.angle / turned
+    order = 2 if settings.predictor == "tangent" or state.before_tangent is None else 4
+    by_newton = (settings.contraction / max(trial.contraction, 1e-12)) ** (1 / order)
     return float(np.clip(length * np.clip(min(by_turn, by_newton), 0.5, 2.0), settings.step_min, settings.step_max))

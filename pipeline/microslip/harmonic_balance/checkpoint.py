@@ -141,6 +141,7 @@ def _begun(family: Family, rows: list[dict[str, Any]], settings: Settings) -> Br
         step=row["curve/step"], before=None if before is None else scaled.pack(before.x, before.lam),
         sense=int(row["curve/sense"]), origin=scaled.pack(points[0].x, points[0].lam),
         origin_tangent=points[0].tangent, count=len(rows), arclength=last.arclength, found=(), status=status,
+        before_tangent=None if before is None or last.kink else before.tangent,
     )  # fmt: skip
     return Branch(points, status, state)
 

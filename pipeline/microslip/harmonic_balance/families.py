@@ -110,7 +110,7 @@ class Family:
 
     def settings(self, given: Settings | None = None) -> Settings:
         """How the curve is followed, between its own ends."""
-        given = given or Settings(points=3000, branch_points=False)
+        given = given or Settings(points=3000, branch_points=False, angle=0.5, step_max=0.4)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 

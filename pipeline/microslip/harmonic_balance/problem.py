@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import scipy.linalg
 from ..data import Array, ComplexArray, Indices
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear
-from . import blocks, play, reduced
+from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import Forces
 from .point_cycles import Cycle, Traced
@@ -165,9 +166,22 @@ class Problem:
         """The same with a share of the loads that are not steady."""
         return replace(self, share=share)
 
+    @cached_property
     def slices(self) -> list[slice]:
         """Coordinates of each part."""
         return [slice(b, b + p.count) for b, p in zip(self.begins, self.parts[0], strict=True)]
+
+    @cached_property
+    def places(self) -> list[list[tuple[int, tuple[int, int], slice, slice, float]]]:
+        """Of each group: (contact of it, parts, coordinates of the force's part, of the motion's, sign) of all places
+        where the derivative of a force by a motion stands."""
+        return [_places(g, np.array(self.begins)) for g in self.groups]
+
+    @cached_property
+    def without(self) -> list[Array]:
+        """(W, c_i, W, c_i) of each part: what the stiffness taken into it takes off the derivative of the forces."""
+        unit = np.eye(self.coefficients)
+        return [-np.einsum("wx,ij->wixj", unit, k) for k in self.stiffness]
 
     def at(self, Omega: float) -> AtFrequency:
         """The problem at one frequency (rad/s)."""
@@ -235,7 +249,7 @@ class AtFrequency:
                 if side is not None:
                     np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
         pressed *= p.length / p.scale
-        moved = [np.abs(one.compliance) @ pressed[s] for one, s in zip(self.views, p.slices(), strict=True)]
+        moved = [np.abs(one.compliance) @ pressed[s] for one, s in zip(self.views, p.slices, strict=True)]
         return float(np.finfo(float).eps * np.abs(np.hstack(moved) / p.scale).max(initial=0.0))
 
     def residual(self, x: Array) -> Array:
@@ -244,8 +258,8 @@ class AtFrequency:
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
-        force, slope = self.forces(x)
-        return self.residual_of(x, force), self.jacobian(slope).dense(), self.rate(x, force)
+        force, slopes = self.forces(x)
+        return self.residual_of(x, force), self.jacobian(slopes).dense(), self.rate(x, force)
 
     def force(self, x: Array) -> Array:
         """(W, c) contact forces less the preload along the coordinates, N and N m."""
@@ -278,28 +292,30 @@ class AtFrequency:
         """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
         p = self.problem
         pieces: dict[tuple[int, int], Array] = {}
-        for g, S in zip(p.groups, slopes, strict=True):
-            _add_slopes(pieces, g, S, p)
-        for i, k in enumerate(p.stiffness):
-            block = pieces.setdefault((i, i), np.zeros((p.coefficients, len(k), p.coefficients, len(k))))
-            for w in range(p.coefficients):
-                block[w, :, w] -= k
-        where = p.slices()
-        D = {(i, j): self._scaled(self._applied(i, P), where[i], where[j]) for (i, j), P in pieces.items()}
+        for i, without in enumerate(p.without):
+            pieces[i, i] = without.copy()
+        for places, S in zip(p.places, slopes, strict=True):
+            for n, (i, j), at, to, sign in places:
+                if (i, j) not in pieces:
+                    size = [p.parts[0][part].count for part in (i, j)]
+                    pieces[i, j] = np.zeros((p.coefficients, size[0], p.coefficients, size[1]))
+                pieces[i, j][:, at, :, to] += sign * S[n].transpose(1, 0, 3, 2)
+        where = p.slices
+        D = {
+            (i, j): self._scaled(_harmonics(self.views[i].compliance, P), where[i], where[j])
+            for (i, j), P in pieces.items()
+        }
         return blocks.one_plus(D, [s.stop - s.start for s in where], p.coefficients)
 
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
         p, v = self.problem, self.problem.displacement(x)
-        excess = self._excess(v, force)
-        out = np.zeros_like(v)
-        for i, s in enumerate(p.slices()):
-            out[:, s] += _harmonics(self.views[i].compliance_rate, excess[:, s])
+        out = self._applied(self._excess(v, force), "compliance_rate")
         rates = [g.rate(g.relative(v), self.period) for g in p.groups]
         if any(r is not None for r in rates):
             zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
             given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
-            out += self._compliant(self.along(given, preload=False))
+            out += self._applied(self.along(given, preload=False))
         driven = self._stacked([view.reference_rate for view in self.views])
         return (out / p.scale).ravel() - driven
 
@@ -317,7 +333,7 @@ class AtFrequency:
         return [
             [
                 s.modal * (p.share if h else 1.0) - s.modal_compliance @ g[h][at]
-                for s, at in zip(parts, p.slices(), strict=True)
+                for s, at in zip(parts, p.slices, strict=True)
             ]
             for h, parts in enumerate(self.seen)
         ]
@@ -330,14 +346,14 @@ class AtFrequency:
     def _excess(self, v: Array, force: Array) -> Array:
         """(W, c) p: forces less the preload, less what the reference stiffness makes of the displacement."""
         out = force.copy()
-        for s, k in zip(self.problem.slices(), self.problem.stiffness, strict=True):
+        for s, k in zip(self.problem.slices, self.problem.stiffness, strict=True):
             out[:, s] -= v[:, s] @ k.T
         return out
 
     def residual_of(self, x: Array, force: Array) -> Array:
         """(size,) R for forces that are known."""
         p = self.problem
-        moved = self._compliant(self._excess(p.displacement(x), force))
+        moved = self._applied(self._excess(p.displacement(x), force))
         return x - self.reference + (moved / p.scale).ravel()
 
     def along(self, forces: list[Array], preload: bool = True) -> Array:
@@ -353,15 +369,14 @@ class AtFrequency:
                 out[:, g.second] -= F
         return out
 
-    def _compliant(self, force: Array) -> Array:
-        """(W, c) D applied to (W, c)."""
+    def _applied(self, force: Array, what: str = "compliance") -> Array:
+        """(W, c) D, or another array of the views, applied to (W, c)."""
+        if len(self.views) == 1:
+            return _harmonics(getattr(self.views[0], what), force)
         out = np.empty_like(force)
-        for i, s in enumerate(self.problem.slices()):
-            out[:, s] = _harmonics(self.views[i].compliance, force[:, s])
+        for view, s in zip(self.views, self.problem.slices, strict=True):
+            out[:, s] = _harmonics(getattr(view, what), force[:, s])
         return out
-
-    def _applied(self, part: int, P: Array) -> Array:
-        return _harmonics(self.views[part].compliance, P)
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
         """A block (W, a, W, b) as a matrix, in units of x."""
@@ -371,7 +386,7 @@ class AtFrequency:
 
     def _stacked(self, amplitudes: list[ComplexArray]) -> Array:
         """(size,) x of complex amplitudes (H + 1, c_i) under the loads, a standing for Re(a exp(i h Omega t))."""
-        p, a = self.problem, np.concatenate(amplitudes, axis=1)
+        p, a = self.problem, amplitudes[0] if len(amplitudes) == 1 else np.concatenate(amplitudes, axis=1)
         out = np.empty((p.coefficients, p.count))
         out[0], out[1::2], out[2::2] = a[0].real, p.share * a[1:].real, -p.share * a[1:].imag
         return (out / p.scale).ravel()
@@ -387,18 +402,16 @@ def _harmonics(D: ComplexArray, V: Array) -> Array:
     return out.reshape(V.shape)
 
 
-def _add_slopes(pieces: dict[tuple[int, int], Array], g: Group, S: Array, p: Problem) -> None:
-    """Derivatives (n, k, W, k, W) of a group's forces into blocks of parts (W, a, W, b)."""
-    begins, sizes = np.array(p.begins), [part.count for part in p.parts[0]]
+def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:
+    """See `Problem.places`."""
     sides: list[tuple[Any, float]] = [(g.first, 1.0)] + ([] if g.second is None else [(g.second, -1.0)])
-    for n, slope in enumerate(S.transpose(0, 2, 1, 4, 3)):  # (W, k, W, k)
-        for row, plus in sides:
-            for column, minus in sides:
-                a, b = row[n], column[n]
-                i, j = (int(np.searchsorted(begins, at[0], "right")) - 1 for at in (a, b))
-                block = pieces.setdefault((i, j), np.zeros((p.coefficients, sizes[i], p.coefficients, sizes[j])))
-                at, to = slice(a[0] - begins[i], a[-1] + 1 - begins[i]), slice(b[0] - begins[j], b[-1] + 1 - begins[j])
-                block[:, at, :, to] += plus * minus * slope
+    found = []
+    for n in range(len(g.first)):
+        for (row, plus), (column, minus) in product(sides, sides):
+            i, j = (int(np.searchsorted(begins, side[n, 0], "right")) - 1 for side in (row, column))
+            at, to = (slice(s[n, 0] - begins[k], s[n, -1] + 1 - begins[k]) for s, k in ((row, i), (column, j)))
+            found.append((n, (i, j), at, to, plus * minus))
+    return found
 
 
 def of(
@@ -432,7 +445,7 @@ def of(
     groups = []
     for same in _equal(assembly):
         patch = contacts[same[0]].patch
-        model = (models or {}).get(same[0]) or play.model(patch, len(same), samples, cycles, periodicity)
+        model = (models or {}).get(same[0]) or by_hand.model(patch, len(same), samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
         second = None if together or contacts[same[0]].second is None else np.array([where[i, 1] for i in same])
         offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))
@@ -479,7 +492,8 @@ def moves_by(assembly: Assembly) -> float:
     gapes, how far the loads move the stiffest."""
     pairs = [(abs(float(c.preload[0])) * 0.3, float(np.diag(c.stiffness)[:2][-1])) for c in assembly.contacts]
     gaps = [-float(c.offset[0]) for c in assembly.contacts]
-    moved = max([*(limit / k for limit, k in pairs if k), *gaps], default=0.0)
+    told = [c.length for c in assembly.contacts if c.length]
+    moved = max([*(limit / k for limit, k in pairs if k), *gaps, *told], default=0.0)
     if moved <= 0:
         stiffest = max((float(np.diag(c.stiffness)[:3].max()) for c in assembly.contacts), default=0.0)
         moved = max((abs(x.amplitude) for x in assembly.loads), default=0.0) / stiffest if stiffest else 0.0

@@ -61,7 +61,7 @@ def unbalanced(at: AtFrequency, before: Places, after: Places) -> tuple[float, s
         before, after: where the springs begin, and the solution of that balance.
     """
     most, whom, p = 0.0, "", at.problem
-    for i, (part, k, s) in enumerate(zip(p.parts[0], p.stiffness, p.slices(), strict=True)):
+    for i, (part, k, s) in enumerate(zip(p.parts[0], p.stiffness, p.slices, strict=True)):
         motions, shares = unconstrained(part, k)
         free = motions[:, shares < FREE]
         forces = np.abs(free.conj().T @ _stuck(part, k) @ (before[0][i] - after[0][i]))

@@ -48,7 +48,7 @@ def amplitude(
     v, f = at.amplitudes(p.displacement(x))[h], at.amplitudes(force)[h]
     of_force, of_motion = np.zeros(p.count, dtype=complex), np.zeros(p.count, dtype=complex)
     value, by_Omega = 0.0j, 0.0j
-    for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices(), strict=True):
+    for part, seen, k, s in zip(p.parts[h], at.seen[h], p.stiffness, p.slices, strict=True):
         row, beside = part.output[output], part.output_residual[output]
         excess = f[s] - k @ v[s]
         driven = share * (row @ seen.modal + part.output_given[output])

@@ -96,21 +96,30 @@ class Poles:
     static: ComplexArray
     given: ComplexArray
 
-    def met(self, Omega: float) -> bool:
-        """Whether a frequency (rad/s) or a harmonic of it is, within `MET`, an eigenvalue."""
-        distance = np.abs(1j * Omega * self.harmonics[:, None] - self.values)
-        return bool((distance <= MET * np.abs(self.values)).any())
+    @cached_property
+    def _near(self) -> Array:
+        return MET * np.abs(self.values)
 
-    def fill(self, view: View, Omega: float) -> None:
-        """What these harmonics are at a frequency (rad/s), into a view."""
-        h = self.harmonics
-        g = 1.0 / (1j * Omega * h[:, None] - self.values)
-        for weight, more, less in (
-            (g, self.given, (view.reference, view.compliance)),
-            (-1j * h[:, None] * g**2, 0.0, (view.reference_rate, view.compliance_rate)),
-        ):
-            less[0][h] = (weight * self.driven) @ self.left.T + more
-            less[1][h] = (self.left * weight[:, None]) @ self.right + (self.static if weight is g else 0.0)
+    @cached_property
+    def _where(self) -> slice | Array:
+        """Of the harmonics in a view."""
+        whole = np.array_equal(self.harmonics, np.arange(len(self.harmonics)))
+        return slice(len(self.harmonics)) if whole else self.harmonics
+
+    def fill(self, view: View, Omega: float) -> bool:
+        """What these harmonics are at a frequency (rad/s), into a view; False where it or one of its harmonics is,
+        within `MET`, an eigenvalue."""
+        h = self._where
+        away = 1j * Omega * self.harmonics[:, None] - self.values
+        if (np.abs(away) <= self._near).any():
+            return False
+        g = 1.0 / away
+        rate = -1j * self.harmonics[:, None] * (g * g)
+        view.reference[h] = (g * self.driven) @ self.left.T + self.given
+        view.compliance[h] = (self.left * g[:, None]) @ self.right + self.static
+        view.reference_rate[h] = (rate * self.driven) @ self.left.T
+        view.compliance_rate[h] = (self.left * rate[:, None]) @ self.right
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +137,13 @@ class Eliminated:
         that the numbers subtracted are without bounds."""
         if self.poles is None:
             return self._far(Omega)
-        if any(group.met(Omega) for group in self.poles):
-            return None
+        view = self._empty
+        return view if all([group.fill(view, Omega) for group in self.poles]) else None
+
+    @property
+    def _empty(self) -> View:
         H, c = len(self.parts), len(self.stiffness)
-        view = View(*[np.empty((H, c, c)[:n], complex) for n in (2, 3, 2, 3)])
-        for group in self.poles:
-            group.fill(view, Omega)
-        return view
+        return View(*[np.empty((H, c, c)[:n], complex) for n in (2, 3, 2, 3)])
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
@@ -195,11 +204,12 @@ class Eliminated:
 
         Beside: of one mode without damping the mean is the eigenvalue itself, where nothing is finite.
         """
-        c, h = len(self.stiffness), int(poles.harmonics[-1])
+        h = int(poles.harmonics[-1])
         sizes = np.abs(poles.values)
         for Omega in (0.97 * np.exp(np.log(sizes).mean()), 1.01 * sizes.min()):
-            view = View(*[np.empty((len(self.parts), c, c)[:n], complex) for n in (2, 3, 2, 3)])
-            poles.fill(view, float(Omega) / max(h, 1))
+            view = self._empty
+            if not poles.fill(view, float(Omega) / max(h, 1)):
+                return False
             exact = seen(self.parts[h], self.stiffness, float(Omega) / max(h, 1), h)
             for a, b in ((view.compliance[h], exact.compliance), (view.reference[h], exact.reference)):
                 if not np.abs(a - b).max(initial=0.0) <= 1e-10 * np.abs(b).max(initial=1e-300):

@@ -64,7 +64,7 @@ def operating(problem: Problem, point: Point) -> Operating:
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
     outputs, work = [], np.zeros(3)
     for h, parts in enumerate(p.parts):
-        each = list(zip(parts, q[h], [f[h][s] for s in p.slices()], strict=True))
+        each = list(zip(parts, q[h], [f[h][s] for s in p.slices], strict=True))
         share = p.share if h else 1.0
         outputs.append(np.sum([reduced.monitored(part, own, F, share) for part, own, F in each], axis=0))
         if h:

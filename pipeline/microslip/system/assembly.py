@@ -85,6 +85,7 @@ class Contact:
         phase: radians by which the wave leads here in the first harmonic. Laws are marched from where the wave is at
             zero phase: what a contact remembers of its beginning is then the same in every sector of a ring.
         compliance: (k, k) of the bodies along the coordinates, by which a patch that deforms yields to its preload.
+        length: m, about what it has to move by to slide, close or bend; None: what preload and offset say.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Contact:
     preload: Array
     phase: float = 0.0
     compliance: Array | None = None
+    length: float | None = None
 
     @cached_property
     def stiffness(self) -> Array:

@@ -1,0 +1,188 @@
+"""Contacts of one point that moves along one line, by hand: small problems wait for their marching, not for the rest.
+
+A law that is marched as a compiled program costs a tenth of a microsecond a point and sample, but half a millisecond
+a call. A spring without memory needs no marching. A spring in series with a slider that holds a constant force is a
+play operator (Krejci, Hysteresis, Convexity and Dissipation in Hyperbolic Equations, 1996): its slider stands where it
+was dragged to last, and the derivative of that place is the one of a single sample. Its memory is periodic after the
+first cycle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..contact.elements import Spring
+from ..contact.friction import Coulomb
+from ..contact.harmonics import fourier
+from ..contact.jenkins import Jenkins
+from ..contact.law import Law
+from ..contact.normal import Preload
+from ..contact.patch import Patch
+from ..contact.point import PointContact
+from ..data import Array, Indices
+from .forces import AFT, Forces
+from .point_cycles import Cycle, Traced, above_rounding, derivative
+
+
+@dataclass(frozen=True, eq=False)
+class OneCoordinate(AFT):
+    """`AFT` for a patch of one point and one coordinate along its tangents."""
+
+    def _sampled(self, u: Array) -> tuple[Array, Array, Array]:
+        """(c, s) the coordinate over a cycle, (s, W) values of the harmonics, (W, s) their transform."""
+        values, transform = _waves(u.shape[2] // 2, self.samples)
+        return u[:, 0] @ values.T, values, transform
+
+    def rate(self, u: Array, period: float) -> None:
+        """The force depends on the path alone."""
+
+    def _speed(self, u: Array) -> Array:
+        """(c, s) change of the coordinate from sample to sample, by its derivative."""
+        return (
+            u[:, 0] @ (_waves(u.shape[2] // 2, self.samples)[0] @ derivative(u.shape[2])).T * (2 * np.pi / self.samples)
+        )
+
+    @cached_property
+    def _length(self) -> float:
+        """How far the point moves per unit of the coordinate."""
+        return float(np.linalg.norm(self.patch.kinematics))
+
+    def _of_points(self, force: Array, normal: float = 0.0) -> Array:
+        """(c, s, 1, 3) forces of the points, with a constant normal one, from those along the coordinate."""
+        out = force[..., None, None] * self.patch.kinematics[:, :, 0] / self._length**2
+        out[..., 0] += normal
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticSpring(OneCoordinate):
+    """A spring that remembers nothing: `contact.elements.Spring`."""
+
+    def force(self, u: Array, period: float) -> Array:
+        path, _, transform = self._sampled(u)
+        return (self._spring.force(path) @ transform.T)[:, None]
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        path, values, transform = self._sampled(u)
+        slope = transform @ (self._spring.slope(path)[..., None] * values)
+        return (self._spring.force(path) @ transform.T)[:, None], slope[:, None, :, None]
+
+    def traced(self, u: Array, period: float) -> list[Traced]:
+        force, zero = self._spring.force(self._sampled(u)[0]), np.zeros(1)
+        work = above_rounding(force * self._speed(u), 1)
+        cycles = [Cycle(w[None], zero, zero, zero, zero, 0.0) for w in work]
+        return [Traced(f, one) for f, one in zip(self._of_points(force), cycles, strict=True)]
+
+    @property
+    def _spring(self) -> Spring:
+        assert isinstance(self.patch.law, Spring)
+        return self.patch.law
+
+
+@dataclass(frozen=True, eq=False)
+class JenkinsPlay(OneCoordinate):
+    """A spring in series with a slider, under a constant normal force."""
+
+    @cached_property
+    def spring(self) -> float:
+        """Stiffness along the coordinate, N/m."""
+        law = self.patch.law
+        return float(np.asarray(law.along if isinstance(law, Jenkins) else self._point.stiffness_1)) * self._length**2
+
+    @cached_property
+    def width(self) -> float:
+        """How far the coordinate is from the slider while this is dragged."""
+        law, zero = self.patch.law, jnp.zeros(1)
+        if isinstance(law, Jenkins):
+            return float(np.asarray(law.held)) * self._length / self.spring
+        normal = self._point.normal.force(zero)
+        return float((self._point.friction.coefficient(zero, normal, zero) * normal)[0]) * self._length / self.spring
+
+    def force(self, u: Array, period: float) -> Array:
+        path, places, _ = self._sliders(u)
+        return (self.spring * (path - places) @ self._sampled(u)[2].T)[:, None]
+
+    def forces(self, u: Array, period: float) -> tuple[Array, Array]:
+        _, values, transform = self._sampled(u)
+        path, places, dragged = self._sliders(u)
+        known = np.vstack([values, np.zeros(values.shape[1])])  # the last row: a slider that was never dragged
+        slope = self.spring * (transform @ (values - known[dragged]))
+        return (self.spring * (path - places) @ transform.T)[:, None], slope[:, None, :, None]
+
+    def traced(self, u: Array, period: float) -> list[Traced]:
+        path, places, _ = self._sliders(u)
+        force, none = self.spring * (path - places), np.zeros(1)
+        mean = 0.5 * (force + np.roll(force, 1, axis=1))
+        moved, slid = (x - np.roll(x, 1, axis=1) for x in (path, places))
+        slips = np.abs(slid) > 1e-9 * np.abs(moved).max(initial=0.0)
+        lost = self.spring * self.width * (np.abs(slid) * slips).sum(axis=1)
+        work = above_rounding(force * self._speed(u), 1), (mean * slid * slips).sum(axis=1), lost, slips.mean(axis=1)
+        cycles = [Cycle(d, s, f, c, none, 0.0) for d, s, f, c in np.transpose(work)[..., None]]
+        return [Traced(f, one) for f, one in zip(self._of_points(force, self._normal), cycles, strict=True)]
+
+    @property
+    def _normal(self) -> float:
+        """N, of the point."""
+        if isinstance(self.patch.law, Jenkins):
+            return 0.0
+        return float(np.asarray(self._point.normal.force(jnp.zeros(1)))[0])
+
+    @property
+    def _point(self) -> PointContact:
+        assert isinstance(self.patch.law, PointContact)
+        return self.patch.law
+
+    def _sliders(self, u: Array) -> tuple[Array, Array, Indices]:
+        """(c, s) the coordinate over a cycle, places of its slider, samples that dragged it there (-1: none)."""
+        path = self._sampled(u)[0]
+        found = [play(one, self.width) for one in path.tolist()]
+        dragged, signs = np.array([f[0] for f in found]), np.array([f[1] for f in found])
+        at = np.take_along_axis(path, dragged, axis=1) - self.width * signs
+        return path, np.where(dragged >= 0, at, 0.0), dragged
+
+
+@lru_cache(maxsize=8)
+def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
+    values, transform = fourier(harmonics, samples)
+    return np.asarray(values), np.asarray(transform)
+
+
+def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
+    """Of every sample of the second cycle of a path: the sample that dragged the slider last (-1: none yet),
+    and in which direction, +1 or -1. It begins at 0."""
+    low, high, last, sign = -width, width, -1, 0
+    dragged, signs = [], []
+    for keep in (False, True):
+        for i, x in enumerate(path):
+            if x > high:
+                low, high, last, sign = x - 2 * width, x, i, 1
+            elif x < low:
+                low, high, last, sign = x, x + 2 * width, i, -1
+            if keep:
+                dragged.append(last)
+                signs.append(sign)
+    return dragged, signs
+
+
+def model(patch: Patch, contacts: int, samples: int, cycles: int, periodicity: float) -> Forces:
+    """Of the forces of equal contacts: by hand where that is possible, else marched."""
+    kind = AFT
+    if patch.kinematics.shape == (1, 3, 1):
+        kind = _by_hand(patch.law, patch.kinematics[0, :, 0], cycles)
+    return kind(patch, contacts, samples, cycles, periodicity)
+
+
+def _by_hand(law: Law, along: Array, cycles: int) -> type[AFT]:
+    """For one point that moves along (3,) n, t1, t2."""
+    if isinstance(law, Spring) and not along[[0, 2]].any():
+        return ElasticSpring
+    if isinstance(law, Jenkins) and np.count_nonzero(along) == 1 and along[law.slider]:
+        return JenkinsPlay if cycles > 1 else AFT
+    plain = isinstance(law, PointContact) and isinstance(law.normal, Preload) and isinstance(law.friction, Coulomb)
+    if plain and not along[0] and law.stiffness_2 is None and law.damping is None and np.size(law.stiffness_1) == 1:
+        return JenkinsPlay if cycles > 1 else AFT
+    return AFT

@@ -1,0 +1,227 @@
+"""Small systems: matrices, and nonlinear elements at their coordinates.
+
+    M q'' + C q' + K q + sum of w_e^T g_e(w_e q) = f(t)
+
+`structure` makes an `Assembly` of them, so that every analysis of bodies with contacts serves them too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from ..contact.elements import Polynomial, Stop
+from ..contact.jenkins import Jenkins
+from ..contact.law import Law
+from ..contact.patch import Patch
+from ..data import Array, Compliance, ModalGroup, Rows, UserError
+from ..settings.mistakes import bounded
+from .assembly import Assembly, Contact, ContactFace, Load, Output
+from .component import Component
+
+ALONG = {"n": 0, "t1": 1, "t2": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A law that acts along one coordinate of a structure.
+
+    Attributes:
+        law: of one point; its force acts against the displacement. at: number of a coordinate from 0, or (n,) weights
+            of all. to: the same of what its other end is fixed to; None: the ground. along: which of the law's
+            directions is used. name: of the element; None: of its kind and number. length: m, about what it has to move
+            by for its nonlinearity to show; None: not known.
+    """
+
+    law: Law
+    at: Any
+    to: Any = None
+    along: str = "t1"
+    name: str | None = None
+    length: float | None = None
+
+    def row(self, count: int) -> Array:
+        """(n,) its displacement per unit of n coordinates.
+
+        Raises:
+            UserError: no such coordinate.
+        """
+        return _row(self.at, count, "at") - (0.0 if self.to is None else _row(self.to, count, "to"))
+
+
+def _row(at: Any, count: int, key: str) -> Array:
+    if np.ndim(at):
+        if np.shape(at) != (count,):
+            raise UserError(f"element: {key}: weights of shape {np.shape(at)}; the structure has {count} coordinates")
+        return np.asarray(at, dtype=float)
+    if at != int(at) or not -count <= at < count:
+        raise UserError(f"element: {key}: there is no coordinate {at}; the structure has {count}, counted from 0")
+    return np.eye(count)[int(at)]
+
+
+def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+    """A spring with the force sum of k_p u^p.
+
+    Args:
+        stiffness: power p -> k_p, N/m^p: ``{3: 0.05}`` is the spring of Duffing's oscillator. at, to, name: see
+            `Element`.
+
+    Raises:
+        UserError: no power, or one that is no whole number from 1 on.
+    """
+    if not stiffness or any(p != int(p) or p < 1 for p in stiffness):
+        raise UserError(f"polynomial: powers {list(stiffness)}: give one or more whole numbers, 1 or larger")
+    bounded("polynomial: stiffness", list(stiffness.values()))
+    return Element(
+        Polynomial(np.array([stiffness.get(p, 0.0) for p in range(1, max(stiffness) + 1)])), at, to, "t1", name
+    )
+
+
+def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+    """A Jenkins element: a spring (N/m) in series with a slider that holds a force limit (N). at, to, name: see
+    `Element`.
+
+    Raises:
+        UserError: a stiffness that is not positive, or a negative limit.
+    """
+    bounded("jenkins: stiffness", stiffness, gt=0)
+    bounded("jenkins: limit", limit, ge=0)
+    law = Jenkins(0.0, float(stiffness), 0.0, float(limit))
+    return Element(law, at, to, name=name, length=limit / stiffness)
+
+
+def stop(
+    stiffness: float, gap: float, at: Any = 0, to: Any = None, both: bool = False, name: str | None = None
+) -> Element:
+    """A spring (N/m) that is met beyond a gap (m) and cannot pull; both: also in the other direction. at, to, name: see
+    `Element`.
+
+    Raises:
+        UserError: a stiffness that is not positive.
+    """
+    bounded("stop: stiffness", stiffness, gt=0)
+    bounded("stop: gap", gap, **({"ge": 0} if both else {}))
+    return Element(Stop(float(stiffness), float(gap), both), at, to, name=name, length=abs(gap) or None)
+
+
+def structure(
+    M: Any, K: Any, C: Any = None, *, force: Mapping[int, complex] | Array | None = None,
+    elements: Sequence[Element] = (), output: int | Sequence[int] | None = None,
+    damping_ratio: float | Sequence[float] = 0.0, name: str = "structure",
+) -> Assembly:  # fmt: skip
+    """A structure of matrices with nonlinear elements.
+
+    Args:
+        M, K, C: (n, n) mass (kg), stiffness (N/m) and damping (N s/m), or numbers where there is one coordinate.
+        force: coordinate -> 0-peak amplitude (N) of the harmonic force, or (n,) of all.
+        elements: see `polynomial`, `jenkins`, `stop` and `Element`.
+        output: coordinates that are read; where the force acts, if not given.
+        damping_ratio: of the modes without elements, one for all or one a mode from the lowest, beside C.
+
+    Raises:
+        UserError: matrices that are none of a structure, a coordinate that there is not.
+
+    Examples:
+        Duffing's oscillator, q'' + 0.05 q' + q + 0.05 q^3 = 0.4 cos(Omega t):
+
+        >>> import microslip as ms
+        >>> duffing = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    """
+    M, K = _matrix(M, "M"), _matrix(K, "K")
+    n = len(M)
+    C = np.zeros((n, n)) if C is None else _matrix(C, "C")
+    for key, A in (("K", K), ("C", C)):
+        if A.shape != M.shape:
+            raise UserError(f"structure: {key} is {len(A)} x {len(A)} and M is {n} x {n}; give them the same size")
+    _check_mass(M)
+    C = C + _modal_damping(M, K, damping_ratio)
+    f = _force(force, n)
+    watched = [int(i) for i in (np.flatnonzero(f) if output is None else np.atleast_1d(output))]
+    rows = np.array([_row(i, n, "output") for i in watched]).reshape(-1, n)
+    nowhere = np.zeros(3)
+    group = ModalGroup(
+        speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
+        G_r=np.zeros((n, n)), phi=np.zeros((0, 3, n)), interfaces={},
+        excitations={"force": Rows(f[None].conj(), ("force",), "m", nowhere)},
+        monitors={"q": Rows(rows, tuple(map(str, watched)), "m", nowhere)}, gauges={},
+        compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
+        checks={},
+    )  # fmt: skip
+    loads = (Load(name, "force"),) if f.any() else ()
+    outputs = tuple(Output(name, "q", str(i)) for i in watched)
+    return Assembly((Component(name, {0: group}),), _contacts(elements, name, K, f), loads, outputs)
+
+
+def _matrix(A: Any, key: str) -> Array:
+    A = np.atleast_2d(np.asarray(A, dtype=float))
+    if A.ndim != 2 or len(A) != A.shape[1]:
+        raise UserError(f"structure: {key}: has shape {A.shape}; give a square matrix")
+    bounded(f"structure: {key}", A)
+    return A
+
+
+def _check_mass(M: Array) -> None:
+    if np.abs(M - M.T).max() > 1e-9 * np.abs(M).max():
+        raise UserError("structure: M is not symmetric; correct it")
+    if np.linalg.eigvalsh(M)[0] <= 1e-14 * np.abs(M).max():
+        raise UserError("structure: a coordinate has no mass (M is not positive definite); condense it or give it some")
+
+
+def _modal_damping(M: Array, K: Array, ratio: float | Sequence[float]) -> Array:
+    """C of ratios D: M X diag(2 D omega) X^T M."""
+    given = np.atleast_1d(np.asarray(ratio, dtype=float))
+    bounded("structure: damping_ratio", given, ge=0)
+    if not given.any():
+        return np.zeros_like(M)
+    if np.abs(K - K.T).max() > 1e-9 * np.abs(K).max():
+        raise UserError("structure: damping_ratio: K is not symmetric and has no such modes; give C")
+    squares, X = scipy.linalg.eigh(K, M)
+    D = np.resize(np.append(given, np.full(len(M), given[-1])), len(M))
+    return M @ X @ np.diag(2 * D * np.sqrt(np.maximum(squares, 0.0))) @ X.T @ M
+
+
+def _force(force: Any, n: int) -> Array:
+    if force is None:
+        return np.zeros(n, dtype=complex)
+    if isinstance(force, Mapping):
+        f = sum((v * _row(i, n, "force").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex))
+    else:
+        f = np.atleast_1d(np.asarray(force, dtype=complex))
+    if f.shape != (n,):
+        raise UserError(f"structure: force: has shape {f.shape}; the structure has {n} coordinates")
+    bounded("structure: force", [*f.real, *f.imag])
+    return f
+
+
+def _contacts(elements: Sequence[Element], component: str, K: Array, force: Array) -> tuple[Contact, ...]:
+    patches: dict[str, Patch] = {}  # equal elements are evaluated together
+    found = []
+    for i, e in enumerate(elements, 1):
+        row = e.row(len(K))
+        if e.along not in ALONG:
+            raise UserError(f"element: along: '{e.along}' is no direction; choose from n, t1, t2")
+        shape = np.zeros((1, 3, 1))
+        shape[0, ALONG[e.along], 0] = 1.0
+        key = f"{e.law!r} {e.along}"
+        patch = patches.setdefault(key, Patch("element", np.zeros((1, 2)), np.ones(1), e.law, shape))
+        own = e.name or f"{type(e.law).__name__.lower()} {i}"
+        face, zero = ContactFace(component, own, rows={0: row[None]}), np.zeros(1)
+        found.append(Contact(own, patch, face, None, zero, zero, length=e.length or _length(e.law, row, K, force)))
+    return tuple(found)
+
+
+def _length(law: Law, row: Array, K: Array, force: Array) -> float | None:
+    """A tenth of the displacement (m) at which the largest nonlinear part of a polynomial is as large as the force of
+    the structure's own stiffness there, or as what drives it where it has none."""
+    if not isinstance(law, Polynomial) or not len(law.stiffness) > 1:
+        return None
+    stiffness, driven = abs(float(row @ K @ row)), float(np.abs(force).max(initial=0.0))
+    lengths = []
+    for p, k in enumerate(map(abs, np.asarray(law.stiffness).tolist()), 1):
+        if p > 1 and k:
+            lengths.append((stiffness / k) ** (1 / (p - 1)) if stiffness else (driven / k) ** (1 / p))
+    return 0.1 * min(lengths) if lengths and min(lengths) > 0 else None
