@@ -148,7 +148,7 @@ def test_a_body_of_one_mode_without_damping():
     problem = sliding(ratio=0.0)
     seen = problem.eliminated[0].at(150.0)
     assert np.isfinite(seen.compliance).all()
-    assert seen.compliance[1, 1, 1] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
+    assert seen.compliance[0, 1, 1, 1] == pytest.approx(1 / (3e4 - 150.0**2), rel=1e-12)
 
 
 def test_mistakes():

@@ -27,6 +27,9 @@ from .newton import Corrected, Equations, NewtonSettings, Scaled, correct, norm,
 TURN = 0.5
 """Share of the angle by which the tangent may turn in a step that the next step is chosen for."""
 
+REACH = 2.0
+"""Length of a correction, over that of the step, beyond which the predicted point is of no use."""
+
 Kind = Literal["start", "regular", "fold", "branch point", "target", "bound"]
 
 
@@ -54,7 +57,7 @@ class Settings:
     step_max: float = 0.1
     angle: float = 0.35
     kink_step: float = 1e-2
-    contraction: float = 0.05
+    contraction: float = 0.02
     predictor: Literal["tangent", "cubic"] = "cubic"
     targets: tuple[float, ...] = ()
     folds: bool = True
@@ -223,7 +226,7 @@ def advance(problem: Equations, state: State, settings: Settings) -> State:
     if state.status:
         return state
     scaled = Scaled(problem)
-    length = min(state.step, settings.step_max)
+    length = _within_the_angle(state, min(state.step, settings.step_max), settings)
     while length >= settings.step_min:
         trial = _tried(scaled, state, length, settings)
         if trial.flips:
@@ -259,7 +262,7 @@ def _angle(a: Array, b: Array) -> float:
 def _tried(scaled: Scaled, state: State, length: float, settings: Settings) -> _Trial:
     """Predict, correct, judge."""
     guess = predicted(state, length, settings)
-    found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton)
+    found = correct(scaled, guess, state.tangent, float(state.tangent @ guess), settings.newton, REACH * length)
     if not found.ok:
         return _Trial(False, 0.5)
     return _judged(state, found, length, settings)
@@ -267,14 +270,21 @@ def _tried(scaled: Scaled, state: State, length: float, settings: Settings) -> _
 
 def predicted(state: State, length: float, settings: Settings) -> Array:
     """A guess of the point a length beyond: along the tangent, wrong by the square of the length, or by the cubic
-    through the last two points and their tangents, wrong by its fourth power; not where that leaves the tangent by
-    much."""
-    ahead = state.y + length * state.tangent
+    through the last two points and their tangents, wrong by its fourth power."""
     if settings.predictor == "tangent" or state.before is None or state.before_tangent is None:
-        return ahead
+        return state.y + length * state.tangent
     last = Segment(state.before, state.y, state.before_tangent, state.tangent, False)
-    (guess,) = last.guesses(1.0 + length / norm(state.y - state.before))
-    return guess if norm(guess - ahead) <= 0.3 * length else ahead
+    return last.guesses(1.0 + length / norm(state.y - state.before))[0]
+
+
+def _within_the_angle(state: State, length: float, settings: Settings) -> float:
+    """A length, shortened until the predicted point is off the tangent by no more than half the angle."""
+    for _ in range(10):
+        off = norm(predicted(state, length, settings) - state.y - length * state.tangent)
+        if off <= 0.5 * settings.angle * length:
+            break
+        length *= 0.7
+    return length
 
 
 def _judged(state: State, found: Corrected, length: float, settings: Settings) -> _Trial:
@@ -561,4 +571,5 @@ def _next_step(state: State, trial: _Trial, length: float, settings: Settings) -
     by_turn = TURN * settings.angle / turned
     order = 2 if settings.predictor == "tangent" or state.before_tangent is None else 4
     by_newton = (settings.contraction / max(trial.contraction, 1e-12)) ** (1 / order)
-    return float(np.clip(length * np.clip(min(by_turn, by_newton), 0.5, 2.0), settings.step_min, settings.step_max))
+    step = length * max(0.5, min(by_turn, by_newton, 2.0))
+    return max(settings.step_min, min(step, settings.step_max))

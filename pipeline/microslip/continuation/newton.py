@@ -173,8 +173,10 @@ def _determinant(factors: tuple[Array, Array]) -> int:
     return -1 if negative % 2 else 1
 
 
-def correct(scaled: Scaled, y: Array, border: Array, value: float, settings: NewtonSettings) -> Corrected:
-    """Solve R = 0 with border . y = value, from y.
+def correct(
+    scaled: Scaled, y: Array, border: Array, value: float, settings: NewtonSettings, reach: float = math.inf
+) -> Corrected:
+    """Solve R = 0 with border . y = value, from y; not where a correction is longer than a reach.
 
     The residual is weighted by the derivatives at the start, so that units do not matter. Near a kink the direction
     can be one along which the residual rises however short the step, though the full step is right (the other side's
@@ -192,6 +194,8 @@ def correct(scaled: Scaled, y: Array, border: Array, value: float, settings: New
             return _resort(scaled, here.y, border, value, settings, iteration, f"{what}: start elsewhere")
         dy = -_solve(factors, here.residual)
         sizes.append(norm(dy))
+        if sizes[-1] > reach:
+            return Corrected(here.y, False, "the solution is not near: start nearer", iteration, np.inf)
         if error := _small_enough(sizes, settings.tolerance * (1.0 + norm(here.y))):
             return _arrived(here.y + dy, factors, iteration, error, sizes)
         here, falls = _damped(scaled, here, dy, weights, border, value, settings.halvings)

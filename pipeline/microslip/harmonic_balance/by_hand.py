@@ -182,7 +182,13 @@ def _by_hand(law: Law, along: Array, cycles: int) -> type[AFT]:
         return ElasticSpring
     if isinstance(law, Jenkins) and np.count_nonzero(along) == 1 and along[law.slider]:
         return JenkinsPlay if cycles > 1 else AFT
-    plain = isinstance(law, PointContact) and isinstance(law.normal, Preload) and isinstance(law.friction, Coulomb)
-    if plain and not along[0] and law.stiffness_2 is None and law.damping is None and np.size(law.stiffness_1) == 1:
+    if isinstance(law, PointContact) and not along[0] and _plain(law):
         return JenkinsPlay if cycles > 1 else AFT
     return AFT
+
+
+def _plain(law: PointContact) -> bool:
+    """Constant normal force and friction, one stiffness, no damper."""
+    if not isinstance(law.normal, Preload) or not isinstance(law.friction, Coulomb):
+        return False
+    return law.stiffness_2 is None and law.damping is None and np.size(law.stiffness_1) == 1

@@ -6,6 +6,7 @@ order in which it passes them, the unstable ones between two folds too.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -110,7 +111,7 @@ class Family:
 
     def settings(self, given: Settings | None = None) -> Settings:
         """How the curve is followed, between its own ends."""
-        given = given or Settings(points=3000, branch_points=False, angle=0.5, step_max=0.4)
+        given = given or Settings(points=3000, branch_points=False, angle=0.5, step=0.05, step_max=0.5)
         way = 1 if self.end > self.begin else -1
         return replace(given, low=min(self.begin, self.end), high=max(self.begin, self.end), direction=way)
 
@@ -214,7 +215,7 @@ class _Noted:
 
     def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
         R, J, slope = self.family.equations.evaluate(x, lam)
-        if not (np.isfinite(R).all() and np.isfinite(J).all()):
+        if not math.isfinite(float(R.sum() + J.sum())):
             self.place = x.copy(), lam
         return R, J, slope
 

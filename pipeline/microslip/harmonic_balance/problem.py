@@ -8,7 +8,6 @@ with the number of its blades, not with its cube.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -54,6 +53,10 @@ class Group:
     phase: Array
     contacts: tuple[int, ...]
 
+    @cached_property
+    def _turned(self) -> bool:
+        return bool(self.phase.any())
+
     def relative(self, v: Array) -> Array:
         """(n, k, W) displacements, preloaded state included, from (W, c) those of the coordinates."""
         d = v[:, self.first] if self.second is None else v[:, self.first] - v[:, self.second]
@@ -68,7 +71,7 @@ class Group:
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         """See `forces.Forces`."""
         F, S = self.model.forces(self._back(u), period)
-        if self.phase.any():
+        if self._turned:
             turn = self._turns(S.shape[2])
             S = np.einsum("nkwlz,nwy,nzx->nkylx", S, turn, turn, optimize=True)
         return self._ahead(F), S
@@ -87,10 +90,10 @@ class Group:
         return self.model.traced(self._back(u), period)
 
     def _back(self, u: Array) -> Array:
-        return np.matmul(u, self._turns(u.shape[2]).transpose(0, 2, 1)) if self.phase.any() else u
+        return np.matmul(u, self._turns(u.shape[2]).transpose(0, 2, 1)) if self._turned else u
 
     def _ahead(self, F: Array) -> Array:
-        return np.matmul(F, self._turns(F.shape[2])) if self.phase.any() else F
+        return np.matmul(F, self._turns(F.shape[2])) if self._turned else F
 
     def _turns(self, coefficients: int) -> Array:
         """(n, W, W) from harmonics of a signal to those of the same signal later by the phase."""
@@ -238,7 +241,16 @@ class AtFrequency:
     @cached_property
     def reference(self) -> Array:
         """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
-        return self._stacked([view.reference for view in self.views])
+        return self._driven[0]
+
+    @cached_property
+    def _driven(self) -> Array:
+        """(2, size) `reference` and its derivative with respect to Omega."""
+        p = self.problem
+        a = np.concatenate([view.reference for view in self.views], axis=2)
+        out = np.empty((2, p.coefficients, p.count))
+        out[:, 0], out[:, 1::2], out[:, 2::2] = a[:, 0].real, p.share * a[:, 1:].real, -p.share * a[:, 1:].imag
+        return (out / p.scale).reshape(2, -1)
 
     @cached_property
     def rounding(self) -> float:
@@ -249,7 +261,7 @@ class AtFrequency:
                 if side is not None:
                     np.add.at(pressed, side, np.abs(g.preload).max(axis=1, keepdims=True))
         pressed *= p.length / p.scale
-        moved = [np.abs(one.compliance) @ pressed[s] for one, s in zip(self.views, p.slices, strict=True)]
+        moved = [np.abs(one.compliance[0]) @ pressed[s] for one, s in zip(self.views, p.slices, strict=True)]
         return float(np.finfo(float).eps * np.abs(np.hstack(moved) / p.scale).max(initial=0.0))
 
     def residual(self, x: Array) -> Array:
@@ -258,8 +270,11 @@ class AtFrequency:
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
-        force, slopes = self.forces(x)
-        return self.residual_of(x, force), self.jacobian(slopes).dense(), self.rate(x, force)
+        v = self.problem.displacement(x)
+        force, slopes = self._forces(v)
+        excess = self._excess(v, force)
+        R, rate = self._residual(x, v, excess)
+        return R, self.jacobian(slopes).dense(), rate
 
     def force(self, x: Array) -> Array:
         """(W, c) contact forces less the preload along the coordinates, N and N m."""
@@ -268,7 +283,9 @@ class AtFrequency:
 
     def forces(self, x: Array) -> tuple[Array, list[Array]]:
         """`force`, and of every group of contacts its derivative (n, k, W, k, W)."""
-        v = self.problem.displacement(x)
+        return self._forces(self.problem.displacement(x))
+
+    def _forces(self, v: Array) -> tuple[Array, list[Array]]:
         both = [g.forces(g.relative(v), self.period) for g in self.problem.groups]
         return self.along([F for F, _ in both]), [S for _, S in both]
 
@@ -301,23 +318,16 @@ class AtFrequency:
                     pieces[i, j] = np.zeros((p.coefficients, size[0], p.coefficients, size[1]))
                 pieces[i, j][:, at, :, to] += sign * S[n].transpose(1, 0, 3, 2)
         where = p.slices
-        D = {
-            (i, j): self._scaled(_harmonics(self.views[i].compliance, P), where[i], where[j])
-            for (i, j), P in pieces.items()
-        }
+        D = {}
+        for (i, j), P in pieces.items():
+            applied = _harmonics(self.views[i].compliance[0], P.reshape(*P.shape[:2], P.shape[2] * P.shape[3]))
+            D[i, j] = self._scaled(applied.reshape(P.shape), where[i], where[j])
         return blocks.one_plus(D, [s.stop - s.start for s in where], p.coefficients)
 
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
-        p, v = self.problem, self.problem.displacement(x)
-        out = self._applied(self._excess(v, force), "compliance_rate")
-        rates = [g.rate(g.relative(v), self.period) for g in p.groups]
-        if any(r is not None for r in rates):
-            zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
-            given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
-            out += self._applied(self.along(given, preload=False))
-        driven = self._stacked([view.reference_rate for view in self.views])
-        return (out / p.scale).ravel() - driven
+        v = self.problem.displacement(x)
+        return self._residual(x, v, self._excess(v, force))[1]
 
     def load_rate(self) -> Array:
         """(size,) dR/dshare, of the loads that are not steady."""
@@ -353,8 +363,20 @@ class AtFrequency:
     def residual_of(self, x: Array, force: Array) -> Array:
         """(size,) R for forces that are known."""
         p = self.problem
-        moved = self._applied(self._excess(p.displacement(x), force))
+        moved = self._applied(self._excess(p.displacement(x), force), slice(1))
         return x - self.reference + (moved / p.scale).ravel()
+
+    def _residual(self, x: Array, v: Array, excess: Array) -> tuple[Array, Array]:
+        """R and dR/dOmega."""
+        p = self.problem
+        moved = self._applied(excess, slice(2))
+        rates = [g.rate(g.relative(v), self.period) for g in p.groups]
+        if any(r is not None for r in rates):
+            zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
+            given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
+            moved[1] += self._applied(self.along(given, preload=False), slice(1))[0]
+        R, rate = (moved / p.scale).reshape(2, -1) - self._driven
+        return x + R, rate
 
     def along(self, forces: list[Array], preload: bool = True) -> Array:
         """(W, c) forces of the groups (n, k, W) along the coordinates."""
@@ -369,13 +391,13 @@ class AtFrequency:
                 out[:, g.second] -= F
         return out
 
-    def _applied(self, force: Array, what: str = "compliance") -> Array:
-        """(W, c) D, or another array of the views, applied to (W, c)."""
+    def _applied(self, force: Array, which: slice) -> Array:
+        """(n, W, c) D, its derivative or both, applied to (W, c)."""
         if len(self.views) == 1:
-            return _harmonics(getattr(self.views[0], what), force)
-        out = np.empty_like(force)
+            return _harmonics(self.views[0].compliance[which], force[..., None])[..., 0]
+        out = np.empty((which.stop, *force.shape))
         for view, s in zip(self.views, self.problem.slices, strict=True):
-            out[:, s] = _harmonics(getattr(view, what), force[:, s])
+            out[:, :, s] = _harmonics(view.compliance[which], force[:, s, None])[..., 0]
         return out
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
@@ -384,22 +406,14 @@ class AtFrequency:
         block = block * unit[columns] / unit[rows][:, None, None]
         return block.reshape(W * block.shape[1], W * block.shape[3])
 
-    def _stacked(self, amplitudes: list[ComplexArray]) -> Array:
-        """(size,) x of complex amplitudes (H + 1, c_i) under the loads, a standing for Re(a exp(i h Omega t))."""
-        p, a = self.problem, amplitudes[0] if len(amplitudes) == 1 else np.concatenate(amplitudes, axis=1)
-        out = np.empty((p.coefficients, p.count))
-        out[0], out[1::2], out[2::2] = a[0].real, p.share * a[1:].real, -p.share * a[1:].imag
-        return (out / p.scale).ravel()
-
 
 def _harmonics(D: ComplexArray, V: Array) -> Array:
-    """(W, c, ...) compliances (H + 1, c, c) of the harmonics applied to (W, c, ...)."""
-    flat = V.reshape(*V.shape[:2], math.prod(V.shape[2:]))
-    out = np.empty_like(flat)
-    out[0] = D[0].real @ flat[0]
-    amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])
-    out[1::2], out[2::2] = amplitude.real, -amplitude.imag
-    return out.reshape(V.shape)
+    """(..., W, c, m) compliances (..., H + 1, c, c) of the harmonics applied to (W, c, m)."""
+    out = np.empty((*D.shape[:-3], *V.shape))
+    out[..., 0, :, :] = D[..., 0, :, :].real @ V[0]
+    amplitude = D[..., 1:, :, :] @ (V[1::2] - 1j * V[2::2])
+    out[..., 1::2, :, :], out[..., 2::2, :, :] = amplitude.real, -amplitude.imag
+    return out
 
 
 def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:

@@ -70,13 +70,12 @@ def seen(part: Linear, stiffness: Array, Omega: float, harmonic: int) -> Seen:
 class View:
     """One part at one frequency in the harmonics 0 to H, as seen from its c contact coordinates.
 
-    Attributes: as those of `Seen`, the harmonics in front: (H + 1, c), (H + 1, c, c).
+    Attributes: as those of `Seen`, the harmonics in front, and before these the value and its derivative with respect
+        to Omega: reference (2, H + 1, c), compliance (2, H + 1, c, c).
     """
 
     reference: ComplexArray
     compliance: ComplexArray
-    reference_rate: ComplexArray
-    compliance_rate: ComplexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,26 +99,20 @@ class Poles:
     def _near(self) -> Array:
         return MET * np.abs(self.values)
 
-    @cached_property
-    def _where(self) -> slice | Array:
-        """Of the harmonics in a view."""
-        whole = np.array_equal(self.harmonics, np.arange(len(self.harmonics)))
-        return slice(len(self.harmonics)) if whole else self.harmonics
-
-    def fill(self, view: View, Omega: float) -> bool:
-        """What these harmonics are at a frequency (rad/s), into a view; False where it or one of its harmonics is,
-        within `MET`, an eigenvalue."""
-        h = self._where
-        away = 1j * Omega * self.harmonics[:, None] - self.values
+    def at(self, Omega: float) -> View | None:
+        """These harmonics at a frequency (rad/s); None where it or one of its harmonics is, within `MET`, an
+        eigenvalue."""
+        h = 1j * self.harmonics[:, None]
+        away = Omega * h - self.values
         if (np.abs(away) <= self._near).any():
-            return False
+            return None
         g = 1.0 / away
-        rate = -1j * self.harmonics[:, None] * (g * g)
-        view.reference[h] = (g * self.driven) @ self.left.T + self.given
-        view.compliance[h] = (self.left * g[:, None]) @ self.right + self.static
-        view.reference_rate[h] = (rate * self.driven) @ self.left.T
-        view.compliance_rate[h] = (self.left * rate[:, None]) @ self.right
-        return True
+        both = np.stack([g, -h * g * g])  # and its derivative
+        reference = (both * self.driven) @ self.left.T
+        compliance = (self.left * both[:, :, None]) @ self.right
+        reference[0] += self.given
+        compliance[0] += self.static
+        return View(reference, compliance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,13 +130,16 @@ class Eliminated:
         that the numbers subtracted are without bounds."""
         if self.poles is None:
             return self._far(Omega)
-        view = self._empty
-        return view if all([group.fill(view, Omega) for group in self.poles]) else None
-
-    @property
-    def _empty(self) -> View:
+        found = [group.at(Omega) for group in self.poles]
+        if len(found) == 1:
+            return found[0]
         H, c = len(self.parts), len(self.stiffness)
-        return View(*[np.empty((H, c, c)[:n], complex) for n in (2, 3, 2, 3)])
+        view = View(np.empty((2, H, c), complex), np.empty((2, H, c, c), complex))
+        for group, one in zip(self.poles, found, strict=True):
+            if one is None:
+                return None
+            view.reference[:, group.harmonics], view.compliance[:, group.harmonics] = one.reference, one.compliance
+        return view
 
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
@@ -207,11 +203,11 @@ class Eliminated:
         h = int(poles.harmonics[-1])
         sizes = np.abs(poles.values)
         for Omega in (0.97 * np.exp(np.log(sizes).mean()), 1.01 * sizes.min()):
-            view = self._empty
-            if not poles.fill(view, float(Omega) / max(h, 1)):
+            view = poles.at(float(Omega) / max(h, 1))
+            if view is None:
                 return False
             exact = seen(self.parts[h], self.stiffness, float(Omega) / max(h, 1), h)
-            for a, b in ((view.compliance[h], exact.compliance), (view.reference[h], exact.reference)):
+            for a, b in ((view.compliance[0, -1], exact.compliance), (view.reference[0, -1], exact.reference)):
                 if not np.abs(a - b).max(initial=0.0) <= 1e-10 * np.abs(b).max(initial=1e-300):
                     return False
         return True
@@ -225,8 +221,10 @@ POLES_AT_MOST = 120
 
 
 def _view(found: Sequence[Seen]) -> View:
-    names = ("reference", "compliance", "reference_rate", "compliance_rate")
-    return View(*[np.array([getattr(one, name) for one in found]) for name in names])
+    return View(
+        np.array([[s.reference for s in found], [s.reference_rate for s in found]]),
+        np.array([[s.compliance for s in found], [s.compliance_rate for s in found]]),
+    )
 
 
 def _alike(a: Linear, b: Linear) -> bool:

@@ -63,6 +63,11 @@ def _row(at: Any, count: int, key: str) -> Array:
     return np.eye(count)[int(at)]
 
 
+def _numbers(values: Sequence[float]) -> Any:
+    """Numbers of a law as numpy has them: nothing of jax is called before a law is marched."""
+    return np.asarray(values, dtype=float)
+
+
 def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name: str | None = None) -> Element:
     """A spring with the force sum of k_p u^p.
 
@@ -90,7 +95,7 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
     """
     bounded("jenkins: stiffness", stiffness, gt=0)
     bounded("jenkins: limit", limit, ge=0)
-    law = Jenkins(0.0, float(stiffness), 0.0, float(limit))
+    law = Jenkins(*_numbers([0.0, stiffness, 0.0, limit]))
     return Element(law, at, to, name=name, length=limit / stiffness)
 
 
@@ -105,7 +110,7 @@ def stop(
     """
     bounded("stop: stiffness", stiffness, gt=0)
     bounded("stop: gap", gap, **({"ge": 0} if both else {}))
-    return Element(Stop(float(stiffness), float(gap), both), at, to, name=name, length=abs(gap) or None)
+    return Element(Stop(*_numbers([stiffness, gap]), both), at, to, name=name, length=abs(gap) or None)
 
 
 def structure(
