@@ -15,7 +15,11 @@ from typing import Any
 __version__ = "0.1.0"
 
 PUBLIC = {
+    "basis": "read_basis write_basis",
+    "results.files": "read_response",
+    "harmonic_balance.solved": "load",
     "system.structure": "structure polynomial jenkins stop Element",
+    "analyses": "harmonic_response follow backbone",
 }
 """Module -> the names of it that are public."""
 

@@ -163,7 +163,7 @@ def curves(
                     one = replace(one, frequency=at)
                 one = replace(one, name=f"{one.label_by(exact)}, {exact(ends[0])} to {exact(ends[1])} {UNITS[over]}")
                 told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
-                journal.say({**journal.head, "parameters": told, "labels": labels(problem)})
+                journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": over})
                 report(f"curve over the {over.replace('_', ' ')}, {one.label}")
                 branch, rows = resumed_curve(_family(built, problem, one), journal, one.name, report, how)
             except KeyboardInterrupt:

@@ -156,7 +156,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
         "iterations": point.iterations, "peak": 0.0, "added": 0, "x": point.x,
         "harmonics": problem.harmonics,
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
-        "exchanged": found.exchanged,
+        "exchanged": found.exchanged, "kinetic": found.kinetic,
     } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
     for name, rows in _outputs(problem).items():
         kept[name] = found.outputs[list(rows.values())]
@@ -201,6 +201,7 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
         row["supplied"],
         row["damped"],
         row["exchanged"],
+        row["kinetic"],
         cycles,
         Checks(**{f.name: row[f"checks/{f.name}"] for f in fields(Checks)}),
     )

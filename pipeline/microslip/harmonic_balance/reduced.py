@@ -241,14 +241,15 @@ def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float =
 
 def work(
     part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """Work of a share of the loads, loss in the bodies' own damping, and what the loads would do in phase with the
-    speed, J per cycle, in one harmonic that is not 0."""
+    speed, J per cycle, and the largest kinetic energy, J, in one harmonic that is not 0."""
     moved = share * (part.load.conj() @ q - part.given.conj() @ force)
     lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
     if part.residual_loss is not None:
         lost += (force.conj() @ part.residual_loss @ force).real
-    return -np.pi * harmonic * float(moved.imag), np.pi * harmonic * float(lost), np.pi * harmonic * float(abs(moved))
+    cycle, kinetic = np.pi * harmonic, 0.5 * (Omega * harmonic) ** 2 * float((q.conj() @ part.M @ q).real)
+    return -cycle * float(moved.imag), cycle * float(lost), cycle * float(abs(moved)), kinetic
 
 
 def untouched(part: Linear) -> Linear:

@@ -37,7 +37,8 @@ class Operating:
         Omega: rad/s. q: component -> (H + 1) arrays (m,) of complex amplitudes of its coordinates; the first one is the
             mean from the preloaded state. outputs: (w, H + 1) read-outs, m. relative: contact -> (k, W) displacement as
             the law measures it. force: contact -> (k, W) forces, N and N m. supplied, damped: J per cycle.
-        exchanged: J that loads and contacts would do and take were they in phase with the speed.
+        exchanged: J that loads and contacts would do and take were they in phase with the speed. kinetic: J, the
+            largest kinetic energy of every harmonic by itself, added up.
         cycles: contact -> what its points do. checks: of all this.
     """
 
@@ -49,6 +50,7 @@ class Operating:
     supplied: float
     damped: float
     exchanged: float
+    kinetic: float
     cycles: Mapping[str, Cycle]
     checks: Checks = UNCHECKED
 
@@ -62,7 +64,7 @@ def operating(problem: Problem, point: Point) -> Operating:
     cycles = [g.point_cycles(u, at.period) for g, u in zip(p.groups, relative, strict=True)]
     beyond = at.along(forces)
     q, f = at.modal(point.x, beyond), at.amplitudes(beyond)
-    outputs, work = [], np.zeros(3)
+    outputs, work = [], np.zeros(4)
     for h, parts in enumerate(p.parts):
         each = list(zip(parts, q[h], [f[h][s] for s in p.slices], strict=True))
         share = p.share if h else 1.0
@@ -78,6 +80,7 @@ def operating(problem: Problem, point: Point) -> Operating:
         float(work[0]),
         float(work[1]),
         float(work[2]) + sum(float(exchanged(F, u).sum()) for F, u in zip(forces, relative, strict=True)),
+        float(work[3]),
         _by_contact(p, cycles),
     )
     return replace(found, checks=checks(p, found))

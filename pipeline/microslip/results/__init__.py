@@ -6,10 +6,10 @@
 
 from .files import Body as Body
 from .files import Response as Response
-from .files import Series as Series
 from .files import read_response as read_response
 from .files import response_of as response_of
 from .files import write_response as write_response
 from .journal import Journal as Journal
 from .journal import open_journal as open_journal
 from .journal import read_journal as read_journal
+from .series import Series as Series

@@ -15,7 +15,8 @@ from ..data import Array, ModalBasis
 from ..operating.motion import read_out
 from ..reduced.compliance import has_residual
 from ..units import counted, percent
-from .files import CONVERGED, Response, Series
+from .files import Response
+from .series import CONVERGED, Series
 
 BALANCE = 1e-4
 """Share of the energy that may be missing between what is supplied, damped and taken by the contacts: they follow from

@@ -12,24 +12,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ..data import Array, ComplexArray, ModalBasis, ModalGroup, UserError
+from ..data import Array, ModalBasis, ModalGroup, UserError
 from ..files.hdf5 import IMAGINARY, create, put, seal
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
 from ..files.store import complete_or_absent, ordinary
 from ..operating.motion import Motion, motion_of
 from ..reduced.coordinates import first_modes, in_modes
 from .journal import is_journal, read_journal
+from .series import Series, unit_of
 
 FORMAT = "microslip-response"
 FORMAT_VERSION = "0.2"
-CONVERGED = "converged"
-
-UNITS = {
-    "frequency": "Hz", "Omega": "rad/s", "supplied": "J", "damped": "J", "dissipated": "J",
-    "by_slip": "J", "monitors": "m", "gauges": "1", "bodies": "m kg^1/2", "displacement": "m, rad",
-    "force": "N, N m", "limit": "N", "normal_swing": "N", "normal_mean": "N",
-}  # fmt: skip
-"""Units by the last part of a name, or by its first one; everything else is a pure number."""
 
 
 @dataclass(frozen=True)
@@ -50,44 +43,6 @@ class Body:
     rpm: float
     harmonics: tuple[tuple[int, bool], ...]
     modes: bool = False
-
-
-@dataclass(frozen=True)
-class Series:
-    """The f points of one sweep, in order.
-
-    Attributes:
-        name: like ``normal_force = 100``. parameters: what sets it apart, in SI: name -> number. key: (f,) see
-            `journal.Journal`. status: f texts, `CONVERGED` or what went wrong. arrays: name -> (f, ...), see
-            docs/response_file.md.
-    """
-
-    name: str
-    parameters: Mapping[str, float]
-    key: Array
-    status: tuple[str, ...]
-    arrays: Mapping[str, Array]
-
-    @property
-    def converged(self) -> Array:
-        """(f,) bool."""
-        return np.array([s == CONVERGED for s in self.status], dtype=bool)
-
-    @property
-    def frequency(self) -> Array:
-        """(f,) Hz."""
-        return self.arrays["frequency"]
-
-    def monitor(self, name: str) -> ComplexArray:
-        """(f, r, H + 1) harmonics of a monitor's rows, m, or of a strain gauge.
-
-        Raises:
-            UserError: none of that name.
-        """
-        known = {n.split("/", 1)[1]: n for n in self.arrays if n.startswith(("gauges/", "monitors/"))}
-        if name not in known:
-            raise UserError(f"monitor '{name}': the response has {', '.join(known) or 'none'}")
-        return np.asarray(self.arrays[known[name]], dtype=complex)
 
 
 @dataclass(frozen=True)
@@ -178,12 +133,14 @@ def response_of(head: Mapping[str, Any], series: Mapping[str, Mapping[float, Map
     The head's keys are those of `Response`; ``parameters`` gives each series its own.
     """
     parameters = head.get("parameters", {})
+    named = {k: tuple(v) for k, v in head.get("labels", {}).items()}
+    over = str(head.get("over", "frequency"))
     return Response(
         case=str(head["case"]),
         mode=str(head.get("mode", "")),
-        series=tuple(_series(name, parameters.get(name, {}), points) for name, points in series.items()),
+        series=tuple(_series(name, parameters.get(name, {}), points, named, over) for name, points in series.items()),
         bodies={k: _body(b) for k, b in head.get("bodies", {}).items()},
-        labels={k: tuple(v) for k, v in head.get("labels", {}).items()},
+        labels=named,
         settings=head.get("settings", {}),
         inputs=str(head.get("inputs", "")),
         description=str(head.get("description", "")),
@@ -201,13 +158,16 @@ def _body(b: Mapping[str, Any]) -> Body:
     return Body(str(b["basis"]), str(b["sha256"]), str(b["file"]), int(b["speed"]), float(b["rpm"]), pairs, own)
 
 
-def _series(name: str, parameters: Mapping[str, float], points: Mapping[float, Mapping[str, Any]]) -> Series:
+def _series(
+    name: str, parameters: Mapping[str, float], points: Mapping[float, Mapping[str, Any]],
+    labels: Mapping[str, tuple[str, ...]], over: str,
+) -> Series:  # fmt: skip
     keys = sorted(points)
     rows = [points[k] for k in keys]
     names = [n for n, v in (rows[0] if rows else {}).items() if n != "status" and not isinstance(v, str)]
     arrays = {n: stacked([np.asarray(row[n]) for row in rows]) for n in names}
     own = {k: float(v) for k, v in parameters.items()}
-    return Series(name, own, np.array(keys), tuple(str(row.get("status", "")) for row in rows), arrays)
+    return Series(name, own, np.array(keys), tuple(str(row.get("status", "")) for row in rows), arrays, labels, over)
 
 
 def stacked(values: Sequence[Array]) -> Array:
@@ -257,6 +217,7 @@ def _write(file: h5py.File, r: Response) -> None:
     for i, s in enumerate(r.series):
         group = file.create_group(f"series_{i:04d}")
         group.attrs["name"], group.attrs["parameters"] = s.name, json.dumps(dict(s.parameters))
+        group.attrs["over"] = s.over
         put(group, "key", s.key)
         put(group, "status", np.array(s.status or ("",)))
         for name, value in s.arrays.items():
@@ -265,12 +226,6 @@ def _write(file: h5py.File, r: Response) -> None:
 
 def _put_text(file: h5py.File, name: str, text: str) -> None:
     put(file, name, np.frombuffer(text.encode(), dtype=np.uint8))
-
-
-def unit_of(name: str) -> str:
-    """Unit of an array by its name."""
-    parts = name.split("/")
-    return UNITS.get(parts[-1]) or UNITS.get(parts[0], "1")
 
 
 def read_response(path: Path | str) -> Response:
@@ -322,11 +277,12 @@ def _response(file: h5py.File) -> Response:
         for name in ("settings", "labels", "resonances", "messages", "bodies")
     }
     names = sorted(n for n in file if n.startswith("series_"))
+    labels = {k: tuple(v) for k, v in told["labels"].items()}
     return Response(
         **{name: str(file.attrs[name]) for name in _TEXTS},
-        series=tuple(_read_series(file[n]) for n in names),
+        series=tuple(_read_series(file[n], labels) for n in names),
         bodies={k: _body(b) for k, b in told["bodies"].items()},
-        labels={k: tuple(v) for k, v in told["labels"].items()},
+        labels=labels,
         settings=told["settings"],
         resonances=tuple(told["resonances"]),
         finished=bool(file.attrs["finished"]),
@@ -336,7 +292,7 @@ def _response(file: h5py.File) -> Response:
     )
 
 
-def _read_series(group: h5py.Group) -> Series:
+def _read_series(group: h5py.Group, labels: Mapping[str, tuple[str, ...]]) -> Series:
     arrays: dict[str, Array] = {}
 
     def take(name: str, item: Any) -> None:
@@ -351,4 +307,5 @@ def _read_series(group: h5py.Group) -> Series:
     if any(len(a) != len(key) for a in arrays.values()) or len(status) != len(key):
         raise ValueError(f"{group.name}: arrays of different lengths")
     parameters = {str(k): float(v) for k, v in json.loads(group.attrs["parameters"]).items()}
-    return Series(str(group.attrs["name"]), parameters, key, status, arrays)
+    over = str(group.attrs.get("over", "frequency"))
+    return Series(str(group.attrs["name"]), parameters, key, status, arrays, labels, over)

@@ -19,7 +19,7 @@ from ..operating.fatigue import Endurance, MaterialLimits, endurance
 from ..operating.motion import Motion, read_out
 from ..operating.stress import CycleStress, StressPeaks, cycle_stress, stress_peaks
 from ..results import Response, Series
-from ..results.files import unit_of
+from ..results.series import unit_of
 from ..units import METRES, Quantity
 from .stage import Report
 

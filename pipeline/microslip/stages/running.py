@@ -14,8 +14,8 @@ from ..case.comparison import Pair, comparison_table, paired
 from ..data import Array, UserError
 from ..files import store
 from ..results import read_response
-from ..results.files import unit_of
 from ..results.names import apart
+from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
 from .job import Job, open_job
 from .modal import modes_stage, system_stage

@@ -63,9 +63,9 @@ def _row(at: Any, count: int, key: str) -> Array:
     return np.eye(count)[int(at)]
 
 
-def _numbers(values: Sequence[float]) -> Any:
+def _numbers(*values: float) -> Any:
     """Numbers of a law as numpy has them: nothing of jax is called before a law is marched."""
-    return np.asarray(values, dtype=float)
+    return np.array(values, dtype=float)
 
 
 def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name: str | None = None) -> Element:
@@ -81,9 +81,8 @@ def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name
     if not stiffness or any(p != int(p) or p < 1 for p in stiffness):
         raise UserError(f"polynomial: powers {list(stiffness)}: give one or more whole numbers, 1 or larger")
     bounded("polynomial: stiffness", list(stiffness.values()))
-    return Element(
-        Polynomial(np.array([stiffness.get(p, 0.0) for p in range(1, max(stiffness) + 1)])), at, to, "t1", name
-    )
+    numbers = _numbers(*(stiffness.get(p, 0.0) for p in range(1, max(stiffness) + 1)))
+    return Element(Polynomial(numbers), at, to, name=name)
 
 
 def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
@@ -95,7 +94,7 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
     """
     bounded("jenkins: stiffness", stiffness, gt=0)
     bounded("jenkins: limit", limit, ge=0)
-    law = Jenkins(*_numbers([0.0, stiffness, 0.0, limit]))
+    law = Jenkins(*_numbers(0.0, stiffness, 0.0, limit))
     return Element(law, at, to, name=name, length=limit / stiffness)
 
 
@@ -110,7 +109,7 @@ def stop(
     """
     bounded("stop: stiffness", stiffness, gt=0)
     bounded("stop: gap", gap, **({"ge": 0} if both else {}))
-    return Element(Stop(*_numbers([stiffness, gap]), both), at, to, name=name, length=abs(gap) or None)
+    return Element(Stop(_numbers(stiffness)[0], _numbers(gap)[0], both), at, to, name=name, length=abs(gap) or None)
 
 
 def structure(

@@ -1,0 +1,161 @@
+"""The analyses of an assembly: forced response over frequency, curves through folds, nonlinear modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from .continuation import Settings
+from .data import UserError
+from .harmonic_balance import families, nonlinear_modes
+from .harmonic_balance import problem as balance
+from .harmonic_balance.nonlinear_modes import Backbone
+from .harmonic_balance.problem import Problem
+from .harmonic_balance.solved import Motions
+from .harmonic_balance.solver import sweep
+from .settings.mistakes import bounded
+from .system.assembly import Assembly
+
+Report = Callable[[str], None]
+
+HERTZ = {"Hz": 1.0, "rad/s": 1 / (2 * np.pi)}
+
+
+def balanced(system: Assembly | Problem, harmonics: int | None = None, samples: int | None = None) -> Problem:
+    """The balance of an assembly.
+
+    Args:
+        harmonics: H, 3 if not given. samples: of a cycle, in which contact forces are evaluated; 16 a harmonic and 64
+            at least, if not given.
+    """
+    if isinstance(system, Problem):
+        if harmonics is not None or samples is not None:
+            raise UserError(
+                "harmonics, samples: this is a balance that has its own; give the assembly, or leave them out"
+            )
+        return system
+    if not isinstance(system, Assembly):
+        raise UserError(
+            f"system: {type(system).__name__} is no assembly; make one by structure, or by case(...).pressed"
+        )
+    H = 3 if harmonics is None else harmonics
+    return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
+
+
+def harmonic_response(
+    system: Assembly | Problem, frequency: Any, *, harmonics: int | None = None, samples: int | None = None,
+    unit: Literal["Hz", "rad/s"] = "Hz", report: Report = lambda _: None,
+) -> Motions:  # fmt: skip
+    """Steady forced vibration at given frequencies, by harmonic balance.
+
+    Every point starts from its neighbours. Where the response has several motions at one frequency a sweep finds one of
+    them and jumps at folds; `follow` finds all.
+
+    Args:
+        system: what vibrates, with its loads. frequency: (f,) in the unit, in the order of the sweep.
+        harmonics: H, 3 if not given. samples: of a cycle, 16 a harmonic and 64 at least if not given.
+        report: is told what is under way.
+
+    Returns:
+        A `Motions`: ``plot()``, ``to_dataframe()``, ``to_xarray()``, ``save(path)``. A point that was not found is
+        there with its cause in ``status``.
+
+    Raises:
+        UserError: no frequency, or one that is not positive.
+
+    Examples:
+        >>> import microslip as ms
+        >>> slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.5)])
+        >>> ms.harmonic_response(slider, [0.8, 1.0, 1.2], unit="rad/s").converged.all()
+        True
+    """
+    problem = balanced(system, harmonics, samples)
+    asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * _hertz(unit)
+    points, hertz = sweep(problem, asked, report), _hertz(unit)
+    known = {} if hertz == 1 else {"parameter": asked / hertz}
+    return Motions("response", points, lambda _: problem, over=_over("frequency", unit), known=known)
+
+
+def follow(
+    system: Assembly | Problem, start: float, stop: float, *,
+    over: Literal["frequency", "load", "normal_force"] = "frequency", frequency: float | None = None,
+    harmonics: int | None = None, samples: int | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
+    settings: Settings | None = None, report: Report = lambda _: None,
+) -> Motions:  # fmt: skip
+    """Steady forced vibration along the whole curve of its motions, through folds, stable or not.
+
+    Args:
+        system: what vibrates, with its loads. start, stop: of the frequency in the unit, or of the factor on the loads
+            that are not steady, or on all normal forces; the first may be the larger one.
+        frequency: in the unit, at which load or normal force vary. harmonics, samples: see `harmonic_response`.
+        settings: of the steps along the curve. report: is told what is under way.
+
+    Returns:
+        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop).
+
+    Raises:
+        UserError: a frequency that is not positive, or one that is missing.
+
+    Examples:
+        Both folds of Duffing's oscillator:
+
+        >>> import microslip as ms
+        >>> duffing = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+        >>> curve = ms.follow(duffing, 0.3, 2.5, harmonics=7, unit="rad/s")
+        >>> curve.folds.round(3).tolist()
+        [1.463, 1.156]
+    """
+    problem, hertz = balanced(system, harmonics, samples), _hertz(unit)
+    if over == "frequency":
+        bounded("start", start, gt=0)
+        bounded("stop", stop, gt=0)
+        family = families.of_frequency(problem, start * hertz, stop * hertz)
+    elif over in ("load", "normal_force"):
+        if frequency is None:
+            raise UserError(f"frequency: is missing: at which frequency does the {over.replace('_', ' ')} vary?")
+        make = families.of_load if over == "load" else families.of_normal_force
+        family = make(problem, frequency * hertz, start, stop)
+    else:
+        raise UserError(f"over: '{over}' is none of frequency, load, normal_force")
+    found = families.followed(family, report, settings)
+    family = replace(family, unit=family.unit * hertz) if over == "frequency" else family
+    known = {
+        "parameter": found.lam / family.unit,
+        "fold": np.array([p.kind == "fold" for p in found.points], dtype=float),
+        "kink": np.array([p.kink for p in found.points], dtype=float),
+        "arclength": np.array([p.arclength for p in found.points]),
+    }
+    return Motions(
+        "curve", family.points(found), lambda v: family.problem(v * family.unit), over=_over(over, unit), known=known,
+        ended=found.status,
+    )  # fmt: skip
+
+
+def backbone(
+    system: Assembly | Problem, low: float, high: float, *, mode: int = 0, output: int = 0,
+    harmonics: int | None = None, samples: int | None = None, report: Report = lambda _: None,
+) -> Backbone:  # fmt: skip
+    """A nonlinear mode: frequency and damping ratio over the amplitude, from sticking contacts to sliding ones.
+
+    Args:
+        system: what vibrates; its loads do not matter. low, high: amplitudes (m) of a read-out, from one at which
+            contacts hardly slide. mode: number of the mode with sticking contacts, 0 the lowest. output: number of the
+            read-out. harmonics, samples: see `harmonic_response`. report: is told what is under way.
+
+    Raises:
+        UserError: a mode that does not move the read-out, or that there is not.
+    """
+    return nonlinear_modes.backbone(balanced(system, harmonics, samples), low, high, mode, output, report=report)
+
+
+def _over(over: str, unit: str) -> str:
+    return "Omega" if over == "frequency" and unit == "rad/s" else over
+
+
+def _hertz(unit: str) -> float:
+    if unit not in HERTZ:
+        raise UserError(f"unit: '{unit}' is none of {', '.join(HERTZ)}")
+    return HERTZ[unit]

@@ -1,0 +1,129 @@
+"""Series of motions that were solved for here: read-outs are worked out, and checked, when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data import Array, UserError
+from ..results.files import Response, read_response, stacked, write_response
+from ..results.series import Series
+from ..units import Quantity
+from . import accuracy
+from .checkpoint import labels, record
+from .problem import Problem
+from .readout import measured
+from .response import Operating, operating
+from .solver import Point
+
+
+class Motions(Series):
+    """Periodic motions of an assembly in the order in which they were found, see `results.Series`.
+
+    Unknowns and frequencies are there at once. Read-outs, energies and what every contact does are worked out when one
+    of them is asked for first, and with them the checks of every point, on which `status` depends.
+
+    Attributes:
+        points: the solutions. problem: value of the parameter -> the balance that was solved.
+    """
+
+    def __init__(
+        self, name: str, points: Sequence[Point], problem: Callable[[float], Problem], *, over: str = "frequency",
+        known: Mapping[str, Array] | None = None, ended: str = "",
+    ) -> None:  # fmt: skip
+        own: dict[str, Any] = {
+            "name": name, "parameters": {}, "over": over, "points": tuple(points), "problem": problem, "ended": ended,
+            "_known": {"frequency": np.array([p.Omega for p in points]) / (2 * np.pi), **(known or {})},
+        }  # fmt: skip
+        self.__dict__.update(own)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    points: tuple[Point, ...]
+    problem: Callable[[float], Problem]
+    ended: str
+    """Why a curve ended; empty of a sweep."""
+    _known: dict[str, Array]
+
+    @property
+    def frequency(self) -> Array:
+        return self._known["frequency"]
+
+    @property
+    def parameter(self) -> Array:
+        return self._known.get("parameter", self.frequency)
+
+    @property
+    def folds(self) -> Array:
+        return self.parameter[np.asarray(self._known.get("fold", np.zeros(len(self))), dtype=bool)]
+
+    @cached_property
+    def key(self) -> Array:
+        """(f,) places."""
+        return np.arange(float(len(self))) if "arclength" in self._known else self.frequency
+
+    @cached_property
+    def labels(self) -> Mapping[str, tuple[str, ...]]:
+        """Name of an array -> its rows."""
+        return (
+            {n: tuple(rows) for n, rows in labels(self.problem(float(self.parameter[0]))).items()} if len(self) else {}
+        )
+
+    @cached_property
+    def _rows(self) -> list[dict[str, Any]]:
+        return [record(self.problem(float(v)), p, self.motion(i)) for i, (v, p) in enumerate(self._pairs)]
+
+    @property
+    def _pairs(self) -> list[tuple[float, Point]]:
+        return list(zip(self.parameter.tolist(), self.points, strict=True))
+
+    @cached_property
+    def status(self) -> tuple[str, ...]:
+        """`CONVERGED` or what went wrong, of every point; its checks included."""
+        return tuple(row["status"] for row in self._rows)
+
+    @cached_property
+    def arrays(self) -> Mapping[str, Array]:
+        """Name -> (f, ...), see docs/response_file.md."""
+        names = [n for n, v in self._rows[0].items() if not isinstance(v, str) and n != "history"] if len(self) else []
+        return {n: stacked([np.asarray(row[n]) for row in self._rows]) for n in names} | self._known
+
+    @property
+    def quantity(self) -> Quantity:
+        return measured(self.problem(float(self.parameter[0])).assembly) if len(self) else Quantity()
+
+    def motion(self, i: int) -> Operating:
+        """All that belongs to point number i: coordinates of the bodies, forces and cycles of the contacts."""
+        value, point = self._pairs[i]
+        return operating(self.problem(value), point)
+
+    def error_estimate(self, i: int | None = None) -> accuracy.Error:
+        """What more harmonics and samples would change of a point, the largest one if none is named: ``readout`` is the
+        share of its amplitude."""
+        i = int(np.argmax(np.where(self.converged, self.amplitude, 0.0))) if i is None else i
+        value, point = self._pairs[i]
+        return accuracy.error(self.problem(value), point.x, point.Omega)
+
+    def save(self, path: Path | str) -> Path:
+        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it."""
+        plain = Series(self.name, self.parameters, self.key, self.status, {**self.arrays}, dict(self.labels), self.over)
+        write_response(path, Response(self.name, "aft", (plain,), labels=dict(self.labels)))
+        return Path(path)
+
+
+def load(path: Path | str) -> Series:
+    """The only series of a response file, as `Motions.save` writes it; `read_response` reads files of several.
+
+    Raises:
+        UserError: no such file, or one of several series.
+    """
+    found = read_response(path).series
+    if len(found) != 1:
+        names = ", ".join(s.name for s in found)
+        raise UserError(f"{path}: holds {len(found)} series ({names}); take one of read_response(path).series")
+    return found[0]
