@@ -77,7 +77,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/ring.py
 	@$(PYTHON) benchmarks/cyclic.py
 	@$(PYTHON) benchmarks/contact_points.py
-	@$(PYTHON) benchmarks/duffing.py
+	@$(PYTHON) benchmarks/structures.py
 	@$(PYTHON) benchmarks/ring_response.py
 
 clean: ## remove products

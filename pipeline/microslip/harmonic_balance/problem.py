@@ -339,14 +339,9 @@ class AtFrequency:
     def modal(self, x: Array, force: Array) -> list[list[ComplexArray]]:
         """Harmonic -> part -> (m,) amplitudes of the bodies' coordinates."""
         p = self.problem
-        g = self.amplitudes(self._excess(p.displacement(x), force))
-        return [
-            [
-                s.modal * (p.share if h else 1.0) - s.modal_compliance @ g[h][at]
-                for s, at in zip(parts, p.slices, strict=True)
-            ]
-            for h, parts in enumerate(self.seen)
-        ]
+        g = np.array(self.amplitudes(self._excess(p.displacement(x), force)))
+        each = [one.coordinates(self.Omega, p.share, g[:, at]) for one, at in zip(p.eliminated, p.slices, strict=True)]
+        return [list(parts) for parts in zip(*each, strict=True)]
 
     def amplitudes(self, v: Array) -> list[ComplexArray]:
         """(c,) complex amplitudes of the harmonics 0 to H of (W, c) real ones."""

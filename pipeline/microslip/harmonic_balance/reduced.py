@@ -141,6 +141,21 @@ class Eliminated:
             view.reference[:, group.harmonics], view.compliance[:, group.harmonics] = one.reference, one.compliance
         return view
 
+    def coordinates(self, Omega: float, share: float, g: ComplexArray) -> list[ComplexArray]:
+        """Harmonic -> (m,) amplitudes of the coordinates at a frequency (rad/s), under a share of the loads that are
+        not steady and (H + 1, c) contact forces beyond those of the stiffness k."""
+        out: dict[int, ComplexArray] = {}
+        for same in self._same:
+            part, h = self.parts[same[0]], np.array(same)
+            T, B, k, w = part.rows, part.yielding, self.stiffness, h[:, None, None] * Omega
+            P, W = (np.linalg.inv(np.eye(part.count) + a) for a in (B @ k, k @ B))
+            held = k @ P
+            driven = np.array([self.parts[i].load - T.conj().T @ (held @ self.parts[i].given) for i in same])
+            right = driven * np.where(h, share, 1.0)[:, None] - g[h] @ (T.conj().T @ W).T
+            A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ held @ T
+            out |= zip(same, np.linalg.solve(A, right[..., None])[..., 0], strict=True)
+        return [out[i] for i in range(len(self.parts))]
+
     def directly(self, Omega: float) -> View:
         """The same from the equations themselves: at a single frequency less work than the eigenvalues."""
         return _view([seen(part, self.stiffness, Omega, h) for h, part in enumerate(self.parts)])
@@ -159,20 +174,24 @@ class Eliminated:
         return _view(found)
 
     @cached_property
+    def _same(self) -> list[list[int]]:
+        """Harmonics by equal matrices."""
+        same: list[list[int]] = []
+        for h, part in enumerate(self.parts):
+            alike = next((group for group in same if _alike(self.parts[group[0]], part)), None)
+            if alike is None:
+                same.append([h])
+            else:
+                alike.append(h)
+        return same
+
+    @cached_property
     def poles(self) -> list[Poles] | None:
         """By equal matrices; None where the eigenvalues do not give what the equations themselves give.
 
         So it is of a body that moves freely without its contacts feeling it, or whose eigenvectors nearly coincide.
         """
-        same: list[list[int]] = []
-        for h, part in enumerate(self.parts):
-            for group in same:
-                if _alike(self.parts[group[0]], part):
-                    group.append(h)
-                    break
-            else:
-                same.append([h])
-        found = [self._of(group) for group in same]
+        found = [self._of(group) for group in self._same]
         return None if any(one is None for one in found) else [one for one in found if one is not None]
 
     def _of(self, harmonics: list[int]) -> Poles | None:
