@@ -38,7 +38,7 @@ def prepared(mesh_file: str, clock: modal.Clock):
     with clock.stage("read"):
         from microslip.fem.discretise import discretise
         from microslip.mesh import read_mesh
-        from microslip.modes.boundary import fixed_dofs
+        from microslip.modal.boundary import fixed_dofs
         from microslip.settings.body import BodySettings
 
         mesh = read_mesh(mesh_file, "mm")
@@ -55,7 +55,7 @@ def prepared(mesh_file: str, clock: modal.Clock):
 
 
 def model_of(d, settings, free, fixed, clock: modal.Clock):
-    from microslip.modes.equilibrium import make_model
+    from microslip.modal.equilibrium import make_model
 
     with clock.stage("K and M"):
         rest = np.zeros((d.mesh.n_points, 3))
@@ -64,8 +64,8 @@ def model_of(d, settings, free, fixed, clock: modal.Clock):
 
 def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
     from microslip.linalg import eigen
-    from microslip.modes.sector import make_sector, sector_pencils
-    from microslip.modes.solution import shared_shifts
+    from microslip.modal.sector import make_sector, sector_pencils
+    from microslip.modal.solution import shared_shifts
 
     d, settings, fixed = prepared(mesh_file, clock)
     with clock.stage("unknowns"):
@@ -95,7 +95,7 @@ def cyclic_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
 def real_worker(mesh_file: str, modes: int, clock: modal.Clock) -> dict:
     from microslip.fem.discretise import free_upper
     from microslip.linalg import eigen
-    from microslip.modes.spectrum import make_pencil
+    from microslip.modal.spectrum import make_pencil
 
     d, settings, fixed = prepared(mesh_file, clock)
     with clock.stage("unknowns"):
@@ -224,7 +224,7 @@ def work(way: str, mesh: str, modes: str, answer: str) -> None:
     with clock.stage("imports"):
         import skfem  # noqa: F401
 
-        from microslip import modes as _  # noqa: F401
+        from microslip import modal as _  # noqa: F401
     result = WORKERS[way](mesh, int(modes), clock)
     Path(answer).write_text(json.dumps({**result, "costs": clock.costs}))
 

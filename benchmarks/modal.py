@@ -70,8 +70,8 @@ def microslip_worker(mesh_file: str, modes: int) -> dict:
         from microslip.fem.discretise import discretise, free_upper
         from microslip.linalg import eigen
         from microslip.mesh import read_mesh
-        from microslip.modes.equilibrium import make_model
-        from microslip.modes.spectrum import make_pencil
+        from microslip.modal.equilibrium import make_model
+        from microslip.modal.spectrum import make_pencil
         from microslip.settings.body import MaterialSettings
 
         solver = timed_solver(eigen.new_solver(), clock)

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from microslip.data import Mesh, ModalBasis, SpeedRange
-from microslip.modes import modal_basis
-from microslip.modes.speed_range import frequencies_over
+from microslip.modal import modal_basis
+from microslip.modal.speed_range import frequencies_over
 from microslip.settings.body import BodySettings
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

@@ -16,16 +16,26 @@ from typing import Any
 
 import damper_study
 import numpy as np
-from pages import HERE, body_reference, case_reference, contact_reference, fill, modal_reference, play, table
+from pages import (
+    HERE,
+    body_reference,
+    case_reference,
+    contact_reference,
+    fill,
+    modal_reference,
+    play,
+    public_reference,
+    table,
+)
 
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
 from microslip.case.assemble import sized
 from microslip.case.settings import ContactSettings
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
-from microslip.modes import modal_basis
-from microslip.modes.campbell import track_basis
-from microslip.modes.speed_range import frequencies_over
+from microslip.modal import modal_basis
+from microslip.modal.campbell import track_basis
+from microslip.modal.speed_range import frequencies_over
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
@@ -1063,11 +1073,24 @@ def own() -> None:
 
 
 def reference() -> None:
-    """The references of body.toml, contact.toml and case.toml, and the table of the modal file."""
+    """The references of body.toml, contact.toml and case.toml, of the modal file and of the public names."""
     fill("modal_file.md", "modal_file", modal_reference())
     fill("body_toml.md", "body_toml", body_reference())
     fill("contact_toml.md", "contact_toml", contact_reference())
     fill("case_toml.md", "case_toml", case_reference())
+    fill("python.md", "public", public_reference())
+
+
+def python() -> None:
+    """The curve of Duffing's oscillator, as the first block of the page draws it."""
+    import microslip as ms
+
+    duffing = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    fig = figure(5.6, 3.4)
+    axes = fig.subplots()
+    plain(axes)
+    ms.follow(duffing, 0.3, 2.5, harmonics=7, unit="rad/s").plot(axes, color="#0b4f9c")
+    save(drawn(fig), "python")
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------
@@ -1394,6 +1417,7 @@ STUDIES = {
     f.__name__: f
     for f in (
         reference,
+        python,
         geometry,
         meeting,
         damping_element,

@@ -9,6 +9,7 @@ Marks in a page:
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import subprocess
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import microslip
 from microslip.case.settings import CaseSettings, ContactSettings
 from microslip.contact.settings import ContactFile
 from microslip.data import (
@@ -495,6 +497,16 @@ def body_reference() -> str:
         SystemExit: a key without a meaning here, or a meaning without a key.
     """
     return _reference(BodySettings, MEANING, "body.toml")
+
+
+def public_reference() -> str:
+    """Table of the public names: what they are called with and the first sentence of their docstrings."""
+    rows = []
+    for name in microslip.__all__:
+        what = getattr(microslip, name)
+        said = (inspect.getdoc(what) or "").split("\n\n")[0].replace("\n", " ")
+        rows.append([f"`ms.{name}`", said])
+    return table(["name", "what it is"], rows)
 
 
 def contact_reference() -> str:

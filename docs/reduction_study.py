@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from microslip.data import Array, Mesh, ModalGroup
-from microslip.modes import modal_basis
+from microslip.modal import modal_basis
 from microslip.settings.body import BodySettings
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
@@ -108,7 +108,7 @@ def full_force(mesh: Mesh, settings: BodySettings, k: Array, frequency: Array) -
     """The same of the full model: a complex factorisation at every frequency, springs by Woodbury."""
     import scipy.sparse as sp
 
-    from microslip.modes.body_rows import body_rows
+    from microslip.modal.body_rows import body_rows
 
     model, pencil = full_model(mesh, settings)
     rows, dofs = body_rows(mesh, settings), model.free.free

@@ -10,7 +10,7 @@ import scipy.linalg
 from microslip.data import Array, Compliance, Interface, Mesh, ModalGroup, Rows
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
-from microslip.modes.rows import patch
+from microslip.modal.rows import patch
 
 YOUNG, POISSON, DENSITY = 2.1e11, 0.3, 7850.0
 

@@ -17,10 +17,10 @@ import scipy.sparse as sp
 from microslip.data import Array, Indices, Mesh, UserError
 from microslip.fem.discretise import Discretisation, discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modes.body_rows import INTERFACE_LABELS, BodyRows, body_rows
-from microslip.modes.boundary import fixed_dofs, materials_of
-from microslip.modes.equilibrium import make_model
-from microslip.modes.spectrum import make_pencil
+from microslip.modal.body_rows import INTERFACE_LABELS, BodyRows, body_rows
+from microslip.modal.boundary import fixed_dofs, materials_of
+from microslip.modal.equilibrium import make_model
+from microslip.modal.spectrum import make_pencil
 from microslip.settings.body import BodySettings
 
 

@@ -19,8 +19,8 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.frames import skew
 from microslip.linalg import eigen
 from microslip.mesh import boundary_facets
-from microslip.modes.boundary import fixed_dofs, with_dead_loads
-from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
+from microslip.modal.boundary import fixed_dofs, with_dead_loads
+from microslip.modal.equilibrium import BodyModel, StaticState, equilibrium, make_model
 from microslip.settings.body import BodySettings
 
 AXIS = np.array([0.0, 1.0, 0.0])  # positive rotation carries z (radial) towards x

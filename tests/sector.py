@@ -17,7 +17,7 @@ from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.frames import skew
 from microslip.linalg.canonical import by_place, signs
-from microslip.modes.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
+from microslip.modal.body_rows import BodyRows, body_rows, reduced_interfaces, reduced_rows
 from microslip.settings.body import BodySettings
 
 BORE, RIM, WIDTH = 0.05, 0.12, 0.012  # m

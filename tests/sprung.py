@@ -15,12 +15,12 @@ import scipy.sparse as sp
 from microslip.data import Array, Mesh, ModalGroup
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modes import rigid
-from microslip.modes.body_rows import body_rows
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import BodyModel, make_model
-from microslip.modes.group import inertia_of
-from microslip.modes.spectrum import make_pencil, rigid_shift
+from microslip.modal import rigid
+from microslip.modal.body_rows import body_rows
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import BodyModel, make_model
+from microslip.modal.group import inertia_of
+from microslip.modal.spectrum import make_pencil, rigid_shift
 from microslip.settings.body import BodySettings
 
 

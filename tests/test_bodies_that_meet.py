@@ -11,7 +11,7 @@ import pytest
 from drawn import GEOMETRY, STEEL, about_y, build, close, face, made, parameters, volume
 
 from microslip.data import Mesh
-from microslip.modes.rows import Patch, patch
+from microslip.modal.rows import Patch, patch
 from microslip.settings.body import load_body
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed")

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from microslip.data import Array, ModalGroup
-from microslip.modes.campbell import LINK, Tracks, crossings, mac, track, track_basis
+from microslip.modal.campbell import LINK, Tracks, crossings, mac, track, track_basis
 
 
 def shapes(n: int, m: int, seed: int = 0) -> Array:

@@ -113,7 +113,7 @@ def test_a_wrong_solution_is_not_called_converged(what: str, monkeypatch: pytest
         monkeypatch.setattr(balance.AtFrequency, "modal", more)
         monkeypatch.setattr(reduced, "work", lambda part, Omega, h, q, *rest: work(part, Omega, h, q / 1.001, *rest))
     else:
-        missing = 1e-3 * (np.arange(3) == ("supplied", "damped").index(what))
+        missing = 1e-3 * (np.arange(4) == ("supplied", "damped").index(what))
         monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) + missing * work(*given)[0]))
     problem = balance.of(cantilever(), 3, 64, length=0.0125)
     found = response.harmonic_response(problem, np.array([0.6]), np.ones(1))
@@ -140,7 +140,7 @@ def test_peaks_and_modes_are_checked_as_points_are(monkeypatch: pytest.MonkeyPat
     problem, band = sliding(samples=64, force=2.0), np.linspace(90.0, 180.0, 9)
     assert peak.highest(problem, band)[0].converged
     work = reduced.work
-    monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.001, 1.0, 1.0]))
+    monkeypatch.setattr(reduced, "work", lambda *given: tuple(np.array(work(*given)) * [1.001, 1.0, 1.0, 1.0]))
     found, _ = peak.highest(problem, band)
     assert not found.converged and found.status.startswith("energy")
 

@@ -15,8 +15,8 @@ import small
 from microslip.basis import read_basis, write_basis
 from microslip.cli import main
 from microslip.data import ModalBasis, Rows, UserError
-from microslip.modes import modal_basis
-from microslip.modes.sampling import at_points, on_common_points
+from microslip.modal import modal_basis
+from microslip.modal.sampling import at_points, on_common_points
 from microslip.pictures import can_draw
 from microslip.reduced.correlation import POINT, compare_groups
 from microslip.settings.body import BodySettings

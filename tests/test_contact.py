@@ -28,11 +28,11 @@ from microslip.fem.contact import (
 from microslip.fem.discretise import discretise, free_upper
 from microslip.fem.segments import clip, facet_functions, reference_nodes
 from microslip.linalg import eigen
-from microslip.modes import equilibrium as newton
-from microslip.modes import modal_basis
-from microslip.modes.closures import contact_curve, contact_pairs
-from microslip.modes.equilibrium import BodyModel, StaticState, equilibrium, make_model
-from microslip.modes.speed_range import frequencies_over, group_at
+from microslip.modal import equilibrium as newton
+from microslip.modal import modal_basis
+from microslip.modal.closures import contact_curve, contact_pairs
+from microslip.modal.equilibrium import BodyModel, StaticState, equilibrium, make_model
+from microslip.modal.speed_range import frequencies_over, group_at
 
 E, NU = STEEL["young"], STEEL["poisson"]
 FACETS = ("triangle", "triangle6", "quad", "quad8", "quad9")
@@ -212,11 +212,11 @@ def test_newton_is_quadratic(monkeypatch):
         return bool(found) and found[-1] < 1e-9
 
     monkeypatch.setattr(newton, "_stands", output)
-    monkeypatch.setattr("microslip.modes.closing.NEAR", 0.0)  # multipliers stay
-    monkeypatch.setattr("microslip.modes.closing.SETTLED", 10.0)
+    monkeypatch.setattr("microslip.modal.closing.NEAR", 0.0)  # multipliers stay
+    monkeypatch.setattr("microslip.modal.closing.SETTLED", 10.0)
     mesh, pair = curved_pair("tetra10", "tetra10", False)
     pair = replace(pair, interference=0.02, penalty=np.full(len(pair.nodes), 20 * E))
-    monkeypatch.setattr("microslip.modes.closing.contact_stiffness", lambda g, p, bent: contact_stiffness(g, p, True))
+    monkeypatch.setattr("microslip.modal.closing.contact_stiffness", lambda g, p, bent: contact_stiffness(g, p, True))
     rest(model_of(mesh, (pair,), held(mesh, a_z0="xyz", b_z1="xyz")))
     fast = [s for s in steps if s < 0.05]
     assert len(fast) >= 3 and fast[-1] < 1e-9

@@ -13,7 +13,7 @@ from microslip.contact.hertz import Hertz
 from microslip.contact.series import BULK
 from microslip.contact.solids import Solid
 from microslip.data import UserError
-from microslip.modes.closures import ContactCurve
+from microslip.modal.closures import ContactCurve
 
 ROUGH, C_N0 = 12e-6, 240e6
 

@@ -19,9 +19,9 @@ from meshes import body, moved, nearest, rotation_matrix, with_sets
 from microslip.data import Mesh, UserError
 from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
-from microslip.modes import modal_basis
-from microslip.modes.rows import patch
-from microslip.modes.stress import gauss_set, nodal_set
+from microslip.modal import modal_basis
+from microslip.modal.rows import patch
+from microslip.modal.stress import gauss_set, nodal_set
 
 SPEED = 600.0  # rad/s; the equilibrium moves by 1 mm, frequencies by up to a tenth
 RPM = SPEED * 30 / np.pi
@@ -282,7 +282,7 @@ def test_forced_response_to_engine_orders(e):
 
 def test_static_compliance_at_every_nodal_diameter():
     """Unit forces on a row in all sectors, turned and shifted in phase: what all rows of sector 0 read on the ring."""
-    from microslip.modes.body_rows import body_rows
+    from microslip.modal.body_rows import body_rows
 
     described = settings(6, sector())
     B, labels = body_rows(sector(), described).stacked(described)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import ast
+import doctest
+import importlib
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -17,6 +20,7 @@ sys.path.insert(0, str(DOCS))
 
 import pages  # noqa: E402
 
+import microslip  # noqa: E402
 from microslip.basis import read_basis  # noqa: E402
 from microslip.stages.job import open_job  # noqa: E402
 from microslip.stages.modal import modes_stage  # noqa: E402
@@ -78,7 +82,22 @@ def test_references_of_files_are_current() -> None:
     assert pages.filled("body_toml.md", "body_toml") == pages.body_reference().strip()
     assert pages.filled("contact_toml.md", "contact_toml") == pages.contact_reference().strip()
     assert pages.filled("case_toml.md", "case_toml") == pages.case_reference().strip()
+    assert pages.filled("python.md", "public") == pages.public_reference().strip()
     assert pages.filled("modal_file.md", "modal_file") == pages.modal_reference().strip()
+
+
+def test_a_public_name_is_no_package_of_the_same_name() -> None:
+    """An attribute that an import of a package sets comes before a name that is loaded when it is used."""
+    rooms = {p.stem for p in PACKAGE.iterdir()}
+    assert not rooms & set(microslip.__all__)
+    assert all(inspect.getdoc(getattr(microslip, name)) for name in microslip.__all__)
+
+
+def test_examples_of_the_public_names() -> None:
+    """Those in their docstrings."""
+    for module in microslip.PUBLIC:
+        done = doctest.testmod(importlib.import_module(f"microslip.{module}"))
+        assert not done.failed, module
 
 
 def test_python_blocks_are_python() -> None:

@@ -19,10 +19,10 @@ from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
 from microslip.linalg.canonical import clusters, signs, turn_clusters
 from microslip.mesh import read_mesh
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import make_model
-from microslip.modes.spectrum import make_pencil
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import make_model
+from microslip.modal.spectrum import make_pencil
 
 BACKENDS = eigen.available_backends()
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
@@ -194,7 +194,7 @@ def test_a_lost_member_is_found_again(name, lost):
 
 def test_a_lost_elastic_mode_of_a_free_body_is_found_again():
     pencil, model = pencil_of(BEAM, body(free=True))
-    from microslip.modes import rigid
+    from microslip.modal import rigid
 
     R = rigid.mass_orthonormal(rigid.free_motions(BEAM.points, BEAM.points.mean(axis=0), model.fixed), pencil.M)
     shift = -1e6
@@ -229,7 +229,7 @@ def test_signs_have_magnitude_one_where_the_largest_is_nearly_tied():
 @pytest.mark.parametrize("mesh", [BEAM, BLOCK], ids=["beam", "block"])
 def test_a_free_body_has_six_rigid_modes(mesh):
     """Exactly zero, M-orthonormal, in the span of the rigid fields, the elastic ones orthogonal to them."""
-    from microslip.modes.rigid import rigid_fields
+    from microslip.modal.rigid import rigid_fields
 
     basis = modal_basis(mesh, body(free=True, modes={"count": 12}))
     g = basis.groups[0, 0]

@@ -33,8 +33,8 @@ from microslip.fem import (
 from microslip.fem.discretise import face_blocks, free_upper, reference_nodes
 from microslip.fem.loads import body_force, thermal, traction
 from microslip.fem.operators import engineering, from_tensor, tangent_tensor, to_symmetric, to_tensor
-from microslip.modes.group import inertia_of
-from microslip.modes.rigid import rigid_fields
+from microslip.modal.group import inertia_of
+from microslip.modal.rigid import rigid_fields
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 LAME, SHEAR = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))

@@ -14,9 +14,9 @@ from microslip.data import MOTIONS, UserError
 from microslip.fem import discretise, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import equilibrium, make_model
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.reduced.floating_frame import (
     energy,
     first_moment,

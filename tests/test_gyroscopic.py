@@ -25,10 +25,10 @@ from microslip.linalg.gyroscopic import (
     hermitian_modes,
     stability_sentence,
 )
-from microslip.modes import modal_basis
-from microslip.modes.campbell import gyroscopic_change, track_gyroscopic
-from microslip.modes.equilibrium import equilibrium, make_model
-from microslip.modes.run_up import run_up_terms
+from microslip.modal import modal_basis
+from microslip.modal.campbell import gyroscopic_change, track_gyroscopic
+from microslip.modal.equilibrium import equilibrium, make_model
+from microslip.modal.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes
 from microslip.report.body import report_html
 

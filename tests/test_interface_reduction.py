@@ -16,10 +16,10 @@ from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import make_model
-from microslip.modes.spectrum import make_pencil
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import make_model
+from microslip.modal.spectrum import make_pencil
 from microslip.reduction import METHODS
 from microslip.ring import neighbours
 
@@ -101,7 +101,7 @@ def test_shapes_are_the_softest_of_the_condensed_patch(free):
 
 def rigid_rows(face, item):
     """The six rows of the patch on its displacements, and the displacements of its points."""
-    from microslip.modes.rows import patch
+    from microslip.modal.rows import patch
 
     p = patch(mesh(), "x1", np.array([0.0, 0.0, 1.0]), "right")
     N = sp.kron(p.N, np.eye(3)).tocsr()[:, face].toarray()

@@ -15,7 +15,7 @@ import small
 from microslip.data import Mesh, UserError
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
 from microslip.mesh.msh import to_vtk
-from microslip.modes.boundary import require_face
+from microslip.modal.boundary import require_face
 from microslip.topology import CELL_TYPES
 
 pytest.importorskip("meshio")

@@ -17,8 +17,8 @@ from small import basis as small_basis
 
 from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
-from microslip.modes import modal_basis
-from microslip.modes.stress import von_mises
+from microslip.modal import modal_basis
+from microslip.modal.stress import von_mises
 from microslip.operating import MaterialLimits, motion_of
 from microslip.operating.cycle import amplitude, at_time, longest, phase, wave_top
 from microslip.operating.fatigue import (

@@ -16,12 +16,12 @@ from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import Mesh, ModalGroup, UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modes import modal_basis, rigid
-from microslip.modes.boundary import known_materials
-from microslip.modes.closures import bolt_forces
-from microslip.modes.equilibrium import make_model
-from microslip.modes.preload import Corrected, determinate, pressed_modes, pressed_state, without_rigid
-from microslip.modes.spectrum import make_pencil
+from microslip.modal import modal_basis, rigid
+from microslip.modal.boundary import known_materials
+from microslip.modal.closures import bolt_forces
+from microslip.modal.equilibrium import make_model
+from microslip.modal.preload import Corrected, determinate, pressed_modes, pressed_state, without_rigid
+from microslip.modal.spectrum import make_pencil
 from microslip.settings.body import load_body
 
 GEOMETRY = Path(__file__).resolve().parents[1] / "geometry"

@@ -13,12 +13,12 @@ from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modes import modal_basis
-from microslip.modes.body_rows import body_rows
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import make_model
-from microslip.modes.solution import held_compliance
-from microslip.modes.spectrum import make_pencil
+from microslip.modal import modal_basis
+from microslip.modal.body_rows import body_rows
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import make_model
+from microslip.modal.solution import held_compliance
+from microslip.modal.spectrum import make_pencil
 from microslip.reduced.quality import percent_off
 from microslip.reduction import METHODS, Substructure
 from microslip.reduction.craig_bampton import fixed_interface_modes

@@ -14,9 +14,9 @@ from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, internal_force, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import (
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import (
     equilibrium,
     heated,
     make_model,

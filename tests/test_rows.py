@@ -13,10 +13,10 @@ from microslip.data import Mesh, UserError
 from microslip.fem import discretise, displacement_gradient, mass, stiffness
 from microslip.fem.discretise import face_blocks, shape_functions
 from microslip.fem.operators import isotropic
-from microslip.modes import modal_basis
-from microslip.modes.body_rows import body_rows
-from microslip.modes.rigid import rigid_fields
-from microslip.modes.rows import Locator, patch, point_rows, slope_rows
+from microslip.modal import modal_basis
+from microslip.modal.body_rows import body_rows
+from microslip.modal.rigid import rigid_fields
+from microslip.modal.rows import Locator, patch, point_rows, slope_rows
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 BENT = {t: brick(t, (2, 3, 2), (0.1, 0.08, 0.05), to=shaken(0.004)) for t in CELLS}

@@ -20,11 +20,11 @@ from microslip.fem.discretise import discretise
 from microslip.frames import rotation
 from microslip.linalg import eigen
 from microslip.linalg.condensed import negative_eigenvalues, new_condensed
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import make_model
-from microslip.modes.sector import sector_pencils
-from microslip.modes.solution import shared_shifts
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import make_model
+from microslip.modal.sector import sector_pencils
+from microslip.modal.solution import shared_shifts
 
 AXIS, ORIGIN = np.array([0.0, 1.0, 0.0]), np.zeros(3)
 N = 6

@@ -17,8 +17,8 @@ from microslip.data import UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response, speed_line
 from microslip.harmonic_balance.solver import solve
-from microslip.modes.campbell import crossings, track_basis
-from microslip.modes.speed_range import basis_at
+from microslip.modal.campbell import crossings, track_basis
+from microslip.modal.speed_range import basis_at
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
 

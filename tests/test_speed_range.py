@@ -12,10 +12,10 @@ from meshes import STEEL, body, brick, nearest, twisted_blade
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import ModalBasis, UserError
 from microslip.linalg import eigen
-from microslip.modes import modal_basis
-from microslip.modes.campbell import track_basis
-from microslip.modes.equilibrium import equilibrium, stiffness_slope
-from microslip.modes.range_basis import (
+from microslip.modal import modal_basis
+from microslip.modal.campbell import track_basis
+from microslip.modal.equilibrium import equilibrium, stiffness_slope
+from microslip.modal.range_basis import (
     Interpolant,
     Settled,
     Solved,
@@ -28,7 +28,7 @@ from microslip.modes.range_basis import (
     refined,
     variable,
 )
-from microslip.modes.speed_range import basis_at, dense_pencil, frequencies_over, group_at
+from microslip.modal.speed_range import basis_at, dense_pencil, frequencies_over, group_at
 from microslip.settings.body import Rotation
 
 BLADE = twisted_blade(n=(1, 3, 7), thickness=0.003)
@@ -312,7 +312,7 @@ def test_factors_kept_lead_newton_to_the_same_equilibrium(rpm: float, monkeypatc
     """From a neighbouring state: with a factorisation in every step, and with those that serve more than one."""
     from test_rotation import model_of
 
-    from microslip.modes import equilibrium as newton
+    from microslip.modal import equilibrium as newton
 
     model, solver = model_of(BLADE, body(supports=[{"face": "z0"}])), eigen.new_solver("superlu")
     near = equilibrium(model, 0.99 * rpm * np.pi / 30, "nonlinear", solver)

@@ -12,9 +12,9 @@ from microslip.fem import discretise, displacement_gradient, green_strain, isotr
 from microslip.fem.discretise import face_blocks, free_upper
 from microslip.fem.loads import traction
 from microslip.fem.operators import engineering, to_symmetric
-from microslip.modes import modal_basis
-from microslip.modes.equilibrium import StaticState, make_model
-from microslip.modes.stress import gauss_set, nodal_set, smoother, von_mises
+from microslip.modal import modal_basis
+from microslip.modal.equilibrium import StaticState, make_model
+from microslip.modal.stress import gauss_set, nodal_set, smoother, von_mises
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]
 STEEL_C = isotropic(E, NU)

@@ -15,8 +15,8 @@ from microslip.data import Mesh
 from microslip.fem.discretise import discretise, face_blocks, shape_functions
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
-from microslip.modes import modal_basis
-from microslip.modes.rows import Locator
+from microslip.modal import modal_basis
+from microslip.modal.rows import Locator
 from microslip.topology import CELL_TYPES
 
 WEDGES = meshes.WEDGES

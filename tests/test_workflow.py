@@ -299,7 +299,7 @@ def test_a_change_of_code_is_another_input(monkeypatch: pytest.MonkeyPatch) -> N
 
     What is no module counts with those beside it: how a page looks, a table that a closed form reads.
     """
-    first = {m: hash_of_code.__wrapped__((m,)) for m in ("modes.compute", "stages.response")}
+    first = {m: hash_of_code.__wrapped__((m,)) for m in ("modal.compute", "stages.response")}
     own = store.hash_file
     for changed, differing in (
         ("contact/point.py", {"stages.response"}),

@@ -18,6 +18,8 @@ PUBLIC = {
     "basis": "read_basis write_basis",
     "results.files": "read_response",
     "harmonic_balance.solved": "load",
+    "exchange.labelled": "to_xarray",
+    "bodies": "modes assemble sample",
     "system.structure": "structure polynomial jenkins stop Element",
     "analyses": "harmonic_response follow backbone",
 }

@@ -574,7 +574,7 @@ def compare(
         least: MAC below which modes stay unpaired.
     """
     from .basis import read_basis
-    from .modes.sampling import on_common_points
+    from .modal.sampling import on_common_points
     from .reduced.correlation import compare_groups, pair_table
 
     if not 0 <= least <= 1:
@@ -608,7 +608,7 @@ def report(file: Path, /, *, output: Output = None, quiet: Quiet = False) -> Non
     from . import pictures
     from .basis import read_basis
     from .files.store import making, write_text
-    from .modes.campbell import engine_orders
+    from .modal.campbell import engine_orders
     from .report.body import report_html
 
     file = _modal_file(file)
@@ -720,7 +720,7 @@ def _not_foreign(path: Path) -> Path:
 
 
 def _at_speed(basis: ModalBasis, rpm: float) -> ModalBasis:
-    from .modes.speed_range import basis_at
+    from .modal.speed_range import basis_at
 
     return basis_at(basis, rpm)
 

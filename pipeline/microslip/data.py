@@ -427,7 +427,7 @@ class ContactState:
     areas: Annotated[Array, Stored("point", "m^2", "of the points")]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModalGroup:
     """The reduced body at one rotation speed (and one nodal diameter).
 
@@ -500,6 +500,9 @@ class ModalGroup:
         """Number of generalised coordinates."""
         return len(self.kind)
 
+    def __repr__(self) -> str:
+        return f"<ModalGroup: {self.n_modes} coordinates at {self.speed:.6g} rad/s, nodal diameter {self.harmonic}>"
+
 
 @dataclass(frozen=True)
 class SpeedRange:
@@ -555,7 +558,7 @@ class SpeedRange:
         return self.speeds[self.held]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModalBasis:
     """Everything a modal file holds: the body, its mesh, and a `ModalGroup` per speed (and nodal diameter).
 
@@ -590,3 +593,26 @@ class ModalBasis:
     cyclic_faces: tuple[str, str] = ("cyclic_left", "cyclic_right")
     ranges: Mapping[int, SpeedRange] = field(default_factory=dict)
     source: str = "elements"
+
+    def to_dataframe(self) -> Any:
+        """A `pandas.DataFrame` of all modes: speed (rad/s), nodal diameter, mode from 1, frequency (Hz), damping ratio,
+        kind."""
+        import pandas
+
+        rows = [
+            (g.speed, nd, i, *of_mode)
+            for (_, nd), g in sorted(self.groups.items())
+            for i, of_mode in enumerate(zip(g.frequency, g.damping_ratio, g.kind, strict=False), 1)
+        ]
+        heads = ["speed_rad_s", "nodal_diameter", "mode", "frequency_Hz", "damping_ratio", "kind"]
+        return pandas.DataFrame(rows, columns=heads)
+
+    def __repr__(self) -> str:
+        speeds, diameters = (len({key[i] for key in self.groups}) for i in (0, 1))
+        g = next(iter(self.groups.values()))
+        named = {"interfaces": g.interfaces, "excitations": g.excitations, "monitors": g.monitors, "gauges": g.gauges}
+        said = "; ".join(f"{key} {', '.join(names)}" for key, names in named.items() if names)
+        elastic = g.frequency[g.omega > 0]
+        over = f" from {elastic[0]:.6g} to {elastic[-1]:.6g} Hz" if len(elastic) else ""
+        of = f"{speeds} speed{'s' * (speeds > 1)}" + (f", {diameters} nodal diameters" if self.sectors > 1 else "")
+        return f"<ModalBasis {self.name}: {g.n_modes} coordinates{over}, {self.reduction}, {of}; {said}>"

@@ -25,9 +25,9 @@ from microslip.fem import discretise, displacement_gradient, green_strain, inter
 from microslip.fem.discretise import free_upper
 from microslip.fem.operators import spin_projector, tangent, tangent_tensor
 from microslip.frames import skew
-from microslip.modes import modal_basis
-from microslip.modes.boundary import fixed_dofs
-from microslip.modes.equilibrium import make_model
+from microslip.modal import modal_basis
+from microslip.modal.boundary import fixed_dofs
+from microslip.modal.equilibrium import make_model
 from microslip.reduced.floating_frame import floating_body, spin_up
 
 L, EA, EI, RHO_A, END, T = 10.0, 2.8e7, 1.4e4, 1.2, 6.0, 15.0

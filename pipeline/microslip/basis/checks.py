@@ -24,7 +24,7 @@ from ..data import (
 )
 from ..files.declared import agrees, nouns, numbers
 from ..linalg.gyroscopic import stability_sentence
-from ..modes.range_basis import Interpolant, frequencies, largest_difference
+from ..modal.range_basis import Interpolant, frequencies, largest_difference
 from ..reduced.coordinates import compliance_row, held, in_modes
 from .integrals import cell_volumes, face_mean, modal_mass
 

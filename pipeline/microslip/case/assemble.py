@@ -19,7 +19,7 @@ from ..files.store import ordinary
 from ..frames import rotation
 from ..harmonic_balance.accuracy import more
 from ..harmonic_balance.cost import GIB, aft_bytes, of_this_machine
-from ..modes.speed_range import basis_at
+from ..modal.speed_range import basis_at
 from ..reduced.compliance import SURFACE, has_residual
 from ..reduced.coordinates import first_modes, in_modes, of_density
 from ..system.assembly import Assembly, Contact, ContactFace, Load, Output, preloaded_contact
@@ -76,7 +76,7 @@ class Loaded:
         return self.group.interfaces[name]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Built:
     """An assembly made from a case.
 
@@ -96,6 +96,9 @@ class Built:
     messages: tuple[str, ...]
     fitted: Mapping[int, Callable[[float], Contact]] = field(default_factory=dict)
     _pressed: dict[float | None, Assembly] = field(init=False, repr=False, compare=False, default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"<Built {self.settings.name}: {self.assembly!r}>"
 
     @property
     def speed(self) -> float:

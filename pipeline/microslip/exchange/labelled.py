@@ -23,7 +23,7 @@ _UNITS = {
 
 
 def to_xarray(basis: ModalBasis) -> Any:
-    """An `xarray.DataTree`; needs the package xarray (``microslip[exchange]``).
+    """A modal basis as an `xarray.DataTree`; needs the package xarray (``microslip[exchange]``).
 
     Axes: node, axis, mode (the coordinates), own_mode (where they differ), row, component. Of a body without sectors a
     group is ``/speed_0``, of a sector ``/speed_0/nd_0``.

@@ -64,18 +64,24 @@ class ElasticSpring(OneCoordinate):
 
     def force(self, u: Array, period: float) -> Array:
         path, _, transform = self._sampled(u)
-        return (self._spring.force(path) @ transform.T)[:, None]
+        return (self._turn * self._spring.force(self._turn * path) @ transform.T)[:, None]
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         path, values, transform = self._sampled(u)
-        slope = transform @ (self._spring.slope(path)[..., None] * values)
-        return (self._spring.force(path) @ transform.T)[:, None], slope[:, None, :, None]
+        moved, turn = self._turn * path, self._turn
+        slope = transform @ ((turn * turn * self._spring.slope(moved))[..., None] * values)
+        return (turn * self._spring.force(moved) @ transform.T)[:, None], slope[:, None, :, None]
 
     def traced(self, u: Array, period: float) -> list[Traced]:
-        force, zero = self._spring.force(self._sampled(u)[0]), np.zeros(1)
+        force, zero = self._turn * self._spring.force(self._turn * self._sampled(u)[0]), np.zeros(1)
         work = above_rounding(force * self._speed(u), 1)
         cycles = [Cycle(w[None], zero, zero, zero, zero, 0.0) for w in work]
         return [Traced(f, one) for f, one in zip(self._of_points(force), cycles, strict=True)]
+
+    @cached_property
+    def _turn(self) -> float:
+        """How far the spring is stretched per unit of the coordinate."""
+        return float(self.patch.kinematics[0, 1, 0])
 
     @property
     def _spring(self) -> Spring:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,12 +32,15 @@ from .response import operating
 from .solver import CONVERGED, Report
 from .solver import Point as Solved
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
 is never in resonance by itself, which it would be with that of the sticking contact in small motions."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Backbone:
     """A nonlinear mode.
 
@@ -53,6 +57,47 @@ class Backbone:
     stuck: float
     status: str
     checks: tuple[Checks, ...]
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz."""
+        return self.Omega / (2 * np.pi)
+
+    def columns(self) -> dict[str, Array]:
+        """Heading -> (k,) numbers."""
+        return {"amplitude_m": self.amplitude, "frequency_Hz": self.frequency, "damping_ratio": self.damping}
+
+    def to_dataframe(self) -> Any:
+        """The table of `columns` as a `pandas.DataFrame`."""
+        import pandas
+
+        return pandas.DataFrame(self.columns())
+
+    def to_xarray(self) -> Any:
+        """Frequency and damping ratio as an `xarray.Dataset` over the amplitude."""
+        import xarray
+
+        table = {"frequency": (self.frequency, "Hz"), "damping_ratio": (self.damping, "1")}
+        variables = {name: ("amplitude", values, {"units": unit}) for name, (values, unit) in table.items()}
+        return xarray.Dataset(variables, coords={"amplitude": ("amplitude", self.amplitude, {"units": "m"})})
+
+    def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
+        """Draw the frequency over the amplitude. Returns the axes, new ones if none are given."""
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            axes = plt.subplots(layout="constrained")[1]
+        axes.semilogx(self.amplitude, self.frequency, **line)
+        axes.set_xlabel("amplitude in m")
+        axes.set_ylabel("frequency in Hz")
+        return axes
+
+    def __repr__(self) -> str:
+        if not len(self.amplitude):
+            return f"<Backbone: no points; {self.status}>"
+        f, a, d = (f"{v[0]:.5g} to {v[-1]:.5g}" for v in (self.frequency, self.amplitude, self.damping))
+        most = f"at most {self.damping.max():.3g}"
+        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {self.status}>"
 
     @property
     def complete(self) -> bool:

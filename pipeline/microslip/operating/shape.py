@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Array, ModalBasis, UserError
 from ..exchange import vtu
 from ..files.store import write_text
-from ..modes.stress import von_mises
+from ..modal.stress import von_mises
 from ..ring.expansion import replicate, sector_rotation
 from .cycle import at_time, longest
 from .fatigue import MaterialLimits, vibration_margin

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..data import ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
-from ..modes.campbell import track_basis
+from ..modal.campbell import track_basis
 from ..reduced.coordinates import basis_in_modes
 from ..ring.expansion import multiplicity
 from ..ring.resonances import eigenmodes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array, ModalBasis
-from ..modes.campbell import Tracks
+from ..modal.campbell import Tracks
 from ..ring.expansion import FORWARD, STANDING, aliased
 from ..ring.neighbours import closed_gap, stuck
 from ..ring.resonances import (

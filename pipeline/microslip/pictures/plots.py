@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import Array, ContactState, ModalBasis, ModalGroup
 from ..files.store import complete_or_absent
-from ..modes.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
+from ..modal.campbell import SURE, Crossing, Tracks, crossings, gyroscopic_change, track_gyroscopic
 from ..reduced.truncation import Coordinate, coordinates, percent
 from ..units import from_rpm, rpm_text, to_rpm
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from ..modes.closures import ContactCurve
+    from ..modal.closures import ContactCurve
 
 COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f", "#5b6270", "#94a112")
 

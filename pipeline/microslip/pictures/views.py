@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array, Indices, Interface, ModalBasis, ModalGroup
-from ..modes.stress import von_mises
+from ..modal.stress import von_mises
 from ..units import rpm_text
 from .lettering import (
     INK,

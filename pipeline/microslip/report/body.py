@@ -12,7 +12,7 @@ import numpy as np
 from ..basis import check_basis
 from ..data import ModalBasis, ModalGroup
 from ..linalg.gyroscopic import stability_sentence
-from ..modes.campbell import crossings, engine_orders, track_basis
+from ..modal.campbell import crossings, engine_orders, track_basis
 from ..reduced.compliance import SUPPLIED, Share, has_residual, sentence, shares
 from ..reduced.coordinates import basis_in_modes
 from ..reduced.quality import sentences

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..data import ModalBasis, ModalGroup
-from ..modes.campbell import engine_orders
+from ..modal.campbell import engine_orders
 from ..ring import resonances
 from ..ring.expansion import aliased, certificate_words, certify_ring
 from ..units import rpm_text

@@ -115,7 +115,7 @@ def _names(series: Sequence[Series]) -> str:
 
 def _groups(body: Body, basis: ModalBasis) -> list[ModalGroup]:
     if body.speed < 0:
-        from ..modes.speed_range import basis_at
+        from ..modal.speed_range import basis_at
 
         basis = basis_at(basis, body.rpm)
     known = {k: basis.groups[max(body.speed, 0), k] for k, _ in body.harmonics}

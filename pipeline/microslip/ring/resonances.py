@@ -17,7 +17,7 @@ import numpy as np
 from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..files.tables import rows_csv
 from ..linalg.gyroscopic import stability_sentence
-from ..modes.campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
+from ..modal.campbell import Tracks, crossings, follow, point_weights, track_basis, track_range
 from ..reduced.coordinates import in_modes
 from ..units import to_rpm
 from .expansion import BACKWARD, FORWARD, STANDING, aliased

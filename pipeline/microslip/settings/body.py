@@ -788,8 +788,17 @@ def load_body(path: Path | str, assignments: list[str] | None = None) -> tuple[B
     """
     path = Path(path)
     raw = override(load_toml(path), assignments or [], path)
+    return body_settings(raw, path), raw
+
+
+def body_settings(raw: dict[str, Any], path: Path) -> BodySettings:
+    """The settings of a body file's table in SI. path: for messages.
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
     settings = validate(BodySettings, raw, path)
-    return _to_metres(settings, UNITS[settings.length_unit]), raw
+    return _to_metres(settings, UNITS[settings.length_unit])
 
 
 def _to_metres(model: Any, scale: float) -> Any:

@@ -123,7 +123,7 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
 
 def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
-    from ..modes.rigid import free_motions
+    from ..modal.rigid import free_motions
 
     fixed = [3 * mesh.point_sets[n] + "xyz".index(c) for n, directions in mesh.supports.items() for c in directions]
     return free_motions(mesh.points, mesh.points.mean(axis=0), np.concatenate(fixed)).shape[1] == 0

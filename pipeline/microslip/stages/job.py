@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data import UserError
-from ..settings.body import BodySettings, load_body, load_toml
+from ..settings.body import BodySettings, body_settings, load_body, load_toml
 
 _NO_SETTINGS = set(".step .stp .brep .iges .igs .inp .cdb .msh .med .unv .bdf .mtx .mat".split())
 
@@ -66,6 +66,16 @@ def open_job(path: Path | str, assignments: list[str] | None = None, root: Path 
         raise UserError(f"{path}: is no body.toml; make one around it with: microslip import {shlex.quote(str(path))}")
     settings, raw = load_body(path, assignments)
     return Job(path, settings, raw, Path(root))
+
+
+def job_of(raw: dict[str, Any], folder: Path) -> Job:
+    """A body from the keys of a body.toml, its paths beginning in a folder.
+
+    Raises:
+        UserError: see `load_body`.
+    """
+    path = folder / "body"
+    return Job(path, body_settings(raw, path), raw, folder)
 
 
 def holds_a_case_alone(path: Path) -> bool:

@@ -21,7 +21,7 @@ from .job import Job
 from .meshing import load_mesh, mesh_stage
 from .stage import Made, Report, Stage
 
-_CODE = ("modes.compute", "basis", "mesh")
+_CODE = ("modal.compute", "basis", "mesh")
 
 
 def modes_stage(
@@ -42,9 +42,7 @@ def modes_stage(
     stage, warnings = Stage(output or job.basis_file, code, force, report), list[str]()
 
     def work() -> Made:
-        basis, told = (
-            _assembled_here(job, mesh_file, report) if matrices is None else _from_matrices(job, matrices, report)
-        )
+        basis, told = basis_of(job, mesh_file, report) if matrices is None else _from_matrices(job, matrices, report)
         report(f"writing {stage.product}")
         write_basis(stage.product, basis)
         warnings.extend(told)
@@ -54,9 +52,13 @@ def modes_stage(
     return stage.product, warnings
 
 
-def _assembled_here(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, list[str]]:
-    """The modal basis of a body that has a mesh, and warnings."""
-    from ..modes import modal_basis
+def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, list[str]]:
+    """The modal basis of a body that has a mesh, and warnings.
+
+    Raises:
+        UserError, NotConverged: see `modes.modal_basis`.
+    """
+    from ..modal import modal_basis
 
     mesh, warnings = load_mesh(job, mesh_file)
     for warning in warnings:
@@ -71,7 +73,7 @@ def _assembled_here(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBas
 def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:
     """The modal basis of a body that another program has assembled, and warnings."""
     from ..exchange.matrices import read_matrices
-    from ..modes import foreign_basis
+    from ..modal import foreign_basis
 
     try:
         body = read_matrices(given, job.folder, job.settings.length_unit)

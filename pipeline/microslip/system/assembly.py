@@ -101,8 +101,12 @@ class Contact:
     @cached_property
     def stiffness(self) -> Array:
         """(k, k) about which the analysis is made: that of the sticking contact where it is preloaded."""
+        from ..contact.elements import Spring
         from ..contact.patch import stuck_stiffness
 
+        if isinstance(self.patch.law, Spring) and self.patch.count == 1:  # at a displacement at which it bends
+            slope = abs(float(self.patch.law.slope(2 * (self.length or 0.0))))
+            return slope * float(self.patch.kinematics[0, 1, 0]) ** 2 * np.eye(1)
         preloaded, at = stuck_stiffness(self.patch, self.offset), np.zeros_like(self.offset)
         if preloaded[0, 0] > 0 or self.preload[0] > 0:
             return preloaded
@@ -220,7 +224,7 @@ class Linear:
         return len(self.rows)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Assembly:
     """Members, contacts, loads and read-outs.
 
@@ -236,6 +240,17 @@ class Assembly:
     outputs: tuple[Output, ...]
     ring: Ring | None = None
     stuck_damping: tuple[float, ...] | None = None
+
+    def __repr__(self) -> str:
+        named = {
+            "components": [m.name for m in self.components],
+            "contacts": [c.name for c in self.contacts],
+            "loads": [x.row for x in self.loads],
+            "read-outs": [f"{w.monitor} {w.label}" for w in self.outputs],
+        }
+        said = "; ".join(f"{key} {', '.join(names)}" for key, names in named.items() if names)
+        ring = f"; one of {self.ring.blades} sectors, engine order {self.ring.order}" if self.ring else ""
+        return f"<Assembly: {said}{ring}>"
 
     def check_names(self) -> None:
         """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no component."""

@@ -86,8 +86,10 @@ def polynomial(stiffness: Mapping[int, float], at: Any = 0, to: Any = None, name
 
 
 def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
-    """A Jenkins element: a spring (N/m) in series with a slider that holds a force limit (N). at, to, name: see
-    `Element`.
+    """A Jenkins element: a spring in series with a slider that holds a force limit.
+
+    Args:
+        stiffness: N/m. limit: N. at, to, name: see `Element`.
 
     Raises:
         UserError: a stiffness that is not positive, or a negative limit.
@@ -101,8 +103,10 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
 def stop(
     stiffness: float, gap: float, at: Any = 0, to: Any = None, both: bool = False, name: str | None = None
 ) -> Element:
-    """A spring (N/m) that is met beyond a gap (m) and cannot pull; both: also in the other direction. at, to, name: see
-    `Element`.
+    """A spring that is met beyond a gap and cannot pull.
+
+    Args:
+        stiffness: N/m. gap: m. both: whether there is one in the other direction too. at, to, name: see `Element`.
 
     Raises:
         UserError: a stiffness that is not positive.

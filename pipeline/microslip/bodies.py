@@ -1,0 +1,104 @@
+"""From a description of a body or of an assembly, in a file or as a dict of the same keys, to what can be analysed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from .basis import read_basis
+from .case.assemble import Built, build
+from .case.settings import CaseSettings
+from .data import ModalBasis, UserError
+from .settings.body import load_toml
+from .settings.mistakes import validate
+from .stages.job import job_of, open_job
+from .stages.places import modal_files
+
+Report = Callable[[str], None]
+
+UNSAID: dict[str, Any] = {"name": "assembly", "sweep": {"start": 1.0, "stop": 2.0, "normal_forces": [0.0]}}
+"""Of a case as a dict, where it does not say it: its name, and a sweep that nobody asks for."""
+
+
+def sample() -> Path:
+    """The modal file that travels with the package: a twisted steel vane, 8 x 40 x 160 mm.
+
+    It has the interfaces ``right`` and ``left`` at its tip, the excitation ``magnet`` and the monitor ``probe``.
+    """
+    return Path(__file__).parent / "samples" / "basis.h5"
+
+
+def modes(
+    body: Path | str | Mapping[str, Any], folder: Path | str = ".", report: Report = lambda _: None
+) -> ModalBasis:
+    """The modal basis of a body: from its mesh, or from its drawing by way of one.
+
+    Args:
+        body: a body.toml or its folder, made where it is not up to date, as ``microslip modes`` does (``meshes/`` and
+            ``build/`` in the folder); or the keys of a body.toml (``docs/body_toml.md``) as a dict with
+            ``geometry.mesh``, of which nothing is written.
+        folder: where paths and products begin. report: is told what is under way.
+
+    Raises:
+        UserError: a mistake in the settings or the mesh, with the key or the place.
+        NotConverged: the equilibrium at speed or the spectrum was not found.
+
+    Examples:
+        >>> import microslip as ms
+        >>> basis = ms.modes({
+        ...     "name": "plate", "length_unit": "m", "geometry": {"mesh": "meshes/tiny/plate.msh"},
+        ...     "material": {"name": "steel", "density": 7850.0, "young": 2.1e11, "poisson": 0.3},
+        ...     "support": [{"face": "root"}],
+        ... })  # doctest: +SKIP
+    """
+    from .stages import modal
+
+    if isinstance(body, Mapping):
+        job = job_of(dict(body), Path(folder))
+        if job.settings.geometry.mesh is None:
+            raise UserError("geometry.mesh: is missing: a body given as a dict has a mesh; or write a body.toml")
+        return modal.basis_of(job, job.mesh_file, report)[0]
+    return read_basis(modal.modes_stage(open_job(body, root=folder), report=report)[0])
+
+
+def assemble(
+    case: Path | str | Mapping[str, Any], folder: Path | str = ".", report: Report = lambda _: None,
+    **bases: ModalBasis | Path | str,
+) -> Built:  # fmt: skip
+    """An assembly of bodies with contacts, loads and read-outs.
+
+    Args:
+        case: a case.toml, or its keys (``docs/case_toml.md``) as a dict; this needs no ``sweep``.
+        folder: where paths begin. bases: body -> its modal basis or file; those of a file that are not named here are
+            looked for, and made, as ``microslip respond`` does.
+
+    Returns:
+        What `harmonic_response`, `follow` and `backbone` take; ``pressed(100.0)`` is the same with a normal force (N)
+        in every contact that has none of its own. ``messages`` are sentences one should know.
+
+    Raises:
+        UserError: names that the modal files do not hold, and every other mistake, with its key.
+
+    Examples:
+        >>> import microslip as ms
+        >>> rub = {"interface": "right", "normal_force": 20.0, "normal_stiffness": 2e5, "tangential_stiffness": 4e5,
+        ...        "friction": 0.2, "points": [4, 2]}
+        >>> case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": [rub]}
+        >>> ms.assemble(case, vane=ms.sample()).assembly.contacts[0].name
+        'right'
+    """
+    path = Path(folder) / "case" if isinstance(case, Mapping) else Path(folder) / case
+    raw = {**UNSAID, **case} if isinstance(case, Mapping) else load_toml(path)
+    settings = validate(CaseSettings, raw, path)
+    unknown = sorted(set(bases) - {b.name for b in settings.components})
+    if unknown:
+        raise UserError(
+            f"{path}: bases: there is no body '{unknown[0]}'; it has {', '.join(b.name for b in settings.components)}"
+        )
+    found = {name: b if isinstance(b, ModalBasis) else read_basis(b) for name, b in bases.items()}
+    missing = [b for b in settings.components if b.name not in found]
+    if missing:
+        files = modal_files(settings, path, Path(folder), report, {name: Path() for name in found})
+        found |= {b.name: read_basis(files[b.name]) for b in missing}
+    return build(settings, found, path)

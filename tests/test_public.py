@@ -1,0 +1,277 @@
+"""What `import microslip as ms` gives: small systems against closed forms, and results that know themselves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import meshio
+import numpy as np
+import pytest
+import small
+
+import microslip as ms
+from microslip.contact.elements import Polynomial, Stop
+from microslip.contact.patch import Patch
+from microslip.data import UserError
+from microslip.harmonic_balance.by_hand import ElasticSpring, model
+from microslip.harmonic_balance.forces import AFT
+
+matplotlib.use("Agg")
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def duffing(**more):
+    return ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})], **more)
+
+
+@pytest.fixture(scope="module")
+def curve():
+    return ms.follow(duffing(), 0.3, 2.5, harmonics=7, unit="rad/s")
+
+
+# against closed forms -------------------------------------------------------------------------------------------------
+
+
+def test_both_folds_of_duffings_oscillator(curve):
+    """As found with 12 harmonics and 256 samples by another route."""
+    np.testing.assert_allclose(curve.folds, [1.462616482, 1.156017684], rtol=0, atol=1e-8)
+    assert curve.ended.startswith("bound") and curve.converged.all() and not curve.failures
+    q, W = curve.harmonics()[:, 1], curve.parameter
+    one = (1 - W**2 + 0.05j * W + 0.75 * 0.05 * abs(q) ** 2) * q  # of one harmonic
+    assert np.abs(one - 0.4).max() < 0.05 * np.abs(q).max()
+
+
+def test_linear_elements_are_entries_of_the_matrices():
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(4, 4))
+    M, K, W = np.eye(4) + 0.1 * A @ A.T, 50 * np.eye(4) + A @ A.T, np.linspace(1.0, 20.0, 9)
+    springs = [ms.polynomial({1: 30.0}, at=1), ms.polynomial({1: 7.0}, at=3, to=0), ms.polynomial({1: 2.0}, at=A[0])]
+    system = ms.structure(M, K, 0.3 * M, force={2: 1.0 + 0.5j}, elements=springs, output=[0, 3])
+    found = ms.harmonic_response(system, W, unit="rad/s", harmonics=2)
+    w = np.array([0, 0, 0, 1]) - np.array([1, 0, 0, 0])
+    K = K + 30.0 * np.diag([0, 1, 0, 0]) + 7.0 * np.outer(w, w) + 2.0 * np.outer(A[0], A[0])
+    exact = np.array([np.linalg.solve(K - x * x * M + 0.3j * x * M, [0, 0, 1.0 + 0.5j, 0]) for x in W])
+    for i, dof in enumerate((0, 3)):
+        np.testing.assert_allclose(found.harmonics(i)[:, 1], exact[:, dof], rtol=1e-9)
+    np.testing.assert_array_equal(found.readouts, ["q 0", "q 3"])
+
+
+def test_the_effective_damping_of_one_coordinate():
+    found = ms.harmonic_response(ms.structure(2.0, 8.0, 0.3, force={0: 1.0}), [0.5, 2.0, 5.0], unit="rad/s")
+    np.testing.assert_allclose(found.damping_ratio, 0.3 / (2 * 2.0 * np.array([0.5, 2.0, 5.0])), rtol=1e-12)
+
+
+def test_a_jenkins_element_is_the_closed_form_of_one_harmonic():
+    """Its describing function; many samples, because those of a cycle are fewer than its kinks need."""
+    k, R = 3.0, 0.5
+    system = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(k, R)])
+    found = ms.harmonic_response(system, np.linspace(0.5, 2.5, 41), unit="rad/s", harmonics=1, samples=4096)
+    W, a = found.parameter, found.amplitude
+    ratio = np.minimum(1.0, R / (k * a))
+    theta = np.arccos(1 - 2 * ratio)
+    stiffness = k / np.pi * (theta - 0.5 * np.sin(2 * theta) + 1j * np.sin(theta) ** 2)
+    exact = 0.3 / np.abs(1 - W**2 + 0.02j * W + stiffness)
+    np.testing.assert_allclose(a, exact, rtol=1e-5)
+    lost = np.where(ratio < 1, 4 * R * (a - R / k), 0.0)
+    np.testing.assert_allclose(found.dissipated, lost, atol=2e-3 * lost.max())
+    assert (lost > 0).any() and (lost == 0).any()
+
+
+@pytest.mark.parametrize("law", [Polynomial(np.array([2.0, -3.0, 5.0])), Stop(7.0, 0.2), Stop(7.0, 0.1, both=True)])
+def test_springs_by_hand_are_those_that_are_marched(law):
+    shape = np.zeros((1, 3, 1))
+    shape[0, 1, 0] = 1.3
+    patch = Patch("element", np.zeros((1, 2)), np.ones(1), law, shape)
+    hand, marched = model(patch, 5, 64, 3, 1e-12), AFT(patch, 5, 64, 3, 1e-12)
+    assert isinstance(hand, ElasticSpring)
+    u = 0.3 * np.random.default_rng(1).normal(size=(5, 1, 7))
+    for a, b in zip(
+        (hand.force(u, 1.0), *hand.forces(u, 1.0)), (marched.force(u, 1.0), *marched.forces(u, 1.0)), strict=True
+    ):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(b).max())
+    for one, other in zip(hand.traced(u, 1.0), marched.traced(u, 1.0), strict=True):
+        np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-12)
+        assert one.cycle.dissipated == pytest.approx(other.cycle.dissipated, abs=1e-12) and one.cycle.lost == 0
+
+
+def test_a_stop_is_met_beyond_its_gap():
+    """The free oscillation up to the gap; beyond it stiffer, so that the resonance leans to higher frequencies."""
+    free = ms.structure(1.0, 1.0, 0.04, force={0: 0.02})
+    stopped = ms.structure(1.0, 1.0, 0.04, force={0: 0.02}, elements=[ms.stop(5.0, 0.3)])
+    grid = np.linspace(0.6, 1.4, 81)
+    a, b = (ms.harmonic_response(s, grid, unit="rad/s", harmonics=5).amplitude for s in (free, stopped))
+    same = a < 0.3
+    np.testing.assert_allclose(a[same][:20], b[same][:20], rtol=1e-9)
+    assert b.max() < 0.95 * a.max() and grid[b.argmax()] > grid[a.argmax()]
+
+
+def test_a_curve_over_the_load_meets_the_one_over_the_frequency(curve):
+    i = int(np.argmin(abs(curve.parameter - 1.2)))
+    at = float(curve.parameter[i])
+    load = ms.follow(duffing(), 0.01, 1.2, over="load", frequency=at, harmonics=7, unit="rad/s")
+    near = np.interp(1.0, load.parameter, load.amplitude) if not len(load.folds) else None
+    crossings = [j for j in range(len(load) - 1) if (load.parameter[j] - 1) * (load.parameter[j + 1] - 1) <= 0]
+    values = [np.interp(1.0, *(np.sort(v[[j, j + 1]]) for v in (load.parameter, load.amplitude))) for j in crossings]
+    assert min(abs(v / curve.amplitude[i] - 1) for v in values) < 2e-2 and (near is None or near in values)
+
+
+# results --------------------------------------------------------------------------------------------------------------
+
+
+def test_tables_say_what_the_result_says(curve):
+    frame, data = curve.to_dataframe(), curve.to_xarray()
+    np.testing.assert_array_equal(frame["Omega"], curve.parameter)
+    np.testing.assert_allclose(frame["frequency_Hz"], curve.parameter / (2 * np.pi), rtol=1e-15)
+    np.testing.assert_array_equal(frame["amplitude_m"], np.abs(data["monitors.q"][:, 0].sel(harmonic=1)))
+    assert data["monitors.q"].attrs["units"] == "m" and data["frequency"].attrs["units"] == "Hz"
+    assert frame["converged"].all() and set(frame["status"]) == {"converged"}
+    np.testing.assert_allclose(frame["supplied_J"], frame["damped_J"] + frame["dissipated_J"], rtol=1e-9)
+
+
+def test_a_result_is_drawn_as_it_is(curve):
+    axes = curve.plot()
+    x, y = axes.lines[0].get_data()
+    assert (
+        y.max() == pytest.approx(curve.amplitude.max(), rel=2e-3) and axes.get_xlabel() == "angular frequency in rad/s"
+    )
+    np.testing.assert_allclose(np.sort(axes.lines[1].get_xdata()), np.sort(curve.folds))
+    for at, amplitude in zip(curve.parameter, curve.amplitude, strict=True):  # the line passes through every point
+        assert np.hypot(x - at, y - amplitude).min() < 1e-9
+
+
+def test_a_saved_result_is_the_same(curve, tmp_path):
+    path = curve.save(tmp_path / "duffing.h5")
+    again = ms.load(path)
+    assert repr(again)[7:] == repr(curve)[8:] and again.over == "Omega"
+    for name, values in curve.arrays.items():
+        np.testing.assert_array_equal(again.arrays[name], values)
+    np.testing.assert_array_equal(again.folds, curve.folds)
+    assert ms.read_response(path).series[0].readouts == curve.readouts == ("q",)
+
+
+def test_the_error_estimate_is_what_more_harmonics_change():
+    coarse = ms.harmonic_response(duffing(), [1.2], unit="rad/s", harmonics=1)
+    fine = ms.harmonic_response(duffing(), [1.2], unit="rad/s", harmonics=9)
+    truth = abs(fine.amplitude[0] / coarse.amplitude[0] - 1)
+    assert 1e-4 < truth <= coarse.error_estimate().readout < 20 * truth
+
+
+def test_a_point_without_a_solution_says_why():
+    free = ms.structure(1.0, 0.0, 0.0, force={0: 1.0}, elements=[ms.polynomial({2: 1.0})])  # falls off its only side
+    found = ms.harmonic_response(free, [1.0, 2.0], unit="rad/s")
+    bad = [f for f, _ in found.failures]
+    assert len(found) == 2 and len(bad) == (~found.converged).sum() and all(cause for _, cause in found.failures)
+    assert len(bad) == 0 or "not converged" in repr(found)
+
+
+def test_a_backbone_goes_from_stuck_to_free():
+    system = ms.structure(1.0, 1.0, 0.01, force={0: 1.0}, elements=[ms.jenkins(3.0, 0.3)])
+    mode = ms.backbone(system, 1e-3, 1e2, harmonics=3)
+    assert (
+        mode.complete
+        and mode.Omega[0] == pytest.approx(2.0, rel=1e-6)
+        and mode.Omega[-1] == pytest.approx(1.0, abs=0.01)
+    )
+    assert "damping ratio" in repr(mode) and len(mode.to_dataframe()) == len(mode.Omega)
+    assert mode.to_xarray()["frequency"].attrs["units"] == "Hz"
+    np.testing.assert_array_equal(mode.plot().lines[0].get_ydata(), mode.frequency)
+
+
+# bodies ---------------------------------------------------------------------------------------------------------------
+
+RUB = {"normal_stiffness": 2e5, "tangential_stiffness": 4e5, "includes": "surface", "friction": 0.2, "points": [3, 2]}
+CASE = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe"}
+
+
+def test_an_assembly_of_a_dict_is_that_of_a_file(tmp_path):
+    import tomllib
+
+    text = (ms.sample().parent / "case.toml").read_text(encoding="utf-8")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    of_file = ms.assemble("case.toml", tmp_path, **{"vane-eigenmodes": ms.sample()})
+    of_dict = ms.assemble(tomllib.loads(text), **{"vane-eigenmodes": ms.read_basis(ms.sample())})
+    one, other = (ms.harmonic_response(a.pressed(100.0), [260.0, 420.0], harmonics=1) for a in (of_file, of_dict))
+    np.testing.assert_array_equal(one.amplitude, other.amplitude)
+    assert one.readouts == ("probe",) and "right" in repr(of_dict) and one.converged.all()
+
+
+def test_the_modes_of_a_dict_are_those_of_its_mesh(tmp_path):
+    mesh = small.beam()
+    types = {"tetra10": "tetra10", "triangle6": "triangle6"}
+    faces = {name: blocks["triangle6"] for name, blocks in mesh.faces.items()}
+    cells = [(types["tetra10"], mesh.cells["tetra10"]), *(("triangle6", f) for f in faces.values())]
+    numbers = [np.full(len(c), i, dtype=int) for i, (_, c) in enumerate(cells)]
+    named = {name: np.array([i, 2]) for i, name in enumerate(faces, 1)} | {"body": np.array([0, 3])}
+    data = {"gmsh:physical": numbers, "gmsh:geometrical": numbers}
+    meshio.Mesh(mesh.points, cells, cell_data=data, field_data=named).write(
+        tmp_path / "small.msh", file_format="gmsh22"
+    )
+    basis = ms.modes(small.table(), tmp_path)
+    np.testing.assert_allclose(basis.groups[0, 0].frequency, small.basis().groups[0, 0].frequency, rtol=1e-9)
+    assert "small: 6 coordinates" in repr(basis) and list(basis.to_dataframe()["mode"]) == [1, 2, 3, 4, 5, 6]
+    assert not list(tmp_path.glob("build/*"))
+
+
+def test_importing_the_package_imports_nothing_else():
+    code = (
+        "import sys, microslip as ms; dir(ms); print(sorted({'numpy', 'jax', 'h5py', 'matplotlib'} & set(sys.modules)))"
+    )
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    )
+
+
+# mistakes -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "make, said",
+    [
+        (lambda: ms.structure(np.eye(2), np.eye(3)), "K is 3 x 3 and M is 2 x 2"),
+        (lambda: ms.structure(np.ones((2, 3)), 1.0), "M: has shape (2, 3); give a square matrix"),
+        (lambda: ms.structure(np.diag([1.0, 0.0]), np.eye(2)), "a coordinate has no mass"),
+        (lambda: ms.structure([[1, 2], [0, 1]], np.eye(2)), "M is not symmetric"),
+        (lambda: ms.structure(1.0, np.nan), "structure: K"),
+        (lambda: ms.structure(1.0, 1.0, damping_ratio=-0.1), "damping_ratio"),
+        (lambda: ms.structure(1.0, 1.0, force={3: 1.0}), "there is no coordinate 3; the structure has 1"),
+        (lambda: ms.structure(1.0, 1.0, output=2), "there is no coordinate 2"),
+        (lambda: ms.structure(1.0, 1.0, elements=[ms.jenkins(1.0, 1.0, at=5)]), "there is no coordinate 5"),
+        (lambda: ms.structure(np.eye(2), np.eye(2), elements=[ms.stop(1.0, 0.1, at=[1.0])]), "weights of shape (1,)"),
+        (lambda: ms.polynomial({}), "give one or more whole numbers"),
+        (lambda: ms.polynomial({0: 1.0}), "powers [0]"),
+        (lambda: ms.jenkins(0.0, 1.0), "jenkins: stiffness"),
+        (lambda: ms.stop(1.0, np.inf), "stop: gap"),
+        (lambda: ms.follow(duffing(), 0.3, 2.5, unit="rpm"), "unit: 'rpm' is none of Hz, rad/s"),
+        (lambda: ms.follow(duffing(), 0.0, 2.5), "start"),
+        (lambda: ms.follow(duffing(), 0.1, 1.0, over="load"), "frequency: is missing"),
+        (lambda: ms.follow(duffing(), 0.1, 1.0, over="time"), "over: 'time'"),
+        (lambda: ms.harmonic_response(duffing(), []), "frequency"),
+        (lambda: ms.harmonic_response("blade", [1.0]), "str is no assembly"),
+        (lambda: ms.harmonic_response(duffing(), [1.0]).harmonics("tip"), "read-out 'tip': the response has q"),
+        (lambda: ms.assemble({**CASE, "contacts": [{"interface": "rigth", "normal_force": 1.0, **RUB}]}, vane=ms.sample()),
+         "no interface 'rigth'"),
+        (lambda: ms.assemble({**CASE, "contacts": []}, wing=ms.sample()), "there is no body 'wing'"),
+        (lambda: ms.assemble({**CASE, "contact": []}, vane=ms.sample()), "contact: unknown key"),
+        (lambda: ms.modes({"name": "plate"}), "geometry"),
+        (lambda: ms.load("nowhere.h5"), "no such response"),
+    ],
+)  # fmt: skip
+def test_mistakes(make, said):
+    with pytest.raises(UserError, match=".*") as caught:
+        make()
+    assert said in str(caught.value)
+
+
+def test_a_case_that_waits_for_a_normal_force_says_so():
+    with pytest.raises(UserError, match="contacts.right: waits for a normal force"):
+        ms.harmonic_response(
+            ms.assemble({**CASE, "contacts": [{"interface": "right", **RUB}]}, vane=ms.sample()), [250.0]
+        )
+
+
+def test_names_that_are_not_there():
+    with pytest.raises(AttributeError, match="no attribute 'harmonic'"):
+        ms.harmonic
