@@ -186,6 +186,10 @@ RUB = {"normal_stiffness": 2e5, "tangential_stiffness": 4e5, "includes": "surfac
 CASE = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe"}
 
 
+def rubbing(**contact):
+    return ms.assemble({**CASE, "contacts": [{**RUB, **contact}]}, vane=ms.sample())
+
+
 def test_an_assembly_of_a_dict_is_that_of_a_file(tmp_path):
     import tomllib
 
@@ -251,7 +255,7 @@ def test_importing_the_package_imports_nothing_else():
         (lambda: ms.harmonic_response(duffing(), []), "frequency"),
         (lambda: ms.harmonic_response("blade", [1.0]), "str is no assembly"),
         (lambda: ms.harmonic_response(duffing(), [1.0]).harmonics("tip"), "read-out 'tip': the response has q"),
-        (lambda: ms.assemble({**CASE, "contacts": [{"interface": "rigth", "normal_force": 1.0, **RUB}]}, vane=ms.sample()),
+        (lambda: rubbing(interface="rigth", normal_force=1.0),
          "no interface 'rigth'"),
         (lambda: ms.assemble({**CASE, "contacts": []}, wing=ms.sample()), "there is no body 'wing'"),
         (lambda: ms.assemble({**CASE, "contact": []}, vane=ms.sample()), "contact: unknown key"),
@@ -274,4 +278,4 @@ def test_a_case_that_waits_for_a_normal_force_says_so():
 
 def test_names_that_are_not_there():
     with pytest.raises(AttributeError, match="no attribute 'harmonic'"):
-        ms.harmonic
+        _ = ms.harmonic

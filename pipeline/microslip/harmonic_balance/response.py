@@ -249,7 +249,7 @@ def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[fl
 def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]) -> tuple[Point, float] | None:
     """The peak of the curve of solutions beside three points of a sweep and its amplitude, m, if there is one.
 
-    It is looked for between the outer two, in twelve steps. If these do not close in on it from both sides, because
+    It is looked for between the outer two, in fourteen steps. If these do not close in on it from both sides, because
     the curve turns back or the contacts switch, it is climbed to along the curve, which may lead beyond the three
     points but not beyond the band. Where the climb fails the highest of the points stands for it.
     """
@@ -264,7 +264,7 @@ def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, in
         tried.append((point, float(abs(found.outputs[0, 1])) if point.converged else 0.0))
         return tried[-1][1]
 
-    options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 12}
+    options: Any = {"xatol": 1e-6 * float(f[high] - f[low]), "maxiter": 14}
     ends = float(f[low]), float(f[high])
     scipy.optimize.minimize_scalar(lambda at: -amplitude(at), bounds=ends, method="bounded", options=options)
     near, height = max(tried, key=lambda one: one[1])

@@ -66,23 +66,30 @@ AT_MOST = 1e-5
 CONTRACTION = 0.03
 """Share of |R| that a step may leave for the derivative to be used again: it costs two or three residuals."""
 
+RISES = 15
+"""How often a step is taken whole although |R| rises: the derivatives of the pieces that it leads to find the solution
+where shorter steps creep along the kinks. The vane of docs/python.md takes a fifth of the evaluations."""
+
 SHORTEST = 0.02
 """Share of a step that is not halved any more: where contacts switch |R| rises at first however short it is, and from
 there the next derivative leads on."""
 
 
-def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None) -> Point:
-    """Newton's method; derivatives of the forces are used again while they serve, steps halved until |R| falls.
+def newton(
+    at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, slope: Any = None, rises: int = RISES
+) -> Point:
+    """Newton's method; derivatives of the forces are used again while they serve.
 
-    The contact forces are continuous with a piecewise continuous derivative; where a step crosses to other pieces |R|
-    may rise, and the half of it need not.
+    The contact forces are continuous with a piecewise continuous derivative. Where a step crosses to other pieces |R|
+    may rise, though the derivative beyond leads on: so steps are taken whole. Where that does not end, they are halved
+    until |R| falls, from the start again.
 
     Args:
         x: start. tolerance: of the largest entry of R over that of x, which counts within 1e-3 and 1e3 of the
             reference's; no less than what `ROUNDING` leaves.
-        slope: derivative of the forces somewhere near, to begin with.
+        slope: derivative of the forces somewhere near, to begin with. rises: how often |R| may rise.
     """
-    R, fresh, history = at.residual(x), False, list[float]()
+    start, R, fresh, history, left_over = x, at.residual(x), False, list[float](), rises
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
@@ -98,12 +105,22 @@ def newton(at: AtFrequency, x: Array, tolerance: float = 1e-10, most: int = 60, 
                 return Point(at.Omega, x, at.undefined(x), error, count, history=tuple(history))
         step = at.jacobian(slope).solve(-R)
         trial, left = x + step, at.residual(x + step)
-        if np.linalg.norm(left) <= CONTRACTION * np.linalg.norm(R):
+        before, after = np.linalg.norm(R), np.linalg.norm(left)
+        if after <= CONTRACTION * before:
             x, R, fresh = trial, left, False
             continue
-        if fresh:
+        if fresh and not rises:
             x, R = _shortened(at, x, R, step, left)
+        elif fresh and (after < before or left_over and np.isfinite(after)):
+            left_over -= not after < before
+            x, R = trial, left
+        elif fresh:
+            break
         slope, fresh = None, False
+    if rises:
+        again = newton(at, start, tolerance, most, rises=0)
+        told = (*history, *again.history)
+        return replace(again, iterations=len(history) + again.iterations, history=told)
     words = f"no convergence in {most} steps, |R|/|x| = {error:.1e}"
     return Point(at.Omega, x, words, error, most, history=tuple(history))
 
