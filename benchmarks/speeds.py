@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from microslip.data import Mesh, ModalBasis, SpeedRange
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.speed_range import frequencies_over
 from microslip.settings.body import BodySettings
 from microslip.stages.job import open_job

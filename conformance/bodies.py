@@ -11,7 +11,7 @@ import numpy as np
 
 from microslip.data import Array, Mesh, ModalBasis
 from microslip.mesh import boundary_facets
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings
 from microslip.system import Body, Damper, Force, Monitor, Spring, System, system_basis
 

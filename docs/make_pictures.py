@@ -33,8 +33,8 @@ from microslip.case import CaseSettings, load_case, run_case
 from microslip.case.assemble import sized
 from microslip.case.settings import ContactSettings
 from microslip.data import ModalBasis, ModalGroup, SpeedRange
-from microslip.modal import modal_basis
 from microslip.modal.campbell import track_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.speed_range import frequencies_over
 from microslip.pictures import lettering, plots, views
 from microslip.pictures.points import points_sheet

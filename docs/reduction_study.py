@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from microslip.data import Array, Mesh, ModalGroup
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

@@ -9,7 +9,7 @@ import numpy as np
 
 from microslip.data import Mesh, ModalBasis
 from microslip.mesh import boundary_facets
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings
 
 SIZE = (0.02, 0.03, 0.12)  # m along x, y, z

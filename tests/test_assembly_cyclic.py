@@ -19,7 +19,7 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.solver import solve
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.ring.neighbours import frame_change
 from microslip.ring.neighbours import stuck as stuck_neighbours
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact

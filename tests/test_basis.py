@@ -25,7 +25,7 @@ from microslip.basis.integrals import modal_mass
 from microslip.data import Mesh, ModalBasis, UserError
 from microslip.files.hdf5 import seal, seal_state
 from microslip.files.hostile import HostileFile, inspect, trial
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings
 from microslip.system import system_basis
 

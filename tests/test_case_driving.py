@@ -14,7 +14,7 @@ from microslip.case import load_case
 from microslip.case.assemble import Built, build
 from microslip.cli import main
 from microslip.data import UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.system.component import Ring
 
 CASE = """

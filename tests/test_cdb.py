@@ -16,7 +16,7 @@ from microslip.data import Mesh, UserError
 from microslip.elasticity import isotropic, orthotropic
 from microslip.fem.discretise import discretise
 from microslip.mesh import mesh_problems, read_mesh
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 

@@ -15,7 +15,7 @@ import small
 from microslip.basis import read_basis, write_basis
 from microslip.cli import main
 from microslip.data import ModalBasis, Rows, UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.sampling import at_points, on_common_points
 from microslip.pictures import can_draw
 from microslip.reduced.correlation import POINT, compare_groups

@@ -19,7 +19,7 @@ from test_truncation import chain
 from microslip.basis import read_basis
 from microslip.case import CaseSettings, run_case
 from microslip.data import Compliance, ModalBasis, ModalGroup, UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.reduced.truncation import closing, verdict
 from microslip.reduction import METHODS

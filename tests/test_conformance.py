@@ -32,7 +32,7 @@ from microslip.basis import FORMAT, FORMAT_VERSION, check_basis, read_basis, wri
 from microslip.cli import main  # noqa: E402
 from microslip.data import Material, ModalBasis, UserError  # noqa: E402
 from microslip.files.hdf5 import seal  # noqa: E402
-from microslip.modal import modal_basis  # noqa: E402
+from microslip.modal.compute import modal_basis  # noqa: E402
 
 SMALL = [n for n in bodies.SAMPLES if n not in bodies.LARGE]
 SCHEMA = validate.Schema()

@@ -29,8 +29,8 @@ from microslip.fem.discretise import discretise, free_upper
 from microslip.fem.segments import clip, facet_functions, reference_nodes
 from microslip.linalg import eigen
 from microslip.modal import equilibrium as newton
-from microslip.modal import modal_basis
 from microslip.modal.closures import contact_curve, contact_pairs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import BodyModel, StaticState, equilibrium, make_model
 from microslip.modal.speed_range import frequencies_over, group_at
 

@@ -19,7 +19,7 @@ from meshes import body, moved, nearest, rotation_matrix, with_sets
 from microslip.data import Mesh, UserError
 from microslip.fem.cyclic import pair_cut_faces
 from microslip.mesh import boundary_facets
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.rows import patch
 from microslip.modal.stress import gauss_set, nodal_set
 

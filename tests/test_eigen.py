@@ -19,8 +19,8 @@ from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
 from microslip.linalg.canonical import clusters, signs, turn_clusters
 from microslip.mesh import read_mesh
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.modal.spectrum import make_pencil
 

@@ -23,7 +23,7 @@ from microslip.exchange import formats, to_xarray, writer
 from microslip.exchange.choice import elastic, select
 from microslip.frames import skew
 from microslip.mesh import boundary_facets
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reduced.floating_frame import floating_body, inertia, mass_matrix, right_side
 from microslip.settings.body import BodySettings
 

@@ -25,7 +25,7 @@ from microslip.data import Array, ModalBasis
 from microslip.exchange import formats, writer
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reference.one_harmonic import jenkins_harmonic
 from microslip.settings.body import BodySettings
 

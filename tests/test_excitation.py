@@ -18,7 +18,7 @@ from microslip.data import ModalBasis, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.ring.expansion import aliased
 from microslip.system import damping, excitation, pressure
 from microslip.system.assembly import Assembly, Load, Output

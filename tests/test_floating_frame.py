@@ -14,8 +14,8 @@ from microslip.data import MOTIONS, UserError
 from microslip.fem import discretise, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.reduced.floating_frame import (
     energy,

@@ -30,7 +30,7 @@ from microslip.case import load_case
 from microslip.cli import main
 from microslip.data import UserError
 from microslip.mesh import mesh_problems, read_mesh
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, load_body, override, validate
 from microslip.system import system_basis
 

@@ -25,8 +25,8 @@ from microslip.linalg.gyroscopic import (
     hermitian_modes,
     stability_sentence,
 )
-from microslip.modal import modal_basis
 from microslip.modal.campbell import gyroscopic_change, track_gyroscopic
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import equilibrium, make_model
 from microslip.modal.run_up import run_up_terms
 from microslip.reduced.coordinates import in_modes

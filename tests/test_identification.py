@@ -18,7 +18,7 @@ from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.envelope import _snake
 from microslip.harmonic_balance.identification import Measured
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.ring.expansion import phase
 from microslip.ring.neighbours import frame_change, stuck
 from microslip.system.assembly import Assembly, Contact, ContactFace

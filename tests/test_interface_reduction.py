@@ -16,8 +16,8 @@ from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.modal.spectrum import make_pencil
 from microslip.reduction import METHODS

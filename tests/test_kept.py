@@ -25,7 +25,7 @@ from microslip.harmonic_balance.checkpoint import labels, record, restored, resu
 from microslip.harmonic_balance.checks import forces_on
 from microslip.harmonic_balance.solver import Point, solve
 from microslip.harmonic_balance.sweeps import overhanging
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.operating import motion_of
 from microslip.operating.motion import displacement, nearest_point
 from microslip.reduced.compliance import has_residual

@@ -16,7 +16,7 @@ from microslip.case import load_case, run_case
 from microslip.case.assemble import load_bodies
 from microslip.cli import main
 from microslip.data import CENTRIFUGAL, ModalBasis, UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reduced.coordinates import of_density
 from microslip.settings.body import BodySettings
 from microslip.stages.running import respond

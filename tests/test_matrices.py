@@ -24,7 +24,7 @@ from microslip.data import UserError
 from microslip.exchange.matrices import matrix_names, read_matrices
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import isotropic, mass, stiffness
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 

@@ -15,9 +15,9 @@ from microslip.data import UserError
 from microslip.fem.cyclic import pair_cut_faces, sector_unknowns
 from microslip.fem.discretise import discretise
 from microslip.fem.operators import mass, stiffness
-from microslip.modal import modal_basis
 from microslip.modal.body_rows import body_rows
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.speed_range import basis_at
 from microslip.ring.expansion import certify_ring, phase
 from microslip.ring.neighbours import closed_gap, frame_change, relative_rows, stuck

@@ -17,7 +17,7 @@ from small import basis as small_basis
 
 from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.stress import von_mises
 from microslip.operating import MaterialLimits, motion_of
 from microslip.operating.cycle import amplitude, at_time, longest, phase, wave_top

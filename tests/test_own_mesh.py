@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 

@@ -21,7 +21,7 @@ from microslip.data import Array, ModalGroup, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance import response
 from microslip.harmonic_balance.solver import solve
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component, Ring

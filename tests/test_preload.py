@@ -16,9 +16,10 @@ from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import Mesh, ModalGroup, UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modal import modal_basis, rigid
+from microslip.modal import rigid
 from microslip.modal.boundary import known_materials
 from microslip.modal.closures import bolt_forces
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.modal.preload import Corrected, determinate, pressed_modes, pressed_state, without_rigid
 from microslip.modal.spectrum import make_pencil

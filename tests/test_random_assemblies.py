@@ -22,7 +22,7 @@ from test_assembly_cyclic import FACES
 from microslip.basis import write_basis
 from microslip.data import Array
 from microslip.frames import rotation
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.stages import running
 
 pytest.importorskip("matplotlib")

@@ -13,9 +13,9 @@ from microslip.case import CaseSettings, run_case
 from microslip.data import UserError
 from microslip.fem.discretise import discretise, free_upper
 from microslip.linalg import eigen
-from microslip.modal import modal_basis
 from microslip.modal.body_rows import body_rows
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.modal.solution import held_compliance
 from microslip.modal.spectrum import make_pencil

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sprung import full_frequencies, patch_statics, reduced_frequencies
 
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reduction import METHODS
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage

@@ -12,9 +12,9 @@ from test_reduction import LOOK, PUSH, SIDE, STATICALLY_EXACT, TIP, full_model, 
 
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.fem import discretise, displacement_gradient, green_strain, isotropic
-from microslip.modal import modal_basis
 from microslip.modal.body_rows import body_rows
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.reduction import METHODS
 
 MESH = brick("tetra10", (3, 2, 2), (0.1, 0.06, 0.05))

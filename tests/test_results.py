@@ -105,7 +105,7 @@ def test_coordinates_in_modes_are_read_in_modes():
     """A basis in physical interface coordinates: the same displacement from both kinds of coordinates."""
     from small import beam, table
 
-    from microslip.modal import modal_basis
+    from microslip.modal.compute import modal_basis
     from microslip.operating.motion import displacement
     from microslip.settings.body import BodySettings
 

@@ -14,8 +14,8 @@ from microslip.data import UserError
 from microslip.fem import discretise, displacement_gradient, green_strain, internal_force, stress_stiffness
 from microslip.fem.discretise import free_upper
 from microslip.linalg import eigen
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import (
     equilibrium,
     heated,

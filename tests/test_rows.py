@@ -13,8 +13,8 @@ from microslip.data import Mesh, UserError
 from microslip.fem import discretise, displacement_gradient, mass, stiffness
 from microslip.fem.discretise import face_blocks, shape_functions
 from microslip.fem.operators import isotropic
-from microslip.modal import modal_basis
 from microslip.modal.body_rows import body_rows
+from microslip.modal.compute import modal_basis
 from microslip.modal.rigid import rigid_fields
 from microslip.modal.rows import Locator, patch, point_rows, slope_rows
 

@@ -14,7 +14,7 @@ from microslip.contact.point import PointContact
 from microslip.data import ModalGroup
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
 

@@ -20,8 +20,8 @@ from microslip.fem.discretise import discretise
 from microslip.frames import rotation
 from microslip.linalg import eigen
 from microslip.linalg.condensed import negative_eigenvalues, new_condensed
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.modal.sector import sector_pencils
 from microslip.modal.solution import shared_shifts

@@ -12,8 +12,8 @@ from meshes import STEEL, body, brick, nearest, twisted_blade
 from microslip.basis import check_basis, read_basis, write_basis
 from microslip.data import ModalBasis, UserError
 from microslip.linalg import eigen
-from microslip.modal import modal_basis
 from microslip.modal.campbell import track_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import equilibrium, stiffness_slope
 from microslip.modal.range_basis import (
     Interpolant,

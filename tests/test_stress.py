@@ -12,7 +12,7 @@ from microslip.fem import discretise, displacement_gradient, green_strain, isotr
 from microslip.fem.discretise import face_blocks, free_upper
 from microslip.fem.loads import traction
 from microslip.fem.operators import engineering, to_symmetric
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import StaticState, make_model
 from microslip.modal.stress import gauss_set, nodal_set, smoother, von_mises
 

@@ -8,7 +8,7 @@ from meshes import body, brick
 from touching import together
 
 from microslip.data import Mesh, UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 JOINT = {"name": "joint", "face": "b_z0", "against": "a_z1"}
 BOLT = {"name": "m8", "face": "b_z1", "against": "a_z0", "preload": 5e4}

@@ -15,7 +15,7 @@ from microslip.data import Mesh
 from microslip.fem.discretise import discretise, face_blocks, shape_functions
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.mesh import boundary_facets, mesh_problems, read_mesh
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.modal.rows import Locator
 from microslip.topology import CELL_TYPES
 

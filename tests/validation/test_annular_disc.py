@@ -17,7 +17,7 @@ from closed_forms.discs import (
 )
 from meshes import body
 
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 PLATE = Disc(inner=0.5, outer=1.0, thickness=0.01, young=2.1e11, poisson=0.3, density=7850.0)
 

@@ -19,7 +19,7 @@ import pytest
 from meshes import STEEL, body, brick, rotation_matrix, shaken, twisted_blade
 from test_rotation import three_points
 
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 pytestmark = [
     pytest.mark.slow,

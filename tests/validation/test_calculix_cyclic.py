@@ -22,7 +22,7 @@ from meshes import body, with_sets
 from test_calculix import PRINTED, deck, displacements, run, same_order, static, stresses
 
 from microslip.mesh import read_mesh
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 pytestmark = [
     pytest.mark.slow,

@@ -12,7 +12,7 @@ from closed_forms import bars, beams, shafts
 from meshes import STEEL, body, brick, nearest, with_sets
 
 from microslip.data import UserError
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.reference.beams import rectangle
 
 E, NU, RHO = STEEL["young"], STEEL["poisson"], STEEL["density"]

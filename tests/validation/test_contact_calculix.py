@@ -17,7 +17,7 @@ from test_calculix import deck, displacements, run
 from touching import SECTORS, shrouded, together
 
 from microslip.data import Mesh
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 pytestmark = [
     pytest.mark.slow,

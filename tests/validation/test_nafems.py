@@ -18,7 +18,7 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 
 CELLS = ("hexahedron20", "hexahedron27", "tetra10")
 CELLS_SLOW = ("hexahedron20", *(pytest.param(c, marks=pytest.mark.slow) for c in CELLS[1:]))

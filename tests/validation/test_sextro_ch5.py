@@ -23,7 +23,7 @@ JENKINS = ["harmonics=1", *(f'contacts.{side}.law={{kind="jenkins", slides_along
 
 @pytest.fixture(scope="module")
 def blade(tmp_path_factory):
-    from microslip.modal import modal_basis
+    from microslip.modal.compute import modal_basis
 
     job = open_job(ROOT / "geometry/blade", ["output.gauss=false", "mesh.size=16"], tmp_path_factory.mktemp("blade"))
     mesh_stage(job)

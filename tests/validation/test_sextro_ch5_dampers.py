@@ -21,7 +21,7 @@ from microslip.case.problem import problem_of
 from microslip.data import ModalBasis
 from microslip.harmonic_balance.response import operating
 from microslip.harmonic_balance.solver import solve
-from microslip.modal import modal_basis
+from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
 

@@ -25,8 +25,8 @@ from microslip.fem import discretise, displacement_gradient, green_strain, inter
 from microslip.fem.discretise import free_upper
 from microslip.fem.operators import spin_projector, tangent, tangent_tensor
 from microslip.frames import skew
-from microslip.modal import modal_basis
 from microslip.modal.boundary import fixed_dofs
+from microslip.modal.compute import modal_basis
 from microslip.modal.equilibrium import make_model
 from microslip.reduced.floating_frame import floating_body, spin_up
 

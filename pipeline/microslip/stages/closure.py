@@ -28,7 +28,7 @@ def closure_stage(
     Raises:
         UserError, NotConverged: see `modes.closure_curve`.
     """
-    from ..modal import closure_curve
+    from ..modal.compute import closure_curve
     from ..pictures.plots import closure_curve_plot
 
     known = [c.name for c in job.settings.closures]

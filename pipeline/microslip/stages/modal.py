@@ -58,7 +58,7 @@ def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, lis
     Raises:
         UserError, NotConverged: see `modes.modal_basis`.
     """
-    from ..modal import modal_basis
+    from ..modal.compute import modal_basis
 
     mesh, warnings = load_mesh(job, mesh_file)
     for warning in warnings:
@@ -73,7 +73,7 @@ def basis_of(job: Job, mesh_file: Path, report: Report) -> tuple[ModalBasis, lis
 def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalBasis, list[str]]:
     """The modal basis of a body that another program has assembled, and warnings."""
     from ..exchange.matrices import read_matrices
-    from ..modal import foreign_basis
+    from ..modal.foreign import foreign_basis
 
     try:
         body = read_matrices(given, job.folder, job.settings.length_unit)
