@@ -359,3 +359,46 @@ def test_what_a_mesh_includes_counts_as_its_input(tmp_path: Path) -> None:
     assert modal.modes_inputs(job, deck) != first
     inner.write_text("1, 0, 0, 0\n")
     assert modal.modes_inputs(job, deck) == first
+
+
+def test_what_a_path_means(tmp_path, monkeypatch):
+    """A name, a folder of products and a product stand for the case or the body that they are of."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("geometry/blade/body.toml", "pipeline/cases/blade.toml", "pipeline/cases/rig.toml", "own/case.toml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("", encoding="utf-8")
+    (tmp_path / "build" / "rig").mkdir(parents=True)
+    case, body = Path("pipeline/cases/blade.toml"), Path("geometry/blade/body.toml")
+    assert places.meant(Path("blade")) == body and places.meant(Path("blade"), case=True) == case
+    assert places.meant(Path("geometry/blade")) == Path("geometry/blade")
+    assert places.meant(Path("geometry/blade"), case=True) == case
+    assert (
+        places.meant(Path("build/rig/response.h5"))
+        == places.meant(Path("build/rig"))
+        == Path("pipeline/cases/rig.toml")
+    )
+    assert places.meant(Path("own")) == Path("own") and places.meant(Path("away.toml")) == Path("away.toml")
+    with pytest.raises(UserError, match="is 'blade' meant"):
+        places.meant(Path("blad"))
+    with pytest.raises(UserError, match="no case here or of this name; there are blade, rig"):
+        places.meant(Path("geometry"), case=True)
+
+
+@pytest.mark.parametrize(
+    "wanted", [response.Wanted("resonances"), response.Wanted("none"), response.Wanted("all", False)]
+)
+def test_stresses_and_pictures_can_be_left_out(wanted, tmp_path):
+    """The stress of a resonance does not depend on whether it is drawn over the whole sweep."""
+    folder = PACKAGE / "samples"
+    few = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=15", "sweep.normal_forces=[100.0]", "harmonics=1"]
+    found = {}
+    for how in (response.ALL, wanted):
+        at = tmp_path / f"{how.stresses}-{how.pictures}"
+        found[how], _ = response.response_stage(
+            folder / "case.toml", {"vane-eigenmodes": folder / "basis.h5"}, at, few, wanted=how
+        )
+        assert bool(list(at.rglob("*.png"))) == how.pictures
+        assert (at / "pictures" / "stress_over_frequency.png").is_file() == (how.stresses == "all" and how.pictures)
+    whole, part = (one["resonances"][0] for one in found.values())
+    assert part["amplitude_m"] == whole["amplitude_m"]
+    assert part.get("stress_amplitude_Pa") == (None if wanted.stresses == "none" else whole["stress_amplitude_Pa"])

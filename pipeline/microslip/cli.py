@@ -37,6 +37,8 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
+app.register_install_completion_command()
+
 Set = Annotated[
     tuple[str, ...],
     Parameter(name="--set", show_default=False, help="override a setting: key.subkey=value (may be repeated)"),
@@ -59,6 +61,11 @@ Stability = Annotated[bool, Parameter(show_default=False, help="Floquet multipli
 Log = Annotated[bool, Parameter(show_default=False, help="write convergence.csv: Newton's method at every point")]
 Book = Annotated[bool, Parameter(show_default=False, help="in the book's mode too, and what that leaves out")]
 Short = Annotated[bool, Parameter(show_default=False, help="what fails, at its worst speed, and the verdict alone")]
+NoStress = Annotated[bool, Parameter(show_default=False, help="leave out the stresses of the response")]
+NoPictures = Annotated[bool, Parameter(show_default=False, help="leave out all pictures")]
+Everywhere = Annotated[
+    bool, Parameter(show_default=False, help="stresses over the whole sweep, not at its resonances alone")
+]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -188,29 +195,37 @@ def modes(body: Path, /, *, output: Output = None, set_: Set = (), force: Force 
 
 
 @app.command
-def run(path: Path, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False) -> None:
+def run(
+    path: Path, /, *, no_stress: NoStress = False, no_pictures: NoPictures = False, set_: Set = (),
+    force: Force = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
     """The whole chain of a body or a case: mesh, modal file, friction response, pictures, report.
 
     Args:
-        path: a body.toml, a system.toml, a case.toml, or the folder that holds it.
+        path: a body.toml, a system.toml, a case.toml, or the folder that holds it; the name of a body or a case; a
+            folder or file of products.
     """
     from .basis import read_basis
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case
+    from .stages.places import is_case, meant
+    from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system
     from .stages.summary import frequency_lines
 
+    wanted = Wanted("none" if no_stress else "all", not no_pictures)
+
+    path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
-            page, converged = run_system(system, list(set_), force, report)
+            page, converged = run_system(system, list(set_), force, report, wanted)
     elif is_case(path):
         with progress(f"run {path}", quiet) as report:
-            page, converged = run_case_file(path, list(set_), force, report)
+            page, converged = run_case_file(path, list(set_), force, report, wanted)
     else:
         job = open_job(path, list(set_))
         with progress(f"run {job.settings.name}", quiet) as report:
-            page, converged = run_body(job, force, report)
+            page, converged = run_body(job, force, report, wanted)
         if not quiet:
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
@@ -276,14 +291,16 @@ def _figure_of_the_book(file: Path) -> Path:
 @app.command
 def respond(
     case: Path, basis: Path | None = None, /, *, over: Over = None, set_: Set = (), log: Log = False,
-    compare_book: Book = False, stability: Stability = False, force: Force = False, quiet: Quiet = False,
+    compare_book: Book = False, stability: Stability = False, all_stresses: Everywhere = False,
+    no_stress: NoStress = False, no_pictures: NoPictures = False, force: Force = False, quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Friction response of a case on a modal file that is there already; needs neither gmsh nor VTK.
 
     Every finished point is kept; interrupted, the same command goes on where it was.
 
     Args:
-        case: a case.toml, the folder that holds it, or the word sample: a blade that travels with the package.
+        case: a case.toml, the folder that holds it, its name, or its products; or the word sample: a blade that travels
+            with the package.
         basis: the modal file of the only body; basis.h5 beside the case, or build/<body>/basis.h5, if not given.
         over: instead of one sweep: the response followed through folds over frequency, load or normal force, as [curve]
             in the case asks; the resonance of every engine order, the line f = e n / 60 over speeds, or the envelope
@@ -292,7 +309,7 @@ def respond(
     from .case import load_case
     from .case.comparison import sentence
     from .stages import running
-    from .stages.response import response_of_case
+    from .stages.response import Wanted, response_of_case
 
     case = _case_file(case)
     if over is not None:
@@ -305,7 +322,9 @@ def respond(
         if compare_book:
             table, pairs, converged = running.compare_book(case, basis, list(set_), force, report, log=log)
         else:
-            table, converged = running.respond(case, basis, list(set_), force, report, log=log)
+            stresses: Literal["all", "resonances", "none"] = "all" if all_stresses else "resonances"
+            wanted = Wanted("none" if no_stress else stresses, not no_pictures)
+            table, converged = running.respond(case, basis, list(set_), force, report, log=log, wanted=wanted)
         if stability:
             from .stages import following
 
@@ -412,9 +431,12 @@ def optimum(
 
 
 def _case_file(case: Path) -> Path:
-    """A case.toml, the one in a folder, or the one that travels with the package."""
+    """A case.toml, the one in a folder, of a name or of products, or the one that travels with the package."""
+    from .stages.places import meant
+
     if str(case) == "sample" and not case.exists():
-        case = PACKAGE / "samples"
+        return PACKAGE / "samples" / "case.toml"
+    case = meant(case, case=True)
     return case / "case.toml" if case.is_dir() else case
 
 

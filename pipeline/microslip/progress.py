@@ -35,13 +35,16 @@ SILENCE = 5.0
 
 def _lines() -> Report:
     began = last = time.perf_counter()
+    step = (0.0, began)  # how many were done when it was first told, and when
 
     def report(text: str) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        if _fraction(text)[0] is None or now - last > SILENCE:
+        nonlocal last, step
+        now, (total, done) = time.perf_counter(), _fraction(text)
+        if total is None or done <= step[0] + 1:
+            step = done, now
+        if total is None or now - last > SILENCE:
             last = now
-            print(f"  {now - began:6.1f} s  {text}", file=sys.stderr, flush=True)
+            print(f"  {now - began:6.1f} s  {text}{_left(step, now, total, done)}", file=sys.stderr, flush=True)
 
     return report
 
@@ -50,10 +53,10 @@ def _lines() -> Report:
 def _bar(title: str) -> Iterator[Report]:
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     text = TextColumn("{task.description}", markup=False)
-    columns = (SpinnerColumn(), text, BarColumn(bar_width=20), TimeElapsedColumn())
+    columns = (SpinnerColumn(), text, BarColumn(bar_width=20), TimeElapsedColumn(), TimeRemainingColumn())
     step = ""
 
     def finish() -> None:
@@ -75,6 +78,15 @@ def _bar(title: str) -> Iterator[Report]:
         task = bar.add_task(title, total=None)
         yield report
         finish()
+
+
+def _left(step: tuple[float, float], now: float, total: float | None, done: float) -> str:
+    """The time that is left of a step at the speed it had so far, in words; nothing where that is not known."""
+    first, began = step
+    if total is None or done <= first:
+        return ""
+    left = (now - began) * (total - done) / (done - first)
+    return f", about {left:.0f} s left" if left < 120 else f", about {left / 60:.0f} min left"
 
 
 def _fraction(text: str) -> tuple[float | None, float]:

@@ -61,7 +61,8 @@ class Assessment:
     Attributes:
         component: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
             places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
-            None. quantity: what the read-out measures.
+            None. quantity: what the read-out measures. everywhere: whether
+            the points are enough for a curve over the frequency.
     """
 
     component: str
@@ -69,6 +70,7 @@ class Assessment:
     resonances: tuple[StressedResonance, ...]
     limits: MaterialLimits | None
     quantity: Quantity = METRES
+    everywhere: bool = True
 
     @property
     def highest(self) -> StressedResonance | None:
@@ -100,14 +102,15 @@ class Assessment:
 
 def assess(
     response: Response, basis: ModalBasis, monitor: str, component: str = "", limits: MaterialLimits | None = None,
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, everywhere: bool = True,
 ) -> Assessment:  # fmt: skip
-    """The stresses of a body at every point of a response; of a resonance the largest of its range, which need not be
+    """The stresses of a body in a response; of a resonance the largest of its range, which need not be
     where the read-out is largest: another mode may stress the body on its flank.
 
     Args:
         monitor: name of the array whose first row says where resonances are. component: whose stresses; may be left out
-            where there is one body.
+            where there is one body. everywhere: at all points that a curve over the frequency needs, not just at as
+            many as it takes to find the largest of each resonance.
 
     Raises:
         UserError: no stress modes at the nodes in the modal file, see `Response.motion`.
@@ -121,7 +124,7 @@ def assess(
         motion = response.motion(series, basis, name)
         normal = float(series.parameters.get("normal_force", 0.0))
         size = abs(series.monitor(monitor)[:, 0, 1])
-        chosen, at = drawn_points(series), tops(series, size)
+        chosen, at = drawn_points(series, *(DRAWN if everywhere else LOOKED_AT)), tops(series, size)
         peaks = stress_peaks(motion.at(chosen), largest=False)
         ranges = _ranges(peaks.amplitude, chosen, series.converged, at)
         most = [_most_stressed(motion, r, chosen, peaks) for r in ranges]
@@ -133,7 +136,7 @@ def assess(
             worst = endurance(cycle_stress(motion, j), limits or ENDLESS)
             f, low, high, there = (float(series.frequency[k]) for k in (i, r[0], r[-1], j))
             found.append(StressedResonance(normal, f, float(size[i]), (low, high), j, there, worst))
-    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor))
+    return Assessment(name, sweeps, tuple(found), limits, _quantity(response, monitor), everywhere)
 
 
 def _quantity(response: Response, monitor: str) -> Quantity:
@@ -168,17 +171,18 @@ def _most_stressed(motion: Motion, around: Indices, chosen: Indices, peaks: Stre
     return int(around[stress_peaks(motion.at(around), largest=False).amplitude.argmax()])
 
 
-MOST_DRAWN, BESIDE_A_PEAK = 400, 20
-"""Points of a sweep that are drawn if it has more, and how many on either side of a resonance are drawn in any case."""
+DRAWN, LOOKED_AT = (400, 20), (40, 2)
+"""Points of a sweep that are drawn if it has more, and how many on either side of a resonance are drawn in any case;
+and those at which stresses are looked at to find the largest ones."""
 
 
-def drawn_points(series: Series) -> Array:
+def drawn_points(series: Series, most: int = DRAWN[0], beside: int = DRAWN[1]) -> Array:
     """Numbers of the points of a sweep that a curve needs."""
     count = len(series.key)
     chosen = np.zeros(count, dtype=bool)
-    chosen[np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int)] = True
+    chosen[np.linspace(0, count - 1, min(count, most)).round().astype(int)] = True
     for i in _searched(series):
-        chosen[max(i - BESIDE_A_PEAK, 0) : i + BESIDE_A_PEAK + 1] = True
+        chosen[max(i - beside, 0) : i + beside + 1] = True
     return np.flatnonzero(chosen)
 
 
@@ -253,7 +257,7 @@ def draw(
 
     drawn: dict[str, Path] = {}
     curves = {n: operating.stress_curve(s.frequency[i], p, s.converged[i]) for n, (s, _, i, p) in found.sweeps.items()}
-    if curves:
+    if curves and found.everywhere:
         label, title = "largest stress amplitude of the body in MPa", f"{case}: largest stress of the body"
         drawn["stress over frequency"] = operating.over_frequency_plot(
             curves, label, title, folder / "stress_over_frequency.png"

@@ -13,8 +13,10 @@ from .job import Job
 from .stage import Made, Report, Stage
 
 
-def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report: Report) -> Path:
-    """Pictures and the self-contained page of a body."""
+def report_stage(
+    job: Job, response: dict[str, Any] | None, force: bool, report: Report, draw: bool = True
+) -> Path:  # fmt: skip
+    """Pictures, if they are wanted, and the self-contained page of a body."""
     from .. import pictures
     from ..report.body import report_html
 
@@ -29,12 +31,14 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
     def work() -> Made:
         basis = read_basis(job.basis_file)
         stage.begin()
-        report("starting PyVista")
-        reason = pictures.can_draw()
+        reason = None
+        if draw:
+            report("starting PyVista")
+            reason = pictures.can_draw()
         if reason is not None:
             report(f"warning: no pictures of the body: {reason}")
             messages.append(f"The pictures of the body are missing: {reason}")
-        drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None)
+        drawn = pictures.draw_all(basis, folder, report, engine_orders, scenes=reason is None) if draw else {}
         tables: list[Path] = []
         if basis.sectors > 1 and (basis.ranges or len(speeds_of(basis)) > 1):
             tables = [job.build_folder / "resonances.csv"]
@@ -49,6 +53,7 @@ def report_stage(job: Job, response: dict[str, Any] | None, force: bool, report:
         "response": response,
         "engine_orders": engine_orders,
         "messages": list(messages),
+        "pictures": draw,
     }
     stage.make(inputs, work)
     return stage.product

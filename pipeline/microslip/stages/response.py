@@ -7,9 +7,9 @@ import importlib.util
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -31,16 +31,32 @@ if TYPE_CHECKING:
     from ..operating.contact_maps import ContactMap
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What is made of a response besides its tables.
+
+    Attributes:
+        stresses: of the body that is watched, where its modal file holds stress modes: at ``all`` points, so that they
+            can be drawn over the frequency, at the ``resonances``, or ``none``. pictures: whether any.
+    """
+
+    stresses: Literal["all", "resonances", "none"] = "all"
+    pictures: bool = True
+
+
+ALL = Wanted()
+
+
 def response_stage(
     case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None, log: bool = False,
+    force: bool = False, report: Report = lambda _: None, log: bool = False, wanted: Wanted = ALL,
 ) -> tuple[dict[str, Any], bool]:  # fmt: skip
     """Friction frequency response of a case in `folder`: HDF5, CSV, pictures, files for ParaView, a summary (JSON).
 
     Every finished point is kept in ``response.points``, from which an interrupted run goes on.
 
     Args:
-        files: body of the case -> its modal file. log: write ``convergence.csv``.
+        files: body of the case -> its modal file. log: write ``convergence.csv``. wanted: besides tables.
 
     Returns:
         The summary, and whether every point converged.
@@ -52,8 +68,9 @@ def response_stage(
             "case": checkpoint.without_defaults(raw),
             "basis": hashes_of(files),
             "files": hashes_of(checkpoint.files_of(settings, case_path)),
+            "wanted": asdict(wanted),
         }
-        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files))
+        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, wanted))
         summary = json.loads(stage.product.read_text())
         if log:
             store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
@@ -67,7 +84,12 @@ def response_of_case(folder: Path, force: bool = False, report: Report = lambda 
 
 
 def _work(
-    stage: Stage, settings: CaseSettings, raw: dict[str, Any], case_path: Path, files: Mapping[str, Path]
+    stage: Stage,
+    settings: CaseSettings,
+    raw: dict[str, Any],
+    case_path: Path,
+    files: Mapping[str, Path],
+    wanted: Wanted,
 ) -> Made:
     bases = {name: read_basis(file) for name, file in files.items()}
     folder = stage.product.parent
@@ -78,7 +100,7 @@ def _work(
     except KeyboardInterrupt:
         _unfinished(points)
         raise
-    summary = _finished(points, result, stage.report)
+    summary = _finished(points, result, wanted, stage.report)
     store.write_text(stage.product, json.dumps(summary, indent=1) + "\n")
     pictures = [folder / "pictures" / name for name in summary["pictures"].values()]
     return Made([*pictures, *(folder / name for name in summary["files"])])
@@ -113,21 +135,18 @@ def _tell(summary: Mapping[str, Any], report: Report) -> None:
         report(f"warning: {message}")
 
 
-def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[str, Any]:
+def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Report) -> dict[str, Any]:
     """Tables, pictures and files of a case that has run, and their summary."""
     from ..harmonic_balance import response_table
-    from ..pictures.response import response_picture
 
     folder, summary = points.file.parent, summarise(result)
     points.begin()
     store.write_text(folder / "response.csv", response_table(result.responses))
-    picture = folder / "pictures" / "response.png"
-    with store.complete_or_absent(picture) as temporary:
-        response_picture(result, temporary)
+    drawn = _drawn(result, folder) if wanted.pictures else {}
     response = _response(points, result, summary)
     write_response(folder / "response.h5", response)
-    drawn, files = {"friction response": picture}, [folder / "response.h5", folder / "response.csv"]
-    more = _assessed(result, response, folder, report)
+    files = [folder / "response.h5", folder / "response.csv"]
+    more = _assessed(result, response, folder, wanted, report)
     if more is not None:
         summary["resonances"] = more.rows or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
@@ -140,6 +159,15 @@ def _finished(points: Checkpoint, result: CaseResult, report: Report) -> dict[st
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
     store.write_text(folder / "response.html", response_html(summary, drawn))
     return summary
+
+
+def _drawn(result: CaseResult, folder: Path) -> dict[str, Path]:
+    from ..pictures.response import response_picture
+
+    picture = folder / "pictures" / "response.png"
+    with store.complete_or_absent(picture) as temporary:
+        response_picture(result, temporary)
+    return {"friction response": picture}
 
 
 def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]) -> Response:
@@ -162,19 +190,24 @@ class _Assessed:
     messages: list[str]
 
 
-def _assessed(result: CaseResult, response: Response, folder: Path, report: Report) -> _Assessed | None:
+def _assessed(
+    result: CaseResult, response: Response, folder: Path, wanted: Wanted, report: Report
+) -> _Assessed | None:  # fmt: skip
     """Stresses of the body that is watched, where its modal file holds stress modes, and its contacts; in pictures."""
-    first = checkpoint.drawn_monitor(result.built)
+    first = None if wanted.stresses == "none" else checkpoint.drawn_monitor(result.built)
     basis = result.built.bodies[result.built.assembly.outputs[0].component].basis
     if first is None or not assessment.has_stresses(basis, response, first[0]):
         return None
     component, monitor = first
     limits = result.settings.material_limits
-    found = assessment.assess(response, basis, monitor, component, limits, report=report)
+    everywhere = wanted.stresses == "all"
+    found = assessment.assess(response, basis, monitor, component, limits, report=report, everywhere=everywhere)
     maps, messages = ({}, []) if found.highest is None else _maps(result, found, report)
-    report("pictures of stresses")
-    scenes = _can_draw() is None
-    drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
+    drawn = {}
+    if wanted.pictures:
+        report("pictures of stresses")
+        scenes = _can_draw() is None
+        drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 

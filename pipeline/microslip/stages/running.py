@@ -21,12 +21,14 @@ from .job import Job, open_job
 from .modal import modes_stage, system_stage
 from .page import report_stage
 from .places import existing_files, find_body, modal_files
-from .response import response_of_case, response_stage
+from .response import ALL, Wanted, response_of_case, response_stage
 from .stage import Report
 
 
-def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> tuple[Path, bool]:
-    """The whole chain of a body, and of the case of the same name if there is one.
+def run_body(
+    job: Job, force: bool = False, report: Report = lambda _: None, wanted: Wanted = ALL
+) -> tuple[Path, bool]:  # fmt: skip
+    """The whole chain of a body, and of the case of the same name if there is one. wanted: besides tables.
 
     Returns:
         The report's path, and whether every point of the response converged.
@@ -45,13 +47,16 @@ def run_body(job: Job, force: bool = False, report: Report = lambda _: None) -> 
         files |= modal_files(case, job.case_file, job.root, report, known=files)
     with response_of_case(job.build_folder, report=report).making():
         if job.case_file is not None:
-            response, converged = response_stage(job.case_file, files, job.build_folder, None, force, report)
-        return report_stage(job, response, force, report), converged
+            response, converged = response_stage(
+                job.case_file, files, job.build_folder, force=force, report=report, wanted=wanted
+            )
+        return report_stage(job, response, force, report, wanted.pictures), converged
 
 
 def run_case_file(
-    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
-) -> tuple[Path, bool]:
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None,
+    wanted: Wanted = ALL,
+) -> tuple[Path, bool]:  # fmt: skip
     """The modal files a case needs, and the case; the products of one not named like its body have their own folder.
 
     Returns:
@@ -62,16 +67,19 @@ def run_case_file(
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
         with response_of_case(job.build_folder, report=report).making():
-            response, converged = response_stage(path, files, job.build_folder, assignments, force, report)
-            return report_stage(job, response, force, report), converged
+            response, converged = response_stage(
+                path, files, job.build_folder, assignments, force, report, wanted=wanted
+            )
+            return report_stage(job, response, force, report, wanted.pictures), converged
     folder = Path(".") / "build" / case.name
-    _, converged = response_stage(path, files, folder, assignments, force, report)
+    _, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
     return folder / "response.csv", converged
 
 
 def run_system(
-    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None
-) -> tuple[Path, bool]:
+    path: Path, assignments: list[str] | None = None, force: bool = False, report: Report = lambda _: None,
+    wanted: Wanted = ALL,
+) -> tuple[Path, bool]:  # fmt: skip
     """The modal file of a system, and the friction response of the case.toml beside it if there is one.
 
     Returns:
@@ -79,17 +87,20 @@ def run_system(
     """
     basis_file = system_stage(path, assignments, None, force, report)
     case = path.parent / "case.toml"
-    return respond(case, basis_file, force=force, report=report) if case.is_file() else (basis_file, True)
+    if not case.is_file():
+        return basis_file, True
+    return respond(case, basis_file, force=force, report=report, wanted=wanted)
 
 
 def respond(
     case_path: Path, basis_file: Path | None, assignments: list[str] | None = None, force: bool = False,
-    report: Report = lambda _: None, root: Path = Path("."), log: bool = False,
+    report: Report = lambda _: None, root: Path = Path("."), log: bool = False, wanted: Wanted = ALL,
 ) -> tuple[Path, bool]:  # fmt: skip
     """Friction response of a case on modal files that are there already: CSV, JSON, picture in build/<case>/.
 
     Args:
         basis_file: of the only body; None: basis.h5 beside the case, or build/<body>/basis.h5 of every body.
+            wanted: besides tables.
 
     Returns:
         The path of the table, and whether every point converged.
@@ -106,7 +117,7 @@ def respond(
                 f"{case_path}: body: it names '{b.body or b.name}', but {files[b.name]} holds '{name}'; make them agree"
             )
     folder = root / "build" / case.name
-    summary, converged = response_stage(case_path, files, folder, assignments, force, report, log)
+    summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
     rows = [*summary["resonances"], *summary["rising_at_the_edge"]]
     for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
         note = f" ({row['note']})" if row.get("note") else f"; add {row['add']}" if "add" in row else ""
