@@ -47,7 +47,8 @@ class CaseResult:
     resonances: normal force -> (frequency in Hz, amplitude in m) of each peak, searched for between the points of the
     sweep. speed: rad/s. messages: sentences a reader must know. built: the assembly. rising: ends of the band at which
     responses still rise. truncation: largest estimated error of an amplitude for want of harmonics and samples, over
-    it; None where it is not estimated.
+    it; None where it is not estimated. errors: normal force (N) -> frequency in Hz -> the same, of resonances among
+    others.
     """
 
     settings: CaseSettings
@@ -61,6 +62,7 @@ class CaseResult:
     rising: tuple[Rising, ...] = ()
     truncation: float | None = None
     stuck_damping: Array = field(default_factory=lambda: np.zeros(0))
+    errors: Mapping[float, Mapping[float, float]] = field(default_factory=dict)
 
     @property
     def quantity(self) -> Quantity:
@@ -137,7 +139,7 @@ def _run(
     ]
     return CaseResult(
         settings, responses, free, stuck[0], resonances, built.speed, tuple(messages), built,
-        tuple(at_the_ends), left.most, stuck[1],
+        tuple(at_the_ends), left.most, stuck[1], left.errors,
     )  # fmt: skip
 
 
@@ -323,11 +325,12 @@ class _Left:
     """What harmonics and samples that are left out would change.
 
     tolerance: their number is looked for, until the share of an amplitude is within it; None: it is given. most: the
-    largest share, None where nothing is judged.
+    largest share, None where nothing is judged. errors: normal force (N) -> Hz -> share, of what is judged.
     """
 
     def __init__(self, built: Built, tolerance: float | None) -> None:
         self.built, self.tolerance, self.most = built, tolerance, None
+        self.errors: dict[float, dict[float, float]] = {}
 
     most: float | None
 
@@ -349,6 +352,7 @@ class _Left:
         looked_at = judged(problem, found, [f for f, _ in peaks])
         for point, estimate, share in looked_at if self.tolerance is not None else ():
             self._enough(problem, found, point, estimate, share, normal)
+        self.errors[normal] = {point.Omega / (2 * np.pi): share for point, _, share in looked_at}
         if not looked_at:
             return []
         point, e, share = max(looked_at, key=lambda one: one[2])
@@ -383,11 +387,20 @@ OPEN = 0.01
 """Share of points and time that may be open in the book's mode before a message is made."""
 
 
+def lifted(built: Built, found: HarmonicResponse) -> Array:
+    """(f,) bool, points at which contacts would lift off though what stands for their law does not follow it."""
+    count = len(built.contacts)  # of a sector; the others of a ring follow
+    book = built.settings.mode == "book"
+    never = [i for i in range(found.open.shape[1]) if not book and not built.contacts[i % count].what.opens]
+    open_ = found.open > OPEN if book else found.open[:, never] > 0
+    return open_.any(axis=1) & found.converged
+
+
 def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:
     """A message where points would lift off in the book's mode, whose friction does not know of it."""
-    share = np.where(found.converged[:, None], found.open, 0.0)
-    if built.settings.mode != "book" or share.max(initial=0.0) <= OPEN:
+    if built.settings.mode != "book" or not lifted(built, found).any():
         return []
+    share = np.where(found.converged[:, None], found.open, 0.0)
     at, which = np.unravel_index(int(share.argmax()), share.shape)
     return [
         f"At F_N = {normal:g} N points of {problem.assembly.contacts[which].name} would lift off, for "
@@ -398,10 +411,8 @@ def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: fl
 
 def _pulling(built: Built, found: HarmonicResponse, normal: float) -> list[str]:
     """A message where contacts that do not open would."""
-    count = len(built.contacts)  # of a sector; the others of a ring follow
-    never = [i for i in range(found.open.shape[1]) if not built.contacts[i % count].what.opens]
-    pulls = ((found.open > 0) & found.converged[:, None])[:, never].any(axis=1)
-    if not normal or not pulls.any():
+    pulls = lifted(built, found)
+    if not normal or built.settings.mode == "book" or not pulls.any():
         return []
     low, high = found.frequency[pulls][[0, -1]]
     return [

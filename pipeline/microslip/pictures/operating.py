@@ -21,6 +21,7 @@ from .plots import (
     said_beside,
     save_figure,
     single_panel,
+    through,
     whole_numbers,
 )
 
@@ -54,7 +55,7 @@ def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -
     figure, axes = single_panel(9.0, 6.0)
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
     for colour, (normal, (x, y)) in reversed(pairs):  # the light ones on top
-        axes.semilogy(x, y, color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
+        axes.semilogy(*through(x, y), color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     figure.legend(loc="outside lower center", ncols=6, fontsize=9)

@@ -52,6 +52,22 @@ def plain_axes(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
+def through(x: Array, y: Array, each: int = 8) -> tuple[Array, Array]:
+    """A line through points (x rising, y positive or not a number) that rounds resonances: 1 / y^2, a parabola near one
+    is interpolated by cubics that keep its rises and falls, so that none is added."""
+    from scipy.interpolate import PchipInterpolator
+
+    fine = np.interp(np.arange(0, len(x) - 1 + 1e-9, 1 / each), np.arange(len(x)), x)
+    out = np.interp(fine, x, y)
+    known = np.flatnonzero(np.isfinite(y) & (y > 0))
+    for run in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+        if len(run) > 2 and (np.diff(x[run]) > 0).all():
+            inside = (fine >= x[run[0]]) & (fine <= x[run[-1]])
+            scale = y[run].max()
+            out[inside] = scale / np.sqrt(PchipInterpolator(x[run], (scale / y[run]) ** 2)(fine[inside]))
+    return fine, out
+
+
 def said_beside(axes: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
     """Words beside a place of a diagram, so many points to the right and above it."""
     axes.annotate(text, at, xytext=shift, textcoords="offset points", **how)

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..case import CaseResult, CaseSettings
+from ..case.run import lifted
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
-from .plots import said_beside
+from .plots import said_beside, through
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -24,13 +25,18 @@ def response_picture(result: CaseResult, path: Path) -> None:
     axes = figure.subplots()
     axes.plot(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
     forces, colours = sorted(result.responses, reverse=True), _colours(len(result.responses))
+    lifts = False
     for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
         r = result.responses[normal]
         apart_from_it = overhanging(r, result.resonances[normal])
         f, amplitude = _with_peaks(r, result.resonances[normal])
         on = ~np.isin(f, [at for at, _ in apart_from_it])
+        if (off := lifted(result.built, r)).any():
+            off = np.interp(f, r.frequency, off) > 0
+            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.2, ls=":")
+            amplitude, lifts = np.where(off, np.nan, amplitude), True
         axes.plot([at for at, _ in apart_from_it], [1e6 * a for _, a in apart_from_it], "o", color=colour, ms=4)
-        axes.plot(f[on], amplitude[on], color=colour, lw=1.6, label=f"$F_N$ = {said} N")
+        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, label=f"$F_N$ = {said} N")
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
     low, high = result.free.frequency[[0, -1]]
@@ -47,6 +53,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
     told = "dashed: sticking contacts"
     if len(result.responses) > 1:
         told += f" at $F_N$ = {max(result.responses):g} N"
+    told += "; dotted: contacts would lift off, not valid" if lifts else ""
     figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told, title_fontsize=8)
     figure.savefig(path, format="png")
 

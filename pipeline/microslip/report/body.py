@@ -22,7 +22,7 @@ from ..ring.resonances import eigenmodes, harmonics_of, speeds_of
 from ..units import rpm_text, to_rpm
 from . import ring
 from .page import Album, Piece, fold, number, page, say, table
-from .response import response_pieces
+from .response import answer, response_pieces, warnings
 from .words import certificate, contact_sentence, fit_sentence, fit_summary, hertz, number_list, range_sentence
 
 
@@ -39,6 +39,7 @@ def report_html(
     """
     stored, basis = basis, basis_in_modes(basis)
     album, cyclic = Album(pictures), basis.sectors > 1
+    answered = answer(response, album) if response is not None else []
     sections = {
         "Body": [table((), _facts(basis)), album.take("mesh")],
         "Frequencies": ring.frequencies(basis, album) if cyclic else _frequencies(basis, album),
@@ -50,12 +51,13 @@ def report_html(
         "How many modes are enough": _truncation(stored, basis, album),
         "Compliance counted once": _counted_once(stored),
         "Loads and read-outs": [_rows(basis)],
-        "Friction response": response_pieces(response or {}, album),
         "Checks": _checks(basis),
         "Provenance": _provenance(basis),
     }
-    told = [say(_lead(basis), tone="lead"), say(*messages, tone="warn")]
-    return page(f"{basis.name}: modal basis", told, sections)
+    sections = {"Friction response": response_pieces(response or {}, album), **sections}
+    about = say(_lead(basis), tone="" if response else "lead")
+    first = [about, warnings(messages)] if response is None else [*answered, warnings(messages), about]
+    return page(f"{basis.name}: {'modal basis' if response is None else 'friction response'}", first, sections)
 
 
 def _groups(basis: ModalBasis) -> list[ModalGroup]:

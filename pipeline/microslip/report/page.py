@@ -96,5 +96,5 @@ def text(value: object) -> str:
     """Escaped HTML; powers of ten of numbers in it are set as such."""
     from markupsafe import Markup, escape
 
-    safe = escape(str(value)).replace(" %", Markup("&nbsp;%"))
+    safe = escape(str(value)).replace(" %", Markup("&nbsp;%")).replace("F_N", Markup("F<sub>N</sub>"))
     return Markup(_POWER.sub(lambda m: f"{m[1]}·10<sup>{m[2].strip('+').replace('-', '−')}{m[3]}</sup>", safe))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..units import Quantity
+from ..units import Quantity, amplitude_of, counted, percent
 from .page import Album, Piece, fold, number, page, say, table
 
 MOST_ROWS = 60
@@ -23,11 +24,90 @@ def response_html(summary: Mapping[str, Any], pictures: Mapping[str, Path]) -> s
     """The page of a case alone.
 
     Args:
-        summary: the response of `body.report_html`; its messages stand on top. pictures: name -> file.
+        summary: the response of `body.report_html`; its messages are told behind the answer. pictures: name -> file.
     """
-    told = {k: v for k, v in summary.items() if k not in ("messages", "pictures")}
-    pieces = [say(*summary.get("messages", []), tone="warn"), *response_pieces(told, Album(pictures))]
+    told, album = {k: v for k, v in summary.items() if k not in ("messages", "pictures")}, Album(pictures)
+    pieces = [*answer(told, album), warnings(summary.get("messages", [])), *response_pieces(told, album)]
     return page(f"{summary.get('case', 'case')}: friction response", pieces)
+
+
+def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
+    """What a person came for: sentences, the resonances, the curve."""
+    rows = response.get("resonances", [])
+    failed = response.get("failed_points")
+    return [
+        say(*_sentences(response), tone="lead"),
+        say(f"{failed} points did not converge; they are marked in the table." if failed else "", tone="bad"),
+        _resonances(rows) if rows else say(""),
+        album.take(SHOWN[0]),
+    ]
+
+
+def _sentences(response: Mapping[str, Any]) -> list[str]:
+    """The highest and the lowest resonance, the largest stress, what the numbers are worth."""
+    rows = response.get("resonances", [])
+    if not rows:
+        return ["No resonance was found in the band." if "resonances" in response else ""]
+    doubtful = sum(bool(row.get("doubt")) for row in rows)
+    said = [f"The highest resonance is {_peak(max(rows, key=_size))}"]
+    tops = [max((r for r in rows if r["normal_force_N"] == n), key=_size) for n in {r["normal_force_N"] for r in rows}]
+    if len(tops) > 1:
+        said[0] += f"; it is lowest with {_peak(min(tops, key=_size))}"
+    said[0] += "."
+    if stressed := [row for row in rows if "stress_amplitude_Pa" in row]:
+        worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
+        margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
+        force = number(worst["normal_force_N"])
+        said.append(
+            f"The largest stress amplitude is {number(1e-6 * worst['stress_amplitude_Pa'])} MPa at "
+            f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {force} N{margin}."
+        )
+    uncertain = response.get("estimated_error_of_harmonics")
+    error = f"; amplitudes are uncertain by {percent(uncertain)} at most" if isinstance(uncertain, float) else ""
+    if doubtful:
+        are = "is" if doubtful == 1 else "are"
+        said.append(f"{doubtful} of {counted(len(rows), 'resonance')} {are} doubtful and marked{error}.")
+    else:
+        said.append(f"Every resonance passes its checks{error}.")
+    return said
+
+
+def _size(row: Mapping[str, Any]) -> float:
+    return amplitude_of(row)[0]
+
+
+def _peak(row: Mapping[str, Any]) -> str:
+    size, of = amplitude_of(row)
+    force = number(row["normal_force_N"])
+    return f"{number(1e6 * size)} {of.micro} at {number(row['frequency_Hz'], 5)} Hz under F_N = {force} N"
+
+
+def _resonances(rows: Sequence[Mapping[str, Any]]) -> Piece:
+    """The table of resonances: what speaks against one stands beside its amplitude, and marks its row."""
+    doubts = any(row.get("doubt") for row in rows)
+    first = ["normal_force_N", "frequency_Hz", *(k for k in rows[0] if k.startswith("amplitude_"))]
+    first += ["doubt"] * doubts + [
+        k for k in ("stress_amplitude_Pa", "reserve_factor", "damping_ratio") if k in rows[0]
+    ]
+    order = [*first, *(k for k in rows[0] if k not in (*first, "doubt"))]
+    return _table_of([{k: row.get(k, "") for k in order} for row in rows])
+
+
+def warnings(messages: Sequence[str]) -> Piece:
+    """What a reader must know; sentences that differ in names and numbers alone are told once, the others unfold."""
+    alike: dict[str, list[str]] = {}
+    for message in messages:
+        alike.setdefault(_DIFFERS.sub("#", message), []).append(message)
+    told, folded = list[str](), list[Piece]()
+    for first, *others in alike.values():
+        told.append(first + (f" The same of {len(others)} others, below." if others else ""))
+        if others:
+            folded.append(fold(f'{len(others)} more like "{first[:60].rstrip()} ..."', say(*others)))
+    return Piece("box", [say(*told), *folded], tone="warn")
+
+
+_DIFFERS = re.compile(r"'[^']*'|^[\w.@-]+:|\b[\w-]*\d[\w.+-]*")
+"""Names and numbers in a message."""
 
 
 def survey_html(
@@ -44,28 +124,42 @@ def survey_html(
 
 
 def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
-    """What the case tells, its tables, and every picture that no other section took."""
+    """What the case tells besides, its other tables, and every picture that no other section took."""
     told = {k: v for k, v in response.items() if not k.endswith("sha256") and v not in ("", None)}
-    words, failed = told.pop("description", ""), told.get("failed_points")
+    words = told.pop("description", "")
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
     facts = [(_label(k), _cell(v)) for k, v in told.items() if k not in tables]
     rest = [n for n in album.left if n not in SHOWN and not n.startswith(("mode_", "modes_", "animation_"))]
     return [
         say(f"{words}." if words else ""),
-        say(f"{failed} points did not converge; they are marked in the table." if failed else "", tone="bad"),
-        *(piece for k, v in tables.items() for piece in (Piece("h3", _label(k)), _table_of(v))),
         *map(album.take, SHOWN),
+        *(piece for k, v in tables.items() if k != "resonances" for piece in (Piece("h3", _label(k)), _table_of(v))),
         *(album.take(name, name) for name in rest),
         table((), facts),
     ]
 
 
 def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
-    """Of rows that have the same names."""
+    """Of rows that have the same names. What is rounding beside the largest number of its unit is a zero."""
     columns = [_column(key) for key in rows[0]]
-    cells = [[_cell(v if f == 1 else v * f) for v, (f, _) in zip(row.values(), columns, strict=True)] for row in rows]
+    units = [name.rpartition(" in ")[2] for _, name in columns]
+    values = [[v if f == 1 else v * f for v, (f, _) in zip(row.values(), columns, strict=True)] for row in rows]
+    largest: dict[str, float] = {}
+    for row in values:
+        for unit, v in zip(units, row, strict=True):
+            largest[unit] = max(largest.get(unit, 0.0), abs(v)) if isinstance(v, float) else largest.get(unit, 0.0)
+
+    def shown(value: Any, unit: str) -> str:
+        if not isinstance(value, float):
+            return _cell(value)
+        return number(0.0 if abs(value) < ROUNDING * largest[unit] else value, 5 if unit == "Hz" else 4)
+
+    cells = [[shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in values]
     return table([name for _, name in columns], cells)
 
+
+ROUNDING = 1e-9
+"""Share of the largest number of a unit in a table below which another one is rounding."""
 
 _FACTORS = (
     *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
@@ -76,8 +170,20 @@ _FACTORS = (
 _UNITS = ("N", "Hz", "m", "mm", "µm", "m/m", "µm/m", "rad", "µrad", "s", "Pa", "MPa", "rpm", "W", "J", "K")
 
 
+_NAMED = {
+    "damping_ratio": (100.0, "damping in %"),
+    "slipping": (100.0, "slip in %"),
+    "open": (100.0, "open in %"),
+    "estimated_error": (100.0, "error in %"),
+    "doubt": (1.0, "validity"),
+}
+"""Columns that people know by other names."""
+
+
 def _column(key: str) -> tuple[float, str]:
     """Factor and name of a column: lengths and stresses in units for people."""
+    if key in _NAMED:
+        return _NAMED[key]
     for end, (factor, unit) in _FACTORS:
         if key.endswith(end):
             return factor, _label(f"{key.rpartition('_')[0]}_{unit}")

@@ -16,13 +16,15 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
+from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import ModalBasis, UserError
 from ..files import store
 from ..report.response import response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
-from ..units import counted, to_rpm
+from ..results.series import CONVERGED
+from ..units import counted, percent, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, hashes_of
 from .stage import Made, Report, Stage
@@ -143,12 +145,15 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     points.begin()
     store.write_text(folder / "response.csv", response_table(result.responses))
     drawn = _drawn(result, folder) if wanted.pictures else {}
+    summary["resonances"] = _judged(_response(points, result, summary), result, summary["resonances"])
     response = _response(points, result, summary)
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
     more = _assessed(result, response, folder, wanted, report)
     if more is not None:
-        summary["resonances"] = more.rows or summary["resonances"]
+        known = {(row["normal_force_N"], row["frequency_Hz"]): row for row in summary["resonances"]}
+        rows = [known.get((row["normal_force_N"], row["frequency_Hz"]), {}) | row for row in more.rows]
+        summary["resonances"] = [_ordered(row) for row in rows] or summary["resonances"]
         drawn, files = drawn | more.drawn, files + more.files
         summary["messages"] += more.messages
     summary["checked"] = sentence(response, response.estimated)
@@ -159,6 +164,41 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     summary["files"] = [path.name for path in [*files, folder / "response.html"]]
     store.write_text(folder / "response.html", response_html(summary, drawn))
     return summary
+
+
+def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of resonances with the effective damping there, what the contacts do, and what speaks against them."""
+    out = []
+    for row in rows:
+        normal, f = row["normal_force_N"], row["frequency_Hz"]
+        series = response.one(normal_force=normal)
+        i = int(np.abs(series.frequency - f).argmin())
+        table = {name: float(series.columns()[name][i]) for name in ("damping_ratio", "slipping", "open")}
+        errors = result.errors.get(normal, {})
+        share = next((e for at, e in errors.items() if np.isclose(at, f, rtol=1e-9, atol=0)), None)
+        table |= {} if share is None else {"estimated_error": float(share)}
+        out.append(_ordered(row | table | {"doubt": _doubt(result, normal, f, series.status[i], share or 0.0)}))
+    return out
+
+
+def _ordered(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with what speaks against it at its end."""
+    return {k: v for k, v in row.items() if k != "doubt"} | {"doubt": row.get("doubt", "")}
+
+
+def _doubt(result: CaseResult, normal: float, frequency: float, status: str, error: float) -> str:
+    """What speaks against a resonance; nothing, where nothing does."""
+    found = result.responses[normal]
+    beside = np.argsort(np.abs(found.frequency - frequency))[:2]
+    if status != CONVERGED:
+        return status
+    if lifted(result.built, found)[beside].any():
+        return "contacts would lift off: not valid"
+    return f"uncertain by about {percent(error)}: raise harmonics" if error > UNCERTAIN else ""
+
+
+UNCERTAIN = 0.1
+"""Estimated error of an amplitude by harmonics and samples that are left out, from which on it is called uncertain."""
 
 
 def _drawn(result: CaseResult, folder: Path) -> dict[str, Path]:

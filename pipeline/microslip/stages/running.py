@@ -120,7 +120,7 @@ def respond(
     summary, converged = response_stage(case_path, files, folder, assignments, force, report, log, wanted)
     rows = [*summary["resonances"], *summary["rising_at_the_edge"]]
     for row, normal in zip(rows, apart([row["normal_force_N"] for row in rows]), strict=True):
-        note = f" ({row['note']})" if row.get("note") else f"; add {row['add']}" if "add" in row else ""
+        note = f" ({row['doubt']})" if row.get("doubt") else f"; add {row['add']}" if "add" in row else ""
         report(f"F_N = {normal} N: {'still rising at ' if 'add' in row else ''}{_at(row)}{note}")
     return folder / "response.csv", converged
 
