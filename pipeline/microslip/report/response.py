@@ -117,10 +117,17 @@ def survey_html(
     album = Album({p.name: p for p in pictures})
     pieces = [say(*sentences, tone="note"), *album.begun("")]
     for name, columns in tables.items():
-        rows = [[number(float(v), 5) for v in row] for row in zip(*columns.values(), strict=True)]
+        rows = [[_number_or_words(v) for v in row] for row in zip(*columns.values(), strict=True)]
         shown = table([_label(key) for key in columns], rows)
         pieces += [Piece("h2", name), shown if len(rows) <= MOST_ROWS else fold(f"{len(rows)} rows", shown)]
     return page(title, pieces)
+
+
+def _number_or_words(value: Any) -> str:
+    try:
+        return number(float(value), 5)
+    except ValueError:
+        return str(value)
 
 
 def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:

@@ -139,11 +139,38 @@ def backbones(
 
 
 def write_backbones(found: Mapping[float, Backbone], case: Case) -> list[Path]:
-    """``backbone.csv`` and ``pictures/backbone.png``."""
+    """``backbone.csv``, ``pictures/backbone.png`` and ``backbone.html``."""
     from ..pictures.following import backbone_plot
 
-    picture = case.folder / "pictures" / "backbone.png"
-    return [_backbone_table(found, case), backbone_plot(found, _title(case, "nonlinear mode"), picture, case.quantity)]
+    title, picture = _title(case, "nonlinear mode"), case.folder / "pictures" / "backbone.png"
+    files = [_backbone_table(found, case), backbone_plot(found, title, picture, case.quantity)]
+    said = [_backbone_message(normal, one, case.quantity) for normal, one in sorted(found.items())]
+    return [*files, _page(case, "backbone", title, said, files)]
+
+
+def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
+    """A nonlinear mode in a sentence."""
+    if not len(one.amplitude):
+        return f"F_N = {normal:g} N: no motion was found: {one.status}."
+    i, f = int(one.damping.argmax()), one.frequency
+    said = (
+        f"F_N = {normal:g} N: from {f[0]:.5g} Hz (sticking: {one.stuck / 2 / np.pi:.5g} Hz) to {f[-1]:.5g} Hz; most "
+        f"damped, {100 * one.damping[i]:.3g} %, at an amplitude of {one.amplitude[i]:.3g} {of.said} and {f[i]:.5g} Hz"
+    )
+    return said + ("." if one.complete else f"; it ends early: {one.status}.")
+
+
+def _page(case: Case, name: str, title: str, sentences: Sequence[str], files: Sequence[Path]) -> Path:
+    """The page of tables and pictures that were written."""
+    from ..report.response import survey_html
+
+    tables = {}
+    for file in (f for f in files if f.suffix == ".csv"):
+        head, *rows = [line.split(",") for line in file.read_text(encoding="utf-8").splitlines()]
+        tables[file.name] = dict(zip(head, zip(*rows, strict=True), strict=True)) if rows else {}
+    page = case.folder / f"{name}.html"
+    store.write_text(page, survey_html(title, sentences, tables, [f for f in files if f.suffix == ".png"]))
+    return page
 
 
 def _backbone_table(found: Mapping[float, Backbone], case: Case) -> Path:
@@ -207,16 +234,20 @@ def optimum_over(
 
 
 def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
-    """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``."""
+    """``optimum.csv``: the highest resonance at every value and the optimum; ``pictures/optimum.png``;
+    ``optimum.html``."""
     from ..pictures.following import optimum_plot
 
     files = [_optimum_table(found.found, over, case, found)]
     if any(one.status == "converged" for one in found.found.values()):
         label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
         picture = case.folder / "pictures" / "optimum.png"
-        title = _title(case, "highest resonance and optimum")
-        files.append(optimum_plot(found, label, title, picture, case.quantity))
-    return files
+        files.append(optimum_plot(found, label, _title(case, "highest resonance and optimum"), picture, case.quantity))
+    said = [
+        f"{optimum_message(found, over, case.quantity)}.",
+        *([] if is_optimum(found) else [f"{missed(found, over)}."]),
+    ]
+    return [*files, _page(case, "optimum", _title(case, "highest resonance and optimum"), said, files)]
 
 
 def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, best: Optimum | None = None) -> Path:
