@@ -148,6 +148,11 @@ MEANING: dict[str, tuple[str, str]] = {
     "geometry.faces.label": ("", "the surface's label in the CAD file, or a part of it"),
     "geometry.faces.colour": ("0-255", "the surface's colour, red, green, blue"),
     "geometry.faces.box": ("*", "x, y, z of the low and of the high corner; what lies wholly inside"),
+    "geometry.faces.cut": ("", "CAD: whether the box cuts: its part of the surface becomes a face of its own"),
+    "geometry.faces.touching": (
+        "",
+        "CAD: another CAD file in the same coordinates; where the two surfaces meet",
+    ),
     "geometry.faces.surfaces": ("", "numbers from the table of `microslip info FILE`"),
     "mesh.size": ("*", "size of the elements; chosen from the body where it is not given"),
     "mesh.order": ("", "order of the elements; 1 is far too stiff in bending"),

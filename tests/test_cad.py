@@ -387,3 +387,69 @@ def test_stopped_half_way(parts: Path, tmp_path: Path, sign: int) -> None:
     process.send_signal(sign)
     assert process.wait(timeout=5) != 0
     assert not out.exists()
+
+
+# parts of the surface -------------------------------------------------------------------------------------------------
+
+TWO_PLATES = """
+import gmsh
+gmsh.initialize(readConfigFiles=False, interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+for name, x, z in (("lower", 0, 0), ("upper", 70, 5)):
+    gmsh.model.occ.addBox(x, 0, z, 100, 20, 5)
+    gmsh.model.occ.synchronize()
+    gmsh.write(f"{name}.step")
+    gmsh.clear()
+gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 40, 10)
+gmsh.model.occ.synchronize()
+gmsh.write("pin.step")
+"""
+
+
+@pytest.fixture(scope="module")
+def plates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two plates of 100 x 20 x 5 mm that overlap over 30 x 20 mm, and a pin of 20 mm."""
+    folder = tmp_path_factory.mktemp("plates")
+    assert python("-c", TWO_PLATES, folder=folder).returncode == 0
+    return folder
+
+
+def test_a_face_where_two_bodies_touch(plates: Path, tmp_path: Path) -> None:
+    """A lap joint: each plate has the other's part of its surface as a face, to the digit, and the same volume."""
+    for own, other in (("lower", "upper"), ("upper", "lower")):
+        rule = {"name": "joint", "touching": str(plates / f"{other}.step")}
+        body, _ = meshed(plates / f"{own}.step", tmp_path / f"{own}.msh", [rule], size=8)
+        assert volume(body) == pytest.approx(1e4, rel=1e-9) and area(body, "joint") == pytest.approx(600.0, rel=1e-9)
+        z = body.points[np.unique(np.concatenate([f.ravel() for f in body.faces["joint"].values()]))]
+        assert np.ptp(z[:, 2]) < 1e-9 and z[:, 0].min() == pytest.approx(0.07) and z[:, 0].max() == pytest.approx(0.1)
+
+
+def test_a_box_cuts_its_part_out_of_the_surface(plates: Path, tmp_path: Path) -> None:
+    """Of a plane and of a cylinder; what is left of a numbered surface stays that surface."""
+    top = next(line for line in table_of(plates / "lower.step") if " 0 0 1 " in f" {line} ").split()[0]
+    rules = [
+        {"name": "pad", "box": [10, 5, 4, 30, 15, 6], "cut": True},
+        {"name": "rest", "surfaces": [int(top)]},
+    ]
+    body, _ = meshed(plates / "lower.step", tmp_path / "lower.msh", rules, size=8)
+    assert area(body, "pad") == pytest.approx(200.0, rel=1e-9) and area(body, "rest") == pytest.approx(1800.0, rel=1e-9)
+    half = [{"name": "half", "box": [-11, 0, 10, 11, 11, 30], "cut": True}]
+    pin, _ = meshed(plates / "pin.step", tmp_path / "pin.msh", half, size=4)
+    assert area(pin, "half") == pytest.approx(np.pi * 10 * 20, rel=1e-3)
+
+
+def table_of(cad: Path) -> list[str]:
+    return python("-m", "microslip.cad", "--list", str(cad), "mm").stdout.splitlines()
+
+
+@pytest.mark.parametrize(
+    "rules, words",
+    [
+        ([{"name": "pad", "box": [200, 0, 0, 210, 5, 5], "cut": True}], ["'pad'", "no part of the surface lies in its"]),
+        ([{"name": "pad", "touching": "away.step"}], ["'pad'", "there is no file", "away.step"]),
+        ([{"name": "a", "box": [0, 0, 4, 20, 10, 6], "cut": True}, {"name": "b", "box": [10, 0, 4, 30, 10, 6], "cut": True}],
+         ["'a' and 'b' overlap"]),
+    ],
+)  # fmt: skip
+def test_parts_that_cannot_be_cut(plates: Path, tmp_path: Path, rules: list, words: list[str]) -> None:
+    refused(plates / "lower.step", tmp_path / "lower.msh", *words, faces=rules)

@@ -9,6 +9,7 @@ import gmsh
 
 from microslip.cad.drawing import default_size, finish, guarded, name_body, positive_size, read_settings
 from microslip.cad.faces import name_picked, table, write_triangles
+from microslip.cad.imprint import imprint
 from microslip.cad.solids import load
 
 
@@ -17,7 +18,7 @@ def mesh_cad(settings_file: str, out: str) -> None:
     settings = read_settings(settings_file)
     geometry, unit = settings.get("geometry", {}), settings.get("length_unit", "m")
     marks = load(Path(settings["folder"]) / geometry.get("cad", ""), unit)
-    name_picked(geometry.get("faces", []), marks)
+    name_picked(*reversed(imprint(geometry.get("faces", []), marks, Path(settings["folder"]), unit)))
     name_body()
     mesh = dict(settings.get("mesh", {}))
     size = mesh["size"] = default_size() if mesh.get("size") is None else mesh["size"]

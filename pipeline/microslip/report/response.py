@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -63,7 +64,11 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
             f"{number(worst['frequency_of_stress_Hz'], 5)} Hz under F_N = {force} N{margin}."
         )
     uncertain = response.get("estimated_error_of_harmonics")
-    error = f"; amplitudes are uncertain by {percent(uncertain)} at most" if isinstance(uncertain, float) else ""
+    error = ""
+    if isinstance(uncertain, float):
+        error = f"; amplitudes are uncertain by {percent(uncertain)} at most"
+        if not math.isfinite(uncertain):
+            error = "; how uncertain amplitudes are is not known at some places"
     if doubtful:
         are = "is" if doubtful == 1 else "are"
         said.append(f"{doubtful} of {counted(len(rows), 'resonance')} {are} doubtful and marked{error}.")

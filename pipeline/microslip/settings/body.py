@@ -199,17 +199,25 @@ GROUND = "ground"
 
 
 class FaceRule(Model):
-    """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways."""
+    """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways.
+
+    cut: of a CAD file, the part of the surface inside the box, cut out of the faces that it has. touching: another CAD
+    file in the same coordinates; the part of the surface that lies on its surface is cut out.
+    """
 
     name: Name
     label: str | None = None
     colour: Annotated[tuple[Byte, Byte, Byte], BeforeValidator(_tuple)] | None = None
     box: Box | None = None
+    cut: bool = False
     surfaces: Annotated[tuple[int, ...], BeforeValidator(_tuple)] | None = None
+    touching: str | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> FaceRule:
-        only_one(self, "label", "colour", "box", "surfaces", what="a face ")
+        only_one(self, "label", "colour", "box", "surfaces", "touching", what="a face ")
+        if self.cut and self.box is None:
+            raise ValueError("cut: belongs to a box, whose part of the surface is cut out; leave it out")
         return self
 
 

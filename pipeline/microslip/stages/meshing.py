@@ -54,6 +54,8 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "unit": job.settings.length_unit,
         "source": store.hash_file(source),
     }
+    if touched := [job.folder / rule.touching for rule in geometry.faces if rule.touching is not None]:
+        inputs["touched"] = [store.hash_file(f) for f in touched if store.ordinary(f).is_file()]
 
     def work() -> Made:
         report(f"meshing {source.name}")
@@ -242,8 +244,8 @@ def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
     made: dict[str, dict[str, Indices]] = {}
     for rule in job.settings.geometry.faces:
         place = f"{job.path}: geometry.faces.{rule.name}"
-        if rule.box is None:
-            raise UserError(f"{place}: a mesh file has no labels or colours; use box")
+        if rule.box is None or rule.cut:
+            raise UserError(f"{place}: a mesh file has no labels or colours and is not cut; use box alone")
         if rule.name in mesh.faces:
             raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
