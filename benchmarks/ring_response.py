@@ -17,17 +17,14 @@ import os
 import platform
 import time
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
 
-from microslip.basis import read_basis
-from microslip.case.assemble import build
-from microslip.case.run import problem_of
-from microslip.case.settings import CaseSettings
+import microslip as ms
 from microslip.data import ModalBasis
-from microslip.harmonic_balance.problem import Problem
-from microslip.harmonic_balance.solver import sweep
+from microslip.harmonic_balance.problem import AtFrequency
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -38,41 +35,41 @@ BLADES, ORDER, FORCE, POINTS, COUNT = 24, 6, 30.0, (72, 5), 150
 def blade() -> ModalBasis:
     """The test blade with 20 modes, on a coarse mesh."""
     coarse = ["mesh.size=12", "output.gauss=false", "output.nodal_stress=false", "output.shapes=false"]
-    return read_basis(modes_stage(open_job(ROOT / "geometry" / "blade", coarse, ROOT / "build" / "bench" / "ring"))[0])
+    return ms.read_basis(
+        modes_stage(open_job(ROOT / "geometry" / "blade", coarse, ROOT / "build" / "bench" / "ring"))[0]
+    )
 
 
-def case(low: float, high: float, count: int, blades: int, points: tuple[int, int], **more: object) -> CaseSettings:
-    """The settings of a ring of blades that meet their neighbours."""
+def case(low: float, high: float, count: int, blades: int, points: tuple[int, int], **more: object) -> dict:
+    """A ring of blades that meet their neighbours, by the keys of a case.toml, and the frequencies."""
     contact = {
         "interface": "right", "against": "left", "against_sector": 1, "law": "rough", "roughness": 7.5e-6,
         "normal_stiffness": 840e6, "tangential_stiffness": 80e6, "friction": 0.2, "points": list(points),
         "includes": "bulk+surface",
     }  # fmt: skip
-    return CaseSettings.model_validate({
-        "name": "ring", "body": "blade", "excitation": "magnet", "amplitude": 1.0, "monitor": "accelerometer",
-        "direction": "x", "contacts": [contact], "samples": 64,
-        "ring": {"blades": blades, "engine_order": ORDER * blades // BLADES},
-        "sweep": {"start": low, "stop": high, "points": count, "normal_forces": [FORCE]}, **more,
-    })  # fmt: skip
+    keys = {
+        "body": "blade", "excitation": "magnet", "monitor": "accelerometer", "contacts": [contact], "samples": 64,
+        "ring": {"blades": blades, "engine_order": ORDER * blades // BLADES}, **more,
+    }  # fmt: skip
+    return {"case": keys, "sweep": (low, high, count)}
 
 
-def problem(settings: CaseSettings, basis: ModalBasis) -> Problem:
-    """The balance under the normal force."""
-    return problem_of(build(settings, {"blade": basis}, "ring"), FORCE)
+def run(settings: dict, basis: ModalBasis, rounds: int) -> tuple[float, float, int, int, float, float]:
+    """Least wall and CPU seconds of a response after one that compiles; Newton steps, failures, Hz and m at the peak.
 
-
-def run(settings: CaseSettings, basis: ModalBasis, rounds: int) -> tuple[float, float, int, int, float, float]:
-    """Least wall and CPU seconds of a sweep after one that compiles; Newton steps, failures, Hz and m at the peak."""
-    s, p = settings.sweep, problem(settings, basis)
-    frequency, spent, used = np.linspace(s.start, s.stop, s.points), [], []
+    The assembly is made once; the time is that of `ms.harmonic_response`.
+    """
+    system, (low, high, count) = ms.assemble(settings["case"], blade=basis, normal_force=FORCE), settings["sweep"]
+    frequency, spent, used = np.linspace(low, high, count), [], []
     for _ in range(rounds + 1):
         began, before = time.perf_counter(), time.process_time()
-        points = sweep(p, frequency)
+        found = ms.harmonic_response(system, frequency)
         spent.append(time.perf_counter() - began)
         used.append(time.process_time() - before)
-    motion = [abs(q.x.reshape(p.coefficients, -1)[1:3]).max() * p.length for q in points]
+    p = found.problem(float(frequency[0]))
+    motion = [abs(q.x.reshape(p.coefficients, -1)[1:3]).max() * p.length for q in found.points]
     top = int(np.argmax(motion))
-    steps, failed = sum(q.iterations for q in points), sum(not q.converged for q in points)
+    steps, failed = sum(q.iterations for q in found.points), sum(not q.converged for q in found.points)
     return min(spent[1:]), min(used[1:]), steps, failed, float(frequency[top]), float(motion[top])
 
 
@@ -80,33 +77,60 @@ def sector_rows(
     basis: ModalBasis, low: float, high: float, rounds: int, count: int, points: tuple[int, int]
 ) -> None:  # fmt: skip
     """The table of the ring by one sector."""
-    print("| mode | wall s | CPU s | Newton steps a point | not converged | peak Hz | contact µm | goal s |")
+    print("| mode | wall s | CPU s | CPU / book | Newton steps a point | not converged | peak Hz | contact µm |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|")
-    for name, goal, more in (
-        ("book", 1, {"mode": "book"}),
-        ("marched, H = 1", 3, {"harmonics": 1}),
-        ("marched, H = 3", 20, {"harmonics": 3}),
-        ("marched, H = 1, 3 cycles", 3, {"harmonics": 1, "cycles": 3}),
-        ("marched, H = 3, 3 cycles", 20, {"harmonics": 3, "cycles": 3}),
-    ):  # fmt: skip
-        settings = case(low, high, count, BLADES, points, **more)
-        wall, cpu, steps, failed, top, size = run(settings, basis, rounds)
-        each = steps / count
-        print(f"| {name} | {wall:.2f} | {cpu:.2f} | {each:.1f} | {failed} | {top:.1f} | {1e6 * size:.2f} | {goal} |",
-              flush=True)  # fmt: skip
+    book, ways = 0.0, (("book", {"mode": "book"}), ("AFT, H = 1", {"harmonics": 1}), ("AFT, H = 3", {"harmonics": 3}))
+    for name, more in ways:
+        wall, cpu, steps, failed, top, size = run(case(low, high, count, BLADES, points, **more), basis, rounds)
+        book = book or cpu
+        told = f"| {name} | {wall:.2f} | {cpu:.2f} | {cpu / book:.1f} | {steps / count:.1f} | {failed} |"
+        print(f"{told} {top:.1f} | {1e6 * size:.2f} |", flush=True)
+    print("\n| mode | forces alone | forces with derivatives | linear systems | the rest |\n|---|--:|--:|--:|--:|")
+    for name, more in ways:
+        spent = parts(case(low, high, count, BLADES, points, **more), basis)
+        print(f"| {name} | {' | '.join(f'{100 * part:.0f} %' for part in spent)} |", flush=True)
+
+
+def parts(settings: dict, basis: ModalBasis) -> list[float]:
+    """Shares of the wall time of a response: forces alone, with derivatives, linear systems, the rest."""
+    system, frequency = ms.assemble(settings["case"], blade=basis, normal_force=FORCE), np.linspace(*settings["sweep"])
+    spent, places = dict.fromkeys(("force", "forces", "jacobian"), 0.0), AtFrequency.__dict__
+    kept = {name: places[name] for name in spent}
+
+    def timed(name: str) -> Any:
+        def call(*given: Any) -> Any:
+            began = time.perf_counter()
+            try:
+                return kept[name](*given)
+            finally:
+                spent[name] += time.perf_counter() - began
+
+        return call
+
+    try:
+        for name in spent:
+            setattr(AtFrequency, name, timed(name))
+        began = time.perf_counter()
+        ms.harmonic_response(system, frequency)
+        whole = time.perf_counter() - began
+    finally:
+        for name, was in kept.items():
+            setattr(AtFrequency, name, was)
+    shares = [value / whole for value in spent.values()]
+    return [*shares, 1.0 - sum(shares)]
 
 
 def growth_rows(basis: ModalBasis, low: float, high: float, rounds: int) -> None:
     """The table of whole rings against their sectors."""
     print("| blades | mode | sector CPU s | ring CPU s | ring / sector | over blades |")
     print("|--:|---|--:|--:|--:|--:|")
-    for name, more in (("book", {"mode": "book"}), ("marched, H = 1, 3 cycles", {"harmonics": 1, "cycles": 3})):
+    for name, more in (("book", {"mode": "book"}), ("AFT, H = 1", {"harmonics": 1})):
         for blades in (12, 24, 48, 100):
             found = []
             for model in ("sector", "full"):
                 settings = case(low, high, COUNT // 8, blades, (18, 5), **more)
-                ring = settings.ring.model_copy(update={"model": model}) if settings.ring else None
-                found.append(run(settings.model_copy(update={"ring": ring}), basis, rounds)[1])
+                settings["case"]["ring"]["model"] = model
+                found.append(run(settings, basis, rounds)[1])
             ratio = found[1] / found[0]
             print(f"| {blades} | {name} | {found[0]:.3f} | {found[1]:.2f} | {ratio:.1f} | {ratio / blades:.2f} |",
                   flush=True)  # fmt: skip

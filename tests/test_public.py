@@ -13,6 +13,7 @@ import pytest
 import small
 
 import microslip as ms
+from microslip.case import load_case, run_case
 from microslip.contact.elements import Polynomial, Stop
 from microslip.contact.patch import Patch
 from microslip.data import UserError
@@ -195,10 +196,17 @@ def test_an_assembly_of_a_dict_is_that_of_a_file(tmp_path):
 
     text = (ms.sample().parent / "case.toml").read_text(encoding="utf-8")
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    of_file = ms.assemble("case.toml", tmp_path, **{"vane-eigenmodes": ms.sample()})
-    of_dict = ms.assemble(tomllib.loads(text), **{"vane-eigenmodes": ms.read_basis(ms.sample())})
-    one, other = (ms.harmonic_response(a.pressed(100.0), [260.0, 420.0], harmonics=1) for a in (of_file, of_dict))
+    of_file = ms.assemble("case.toml", tmp_path, normal_force=100.0, **{"vane-eigenmodes": ms.sample()})
+    of_dict = ms.assemble(tomllib.loads(text), normal_force=100.0, **{"vane-eigenmodes": ms.read_basis(ms.sample())})
+    one, other = (ms.harmonic_response(a, [260.0, 420.0], harmonics=1) for a in (of_file, of_dict))
     np.testing.assert_array_equal(one.amplitude, other.amplitude)
+    swept = load_case(
+        tmp_path / "case.toml", ["sweep.start=260.0", "sweep.stop=420.0", "sweep.points=2", "harmonics=1"]
+    )
+    found = run_case(swept[0], ms.read_basis(ms.sample()), "case.toml").responses[100.0]
+    np.testing.assert_allclose(np.abs(found.monitor[found.asked]), one.amplitude, rtol=1e-8)
+    book = ms.assemble({**tomllib.loads(text), "mode": "book"}, normal_force=100.0, **{"vane-eigenmodes": ms.sample()})
+    assert abs(ms.harmonic_response(book, [420.0]).amplitude[0] / one.amplitude[1] - 1) < 0.05
     assert one.readouts == ("probe",) and "right" in repr(of_dict) and one.converged.all()
 
 

@@ -46,7 +46,7 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
         return system
     if isinstance(system, Built):
         if waiting := [c.interface for c in system.contacts if swept(c)]:
-            raise UserError(f"contacts.{waiting[0]}: waits for a normal force; take pressed(FORCE) of the assembly, N")
+            raise UserError(f"contacts.{waiting[0]}: waits for a normal force; give normal_force to assemble, N")
         asked = {"harmonics": harmonics, "samples": samples}
         return problem_of(system, None, **{key: n for key, n in asked.items() if n is not None})
     if not isinstance(system, Assembly):

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from .basis import read_basis
-from .case.assemble import Built, build
+from .case.assemble import Built, build, swept
 from .case.settings import CaseSettings
 from .data import ModalBasis, UserError
 from .settings.body import load_toml
-from .settings.mistakes import validate
+from .settings.mistakes import bounded, validate
 from .stages.job import job_of, open_job
 from .stages.places import modal_files
 
@@ -63,19 +63,19 @@ def modes(
 
 
 def assemble(
-    case: Path | str | Mapping[str, Any], folder: Path | str = ".", report: Report = lambda _: None,
-    **bases: ModalBasis | Path | str,
+    case: Path | str | Mapping[str, Any], folder: Path | str = ".", *, normal_force: float | None = None,
+    report: Report = lambda _: None, **bases: ModalBasis | Path | str,
 ) -> Built:  # fmt: skip
     """An assembly of bodies with contacts, loads and read-outs.
 
     Args:
         case: a case.toml, or its keys (``docs/case_toml.md``) as a dict; this needs no ``sweep``.
-        folder: where paths begin. bases: body -> its modal basis or file; those of a file that are not named here are
-            looked for, and made, as ``microslip respond`` does.
+        folder: where paths begin. normal_force: N, of every contact that has none of its own.
+        bases: body -> its modal basis or file; those of a file that are not named here are looked for, and made, as
+            ``microslip run`` does.
 
     Returns:
-        What `harmonic_response`, `follow` and `backbone` take; ``pressed(100.0)`` is the same with a normal force (N)
-        in every contact that has none of its own. ``messages`` are sentences one should know.
+        What `harmonic_response`, `follow` and `backbone` take; its ``messages`` are sentences one should know.
 
     Raises:
         UserError: names that the modal files do not hold, and every other mistake, with its key.
@@ -101,4 +101,8 @@ def assemble(
     if missing:
         files = modal_files(settings, path, Path(folder), report, {name: Path() for name in found})
         found |= {b.name: read_basis(files[b.name]) for b in missing}
+    if normal_force is not None:
+        bounded("normal_force", normal_force, ge=0)
+        own = [c.model_copy(update={"normal_force": normal_force}) if swept(c) else c for c in settings.contacts]
+        settings = settings.model_copy(update={"contacts": tuple(own)})
     return build(settings, found, path)

@@ -652,7 +652,7 @@ def info(
     """What a file holds: a modal file, a mesh, a CAD file (its faces, to choose from), matrices, or a body.toml.
 
     Args:
-        file: basis.h5, a mesh, a STEP or BREP file, matrices, or a body.toml.
+        file: basis.h5 or its folder, a mesh, a STEP or BREP file, matrices, or a body.toml.
         output: of a CAD file: a picture (.png) of its surfaces with their numbers.
         unit: unit of length of a mesh or CAD file.
         speed: of a modal file: this one of its speeds only, counted from 0.
@@ -664,6 +664,8 @@ def info(
 
     if not file.exists():
         raise UserError(f"{file}: there is no such file; correct the path")
+    if file.is_dir() and not (file / "body.toml").is_file() and (file / "basis.h5").is_file():
+        file = file / "basis.h5"
     if unit not in UNITS:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     suffix = file.suffix.lower()
@@ -824,6 +826,7 @@ def _fail(text: str, code: int) -> int:
 
 def entry() -> None:
     """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
+    os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of a contact law are too short to be shared
     asked = []
 
     def end(number: int, _: object) -> None:
