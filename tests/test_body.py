@@ -94,9 +94,9 @@ MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"geometry": [{}]}, "geometry: must be one table; write [geometry] with single brackets"),
     (
         {"geometry": {"cad": "a", "faces": [{"name": "x", "label": "a", "box": [0, 0, 0, 1, 1, 1]}]}},
-        "geometry.faces.x: a face needs exactly one of label, colour, box, surfaces, and has label and box",
+        "geometry.faces.x: a face needs exactly one of label, colour, box, surfaces, touching, and has label and box",
     ),
-    ({"geometry": {"cad": "a", "faces": [{"name": "x"}]}}, "colour, box, surfaces, and has none"),
+    ({"geometry": {"cad": "a", "faces": [{"name": "x"}]}}, "colour, box, surfaces, touching, and has none"),
     ({"geometry": {"cad": "a", "faces": [{"name": "x", "box": [0, 1]}]}}, "faces.x.box: must have 6 entries and has 2"),
     ({"geometry": {"cad": "a", "faces": [{"name": "x", "colour": [300, 0, 0]}]}}, "entry 1 of the list must not be"),
     ({"supports": {"face": "clamp"}}, "supports: must be a list; write [[supports]] with double brackets"),

@@ -287,3 +287,21 @@ def test_a_case_that_waits_for_a_normal_force_says_so():
 def test_names_that_are_not_there():
     with pytest.raises(AttributeError, match="no attribute 'harmonic'"):
         _ = ms.harmonic
+
+
+@pytest.mark.parametrize(
+    "make, said",
+    [
+        (lambda: ms.backbone(ms.structure(1.0, 1.0), 1e-3, 1.0), "nothing is read; give output to structure"),
+        (lambda: ms.backbone(duffing(), 1.0, 1e-3), "high: 0.001 is not above low"),
+        (lambda: ms.backbone(duffing(), 1e-3, 1.0, mode=9), "there is no mode 9; there are 1, counted from 0"),
+        (lambda: ms.harmonic_response(ms.structure(1.0, 1.0, output=0), [1.0]), "nothing drives it"),
+        (lambda: ms.harmonic_response(duffing(), [1.0], harmonics=3, samples=8), "8 are too few for 3 harmonics"),
+        (lambda: ms.jenkins("stiff", 1.0), "jenkins: stiffness: 'stiff' is no number"),
+        (lambda: ms.structure(1.0, 1.0, force={5: 1.0}), "structure: force: there is no coordinate 5"),
+    ],
+)
+def test_what_a_newcomer_typed(make, said):
+    with pytest.raises(UserError) as caught:
+        make()
+    assert said in str(caught.value)

@@ -54,7 +54,16 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
             f"system: {type(system).__name__} is no assembly; make one by structure, or by case(...).pressed"
         )
     H = 3 if harmonics is None else harmonics
+    if samples is not None and samples < 4 * H:
+        raise UserError(f"samples: {samples} are too few for {H} harmonics; take {4 * H} at least, better {16 * H}")
     return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
+
+
+def _driven(problem: Problem) -> Problem:
+    """Raise `UserError` where nothing drives it."""
+    if not problem.assembly.loads:
+        raise UserError("system: nothing drives it; give force to structure, or an excitation to assemble")
+    return problem
 
 
 def harmonic_response(
@@ -84,7 +93,7 @@ def harmonic_response(
         >>> ms.harmonic_response(slider, [0.8, 1.0, 1.2], unit="rad/s").amplitude.round(3).tolist()
         [0.221, 0.3, 0.669]
     """
-    problem = balanced(system, harmonics, samples)
+    problem = _driven(balanced(system, harmonics, samples))
     asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * _hertz(unit)
     points, hertz = sweep(problem, asked, report), _hertz(unit)
     known = {} if hertz == 1 else {"parameter": asked / hertz}
@@ -106,7 +115,8 @@ def follow(
         settings: of the steps along the curve. report: is told what is under way.
 
     Returns:
-        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop).
+        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop, or
+        came back to the start: another branch is then left out). Whether a motion is stable is not told.
 
     Raises:
         UserError: a frequency that is not positive, or one that is missing.
@@ -120,7 +130,7 @@ def follow(
         >>> curve.folds.round(3).tolist()
         [1.463, 1.156]
     """
-    problem, hertz = balanced(system, harmonics, samples), _hertz(unit)
+    problem, hertz = _driven(balanced(system, harmonics, samples)), _hertz(unit)
     if over == "frequency":
         bounded("start", start, gt=0)
         bounded("stop", stop, gt=0)
@@ -160,7 +170,17 @@ def backbone(
     Raises:
         UserError: a mode that does not move the read-out, or that there is not.
     """
-    return nonlinear_modes.backbone(balanced(system, harmonics, samples), low, high, mode, output, report=report)
+    problem = balanced(system, harmonics, samples)
+    count = len(problem.assembly.outputs)
+    if not 0 <= output < count:
+        has = f"there are {count}, counted from 0" if count else "nothing is read; give output to structure"
+        raise UserError(f"output: there is no read-out {output}; {has}")
+    if not 0 <= mode < (modes := len(problem.parts[1][0].M)):
+        raise UserError(f"mode: there is no mode {mode}; there are {modes}, counted from 0")
+    bounded("low", low, gt=0)
+    if not high > low:
+        raise UserError(f"high: {high:g} is not above low, {low:g}; give the smaller amplitude first")
+    return nonlinear_modes.backbone(problem, low, high, mode, output, report=report)
 
 
 def _over(over: str, unit: str) -> str:

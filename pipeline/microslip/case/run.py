@@ -368,7 +368,8 @@ class _Left:
             finer = f"twice the harmonics ({e.harmonics}) and samples ({e.samples})"
             return [f"{where}: with {finer} no solution was found."]
         what = "harmonics" if e.by_harmonics > e.by_samples else "samples"
-        said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}."
+        said = f"mostly for want of {what}, with {balanced} and {e.samples} samples; raise {what}"
+        said += f" (and samples to {16 * (problem.harmonics + 2)} or more)." if what == "harmonics" else "."
         return [f"{where} by about {percent(share)}, {said}"]
 
     def _enough(
@@ -389,11 +390,11 @@ OPEN = 0.01
 
 def lifted(built: Built, found: HarmonicResponse) -> Array:
     """(f,) bool, points at which contacts would lift off though what stands for their law does not follow it."""
+    if built.settings.mode == "book":
+        return (found.open > OPEN).any(axis=1) & found.converged
     count = len(built.contacts)  # of a sector; the others of a ring follow
-    book = built.settings.mode == "book"
-    never = [i for i in range(found.open.shape[1]) if not book and not built.contacts[i % count].what.opens]
-    open_ = found.open > OPEN if book else found.open[:, never] > 0
-    return open_.any(axis=1) & found.converged
+    never = [i for i in range(found.open.shape[1]) if not built.contacts[i % count].what.opens]
+    return (found.open[:, never] > 0).any(axis=1) & found.converged
 
 
 def _lifting(built: Built, problem: Problem, found: HarmonicResponse, normal: float) -> list[str]:

@@ -48,7 +48,7 @@ FLOOR = 0.1
 read-out the error is a small one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Error:
     """Estimated error of a solution.
 
@@ -64,6 +64,10 @@ class Error:
     by_harmonics: float
     by_samples: float
     x: Array
+
+    def __repr__(self) -> str:
+        share = f"{100 * self.readout:.2g} %" if np.isfinite(self.readout) else "not known: no finer solution was found"
+        return f"<Error: {share} of {self.amplitude:.4g}, with {self.harmonics} harmonics and {self.samples} samples>"
 
     @property
     def readout(self) -> float:

@@ -52,7 +52,8 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     said = [f"The highest resonance is {_peak(max(rows, key=_size))}"]
     tops = [max((r for r in rows if r["normal_force_N"] == n), key=_size) for n in {r["normal_force_N"] for r in rows}]
-    if len(tops) > 1:
+    ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}
+    if len(tops) > 1 and not ends and not any(JUMPS in row.get("doubt", "") for row in rows):
         said[0] += f"; it is lowest with {_peak(min(tops, key=_size))}"
     said[0] += "."
     if stressed := [row for row in rows if "stress_amplitude_Pa" in row]:
@@ -77,6 +78,10 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     return said
 
 
+JUMPS = "another motion"
+"""In what speaks against a resonance beside which there is another motion, higher perhaps."""
+
+
 def _size(row: Mapping[str, Any]) -> float:
     return amplitude_of(row)[0]
 
@@ -94,7 +99,7 @@ def _resonances(rows: Sequence[Mapping[str, Any]]) -> Piece:
     first += ["doubt"] * doubts + [
         k for k in ("stress_amplitude_Pa", "reserve_factor", "damping_ratio") if k in rows[0]
     ]
-    order = [*first, *(k for k in rows[0] if k not in (*first, "doubt"))]
+    order = [*first, *(k for k in dict.fromkeys(k for row in rows for k in row) if k not in (*first, "doubt"))]
     return _table_of([{k: row.get(k, "") for k in order} for row in rows])
 
 
@@ -105,7 +110,7 @@ def warnings(messages: Sequence[str]) -> Piece:
         alike.setdefault(_DIFFERS.sub("#", message), []).append(message)
     told, folded = list[str](), list[Piece]()
     for first, *others in alike.values():
-        told.append(first + (f" The same of {len(others)} others, below." if others else ""))
+        told.append(first + (f" The same {len(others)} times more, below." if others else ""))
         if others:
             folded.append(fold(f'{len(others)} more like "{first[:60].rstrip()} ..."', say(*others)))
     return Piece("box", [say(*told), *folded], tone="warn")

@@ -57,7 +57,10 @@ def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = N
     Raises:
         UserError: one that is not finite or out of its bounds.
     """
-    at = np.asarray(value, dtype=float)
+    try:
+        at = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise UserError(f"{what}: {value!r} is no number; correct it") from None
     for kind, bound, good in (
         ("finite_number", None, np.isfinite(at)),
         ("greater_than", gt, gt is None or at > gt),

@@ -20,7 +20,9 @@ from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import ModalBasis, UserError
 from ..files import store
-from ..report.response import response_html
+from ..harmonic_balance.response import HarmonicResponse
+from ..harmonic_balance.sweeps import overhanging
+from ..report.response import JUMPS, response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
 from ..results.series import CONVERGED
@@ -70,9 +72,11 @@ def response_stage(
             "case": checkpoint.without_defaults(raw),
             "basis": hashes_of(files),
             "files": hashes_of(checkpoint.files_of(settings, case_path)),
-            "wanted": asdict(wanted),
         }
-        stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, wanted))
+        more = {"wanted": asdict(ALL)}  # what is there with all that can be made will do
+        if wanted == ALL or not stage.is_made(inputs | more):
+            more = {"wanted": asdict(wanted)}
+        stage.make(inputs | more, lambda: _work(stage, settings, raw, case_path, files, wanted))
         summary = json.loads(stage.product.read_text())
         if log:
             store.write_text(folder / "convergence.csv", convergence_table(read_response(folder / "response.h5")))
@@ -176,7 +180,7 @@ def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) 
         table = {name: float(series.columns()[name][i]) for name in ("damping_ratio", "slipping", "open")}
         errors = result.errors.get(normal, {})
         share = next((e for at, e in errors.items() if np.isclose(at, f, rtol=1e-9, atol=0)), None)
-        table |= {} if share is None else {"estimated_error": float(share)}
+        table |= {} if share is None or not np.isfinite(share) else {"estimated_error": float(share)}
         out.append(_ordered(row | table | {"doubt": _doubt(result, normal, f, series.status[i], share or 0.0)}))
     return out
 
@@ -194,7 +198,22 @@ def _doubt(result: CaseResult, normal: float, frequency: float, status: str, err
         return status
     if lifted(result.built, found)[beside].any():
         return "contacts would lift off: not valid"
-    return f"uncertain by about {percent(error)}: raise harmonics" if error > UNCERTAIN else ""
+    if _jumps(found, frequency) or any(
+        np.isclose(f, frequency) for f, _ in overhanging(found, result.resonances[normal])
+    ):
+        return f"beside it is {JUMPS}, higher perhaps: respond --over frequency"
+    if not np.isfinite(error):
+        return "uncertain: with more harmonics and samples no solution was found"
+    return f"uncertain by about {percent(error)}: raise harmonics and samples" if error > UNCERTAIN else ""
+
+
+def _jumps(found: HarmonicResponse, frequency: float) -> bool:
+    """Whether the response jumps to another motion within a step of a resonance."""
+    ok = np.flatnonzero(found.converged)
+    f, a = found.frequency[ok], np.abs(found.monitor[ok])
+    step = float(np.median(np.diff(found.frequency[found.asked])))
+    near = (np.diff(f) < 0.02 * step) & (np.abs(f[:-1] - frequency) < step)
+    return bool((near & (np.abs(np.diff(a)) > 0.2 * a.max(initial=0.0))).any())
 
 
 UNCERTAIN = 0.1

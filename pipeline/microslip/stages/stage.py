@@ -64,6 +64,10 @@ class Stage:
                 store.note_product(self.product, all_inputs, made.files, **made.note)
             return True
 
+    def is_made(self, inputs: Mapping[str, Any]) -> bool:
+        """Whether the product is up to date, and not to be made all the same."""
+        return not self.force and store.is_up_to_date(self.product, {**inputs, "code": hash_of_code(self.code)})
+
     def making(self) -> AbstractContextManager[None]:
         """What else belongs to the product is made under its lock, see `store.making`."""
         return store.making(self.product, self.report)

@@ -50,16 +50,18 @@ class Element:
         Raises:
             UserError: no such coordinate.
         """
-        return _row(self.at, count, "at") - (0.0 if self.to is None else _row(self.to, count, "to"))
+        to = 0.0 if self.to is None else _row(self.to, count, "element: to")
+        return _row(self.at, count, "element: at") - to
 
 
 def _row(at: Any, count: int, key: str) -> Array:
     if np.ndim(at):
         if np.shape(at) != (count,):
-            raise UserError(f"element: {key}: weights of shape {np.shape(at)}; the structure has {count} coordinates")
+            raise UserError(f"{key}: weights of shape {np.shape(at)}; the structure has {count} coordinates")
         return np.asarray(at, dtype=float)
+    bounded(key, at)
     if at != int(at) or not -count <= at < count:
-        raise UserError(f"element: {key}: there is no coordinate {at}; the structure has {count}, counted from 0")
+        raise UserError(f"{key}: there is no coordinate {at}; the structure has {count}, counted from 0")
     return np.eye(count)[int(at)]
 
 
@@ -149,7 +151,7 @@ def structure(
     C = C + _modal_damping(M, K, damping_ratio)
     f = _force(force, n)
     watched = [int(i) for i in (np.flatnonzero(f) if output is None else np.atleast_1d(output))]
-    rows = np.array([_row(i, n, "output") for i in watched]).reshape(-1, n)
+    rows = np.array([_row(i, n, "structure: output") for i in watched]).reshape(-1, n)
     nowhere = np.zeros(3)
     group = ModalGroup(
         speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
@@ -196,7 +198,9 @@ def _force(force: Any, n: int) -> Array:
     if force is None:
         return np.zeros(n, dtype=complex)
     if isinstance(force, Mapping):
-        f = sum((v * _row(i, n, "force").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex))
+        f = sum(
+            (v * _row(i, n, "structure: force").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex)
+        )
     else:
         f = np.atleast_1d(np.asarray(force, dtype=complex))
     if f.shape != (n,):
