@@ -131,7 +131,9 @@ def of_rows(rows: list[Any]) -> Array:
 
 
 def _told(row: Raw) -> Raw:
-    return {k: v for k, v in row.items() if k != "normal_force_N" and isinstance(v, float)}
+    """Without shares of points and samples, which flip as rounding has it, and with them the estimate of error."""
+    other = ("normal_force_N", "slipping", "open", "estimated_error")
+    return {k: v for k, v in row.items() if k not in other and isinstance(v, float)}
 
 
 def apart(a: dict[str, Array], b: dict[str, Array]) -> dict[str, float]:
