@@ -352,7 +352,13 @@ class _Left:
         looked_at = judged(problem, found, [f for f, _ in peaks])
         for point, estimate, share in looked_at if self.tolerance is not None else ():
             self._enough(problem, found, point, estimate, share, normal)
-        self.errors[normal] = {point.Omega / (2 * np.pi): share for point, _, share in looked_at}
+        self.errors[normal] = {  # of the resonance itself, not of another motion at its frequency
+            f: share
+            for f, height in peaks
+            for point, e, share in looked_at
+            if np.isclose(point.Omega / (2 * np.pi), f, rtol=1e-9, atol=0)
+            and np.isclose(e.amplitude, height, rtol=1e-3)
+        }
         if not looked_at:
             return []
         point, e, share = max(looked_at, key=lambda one: one[2])

@@ -50,7 +50,7 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if not rows:
         return ["No resonance was found in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
-    said = [f"The highest resonance is {_peak(max(rows, key=_size))}"]
+    said = [f"The highest resonance{' found' if doubtful else ''} is {_peak(max(rows, key=_size))}"]
     tops = [max((r for r in rows if r["normal_force_N"] == n), key=_size) for n in {r["normal_force_N"] for r in rows}]
     ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}
     if len(tops) > 1 and not ends and not any(JUMPS in row.get("doubt", "") for row in rows):
