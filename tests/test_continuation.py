@@ -462,7 +462,8 @@ def test_an_oscillator_with_a_gap_is_the_same_curve_from_both_ends(hardness):
         return hardness * np.maximum(q - gap, 0), hardness * (q > gap)[:, None] * by
 
     problem = sampled(law, 7, 64, 0.05, 0.3, 3.0)
-    ends = Settings(low=0.55, high=3.0, points=4000, step_max=0.005)  # the shortest leg between two folds is 0.004
+    longest = 0.02 if hardness == 100.0 else 0.005  # of the other ones the shortest leg between two folds is 0.004
+    ends = Settings(low=0.55, high=3.0, points=4000, step_max=longest)
     up = trace(problem, np.zeros(15), 0.55, ends)
     down = trace(problem, np.zeros(15), 3.0, replace(ends, direction=-1))
     assert up.lam[-1] == 3.0 and down.lam[-1] == 0.55 and goes_on(up, problem) and goes_on(down, problem)
