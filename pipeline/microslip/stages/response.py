@@ -7,7 +7,7 @@ import importlib.util
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -149,8 +149,9 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     points.begin()
     store.write_text(folder / "response.csv", response_table(result.responses))
     drawn = _drawn(result, folder) if wanted.pictures else {}
-    summary["resonances"] = _judged(_response(points, result, summary), result, summary["resonances"])
     response = _response(points, result, summary)
+    summary["resonances"] = _judged(response, result, summary["resonances"])
+    response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
     more = _assessed(result, response, folder, wanted, report)
@@ -177,7 +178,8 @@ def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) 
         normal, f = row["normal_force_N"], row["frequency_Hz"]
         series = response.one(normal_force=normal)
         i = int(np.abs(series.frequency - f).argmin())
-        table = {name: float(series.columns()[name][i]) for name in ("damping_ratio", "slipping", "open")}
+        columns = series.columns()
+        table = {name: float(columns[name][i]) for name in ("damping_ratio", "slipping", "open")}
         errors = result.errors.get(normal, {})
         share = next((e for at, e in errors.items() if np.isclose(at, f, rtol=1e-9, atol=0)), None)
         table |= {} if share is None or not np.isfinite(share) else {"estimated_error": float(share)}
