@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from microslip.data import Array
+from microslip.report.page import number, text
 from microslip.results import Response, Series, read_response
 from microslip.units import amplitude_of
 
@@ -58,9 +59,10 @@ def answer(folder: Path) -> Answer:
 def _agree(a: Answer) -> None:
     """The table, the page and the response file say the same as far as their digits go."""
     rows = a.summary["resonances"]
-    for row, told, cells in zip(rows, a.response.resonances, a.page, strict=True):  # the summary has stresses besides
+    shown = a.page if rows else []  # without one, that table tells what rises at the edge of the band
+    for row, told, cells in zip(rows, a.response.resonances, shown, strict=True):  # the summary has stresses besides
         np.testing.assert_allclose(*([r[k] for k in told if k != "doubt"] for r in (row, told)), rtol=1e-12)
-        assert {f"{told['frequency_Hz']:.5g}", f"{1e6 * amplitude_of(told)[0]:.4g}"} <= {*cells}
+        assert {text(number(told["frequency_Hz"], 5)), text(number(1e6 * amplitude_of(told)[0]))} <= {*cells}
     first, name = next(iter(a.response.labels)), next(c for c in a.table if c.startswith("amplitude_"))
     told = [s.arrays[first][asked(s), 0, 1] for s in a.response.series[:1]]
     np.testing.assert_allclose(a.table[name], np.abs(told[0]), rtol=1e-8)

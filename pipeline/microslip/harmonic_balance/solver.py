@@ -66,7 +66,7 @@ AT_MOST = 1e-5
 CONTRACTION = 0.03
 """Share of |R| that a step may leave for the derivative to be used again: it costs two or three residuals."""
 
-RISES = 15
+RISES = 5
 """How often a step is taken whole although |R| rises: the derivatives of the pieces that it leads to find the solution
 where shorter steps creep along the kinks. The vane of docs/python.md takes a fifth of the evaluations."""
 

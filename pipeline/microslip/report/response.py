@@ -160,7 +160,8 @@ def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
     """Of rows that have the same names. What is rounding beside the largest number of its unit is a zero."""
     columns = [_column(key) for key in rows[0]]
     units = [name.rpartition(" in ")[2] for _, name in columns]
-    values = [[v if f == 1 else v * f for v, (f, _) in zip(row.values(), columns, strict=True)] for row in rows]
+    scaled = [zip(row.values(), (factor for factor, _ in columns), strict=True) for row in rows]
+    values = [[v * f if isinstance(v, float) else v for v, f in row] for row in scaled]
     largest: dict[str, float] = {}
     for row in values:
         for unit, v in zip(units, row, strict=True):
