@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import sweep
 from .settings.mistakes import bounded
 from .system.assembly import Assembly
+
+if TYPE_CHECKING:
+    from .time_domain.orbit import Orbit
 
 Report = Callable[[str], None]
 System = Assembly | Built | Problem
@@ -45,8 +48,7 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
             )
         return system
     if isinstance(system, Built):
-        if waiting := [c.interface for c in system.contacts if swept(c)]:
-            raise UserError(f"contacts.{waiting[0]}: waits for a normal force; give normal_force to assemble, N")
+        _pressed(system)
         asked = {"harmonics": harmonics, "samples": samples}
         return problem_of(system, None, **{key: n for key, n in asked.items() if n is not None})
     if not isinstance(system, Assembly):
@@ -57,6 +59,17 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
     if samples is not None and samples < 4 * H:
         raise UserError(f"samples: {samples} are too few for {H} harmonics; take {4 * H} at least, better {16 * H}")
     return balance.of(system, H, max(64, 16 * H) if samples is None else samples)
+
+
+def _pressed(built: Built) -> Assembly:
+    """The assembly of a case.
+
+    Raises:
+        UserError: contacts that wait for a normal force.
+    """
+    if waiting := [c.interface for c in built.contacts if swept(c)]:
+        raise UserError(f"contacts.{waiting[0]}: waits for a normal force; give normal_force to assemble, N")
+    return built.assembly
 
 
 def _driven(problem: Problem) -> Problem:
@@ -191,3 +204,44 @@ def _hertz(unit: str) -> float:
     if unit not in HERTZ:
         raise UserError(f"unit: '{unit}' is none of {', '.join(HERTZ)}")
     return HERTZ[unit]
+
+
+def integrate(
+    system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
+    samples: int = 256, steps: int | None = None, start: Literal["static", "rest"] = "static",
+    report: Report = lambda _: None,
+) -> Orbit:  # fmt: skip
+    """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
+
+    Between contact forces the bodies move exactly, whatever their frequencies; the contacts' laws kick them. Where a
+    steady vibration is wanted, `harmonic_response` is faster; this finds what does not repeat, and what a start leads
+    to.
+
+    Args:
+        system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. settle: periods
+            that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
+            if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
+        start: ``static``, at rest under the steady loads, or ``rest``, at rest in the preloaded state.
+        report: is told what is under way.
+
+    Returns:
+        An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``; ``error`` of its last period.
+
+    Raises:
+        UserError: steps that are too few for the springs of the contacts. NotConverged: no state of rest is found.
+
+    Examples:
+        A mass that hits a stop once in every period:
+
+        >>> import microslip as ms
+        >>> hammer = ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[ms.stop(100.0, 0.5)])
+        >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
+        1
+    """
+    from .time_domain import equations, orbit
+
+    if isinstance(system, Built):
+        system = _pressed(system)
+    assembly = system.assembly if isinstance(system, Problem) else system
+    found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    return orbit.run(found, settle, keep, samples, steps, start, report)

@@ -76,6 +76,9 @@ class Stop(Spring):
     gap: Array = number()
     both: bool = static(default=False)
 
+    def overlap(self, u: Array) -> Array:
+        return (jnp.abs(u[:, 1]) if self.both else u[:, 1]) - self.gap
+
     def _pressed(self, u: Any) -> Any:
         over = (u > self.gap) * (u - self.gap)
         return over + (u < -self.gap) * (u + self.gap) if self.both else over

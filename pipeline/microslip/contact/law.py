@@ -212,6 +212,11 @@ class Law:
         """(n,) energy in J that an unloading can give back at most."""
         raise NotImplementedError
 
+    def overlap(self, u: Array) -> Array:
+        """(n,) m by which points at ``u`` (n, 3) are past their first touch. Below zero they hold no force and remember
+        nothing, and no way of that length closes them. NaN, the default: they never open, or it is not known."""
+        return jnp.full(u.shape[0], jnp.nan)
+
     def lost(self, step: Step) -> Array:
         """(n,) energy in J that a step takes for good, counted where it goes: friction times the path slid, dampers,
         stretched area that opens.

@@ -32,6 +32,10 @@ class Normal:
         """(n,) elastic energy, J: the integral of the force."""
         raise NotImplementedError
 
+    def touches(self) -> Array | float:
+        """m: the approach, of each point if they differ, below which there is no force; NaN: there always is one."""
+        return 0.0
+
     def scaled(self, share: Array) -> Normal | None:
         """The law of shares of the area, None where it has no number for that."""
         return None
@@ -56,6 +60,9 @@ class Penalty(Normal):
     def stored(self, u: Array) -> Array:
         return 0.5 * self.stiffness_0 * jnp.maximum(u - self.gap, 0.0) ** 2
 
+    def touches(self) -> Array | float:
+        return self.gap
+
     def scaled(self, share: Array) -> Penalty:
         return replace(self, stiffness_0=self.stiffness_0 * share)
 
@@ -74,6 +81,9 @@ class Preload(Normal):
 
     def share(self, u: Array) -> Array:
         return jnp.ones_like(u)
+
+    def touches(self) -> float:
+        return np.nan
 
     def stored(self, u: Array) -> Array:
         return self.constant * u
@@ -122,6 +132,9 @@ class Gapped(Normal):
 
     def share(self, u: Array) -> Array:
         return self.normal.share(u - self.gap)
+
+    def touches(self) -> Array | float:
+        return self.gap + self.normal.touches()
 
     def stored(self, u: Array) -> Array:
         return self.normal.stored(u - self.gap)

@@ -114,6 +114,9 @@ class PointContact(Law):
         stretched = ratio(state.elastic**2, self._springs(state.share))
         return self.normal.stored(u[:, 0]) + 0.5 * jnp.sum(stretched, axis=0)
 
+    def overlap(self, u: Array) -> Array:
+        return u[:, 0] - self.normal.touches()
+
     def lost(self, step: Step) -> Array:
         before, after = step.before, step.after
         slid = norm(after.slipped - before.slipped)

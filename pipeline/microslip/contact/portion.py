@@ -47,6 +47,9 @@ class Portion(Law):
     def stored(self, u: Array, state: State) -> Array:
         return self.share * self.whole.stored(u, state)
 
+    def overlap(self, u: Array) -> Array:
+        return self.whole.overlap(u)
+
     def lost(self, step: Step) -> Array:
         before, force = ((f.T / self.share).T for f in (step.force_before, step.force))
         return self.share * self.whole.lost(step._replace(force_before=before, force=force))

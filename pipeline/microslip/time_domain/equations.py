@@ -1,0 +1,171 @@
+"""An assembly as equations in time: linear bodies whose flow is known exactly, and contacts that kick them.
+
+With q of all bodies, v = q' and the loads' harmonics o = (1, cos h1 Omega t, sin h1 Omega t, ...), the motion between
+contact forces is linear with constant coefficients,
+
+    q' = v,  v' = M^-1 (B o - C v - K q),  o' = rotation of o,
+
+whatever the frequency: exp(A tau) gives it after any time tau, resonance and rigid motion included (Sextro Eq. (4.1-3)
+with the sign corrected). Contacts see d = D q + D_o o - R (F - F_0); R is the compliance that the modes leave out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from ..contact.patch import stuck_stiffness
+from ..data import Array, UserError
+from ..settings.mistakes import bounded
+from ..system.assembly import Assembly, Contact, Linear
+
+SEEN = 1e-12
+"""Share of the largest entry below which a coupling of modes by dampers counts as rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Real equations of motion in modal coordinates, M = 1, and rows of what is seen of them.
+
+    Attributes:
+        assembly. Omega: rad/s of the first harmonic of the loads. omega2: (m,) (rad/s)^2. C: (m, m) damping and
+            gyroscopic matrix over M. shapes: (m0, m) coordinates of the assembly per modal one.
+        harmonics: those of the loads, positive. B: (m, 1 + 2 H) modal forces of o.
+        D: (c, m), D_o: (c, 1 + 2 H) motion of the contact coordinates. R: (c, c) m/N. F_0: (c,) preload, N and N m.
+        output: (w, m), output_given: (w, 1 + 2 H), output_residual: (w, c); the read-outs are
+            y = output q + output_given o - output_residual (F - F_0).
+    """
+
+    assembly: Assembly
+    Omega: float
+    omega2: Array
+    C: Array
+    shapes: Array
+    harmonics: tuple[int, ...]
+    B: Array
+    D: Array
+    D_o: Array
+    R: Array
+    F_0: Array
+    output: Array
+    output_given: Array
+    output_residual: Array
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        return self.assembly.contacts
+
+    @cached_property
+    def turning(self) -> Array:
+        """(1 + 2 H, 1 + 2 H) o' over o."""
+        turns = [np.array([[0.0, -1.0], [1.0, 0.0]]) * h * self.Omega for h in self.harmonics]
+        return scipy.linalg.block_diag(np.zeros((1, 1)), *turns)
+
+    def oscillators(self, time: Array | float) -> Array:
+        """(..., 1 + 2 H) o at times (s)."""
+        angle = np.asarray(time)[..., None] * self.Omega * np.array(self.harmonics, dtype=float)
+        pairs = np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(*np.shape(time), -1)
+        return np.concatenate([np.ones((*np.shape(time), 1)), pairs], axis=-1)
+
+    @cached_property
+    def steady(self) -> Array | None:
+        """(m, 1 + 2 H) the periodic motion q = steady o that open contacts leave; None: there is none (a resonance
+        without damping, a body that nothing holds under a force)."""
+        m = len(self.omega2)
+        found = np.zeros((m, 1 + 2 * len(self.harmonics)))
+        K = np.diag(self.omega2)
+        for i, h in enumerate((0, *self.harmonics)):
+            w = h * self.Omega
+            S = K + 1j * w * self.C - w**2 * np.eye(m)
+            f = self.B[:, 0] + 0j if h == 0 else self.B[:, 2 * i - 1] - 1j * self.B[:, 2 * i]
+            q, *_ = np.linalg.lstsq(S, f, rcond=1e-14)
+            if np.abs(S @ q - f).max(initial=0.0) > 1e-8 * np.abs(f).max(initial=0.0):
+                return None
+            if h == 0:
+                found[:, 0] = q.real
+            else:
+                found[:, 2 * i - 1], found[:, 2 * i] = q.real, -q.imag
+        return found
+
+    @cached_property
+    def springs(self) -> Array:
+        """(c, c) N/m of the closed, sticking contacts on bodies that yield at once by R; of one that stiffens as it is
+        pressed, the stiffest within `DEEPEST`."""
+        k = scipy.linalg.block_diag(np.zeros((0, 0)), *map(_stiffest, self.contacts))
+        return k @ np.linalg.inv(np.eye(len(k)) + self.R @ k)
+
+    @cached_property
+    def fastest(self) -> float:
+        """rad/s: the highest frequency of the bodies with their contacts closed and stuck."""
+        K = np.diag(self.omega2) + self.D.T @ self.springs @ self.D
+        return float(np.sqrt(max(np.linalg.eigvalsh(0.5 * (K + K.T)).max(initial=0.0), 0.0)))
+
+    @cached_property
+    def rate(self) -> float:
+        """rad/s: of the contacts' springs on bodies without springs of their own. Kicks are stable up to steps of
+        2 / rate."""
+        K = self.D.T @ self.springs @ self.D
+        return float(np.sqrt(max(np.linalg.eigvalsh(0.5 * (K + K.T)).max(initial=0.0), 0.0)))
+
+
+DEEPEST = 6.6e-5
+"""m: how deep contacts that stiffen are taken to be pressed where their largest stiffness is needed."""
+
+
+def _stiffest(contact: Contact) -> Array:
+    """(k, k) N/m."""
+    found, at = contact.stiffness, np.zeros_like(contact.offset)
+    for at[0] in DEEPEST / 4.0 ** np.arange(9):
+        k = stuck_stiffness(contact.patch, at)
+        found = k if np.trace(k) > np.trace(found) else found
+    return found
+
+
+def of(assembly: Assembly, Omega: float) -> Equations:
+    """The equations of an assembly driven at a frequency (rad/s); a sector that stands for a ring is unrolled.
+
+    Loss factors of bodies count as dampers that take as much at that frequency.
+
+    Raises:
+        UserError: a frequency that is not positive; modes that are not real.
+    """
+    bounded("frequency", Omega / (2 * np.pi), gt=0)
+    assembly = assembly.unrolled()
+    assembly.check_names()
+    harmonics = tuple(sorted({x.harmonic for x in assembly.loads if x.harmonic}))
+    parts = {h: assembly.joined(h) for h in (0, 1, *harmonics)}
+    mean, first = parts[0], parts[1]
+    M, K, C, rows = (_real(a, assembly) for a in (first.M, mean.K, first.viscous(Omega), mean.rows))
+    omega2, V = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+    omega2 = np.where(np.abs(omega2) < SEEN * np.abs(omega2).max(initial=0.0), 0.0, omega2)
+    C = V.T @ C @ V
+    C = np.where(np.abs(C) < SEEN * np.abs(C).max(initial=0.0), 0.0, C)
+    D = rows @ V
+    F_0 = np.concatenate([c.preload for c in assembly.contacts]) if assembly.contacts else np.zeros(0)
+    B = _of_harmonics(parts, harmonics, lambda p: V.T @ p.load)
+    return Equations(
+        assembly, float(Omega), omega2, C, V, harmonics, B, D,
+        _of_harmonics(parts, harmonics, lambda p: p.given), _real(mean.residual, assembly), F_0,
+        _real(mean.output, assembly) @ V, _of_harmonics(parts, harmonics, lambda p: p.output_given),
+        _real(mean.output_residual, assembly),
+    )  # fmt: skip
+
+
+def _real(values: Array, assembly: Assembly) -> Array:
+    if np.abs(values.imag).max(initial=0.0) > 1e-9 * np.abs(values).max(initial=0.0):
+        names = ", ".join(c.name for c in assembly.components)
+        raise UserError(f"{names}: has complex modes, which a motion in time cannot take; leave the flow or speed out")
+    return np.ascontiguousarray(values.real)
+
+
+def _of_harmonics(parts: dict[int, Linear], harmonics: Sequence[int], of: Callable[[Linear], Array]) -> Array:
+    """(n, 1 + 2 H): complex amplitudes a of every harmonic as Re(a exp(i h Omega t)) = a' cos - a'' sin."""
+    columns = [of(parts[0]).real]
+    for h in harmonics:
+        a = of(parts[h])
+        columns += [a.real, -a.imag]
+    return np.stack(columns, axis=1)

@@ -1,0 +1,172 @@
+"""Motion in time: exact flows, order of accuracy, energy, impacts, harmonic balance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import microslip as ms
+from microslip.contact.friction import Coulomb
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import value
+from microslip.contact.normal import Normal, Penalty, Rough
+from microslip.contact.patch import Patch
+from microslip.contact.point import PointContact
+from microslip.data import UserError
+from microslip.system import Body, Contact, Force, Monitor, Spring, System
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.component import Component
+from microslip.time_domain import equations, orbit
+from microslip.time_domain.stepper import Options, Stepper
+
+MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
+"""Of the impact oscillator of Sextro, section 4.2: kg, N/m, N s/m, m."""
+
+
+def patch(normal: Normal, damping: float = 0.0, mu: float = 0.0, stiffness: float = 0.0) -> Patch:
+    law = PointContact(normal, Coulomb(value(mu)), value(stiffness), None, value(damping) if damping else None)
+    return Patch("stop", np.zeros((1, 2)), np.ones(1), law)
+
+
+def hitting(touching: Patch, normal: float | None = None, push: float = STIFFNESS * FOOT) -> Assembly:
+    """The mass of section 4.2 on its spring, which barely touches its stop at rest, or is pressed against it."""
+    spring = Spring("ground", "mass", (STIFFNESS, 4e4, 3e4))
+    faces = [Contact("stop", "mass", (1, 0, 0), t2=(0, 0, 1))]
+    forces = [Force("foot", "mass", (1, 0, 0)), Force("side", "mass", (0.2, 1, 0.5))]
+    basis = System("oscillator", [Body("mass", MASS, (0, 0, 0))], [spring], faces, forces, [Monitor("mass", "mass")])
+    group = basis.basis().groups[0, 0]
+    row = group.excitations["foot"].rows[0]
+    group = replace(group, C_r=group.C_r + DAMPING * np.outer(row, row))
+    contact = preloaded_contact("stop", touching, ContactFace("mass", "stop"), None, normal, 0.0)
+    outputs = tuple(Output("mass", "mass", f"u_{x}") for x in "xyz")
+    load = Load("mass", "foot" if normal is None else "side", push)
+    return Assembly((Component("mass", {0: group}),), (contact,), (load,), outputs)
+
+
+BOOK = patch(Rough(value(0.3e6), value(5.2e-6), Polynomial()), damping=6.0 / 0.3e6)
+
+
+def test_bodies_alone_move_exactly_at_resonance_and_with_few_steps() -> None:
+    """x'' + x = cos t from rest is t sin(t) / 2, and a body that nothing holds goes as (1 - cos t)."""
+    M, K = np.diag([1.0, 2.0]), np.diag([1.0, 0.0])
+    found = ms.integrate(ms.structure(M, K, force={0: 1.0, 1: 2.0}, output=[0, 1]), 1.0, unit="rad/s", settle=0, keep=9)
+    t = found.time
+    np.testing.assert_allclose(found.y[0], 0.5 * t * np.sin(t), atol=1e-9)
+    np.testing.assert_allclose(found.y[1], 1 - np.cos(t), atol=1e-9)
+    np.testing.assert_allclose(found.v[0], 0.5 * (np.sin(t) + t * np.cos(t)), atol=1e-9)
+    assert found.balance < 1e-11
+
+
+def test_gyroscopic_bodies_move_exactly() -> None:
+    """Dampers that couple all modes: against Radau."""
+    K, C = np.array([[3.0, -1.0], [-1.0, 2.0]]), np.array([[0.1, 0.7], [-0.7, 0.05]])
+    found = ms.integrate(
+        ms.structure(np.eye(2), K, C, force={0: 1.0}, output=[0, 1]), 1.3, unit="rad/s", settle=0, keep=3, samples=32
+    )
+
+    def rate(t: float, z: np.ndarray) -> np.ndarray:
+        return np.concatenate([z[2:], np.array([np.cos(1.3 * t), 0]) - K @ z[:2] - C @ z[2:]])
+
+    exact = solve_ivp(rate, (0, found.time[-1]), np.zeros(4), "DOP853", found.time, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(found.y, exact.y[:2], atol=1e-9)
+    assert found.balance < 1e-11
+
+
+def book_force(u: float, rate: float) -> float:
+    """The stop of section 4.2 by hand: Sextro Eqs. (4.1-16), (3.3-21), (3.3-24), clipped at zero; N."""
+    x = min(max(u / 5.2e-6, 0.0), 1.0)
+    volume, area = x**3 * (1 - 0.5 * x) + max(u / 5.2e-6 - 1, 0.0), x * x * (3 - 2 * x)
+    return max(0.3e6 * 5.2e-6 * volume + 6.0 * area * rate, 0.0)
+
+
+def test_an_impact_oscillator_of_the_book_in_second_order() -> None:
+    """Three periods of section 4.2 at 64.32 rad/s against an integration of the printed equations by hand: the error
+    falls with the square of the step."""
+    Omega, samples = 64.32, 64
+    e = equations.of(hitting(BOOK), Omega)
+
+    def rate(t: float, z: np.ndarray) -> list[float]:
+        push = STIFFNESS * FOOT * np.cos(Omega * t) - STIFFNESS * z[0] - DAMPING * z[1]
+        return [z[1], (push - book_force(z[0], z[1])) / MASS]
+
+    times = 2 * np.pi / Omega / samples * np.arange(1, 3 * samples + 1)
+    exact = solve_ivp(rate, (0, times[-1]), [0, 0], "Radau", times, rtol=1e-11, atol=1e-15, max_step=1e-4).y[0]
+    size, errors = np.abs(exact).max(), []
+    for steps in (2048, 4096, 8192, 16384):
+        found = orbit.run(e, 0, 3, samples, steps, "rest")
+        errors.append(np.abs(found.y[0] - exact).max() / size)
+    order = -np.polyfit(np.arange(4), np.log2(errors), 1)[0]
+    assert errors[-1] < 1e-5 and 1.8 < order < 2.4
+
+
+def test_leaps_over_flights_change_nothing() -> None:
+    """The same with every step taken, to rounding as the contact multiplies it; in less steps."""
+    e = equations.of(hitting(BOOK), 64.32)
+    found = []
+    for leaps in (True, False):
+        s = Stepper(e, 2 * np.pi / 64.32 / 8192)
+        s.__dict__["options"] = Options(False, leaps, True)
+        _, seen = s.run(s.start(np.zeros(3), np.zeros(3)), np.full(128, 128))
+        found.append(np.asarray(seen.q))
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9 * np.abs(found[1]).max())
+
+
+def test_energy_is_kept_to_rounding_and_what_contacts_do_with_it_to_second_order() -> None:
+    """With friction, lift-off and dampers in three dimensions."""
+    e = equations.of(hitting(patch(Penalty(value(2e5)), mu=0.3, stiffness=1e5), normal=0.5, push=1.5), 300.0)
+    found = [orbit.run(e, 3, 2, 64, steps) for steps in (2048, 4096)]
+    assert max(one.balance for one in found) < 1e-8
+    assert found[0].count("slips") and found[0].count("opens")
+    assert found[1].drift < 0.4 * found[0].drift < 4e-3
+
+
+def test_a_viscous_contact_throws_back_what_its_closed_form_says() -> None:
+    """Met by a body without other springs with 0.1 m/s: it leaves where the force ends, with exp(-D w t) of that speed,
+    tan(w sqrt(1 - D^2) t) = 2 D sqrt(1 - D^2) / (2 D^2 - 1). The damper begins with a jump: first order in steps."""
+    k, beta, speed = 3e5, 2e-4, 0.1
+    free = replace(hitting(patch(Penalty(value(k)), damping=beta)), loads=())
+    e = equations.of(free, 2 * np.pi * 10)
+    e = replace(e, omega2=np.zeros(3), C=np.zeros((3, 3)))
+    s = Stepper(e, 1e-7)
+    along = e.D[0] / (e.D[0] @ e.D[0])
+    _, seen = s.run(s.start(-1e-4 * along, speed * along), np.full(64, 2**11))
+    rates = np.asarray(seen.q_dot) @ e.D[0]
+    w, D = np.sqrt(k / MASS), beta * np.sqrt(k / MASS) / 2
+    root = np.sqrt(1 - D**2)
+    left = np.arctan2(2 * D * root, 2 * D**2 - 1) / (w * root)
+    assert rates[0] == pytest.approx(speed) and rates[-1] == pytest.approx(-speed * np.exp(-D * w * left), rel=1e-4)
+
+
+@pytest.mark.parametrize("frequency", [0.8, 1.0])
+def test_a_steady_vibration_is_that_of_harmonic_balance(frequency: float) -> None:
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+    found = ms.integrate(slider, frequency, unit="rad/s", settle=150, keep=2, steps=4096)
+    balanced = ms.harmonic_response(slider, [frequency], harmonics=15, samples=4096, unit="rad/s").amplitude[0]
+    assert 2 / 256 * abs(np.fft.rfft(found.y[0][-256:])[1]) == pytest.approx(balanced, rel=1e-4)
+    assert found.repeats == 1
+
+
+def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
+    """Section 4.2: what the book calls period two at 30.84 rad/s is two impacts in one period of the excitation."""
+    for Omega, periods, impacts in ((64.32, 1, 1), (30.84, 1, 2), (37.41, 2, 3)):
+        found = orbit.run(equations.of(hitting(BOOK), Omega), 300, 8)
+        assert (found.repeats, found.impacts * found.repeats) == (periods, impacts) and found.error < 1e-4
+
+
+def test_too_few_steps_are_refused_with_how_many_are_needed() -> None:
+    with pytest.raises(UserError, match="take 158 or more"):
+        orbit.run(equations.of(hitting(BOOK), 40.0), 0, 1, steps=20)
+
+
+def test_a_static_start_is_the_balance_of_steady_loads_and_contact() -> None:
+    """Pressed by 2 N into a penalty spring beside its own: u = F / (k + c)."""
+    base = hitting(patch(Penalty(value(3e5))))
+    pressed = replace(base, loads=(Load("mass", "foot", 2.0, 0),))
+    q, _ = orbit.begun(equations.of(pressed, 10.0), "static")
+    e = equations.of(pressed, 10.0)
+    assert (e.output @ q)[0] == pytest.approx(2.0 / (3e5 + STIFFNESS), rel=1e-9)
+    assert jnp.isfinite(q).all()
