@@ -456,6 +456,10 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.fitted_at": ("N", "at which load; if not given the force that presses it: its own, or each of the sweep"),
     "contacts.isotropic": ("", "geometric mean of both tangential stiffnesses of a curved patch, as the book's mode "
                            "needs it"),
+    "springs.row": ("", "excitation of a body, `body:excitation` where there are several: its point and direction"),
+    "springs.stiffness": ("N/m", "of the spring"),
+    "springs.damping": ("N s/m", "of a damper beside it, against the ground"),
+    "springs.motion": ("m", "0-peak, of its far end: moves as cos of the driving frequency"),
     "sweep.start": ("Hz", "first frequency"),
     "sweep.stop": ("Hz", "last one"),
     "sweep.points": ("", "equally spaced"),
@@ -483,6 +487,15 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "curve.frequency": ("Hz", "at which load or normal force vary; the highest resonance in the sweep's band if not "
                         "given, at the first normal force where that varies"),
     "curve.points": ("", "of a curve at most"),
+    "orbit.frequency": ("Hz", "of the first harmonic of the excitations: one or several, one motion each"),
+    "orbit.Omega": ("rad/s", "or so"),
+    "orbit.settle": ("", "periods that are left to themselves"),
+    "orbit.keep": ("", "periods that are kept"),
+    "orbit.samples": ("", "of each that is kept"),
+    "orbit.steps": ("", "of each; if not given, 150 in a period of the fastest motion with closed contacts, and 512 at "
+                    "least"),
+    "orbit.start": ("", "at rest under the steady loads, or as preloaded"),
+    "orbit.normal_force": ("N", "of the contacts that the sweep presses"),
     "identification.ratio": ("", "c_T / c_N, kept"),
     "identification.stiffnesses": ("N/m", "c_N of further curves in the diagram"),
     "identification.modes": ("", "how many are drawn"),

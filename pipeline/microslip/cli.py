@@ -368,6 +368,30 @@ def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], forc
 
 
 @app.command
+def orbit(
+    case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """Motion in time of a case from rest, as [orbit] asks: phase portraits, impacts, periods after which it comes back.
+
+    Args:
+        case: a case.toml, the folder that holds it, its name, or its products.
+        basis: see respond.
+    """
+    from .case import load_case
+    from .stages.orbit import orbit_stage
+    from .stages.places import existing_files
+
+    case = _case_file(case)
+    with progress(f"orbit {case}", quiet) as report:
+        settings, _ = load_case(case, list(set_))
+        files = existing_files(settings, case, basis, Path("."))
+        made, sentences, fine = orbit_stage(case, files, Path("build") / settings.name, list(set_), force, report)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not fine:
+        raise NotConverged(f"a motion diverged; {made[0]} holds what was found until then")
+
+
+@app.command
 def backbone(
     case: Path, basis: Path | None = None, /, *, mode: int | None = None, low: float | None = None,
     high: float | None = None, set_: Set = (), quiet: Quiet = False,

@@ -27,7 +27,7 @@ from ..system.component import Component, Ring
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
 from .compliance import Face, Springs, counted_once, residual_share
-from .driving import as_asked, damped, flow_of, loads_of, messages_of, with_field
+from .driving import as_asked, damped, flow_of, loads_of, messages_of, on_springs, with_field
 from .points import (
     curved_springs,
     fitting_forces,
@@ -160,6 +160,8 @@ def _loaded(settings: CaseSettings, b: BodyOfCase, basis: ModalBasis, path: Path
         groups = damped(groups, ratios, f"{path}: {whose}damping_ratio")
     if b.weak_springs is not None:
         groups = {k: on_weak_springs(g, b.weak_springs, f"{path}: {key}weak_springs") for k, g in groups.items()}
+    own = [(row, s) for s in settings.springs for body, row in [settings.address(s.row)] if body == b.name]
+    groups = {k: on_springs(g, own, f"{path}: springs") for k, g in groups.items()}
     return Loaded(b, basis, stored, groups, viscous)
 
 
@@ -553,7 +555,8 @@ def _loads(
             found += loads_of(x, body, row, base, blades, turning)
         except UserError as error:
             raise UserError(f"{path}: excitations.{x.row or x.face}: {error}") from error
-    return tuple(named.values()), tuple(found), said
+    moved = [(*settings.address(s.row), s.stiffness * s.motion) for s in settings.springs if s.motion]
+    return tuple(named.values()), (*found, *(Load(*one) for one in moved)), said
 
 
 def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str) -> tuple[Output, ...]:

@@ -46,6 +46,19 @@ class MagnetsOfCase(Model):
         return self
 
 
+class SpringOfCase(Model):
+    """A spring from a body to the ground, where and along which an excitation of the body pushes.
+
+    row: ``excitation``, or ``body:excitation``, of one force at a point. stiffness: N/m. damping: N s/m against the
+    ground. motion: m, 0-peak, with which the far end of the spring moves, as cos of the driving frequency.
+    """
+
+    row: Address
+    stiffness: Positive
+    damping: NotNegative = 0.0
+    motion: NotNegative = 0.0
+
+
 class ExcitationOfCase(Model):
     """A harmonic force: a row of a body's modal file times an amplitude (N, or Pa for a unit pressure).
 
@@ -128,6 +141,22 @@ def pattern_of(m: MagnetsOfCase):  # type: ignore[no-untyped-def]  # noqa: ANN20
 
 
 # --- from settings to loads ------------------------------------------------------------------------------------------
+
+
+def on_springs(group: ModalGroup, springs: Sequence[tuple[str, SpringOfCase]], key: str) -> ModalGroup:
+    """The group with springs and dampers to the ground along rows of its excitations.
+
+    Raises:
+        UserError: no excitation of that name.
+    """
+    K, C = group.K_r, group.C_r
+    for row, s in springs:
+        if row not in group.excitations:
+            known = ", ".join(group.excitations) or "none"
+            raise UserError(f"{key}: there is no excitation '{row}' to attach it to; the body has {known}")
+        w = group.excitations[row].rows[0]
+        K, C = K + s.stiffness * np.outer(w.conj(), w), C + s.damping * np.outer(w.conj(), w)
+    return replace(group, K_r=K, C_r=C) if springs else group
 
 
 def base_of(excitations: Sequence[ExcitationOfCase], given: int | None, turning: Turning) -> int:

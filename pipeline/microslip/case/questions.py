@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -125,3 +126,32 @@ class IdentificationOfCase(Model):
     ratio: Positive = 0.5
     stiffnesses: Positives = ()
     modes: Annotated[int, Field(ge=1, le=100)] = 3
+
+
+class OrbitOfCase(Model):
+    """The motion in time from a start, by `microslip orbit`.
+
+    frequency: Hz, or Omega: rad/s, of the first harmonic of the excitations: one, or several to look at one after the
+    other. settle: periods that are left to themselves. keep: periods that are kept. samples: of each. steps: of each,
+    if not given as many as the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
+    loads, ``rest`` as preloaded. normal_force: N, of the contacts that the sweep presses.
+    """
+
+    frequency: Positives | None = None
+    Omega: Positives | None = None
+    settle: Annotated[int, Field(ge=0, le=1000000)] = 300
+    keep: Annotated[int, Field(ge=1, le=100000)] = 40
+    samples: Annotated[int, Field(ge=8, le=8192)] = 256
+    steps: Annotated[int, Field(ge=1, le=100000000)] | None = None
+    start: Literal["static", "rest"] = "static"
+    normal_force: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> OrbitOfCase:
+        if not self.frequency and not self.Omega or self.frequency and self.Omega:
+            raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, and not both")
+        return self
+
+    @property
+    def hertz(self) -> tuple[float, ...]:
+        return self.frequency or tuple(w / (2 * math.pi) for w in self.Omega or ())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -31,10 +32,10 @@ from ..settings.body import (
     validate,
 )
 from ..system.excitation import Turning
-from .driving import ROTATION, ExcitationOfCase, base_of
+from .driving import ROTATION, ExcitationOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
-from .questions import CurveOfCase, IdentificationOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
+from .questions import CurveOfCase, IdentificationOfCase, OrbitOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
 
 FIRST_HARMONICS = 3
 """With which ``harmonics = "auto"`` begins."""
@@ -290,6 +291,7 @@ class CaseSettings(Model):
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
     periodicity: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
     memory_limit: Positive | None = None
+    springs: Annotated[tuple[SpringOfCase, ...], BeforeValidator(_tuple)] = ()
     contacts: Annotated[tuple[ContactSettings, ...], BeforeValidator(_tuple)]
     sweep: Sweep
     material_limits: MaterialLimits | None = None
@@ -297,19 +299,34 @@ class CaseSettings(Model):
     speeds: SpeedsOfCase | None = None
     ranges: RangesOfCase | None = None
     curve: CurveOfCase | None = None
+    orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _swept(cls, raw: Any) -> Any:
+        """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
+        if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
+            raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
+        return raw
+
+    @property
+    def is_only_in_time(self) -> bool:
+        """Whether it asks for motions in time and for no sweep."""
+        return self.orbit is not None and self.sweep == Sweep.model_validate(band_of(self.orbit.model_dump()))
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
+        moved = any(s.motion for s in self.springs) and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
-            if bool(getattr(self, short)) == bool(getattr(self, many)):
+            if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
                 raise ValueError(f"{short}: give {short}, or one or more [[{many}]], and not both")
         names = [b.name for b in self.components]
         if twice := sorted({n for n in names if names.count(n) > 1}):
             raise ValueError(f"bodies: the name '{twice[0]}' is taken; give every body its own")
         if said := self._whose():
             raise ValueError(said)
-        if all(x.is_zero for x in self.loads):
+        if self.loads and all(x.is_zero for x in self.loads):
             key = "excitations" if self.excitations else "amplitude"
             raise ValueError(f"{key}: a force of 0 moves nothing; give its size in N (Pa of a pressure)")
         if said := self._met_twice():
@@ -352,6 +369,7 @@ class CaseSettings(Model):
         """A sentence where there are several bodies and a name does not say which of them has it; else nothing."""
         named = [("contacts", end) for c in self.contacts for end in (c.interface, c.against) if end != GROUND]
         named += [("excitations", x.row or x.face or "") for x in self.loads]
+        named += [("springs", s.row) for s in self.springs]
         named += [("monitors", m.monitor) for m in self.outputs]
         open_ = [(key, name) for key, name in named if ":" not in name]
         if not open_ or len(self.components) == 1:
@@ -433,7 +451,8 @@ class CaseSettings(Model):
     @property
     def loads(self) -> tuple[ExcitationOfCase, ...]:
         """The excitations; one that the short form names."""
-        return self.excitations or (ExcitationOfCase(row=self.excitation or "", amplitude=self.amplitude),)
+        short = () if self.excitation is None else (ExcitationOfCase(row=self.excitation, amplitude=self.amplitude),)
+        return self.excitations or short
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -464,6 +483,17 @@ class CaseSettings(Model):
         """Body and row of ``body:row``; the only body of the case where none is named."""
         body, _, row = text.rpartition(":")
         return body or self.components[0].name, row
+
+
+def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
+    """Start and stop (Hz) of the sweep of a case that has none: an octave around what is asked of its motion in time;
+    nothing where that says no numbers."""
+    for key, unit in (("frequency", 1.0), ("Omega", 2 * math.pi)):
+        values = orbit.get(key)
+        asked = [v for v in (values if isinstance(values, list | tuple) else [values]) if isinstance(v, int | float)]
+        if asked and min(asked) > 0:
+            return {"start": 0.5 * min(asked) / unit, "stop": 2.0 * max(asked) / unit}
+    return {}
 
 
 def load_case(path: Path | str, assignments: list[str] | None = None) -> tuple[CaseSettings, dict[str, Any]]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import checkpoint, load_case
+from ..case import CaseSettings, checkpoint, load_case
 from ..case.comparison import Pair, comparison_table, paired
 from ..data import Array, UserError
 from ..files import store
@@ -19,6 +19,7 @@ from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
 from .job import Job, open_job
 from .modal import modes_stage, system_stage
+from .orbit import orbit_stage
 from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
@@ -47,10 +48,21 @@ def run_body(
         files |= modal_files(case, job.case_file, job.root, report, known=files)
     with response_of_case(job.build_folder, report=report).making():
         if job.case_file is not None:
-            response, converged = response_stage(
-                job.case_file, files, job.build_folder, force=force, report=report, wanted=wanted
-            )
+            response, converged = _answered(job.case_file, case, files, job.build_folder, None, force, report, wanted)
         return report_stage(job, response, force, report, wanted.pictures), converged
+
+
+def _answered(
+    path: Path, case: CaseSettings, files: Mapping[str, Path], folder: Path, assignments: list[str] | None,
+    force: bool, report: Report, wanted: Wanted,
+) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
+    """The response of a case, None if it asks for motions in time alone, and those; whether all of it converged."""
+    response, converged = None, True
+    if not case.is_only_in_time:
+        response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
+    if case.orbit is not None:
+        converged = orbit_stage(path, files, folder, assignments, force, report)[2] and converged
+    return response, converged
 
 
 def run_case_file(
@@ -67,13 +79,11 @@ def run_case_file(
     if case.body is not None and case.body == case.name:
         job = open_job(find_body(path, case.body, Path(".")))
         with response_of_case(job.build_folder, report=report).making():
-            response, converged = response_stage(
-                path, files, job.build_folder, assignments, force, report, wanted=wanted
-            )
+            response, converged = _answered(path, case, files, job.build_folder, assignments, force, report, wanted)
             return report_stage(job, response, force, report, wanted.pictures), converged
     folder = Path(".") / "build" / case.name
-    _, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
-    return folder / "response.csv", converged
+    _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
+    return folder / ("orbit.html" if case.is_only_in_time else "response.csv"), converged
 
 
 def run_system(

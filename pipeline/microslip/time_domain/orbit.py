@@ -33,7 +33,7 @@ STABLE = 1.8
 """Steps times the rate of the contacts above which kicks may grow; they do above 2."""
 
 CHUNK = 16
-"""Periods between two reports, as long as they settle."""
+"""Periods between two reports."""
 
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
@@ -47,8 +47,8 @@ class Orbit:
         equations. labels: of the read-outs, ``monitor direction``. samples: of a period. steps: of a period.
         time: (s,) s. y, v: (w, s) read-outs in m and their velocities in m/s. q, q_dot: (m, s) modal coordinates of
             `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
-        energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads, ``damped``,
-            and ``contacts``, done on them; of that ``stored`` and ``lost``, nan where a law does not tell.
+        energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads,
+            ``damped``, and ``contacts``, done on them; of that ``stored`` and ``lost``, nan where a law does not tell.
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
         error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
             read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
@@ -136,10 +136,16 @@ class Orbit:
         return float(np.ptp(left) / size) if size else 0.0
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:
-        """Its phase portrait: velocity over displacement of a read-out, and the points after every period."""
-        from ..pictures.orbit import portrait
+        """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period."""
+        if axes is None:
+            import matplotlib.pyplot as plt
 
-        return portrait(self, axes, read_out)
+            axes = plt.subplots(layout="constrained")[1]
+        y, v, last = self.y[read_out], self.v[read_out], slice(self.samples - 1, None, self.samples)
+        axes.plot(y, v, linewidth=0.8)
+        axes.plot(y[last], v[last], "o", label="after every period")
+        axes.set(xlabel=f"{self.labels[read_out]} in m", ylabel="velocity in m/s")
+        return axes
 
 
 def run(
@@ -172,7 +178,8 @@ def run(
             kept.append(Seen._make(map(np.asarray, seen)))
             events.append(np.asarray(now.events)[: min(int(now.count), EVENTS)])
             missed += max(0, int(now.count) - EVENTS)
-        report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
+        if done % CHUNK == 0 or done in (settle, settle + keep):
+            report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
     return replace(_orbit(stepper, kept, events, missed, samples, each), error=_error(stepper, now, samples, each))
 
 

@@ -1,0 +1,140 @@
+"""Motions in time of a case: a table, all samples in HDF5, pictures and a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import CaseSettings, checkpoint, load_case
+from ..case.assemble import build, swept
+from ..data import UserError
+from ..files import store
+from ..files.hdf5 import create, put
+from ..files.tables import columns_csv
+from ..report.response import survey_html
+from ..time_domain import equations, orbit
+from ..time_domain.orbit import KINDS, Orbit
+from .checkpoint import hashes_of
+from .stage import Made, Report, Stage
+
+
+def orbit_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """The motions in time that a case asks for, in a folder.
+
+    Args:
+        files: body of the case -> its modal file.
+
+    Returns:
+        The files, a sentence a motion, and whether none diverged.
+
+    Raises:
+        UserError: the case asks for none.
+    """
+    settings, raw = load_case(case_path, assignments)
+    if settings.orbit is None:
+        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz) or Omega (rad/s)")
+    stage = Stage(folder / "orbit.json", ("stages.orbit",), force, report)
+    inputs = {
+        "case": checkpoint.without_defaults(raw),
+        "basis": hashes_of(files),
+        "files": hashes_of(checkpoint.files_of(settings, case_path)),
+    }
+    stage.make(inputs, lambda: _work(stage, settings, case_path, files))
+    told = json.loads(stage.product.read_text())
+    return [folder / name for name in told["files"]], told["sentences"], not told["diverged"]
+
+
+def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path]) -> Made:
+    from ..pictures.orbit import orbit_picture, portraits
+
+    folder, asked = stage.product.parent, settings.orbit
+    assert asked is not None
+    built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
+    if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
+        raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
+    assembly, found = built.pressed(asked.normal_force), list[tuple[str, Orbit]]()
+    for f in asked.hertz:
+        name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
+
+        def tell(text: str, name: str = name) -> None:
+            stage.report(f"{name}: {text}")
+
+        driven = equations.of(assembly, 2 * np.pi * f)
+        found.append((name, orbit.run(driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start, tell)))
+        stage.report(_sentence(*found[-1]))
+    stage.begin()
+    sentences = [*(_sentence(*one) for one in found), *built.messages]
+    store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
+    with store.complete_or_absent(folder / "orbit.h5") as temporary:
+        _write(temporary, found)
+    (folder / "pictures").mkdir(exist_ok=True)
+    drawn = [portraits(found, folder / "pictures" / "phase_portraits.png", f"{settings.name}: phase portraits")]
+    for i, (name, one) in enumerate(found, 1):
+        title = f"{settings.name}: {name}, {one.said}"
+        drawn.append(orbit_picture(one, folder / "pictures" / f"orbit_{i}.png", title))
+    tables = {"Motions": _table(found)}
+    store.write_text(folder / "orbit.html", survey_html(f"{settings.name}: motion in time", sentences, tables, drawn))
+    names = ["orbit.html", "orbit.csv", "orbit.h5", *(f"pictures/{p.name}" for p in drawn)]
+    diverged = [name for name, one in found if np.isfinite(one.diverged)]
+    told = {"files": names, "sentences": sentences, "diverged": diverged}
+    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    return Made([folder / name for name in names])
+
+
+def _sentence(name: str, one: Orbit) -> str:
+    if not len(one.time):
+        return f"{name}: {one.said}."
+    size = 0.5 * np.ptp(one.y[0])
+    return (
+        f"{name}: {one.said}; {one.labels[0]} swings by {1e6 * size:.5g} µm on either side, its last period uncertain "
+        f"by {100 * one.error:.2g} %."
+    )
+
+
+def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:
+    """Column -> values, one a motion."""
+    rows = [
+        {
+            "frequency_Hz": one.equations.Omega / (2 * np.pi),
+            "angular_frequency_rad_s": one.equations.Omega,
+            "repeats_after_periods": one.repeats,
+            "impacts_per_period": one.impacts,
+            "slips_per_period": one.count("slips") / max(len(one.time) // one.samples, 1),
+            "smallest_m": one.y[0].min(initial=np.inf),
+            "largest_m": one.y[0].max(initial=-np.inf),
+            "steps_per_period": one.steps,
+            "estimated_error": one.error,
+            "energy_balance": one.balance,
+            "contact_energy_drift": one.drift,
+        }
+        for _, one in found
+    ]
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def _write(path: Path, found: list[tuple[str, Orbit]]) -> None:
+    """``orbit.h5``: a group a motion, with its samples and events; units stand beside."""
+    with create(path) as file:
+        for i, (name, one) in enumerate(found, 1):
+            group = file.create_group(f"motion_{i}")
+            group.attrs["name"], group.attrs["said"] = name, one.said
+            group.attrs["Omega"], group.attrs["samples_per_period"] = one.equations.Omega, one.samples
+            group.attrs["read_outs"] = ", ".join(one.labels)
+            group.attrs["events"] = "rows of time in s, number of the contact, kind: " + ", ".join(
+                f"{k} {kind}" for k, kind in enumerate(KINDS)
+            )
+            for key, values, unit in (
+                ("time", one.time, "s"), ("displacement", one.y, "m"), ("velocity", one.v, "m/s"),
+                ("modal_displacement", one.q, "m kg^1/2"), ("modal_velocity", one.q_dot, "m kg^1/2 / s"),
+                ("contact_displacement", one.d, "m, rad"), ("contact_force", one.force, "N, N m"),
+                ("event", one.events, ""), *((f"energy_{k}", v, "J") for k, v in one.energy.items()),
+            ):  # fmt: skip
+                put(group, key, values, unit)
