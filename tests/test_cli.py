@@ -163,6 +163,9 @@ def test_init_copies_a_runnable_body_and_overwrites_nothing(folder: Path, capsys
         assert main(["info", name]) == 0
     assert (folder / "blade" / "case.toml").is_file()
     assert main(["init", "blade", "mine"]) == 0 and (folder / "mine" / "body.toml").is_file()
+    assert main(["init", "sample", "vane"]) == 0
+    case = (folder / "vane" / "case.toml").read_text()
+    assert 'name = "vane"' in case and 'body = "vane-eigenmodes"' in case
     said(capsys)
     before = (folder / "blade" / "body.toml").read_bytes()
     (folder / "my part").mkdir()

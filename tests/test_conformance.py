@@ -537,7 +537,7 @@ def test_respond_to_the_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert peaks[1000.0] == pytest.approx(told["stuck_frequencies_Hz"][0], rel=1e-4)  # sticking
     assert 270.93 < peaks[20.0] < peaks[100.0] < peaks[1000.0]  # the first frequency of the free vane
     assert main(["init", "sample", "mine"]) == 0
-    assert main(["respond", "mine", "--set", "name=mine", "-q"]) == 0
+    assert main(["respond", "mine", "-q"]) == 0
     first, second = (tmp_path / f"build/{n}/response.csv" for n in ("sample", "mine"))
     assert first.read_text() == second.read_text()
 

@@ -236,6 +236,24 @@ def test_importing_the_package_imports_nothing_else():
     )
 
 
+def test_gyroscopic_forces_in_the_damping_matrix_are_solved_exactly():
+    """Of two coordinates with forces across, a spring at each: against the direct solution at every frequency."""
+    M, K, C = np.diag([1.0, 2.0]), np.array([[4.0, -1.0], [-1.0, 9.0]]), np.array([[0.1, 1.5], [-1.5, 0.2]])
+    springs = [ms.polynomial({1: 0.7}, at=0), ms.polynomial({1: 0.3}, at=1)]
+    whirling = ms.structure(M, K, C, force={0: 1.0}, elements=springs, output=[0, 1])
+    Omega = np.linspace(0.5, 4.0, 15)
+    matrices = K + np.diag([0.7, 0.3]) - Omega[:, None, None] ** 2 * M + 1j * Omega[:, None, None] * C
+    exact = np.linalg.solve(matrices, np.array([1.0, 0.0])[:, None])[:, :, 0]
+    swept = ms.harmonic_response(whirling, Omega, harmonics=3, unit="rad/s")
+    for i in range(2):
+        np.testing.assert_allclose(swept.harmonics(f"q {i}")[:, 1], exact[:, i], rtol=1e-9)
+    curve = ms.follow(whirling, 0.5, 4.0, harmonics=1, unit="rad/s")
+    w = 2 * np.pi * np.asarray(curve.frequency)
+    there = K + np.diag([0.7, 0.3]) - w[:, None, None] ** 2 * M + 1j * w[:, None, None] * C
+    first = np.linalg.solve(there, np.array([1.0, 0.0])[:, None])[:, 0, 0]
+    np.testing.assert_allclose(curve.amplitude, np.abs(first), rtol=1e-7)
+
+
 # mistakes -------------------------------------------------------------------------------------------------------------
 
 
@@ -246,6 +264,7 @@ def test_importing_the_package_imports_nothing_else():
         (lambda: ms.structure(np.ones((2, 3)), 1.0), "M: has shape (2, 3); give a square matrix"),
         (lambda: ms.structure(np.diag([1.0, 0.0]), np.eye(2)), "a coordinate has no mass"),
         (lambda: ms.structure([[1, 2], [0, 1]], np.eye(2)), "M is not symmetric"),
+        (lambda: ms.structure(np.eye(2), [[1, 2], [0, 5]]), "K is not symmetric: circulatory"),
         (lambda: ms.structure(1.0, np.nan), "structure: K"),
         (lambda: ms.structure(1.0, 1.0, damping_ratio=-0.1), "damping_ratio"),
         (lambda: ms.structure(1.0, 1.0, force={3: 1.0}), "there is no coordinate 3; the structure has 1"),

@@ -66,6 +66,7 @@ NoPictures = Annotated[bool, Parameter(show_default=False, help="leave out all p
 Everywhere = Annotated[
     bool, Parameter(show_default=False, help="stresses over the whole sweep, not at its resonances alone")
 ]
+Apart = Annotated[bool, Parameter(show_default=False, help="every solid of the CAD file is a part of its own")]
 Ring = Annotated[bool, Parameter(show_default=False, help="vtu: the ring of a cyclic body, a file a nodal diameter")]
 
 Over = Annotated[
@@ -109,8 +110,9 @@ def init(name: str, folder: Path | None = None, /) -> None:
         target.mkdir(parents=True, exist_ok=True)
         for source, copy in files:
             shutil.copyfile(source, target / copy)
-            if copy.endswith(".toml") and name not in ("sample", "contact"):  # their products bear other names
-                _rename(target / copy, target.resolve().name)
+            if copy.endswith(".toml") and name != "contact":  # whose files have names of their own
+                keys = ("name",) if name == "sample" else ("name", "body")  # whose body is a modal file's
+                _rename(target / copy, target.resolve().name, keys)
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror}); choose another folder") from error
     file, verb = _MADE.get(name, ("body.toml", "run"))
@@ -140,11 +142,11 @@ def _to_copy(name: str) -> list[tuple[Path, str]]:
     return files + ([(case, "case.toml")] if case.is_file() else [])
 
 
-def _rename(path: Path, name: str) -> None:
+def _rename(path: Path, name: str, keys: tuple[str, ...]) -> None:
     """Give the body (and its case) the name of its folder, so that its products stand in build/<folder>/."""
     if re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", name):
         text = path.read_text(encoding="utf-8")
-        for key in ("name", "body"):
+        for key in keys:
             text = re.sub(rf'^{key} = "[^"]*"', f'{key} = "{name}"', text, count=1, flags=re.M)
         path.write_text(text, encoding="utf-8")
 
@@ -551,18 +553,32 @@ def _say_seal(file: Path, quiet: bool) -> None:
 
 
 @app.command(name="import")
-def import_(file: Path, folder: Path | None = None, /, *, unit: str = "mm") -> None:
+def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) -> None:
     """Make a body.toml around a CAD file, a mesh or matrices, or a modal file from measured modes.
+
+    Several CAD files, or several meshes, of parts that touch become an assembly: a body.toml each, with the faces where
+    they touch, and a case.toml with the contacts between them.
 
     Args:
         file: a CAD file (.step, .stp, .brep, .iges), a mesh (.inp, .cdb, .bdf, .med, .unv, .msh), a stiffness matrix
             (.mtx, .mat, .h5, .op4, .pch, .sti), or modes of a test (.uff, .unv with data set 55).
-        folder: of the new body.toml or basis.h5; one of the file's name if not given.
-        unit: of its lengths, where the file does not tell.
+        more: the other parts of an assembly, and the folder of the new files, last; one of their names if not given.
+            A part may be a folder with a body.toml that is there already.
+        unit: of lengths, where the file does not tell.
     """
     from .stages.importing import import_file
+    from .stages.parts import import_apart, import_parts
 
-    for line in import_file(file, folder, unit).told:
+    parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
+    folder = more[-1] if len(parts) <= len(more) else None
+    if apart and len(parts) > 1:
+        raise UserError(f"import --apart: sets the solids of one file apart, and {len(parts)} parts are given")
+    made = (
+        import_apart(file, folder)
+        if apart
+        else (import_file(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
+    )
+    for line in made.told:
         print(line)
 
 

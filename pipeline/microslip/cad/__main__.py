@@ -10,6 +10,7 @@ import gmsh
 from microslip.cad.drawing import default_size, finish, guarded, name_body, positive_size, read_settings
 from microslip.cad.faces import name_picked, table, write_triangles
 from microslip.cad.imprint import imprint
+from microslip.cad.parts import set_apart, tell_touches
 from microslip.cad.solids import load
 
 
@@ -36,13 +37,18 @@ def tell(cad: str, unit: str, triangles: str = "") -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Command line: SETTINGS OUT, or --list FILE UNIT [TRIANGLES.npz]."""
+    """Command line: see the package's docstring."""
     if len(arguments) in (3, 4) and arguments[0] == "--list":
         guarded(lambda: tell(*arguments[1:]), arguments[1])
+    elif len(arguments) == 3 and arguments[0] == "--apart":
+        guarded(lambda: set_apart(*arguments[1:]), arguments[1])
+    elif len(arguments) > 3 and arguments[0] == "--touches":
+        guarded(lambda: tell_touches(*arguments[1:]), "import.json")
     elif len(arguments) == 2:
         guarded(lambda: mesh_cad(*arguments), arguments[0])
     else:
-        sys.exit("usage: python -m microslip.cad SETTINGS OUT.msh | --list FILE UNIT [TRIANGLES.npz]")
+        ways = "SETTINGS OUT.msh | --list FILE UNIT [TRIANGLES.npz] | --apart FILE FOLDER | --touches UNIT FILE FILE..."
+        sys.exit(f"usage: python -m microslip.cad {ways}")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import gmsh
 import numpy as np
 
 from microslip.cad.drawing import boundary_surfaces, name_face, surfaces_where, warn
+from microslip.cad.imprint import lies_in
 from microslip.cad.marks import Marks, short_name
 from microslip.cad.solids import load
 from microslip.data import UserError
@@ -49,9 +50,7 @@ def pick(rule: dict[str, Any], marks: Marks) -> list[int]:
     if rule.get("surfaces") is not None:
         return [tag for tag in tags if tag in rule["surfaces"]]
     if rule.get("box") is not None:
-        low, high = np.reshape(rule["box"], (2, 3))
-        near = 1e-6 * np.linalg.norm(high - low) + 2e-7  # OpenCASCADE widens boxes by 1e-7
-        return surfaces_where(lambda _, box: bool((box[0] >= low - near).all() and (box[1] <= high + near).all()))
+        return surfaces_where(lambda _, box: lies_in(box, np.reshape(rule["box"], (2, 3))))
     raise UserError(f"geometry.faces: face {rule.get('name')!r} needs one of label, colour, box, surfaces")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ def imprint(
     whose: list[int] = []
     for i, rule in enumerate(rules):
         if rule.get("cut") or rule.get("touching"):
-            found = in_box(rule) if rule.get("box") is not None else touching(rule, folder, unit)
+            found = touching(rule, folder, unit) if rule.get("touching") else in_box(rule)
             if not found:
                 raise UserError(f"geometry.faces: face {rule.get('name')!r}: no part of the surface {_where(rule)}")
             tools, whose = tools + found, whose + [i] * len(found)
@@ -60,7 +60,9 @@ def imprint(
 
 
 def _where(rule: dict[str, Any]) -> str:
-    return "lies in its box" if rule.get("box") is not None else f"touches {rule['touching']}"
+    words = [f"touches {rule['touching']}"] if rule.get("touching") else []
+    words += ["lies in its box"] if rule.get("box") is not None else []
+    return " and ".join(words)
 
 
 def _refuse_shared(rules: Sequence[dict[str, Any]], cut: dict[int, list[int]]) -> None:
@@ -87,7 +89,7 @@ def in_box(rule: dict[str, Any]) -> Pieces:
     occ = gmsh.model.occ
     low, high = np.reshape(rule["box"], (2, 3))
     box = [(3, occ.addBox(*low, *(high - low)))]
-    surfaces = [tag for tag in boundary_surfaces() if _meets(_box_of(tag), np.array([low, high]))]
+    surfaces = [tag for tag in boundary_surfaces() if meet(box_of(tag), np.array([low, high]))]
     found = [piece for tag in surfaces for piece in _common((2, tag), box)]
     occ.remove(box, recursive=True)
     return found
@@ -101,26 +103,46 @@ def touching(rule: dict[str, Any], folder: Path, unit: str) -> Pieces:
     mine, before = boundary_surfaces(), set(gmsh.model.getEntities(3))
     import_shapes(path, unit)
     others = [solid for solid in gmsh.model.getEntities(3) if solid not in before]
-    theirs = boundary_surfaces(others)
-    pairs = [(a, b) for a in mine for b in theirs if _meets(_box_of(a), _box_of(b))]
-    found = [piece for a, b in pairs for piece in _common((2, a), [(2, b)])]
+    found = common_surfaces(mine, boundary_surfaces(others))
     occ.remove(others, recursive=True)
     occ.synchronize()
-    return found
+    if rule.get("box") is None:
+        return found
+    left = [(dim, tag) for dim, tag in found if not lies_in(box_of(tag), np.reshape(rule["box"], (2, 3)))]
+    occ.remove(left, recursive=True)
+    occ.synchronize()
+    return [piece for piece in found if piece not in left]
 
 
-def _box_of(surface: int) -> np.ndarray:
+def common_surfaces(mine: Iterable[int], theirs: Sequence[int]) -> Pieces:
+    """New surfaces, what two sets of surfaces have in common."""
+    pairs = [(a, b) for a in mine for b in theirs if meet(box_of(a), box_of(b))]
+    return [piece for a, b in pairs for piece in _common((2, a), [(2, b)])]
+
+
+def box_of(surface: int) -> np.ndarray:
+    """(2, 3) low and high corner."""
     return np.reshape(gmsh.model.getBoundingBox(2, surface), (2, 3))
 
 
-def _meets(one: np.ndarray, other: np.ndarray) -> bool:
+def lies_in(one: np.ndarray, box: np.ndarray) -> bool:
+    """Whether one box lies wholly in another; OpenCASCADE widens those of shapes by 1e-7."""
+    near = 1e-6 * float(np.linalg.norm(box[1] - box[0])) + 2e-7
+    return bool((one[0] >= box[0] - near).all() and (one[1] <= box[1] + near).all())
+
+
+def meet(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two boxes have a point in common."""
     near = 1e-6 * float(np.linalg.norm(one[1] - one[0]))
     return bool((one[0] <= other[1] + near).all() and (other[0] <= one[1] + near).all())
 
 
 def _common(surface: tuple[int, int], others: Pieces) -> Pieces:
-    """What a surface and other shapes have in common: surfaces alone; where they just cross it is nothing."""
+    """What a surface and other shapes have in common: surfaces alone; where they just cross it is nothing.
+
+    Of copies: a face that lies wholly on the other is a piece itself, and would go with its body.
+    """
     occ = gmsh.model.occ
-    pieces, _ = occ.intersect(occ.copy([surface]), others, removeObject=True, removeTool=False)
+    pieces, _ = occ.intersect(occ.copy([surface]), occ.copy(others), removeObject=True, removeTool=True)
     occ.remove([piece for piece in pieces if piece[0] < 2], recursive=True)
     return [piece for piece in pieces if piece[0] == 2]

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray
+from ..data import Array, ComplexArray, UserError
 from ..system.assembly import Linear
 from .forces import AFT
 from .problem import AtFrequency, Problem
@@ -91,8 +91,17 @@ def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
 
     Returns:
         (m, l) motions of unit stiffness with sticking contacts, (l,) what share of it is not the contacts'.
+
+    Raises:
+        UserError: motions that not even sticking contacts hold.
     """
-    shares, motions = scipy.linalg.eigh(part.K, _stuck(part, stiffness))
+    try:
+        shares, motions = scipy.linalg.eigh(part.K, _stuck(part, stiffness))
+    except np.linalg.LinAlgError as error:
+        raise UserError(
+            "nothing holds the bodies as a whole, and a steady force has no balance there: hold one of them "
+            "([[supports]] of its body.toml), or give free bodies weak_springs in the case"
+        ) from error
     return motions[:, shares < HELD], shares[shares < HELD]
 
 

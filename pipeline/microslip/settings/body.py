@@ -199,10 +199,11 @@ GROUND = "ground"
 
 
 class FaceRule(Model):
-    """How a face of a CAD file or of a mesh without sets is picked: exactly one of the ways.
+    """How a face of a CAD file or of a mesh is picked: exactly one of the ways.
 
-    cut: of a CAD file, the part of the surface inside the box, cut out of the faces that it has. touching: another CAD
-    file in the same coordinates; the part of the surface that lies on its surface is cut out.
+    cut: of a CAD file, the part of the surface inside the box, cut out of the faces that it has. touching: another file
+    of the same kind in the same coordinates; the part of the surface that lies on its surface, cut out of a CAD file,
+    the facets of a mesh whose middle lies there; of several such patches, those wholly in the box.
     """
 
     name: Name
@@ -215,8 +216,9 @@ class FaceRule(Model):
 
     @model_validator(mode="after")
     def _one_way(self) -> FaceRule:
-        only_one(self, "label", "colour", "box", "surfaces", "touching", what="a face ")
-        if self.cut and self.box is None:
+        boxed = self.touching is not None and self.box is not None
+        only_one(self, "label", "colour", *([] if boxed else ["box"]), "surfaces", "touching", what="a face ")
+        if self.cut and (boxed or self.box is None):
             raise ValueError("cut: belongs to a box, whose part of the surface is cut out; leave it out")
         return self
 

@@ -54,8 +54,7 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
         raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
-    stem = (folder.resolve().name if folder else "") or file.stem
-    name = re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
+    name = body_name((folder.resolve().name if folder else "") or file.stem)
     if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
@@ -69,6 +68,11 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     missing = "interfaces" if "[[supports]]" in lines else "supports, interfaces"
     last = f"{target}: ready. Add {missing} and loads, then: microslip run {shlex.quote(str(target.parent))}"
     return Imported(target, (*told, last))
+
+
+def body_name(stem: str) -> str:
+    """The name that a body has by that of its folder or file."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", stem).lstrip("-._")[:64] or "part"
 
 
 _UNIVERSAL = (".uff", ".uf", ".unv", ".u")
@@ -143,11 +147,22 @@ def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, 
     """
     with tempfile.TemporaryDirectory() as scratch:
         triangles = Path(scratch) / "triangles.npz"
-        words = ["-m", "microslip.cad", "--list", str(file), unit]
-        done = run_apart([*words, str(triangles)] if picture else words, scratch)
-        if done.returncode:
-            raise UserError((done.stderr.strip().splitlines() or [f"{file}: cannot be read"])[-1])
-        return done.stdout.strip(), "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)
+        words = ["--list", str(file), unit]
+        text = cad_result([*words, str(triangles)] if picture else words)
+        return text, "" if picture is None else _draw(triangles, f"{file.name}: its surfaces", picture)
+
+
+def cad_result(words: list[str]) -> str:
+    """What the CAD route prints, in a process of its own.
+
+    Raises:
+        UserError: what the CAD kernel says.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        done = run_apart(["-m", "microslip.cad", *words], scratch)
+    if done.returncode:
+        raise UserError((done.stderr.strip().splitlines() or [f"{' '.join(words)}: cannot be read"])[-1])
+    return done.stdout.strip()
 
 
 def _draw(triangles: Path, title: str, picture: Path) -> str:
@@ -168,6 +183,9 @@ def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     picture = folder / "surfaces.png"
     text, reason = cad_table(file, unit, picture)
     told = [text, f"warning: no picture of the surfaces: {reason}" if reason else f"{picture}: the surfaces, numbered"]
+    if text.count("\nsolid ") > 1:
+        apart = f"microslip import {shlex.quote(str(file))} --apart"
+        told.append(f"the solids are joined to one body; each as a body of its own, with contacts between: {apart}")
     lines = ["free = true               # nothing is held yet", "", "[geometry]", f"cad = {_beside(file, folder)}", ""]
     lines += ["# The surfaces of the file" + (":" if reason else f", shown in {picture.name}:")]
     lines += [f"# {line}" for line in text.splitlines()[1:]]

@@ -15,7 +15,7 @@ import numpy as np
 from ..data import Indices, Material, Mesh, UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
-from ..settings.body import MaterialSettings, implausible
+from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
 from .stage import PACKAGE, Made, Report, Stage
@@ -54,8 +54,8 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
         "unit": job.settings.length_unit,
         "source": store.hash_file(source),
     }
-    if touched := [job.folder / rule.touching for rule in geometry.faces if rule.touching is not None]:
-        inputs["touched"] = [store.hash_file(f) for f in touched if store.ordinary(f).is_file()]
+    if touched := touched_files(job):
+        inputs["touched"] = [store.hash_file(f) for f in touched]
 
     def work() -> Made:
         report(f"meshing {source.name}")
@@ -65,6 +65,12 @@ def mesh_stage(job: Job, output: Path | None = None, force: bool = False, report
 
     Stage(product, ("cad",), force, report).make(inputs, work)
     return product
+
+
+def touched_files(job: Job) -> list[Path]:
+    """The files of other bodies on which faces of this one lie, those that are there."""
+    named = [job.folder / rule.touching for rule in job.settings.geometry.faces if rule.touching is not None]
+    return [file for file in named if store.ordinary(file).is_file()]
 
 
 def _refuse_unnamed_faces(job: Job) -> None:
@@ -234,27 +240,50 @@ def strange_material(m: Material, system: str) -> str:
 
 
 def _faces_by_rule(job: Job, mesh: Mesh) -> Mesh:
-    """Faces of a user's own mesh given by boxes, those of one name added up; named sets of the file are there already.
+    """Faces of a user's own mesh given by boxes or by another mesh, those of one name added up; named sets of the file
+    are there already.
 
     Raises:
-        UserError: a rule by anything but a box, nothing in its box, the name of a set of the file.
+        UserError: a rule of another kind, nothing that answers to it, the name of a set of the file.
     """
-    from ..mesh import boundary_facets, faces_from_points
-
     made: dict[str, dict[str, Indices]] = {}
     for rule in job.settings.geometry.faces:
         place = f"{job.path}: geometry.faces.{rule.name}"
-        if rule.box is None or rule.cut:
-            raise UserError(f"{place}: a mesh file has no labels or colours and is not cut; use box alone")
         if rule.name in mesh.faces:
             raise UserError(f"{place}: the mesh file has a set of that name; give the face another one")
+        face = made.setdefault(rule.name, {})
+        for kind, facets in _answering(job, mesh, rule, place).items():
+            face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
+    return replace(mesh, faces={**mesh.faces, **made})
+
+
+def _answering(job: Job, mesh: Mesh, rule: FaceRule, place: str) -> dict[str, Indices]:
+    """Type -> facets of a mesh's surface that answer to a rule: those in its box, on another mesh, or both.
+
+    Raises:
+        UserError: a rule of another kind, or no facet.
+    """
+    from ..mesh import boundary_facets, faces_from_points
+    from ..mesh.touching import touching_facets
+
+    if rule.cut or rule.box is None and rule.touching is None:
+        raise UserError(f"{place}: a mesh file has no labels or colours and is not cut; use box or touching alone")
+    found = boundary_facets(mesh)
+    if rule.touching is not None:
+        found = touching_facets(mesh, _other_mesh(job, rule.touching, place))
+    if rule.box is not None:
         low, high = np.array(rule.box[:3]), np.array(rule.box[3:])
         slack = 1e-6 * np.ptp(mesh.points, axis=0).max()
         inside = ((mesh.points >= low - slack) & (mesh.points <= high + slack)).all(axis=1)
-        found = faces_from_points(boundary_facets(mesh), np.flatnonzero(inside), mesh.n_points)
-        if not found:
-            raise UserError(f"{place}: no facet of the surface is in the box; widen it")
-        face = made.setdefault(rule.name, {})
-        for kind, facets in found.items():
-            face[kind] = np.unique(np.concatenate([face[kind], facets]), axis=0) if kind in face else facets
-    return replace(mesh, faces={**mesh.faces, **made})
+        found = faces_from_points(found, np.flatnonzero(inside), mesh.n_points)
+    if not found:
+        where = f"lies on {rule.touching}" if rule.touching is not None else "is in the box; widen it"
+        raise UserError(f"{place}: no facet of the surface {where}")
+    return found
+
+
+def _other_mesh(job: Job, name: str, place: str) -> Mesh:
+    file = job.folder / name
+    if not store.ordinary(file).is_file():
+        raise UserError(f"{place}: touching: there is no file {file}")
+    return read_mesh(file, job.settings.length_unit)

@@ -18,7 +18,7 @@ from ..mesh import UNITS
 from ..mesh.inp import files_of
 from ..settings.body import BodySettings, MatrixFiles
 from .job import Job
-from .meshing import load_mesh, mesh_stage
+from .meshing import load_mesh, mesh_stage, touched_files
 from .stage import Made, Report, Stage
 
 _CODE = ("modal.compute", "basis", "mesh")
@@ -106,6 +106,8 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
         inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
+        if touched := touched_files(job):
+            inputs["touched"] = [store.hash_file(f) for f in touched]
     if job.settings.temperature.file:
         inputs["temperature"] = store.hash_file(_temperature_file(job))
     return inputs

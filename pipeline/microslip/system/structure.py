@@ -126,7 +126,8 @@ def structure(
     """A structure of matrices with nonlinear elements.
 
     Args:
-        M, K, C: (n, n) mass (kg), stiffness (N/m) and damping (N s/m), or numbers where there is one coordinate.
+        M, K, C: (n, n) mass (kg), stiffness (N/m) and damping (N s/m), or numbers where there is one coordinate. M and
+            K are symmetric; C may hold gyroscopic forces, its skew part.
         force: coordinate -> 0-peak amplitude (N) of the harmonic force, or (n,) of all.
         elements: see `polynomial`, `jenkins`, `stop` and `Element`.
         output: coordinates that are read; where the force acts, if not given.
@@ -148,6 +149,11 @@ def structure(
         if A.shape != M.shape:
             raise UserError(f"structure: {key} is {len(A)} x {len(A)} and M is {n} x {n}; give them the same size")
     _check_mass(M)
+    if not _symmetric(K):
+        raise UserError(
+            "structure: K is not symmetric: circulatory forces have no modes that resonances are looked for by; give "
+            "its symmetric part, and gyroscopic forces in C"
+        )
     C = C + _modal_damping(M, K, damping_ratio)
     f = _force(force, n)
     watched = [int(i) for i in (np.flatnonzero(f) if output is None else np.atleast_1d(output))]
@@ -174,8 +180,12 @@ def _matrix(A: Any, key: str) -> Array:
     return A
 
 
+def _symmetric(A: Array) -> bool:
+    return bool(np.abs(A - A.T).max() <= 1e-9 * np.abs(A).max())
+
+
 def _check_mass(M: Array) -> None:
-    if np.abs(M - M.T).max() > 1e-9 * np.abs(M).max():
+    if not _symmetric(M):
         raise UserError("structure: M is not symmetric; correct it")
     if np.linalg.eigvalsh(M)[0] <= 1e-14 * np.abs(M).max():
         raise UserError("structure: a coordinate has no mass (M is not positive definite); condense it or give it some")
@@ -187,8 +197,6 @@ def _modal_damping(M: Array, K: Array, ratio: float | Sequence[float]) -> Array:
     bounded("structure: damping_ratio", given, ge=0)
     if not given.any():
         return np.zeros_like(M)
-    if np.abs(K - K.T).max() > 1e-9 * np.abs(K).max():
-        raise UserError("structure: damping_ratio: K is not symmetric and has no such modes; give C")
     squares, X = scipy.linalg.eigh(K, M)
     D = np.resize(np.append(given, np.full(len(M), given[-1])), len(M))
     return M @ X @ np.diag(2 * D * np.sqrt(np.maximum(squares, 0.0))) @ X.T @ M

@@ -1,0 +1,322 @@
+"""Parts that touch: a body.toml each with the faces where they meet, and a case with the contacts between them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import tempfile
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data import Array, UserError
+from ..files.store import ordinary, write_text
+from ..mesh import UNITS, boundary_facets, read_mesh
+from ..mesh.touching import touches
+from .importing import CAD, MATRICES, Imported, body_name, cad_result, import_file
+
+NORMAL_STIFFNESS, TANGENTIAL_STIFFNESS = 4e11, 2e11
+"""N/m3, per area of a joint of machined steel: where an own case begins, not a property of it."""
+
+STEEL = 5170.0
+"""m/s, speed of sound in a bar."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of an assembly: its file, its name, and the body.toml around it; there: before anything is written."""
+
+    file: Path
+    name: str
+    body: Path
+    there: bool = False
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        """The keys of the body.toml."""
+        return tomllib.loads(self.body.read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """points: (p, 3) of the surface of a part, at which it may be driven. box: (2, 3) its low and high corner."""
+
+    points: Array
+    box: Array
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Where two parts touch, lengths in the parts' unit.
+
+    Attributes:
+        parts: their numbers. area, normal: (3,) None where it is curved. boxes: (2, 6) low and high corner in either
+            part. faces: its name in either part. alone: whether these two parts touch nowhere else.
+    """
+
+    parts: tuple[int, int]
+    area: float
+    normal: Array | None
+    boxes: Array
+    faces: tuple[str, str] = ("", "")
+    alone: bool = True
+
+
+def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Imported:
+    """Write a body.toml around each of several files, with its faces where it touches the others, and a case.toml.
+
+    Args:
+        files: CAD files or meshes, all of one kind, in the same coordinates, or folders with a body.toml around one, to
+            whose end lines are added. folder: of the case, and of those of the new bodies; by default of all the names.
+        unit: of lengths.
+
+    Raises:
+        UserError: unreadable files, nothing that touches, files that are there already.
+    """
+    home, parts = _parts(files, folder)
+    unit = _unit_of(files, unit)
+    shapes, patches = _found(parts, unit)
+    if not patches:
+        raise UserError(
+            f"{' and '.join(map(str, files))}: touch nowhere; they have to lie in the same coordinates, without a gap "
+            "between them and without overlap"
+        )
+    _refuse_named(parts, patches)
+    told: list[str] = []
+    for number, part in enumerate(parts):
+        if not part.there:
+            told += import_file(part.file, part.body.parent, unit).told[:-1]
+        _add(part, _joints(parts, number, patches, unit))
+    told += [_sentence(parts, patch, unit) for patch in patches]
+    flat = [patch for patch in patches if patch.normal is not None]
+    if not flat:
+        return Imported(home, (*told, "warning: none of the patches is flat, so no case is written"))
+    driven = flat[0].parts[0]
+    rows = _drive(parts[driven], shapes[driven].points, flat[0])
+    write_text(home / "case.toml", "\n".join(_case(home, parts, flat, shapes, unit, rows)) + "\n")
+    told.append(f"{home / 'case.toml'}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}")
+    return Imported(home / "case.toml", tuple(told))
+
+
+def _parts(files: Sequence[Path], folder: Path | None) -> tuple[Path, list[Part]]:
+    """The folder of an assembly, and its parts, none of which would take the place of anything.
+
+    Raises:
+        UserError: see `import_parts`.
+    """
+    for file in files:
+        if not (file / "body.toml" if file.is_dir() else ordinary(file)).is_file():
+            raise UserError(f"{file}: there is no such file, or no body.toml in this folder; correct the path")
+    names = [body_name(f.resolve().name if f.is_dir() else f.stem) for f in files]
+    home = folder or Path("-".join(names)[:64].rstrip("-._"))
+    parts = [_part(f, n, home) for f, n in zip(files, names, strict=True)]
+    names = [part.name for part in parts]
+    if twice := sorted({n for n in names if names.count(n) > 1}):
+        raise UserError(f"{twice[0]}: is the name of two of these parts; give the files names of their own")
+    for new in (home / "case.toml", *(part.body for part in parts if not part.there)):
+        if new.exists():
+            raise UserError(f"{new}: is there already; give another folder as last argument (nothing was changed)")
+    return home, parts
+
+
+def _refuse_named(parts: Sequence[Part], patches: Sequence[Patch]) -> None:
+    """Refuse bodies that have a face or an interface under the name of a new one."""
+    for patch in patches:
+        for i, face in zip(patch.parts, patch.faces, strict=True):
+            keys = parts[i].keys if parts[i].there else {}
+            taken = {
+                row.get("name") for row in (*keys.get("interfaces", ()), *keys.get("geometry", {}).get("faces", ()))
+            }
+            if face in taken:
+                raise UserError(f"{parts[i].body}: has a face or an interface '{face}' already; rename or remove it")
+
+
+def import_apart(file: Path, folder: Path | None) -> Imported:
+    """The solids of one CAD file as parts of an assembly, each in a file of its own beside its body.toml.
+
+    Raises:
+        UserError: see `import_parts`; a file of one solid.
+    """
+    home = folder or Path(body_name(file.stem))
+    if not ordinary(file).is_file():
+        raise UserError(f"{file}: there is no such file; correct the path")
+    if home.exists():
+        raise UserError(f"{home}: is there already; give another folder as last argument (nothing was changed)")
+    with tempfile.TemporaryDirectory() as scratch:
+        names = json.loads(cad_result(["--apart", str(file.resolve()), scratch]))
+        made = [home / name / f"{name}.step" for name in names]
+        for new in made:
+            write_text(new, (Path(scratch) / new.name).read_text(encoding="utf-8"))
+    return import_parts(made, home, "mm")
+
+
+def _unit_of(files: Sequence[Path], unit: str) -> str:
+    """The unit of lengths: that of the bodies that are there, which must be one, else the one asked for."""
+    if unit not in UNITS:
+        raise UserError(f"--unit {unit}: unknown unit of length; choose one of {', '.join(UNITS)}")
+    own = {f: tomllib.loads((f / "body.toml").read_text())["length_unit"] for f in files if f.is_dir()}
+    if len({*own.values()}) > 1 or len(own) not in (0, len(files)) and unit not in own.values():
+        said = ", ".join(f"{f} in {u}" for f, u in own.items())
+        raise UserError(f"{said}: parts of one assembly need one unit of length (of files: --unit)")
+    return next(iter(own.values()), unit)
+
+
+def _part(file: Path, name: str, home: Path) -> Part:
+    if not file.is_dir():
+        return Part(file, name, home / name / "body.toml")
+    part = Part(file, name, file / "body.toml", there=True)
+    geometry = part.keys.get("geometry", {})
+    source = geometry.get("cad") or geometry.get("mesh")
+    if source is None:
+        raise UserError(f"{part.body}: geometry: only bodies with cad or mesh can be laid beside each other")
+    return Part(file / source, str(part.keys.get("name", name)), part.body, there=True)
+
+
+def _found(parts: Sequence[Part], unit: str) -> tuple[list[Shape], list[Patch]]:
+    """The shapes of the parts, and the patches, with names of their faces."""
+    kinds = {part.file.suffix.lower() in CAD for part in parts}
+    if len(kinds) > 1 or any(part.file.suffix.lower() in MATRICES for part in parts):
+        raise UserError(
+            f"{', '.join(str(part.file) for part in parts)}: where they touch can be told of CAD files or of meshes, "
+            "all of one kind; import the others one by one"
+        )
+    shapes, patches = (_of_cad if kinds == {True} else _of_meshes)([part.file for part in parts], unit)
+    return shapes, [_named(parts, patch, patches) for patch in patches]
+
+
+def _named(parts: Sequence[Part], patch: Patch, patches: Sequence[Patch]) -> Patch:
+    """The patch with its faces named after the other part, numbered where the two have several."""
+    same = [p for p in patches if p.parts == patch.parts]
+    end = "" if len(same) == 1 else f"-{1 + [p is patch for p in same].index(True)}"
+    one, other = (parts[i].name for i in patch.parts)
+    return replace(patch, faces=(f"{other[:60]}{end}", f"{one[:60]}{end}"), alone=len(same) == 1)
+
+
+def _of_cad(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]:
+    found = json.loads(cad_result(["--touches", unit, *map(str, files)]))
+    made = []
+    for touch in found["touches"]:
+        normal = None if touch["normal"] is None else np.array(touch["normal"])
+        made.append(Patch(tuple(touch["parts"]), touch["area"], normal, np.array([touch["box"]] * 2)))
+    pairs = zip(found["corners"], found["boxes"], strict=True)
+    return [Shape(np.array(corners), np.reshape(box, (2, 3))) for corners, box in pairs], made
+
+
+def _of_meshes(files: Sequence[Path], unit: str) -> tuple[list[Shape], list[Patch]]:
+    meshes, scale = [read_mesh(file, unit) for file in files], UNITS[unit]
+    made = []
+    for i, j in combinations(range(len(meshes)), 2):
+        theirs = touches(meshes[j], meshes[i])
+        for own in touches(meshes[i], meshes[j]) if theirs else ():
+            met = min(theirs, key=lambda t: float(np.linalg.norm(t.low + t.high - own.low - own.high)))
+            boxes = np.array([[*t.low, *t.high] for t in (own, met)]) / scale
+            made.append(Patch((i, j), own.area / scale**2, own.normal, boxes))
+    surfaces = [np.unique(np.concatenate([f.ravel() for f in boundary_facets(m).values()])) for m in meshes]
+    points = [m.points[s] / scale for m, s in zip(meshes, surfaces, strict=True)]
+    return [Shape(p, np.array([p.min(axis=0), p.max(axis=0)])) for p in points], made
+
+
+def _joints(parts: Sequence[Part], number: int, patches: Sequence[Patch], unit: str) -> list[str]:
+    """Lines of a body.toml: the faces and interfaces where a part touches others, curved ones as comments."""
+    lines: list[str] = []
+    for patch in patches:
+        if number not in patch.parts:
+            continue
+        mine = patch.parts.index(number)
+        other, mark = parts[patch.parts[1 - mine]], "" if patch.normal is not None else "#"
+        beside = Path(os.path.relpath(other.file.resolve(), parts[number].body.parent.resolve())).as_posix()
+        lines += ["", f"{mark}[[geometry.faces]]       # where it touches {other.name}, {patch.area:.4g} {unit}2"]
+        lines += [f'{mark}name = "{patch.faces[mine]}"', f"{mark}touching = {json.dumps(beside)}"]
+        if not patch.alone:
+            lines += [f"{mark}box = [{', '.join(f'{v:.6g}' for v in _widened(patch.boxes[mine]))}]"]
+        lines += [f"{mark}[[interfaces]]", f'{mark}name = "{patch.faces[mine]}"', f'{mark}face = "{patch.faces[mine]}"']
+    return lines
+
+
+def _widened(box: Array) -> Array:
+    """The box by a hundredth of its size larger on every side, (6,)."""
+    more = 0.01 * float(np.linalg.norm(box[3:] - box[:3]))
+    return np.concatenate([box[:3] - more, box[3:] + more])
+
+
+def _add(part: Part, lines: Sequence[str]) -> None:
+    """Write lines at the end of a body.toml."""
+    if lines:
+        write_text(part.body, part.body.read_text(encoding="utf-8").rstrip("\n") + "\n" + "\n".join(lines) + "\n")
+
+
+def _sentence(parts: Sequence[Part], patch: Patch, unit: str) -> str:
+    one, other = (parts[i].name for i in patch.parts)
+    where = f"{one} touches {other} over {patch.area:.4g} {unit}2"
+    return f"{where}: " + (
+        f"{one}:{patch.faces[0]} against {other}:{patch.faces[1]}"
+        if patch.normal is not None
+        else "a curved patch, written as comments: uncomment them and give it curvature or patch in a case"
+    )
+
+
+def _drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
+    """Excitation and monitor of a part: its own first ones, or new ones at the point farthest from a patch."""
+    names = [next((row["name"] for row in part.keys.get(key, ())), "") for key in ("excitations", "monitors")]
+    middle = (patch.boxes[0, :3] + patch.boxes[0, 3:]) / 2
+    at = ", ".join(f"{v:.6g}" for v in corners[np.linalg.norm(corners - middle, axis=1).argmax()] + 0.0)
+    n = np.zeros(3) if patch.normal is None else patch.normal
+    lines = []
+    if not names[0]:
+        lines += ["", "[[excitations]]           # a force of 1 N, as far from the contact as can be"]
+        lines += ['name = "shaker"', f"point = [{at}]", f"direction = [{', '.join(f'{v:.6g}' for v in n + 0.0)}]"]
+    if not names[1]:
+        lines += ["", "[[monitors]]", 'name = "probe"', f"point = [{at}]"]
+    _add(part, lines)
+    return names[0] or "shaker", names[1] or "probe"
+
+
+def _case(
+    home: Path, parts: Sequence[Part], patches: Sequence[Patch], shapes: Sequence[Shape], unit: str,
+    rows: tuple[str, str],
+) -> list[str]:  # fmt: skip
+    """Lines of a case.toml of the parts and their flat contacts."""
+    driven, n = parts[patches[0].parts[0]].name, patches[0].normal
+    axis = "xyz"[int(np.abs(n).argmax())] if n is not None else "x"
+    low, high = _band(shapes, UNITS[unit])
+    springs = [f", weak_springs = {low / 10:.2g}" * bool(part.keys.get("free")) for part in parts]
+    bodies = ",\n".join(f'    {{ name = "{part.name}"{s} }}' for part, s in zip(parts, springs, strict=True))
+    lines = [
+        f'name = "{body_name(home.resolve().name)}"',
+        f'excitation = "{driven}:{rows[0]}"',
+        "amplitude = 1.0             # N",
+    ]
+    lines += [f'monitor = "{driven}:{rows[1]}"', f'direction = "{axis}"']
+    lines += [
+        "bodies = [                  # weak_springs, Hz: of what nothing holds; leave them out of supported bodies"
+    ]
+    lines += [bodies, "]"]
+    for patch in patches:
+        one, other = (f"{parts[i].name}:{face}" for i, face in zip(patch.parts, patch.faces, strict=True))
+        area = patch.area * UNITS[unit] ** 2
+        lines += ["", "[[contacts]]", f'interface = "{one}"', f'against = "{other}"']
+        lines += [f"normal_stiffness = {NORMAL_STIFFNESS * area:.2g}   # N/m of the whole patch: a guess by its area"]
+        lines += [f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", "friction = 0.2", "points = [3, 3]"]
+    lines += ["", "[sweep]                     # a guess: about the first bending of a beam as long as all of it"]
+    return [
+        *lines,
+        f"start = {float(f'{low:.2g}'):g}",
+        f"stop = {float(f'{high:.2g}'):g}",
+        "points = 100",
+        "normal_forces = [1000.0]       # N",
+    ]
+
+
+def _band(shapes: Sequence[Shape], scale: float) -> tuple[float, float]:
+    """Hz, from half to three times the first frequency of a free beam of steel: as long as all parts together, as
+    thick as the thinnest."""
+    length = scale * float(np.ptp(np.concatenate([shape.box for shape in shapes]), axis=0).max())
+    thickness = scale * min(float(np.ptp(shape.box, axis=0).min()) for shape in shapes)
+    first = 4.730**2 / (2 * np.pi * np.sqrt(12)) * STEEL * thickness / length**2
+    return first / 2, 3 * first
