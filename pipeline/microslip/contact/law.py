@@ -51,7 +51,8 @@ keep_compiled()
 program = partial(
     jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False} if (0, 6) <= jax.__version_info__ < (0, 11) else {}
 )
-"""`jax.jit` of what python calls: compiled in half the time and no slower. Other versions may not know the option."""
+"""`jax.jit` of what python calls: compiled in half the time, and slower only where there are hundreds of points. Other
+versions may not know the option."""
 
 Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .cycle import blank, march, push, rates, units
+from .cycle import blank, march, push, rates, recall
 from .law import Array, Law, State
 from .linearised import Linearised, linearised
 
@@ -180,12 +180,9 @@ class _Loop:
 
     def _solving(self, at: _At) -> _At:
         """One cycle more, and the next begins where Newton's method expects the solution."""
-        still = jnp.zeros((len(self.path), 2, 3))
-        (force, after), (_, changed) = push(
-            self.law, self.path, self.dt, at.start, units(self.law, at.start, at.memory), still
-        )
+        (force, after), slope = recall(self.law, self.path, self.dt, at.start)
         memory, size = self.law.memory(force[-1], after), jnp.abs(force).max()
-        newton = _Newton(self._remembered(changed))
+        newton = _Newton(slope)
         missing = memory - at.memory + RECALL * (at.first - at.memory)
         left = _length(missing)
         step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
@@ -213,11 +210,6 @@ class _Loop:
         return at._replace(
             found=found, begun=at.start, start=state, memory=memory, change=change, first=first, periodic=ended
         )
-
-    def _remembered(self, tangents: State) -> Array:
-        """(p, ..., 2, n) tangents of the memory."""
-        size = jax.tree_util.tree_leaves(tangents)[0].shape[0]
-        return jax.vmap(self.law.memory)(jnp.zeros((size, *self.path.shape[1:])), tangents)
 
     def _change(self, at: _At, force: Array, memory: Array) -> tuple[Array, Array]:
         """Largest change of the memory over the cycle, and whether it is periodic as `periodic` says of marching."""

@@ -57,7 +57,7 @@ class Settings:
     step_max: float = 0.1
     angle: float = 0.35
     kink_step: float = 1e-2
-    contraction: float = 0.02
+    contraction: float = 0.05
     predictor: Literal["tangent", "cubic"] = "cubic"
     targets: tuple[float, ...] = ()
     folds: bool = True

@@ -139,10 +139,9 @@ def _solved(A: Array, B: Array) -> Array:
 def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int) -> Matrix:
     """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten."""
     n = len(sizes)
-    diagonal = [np.zeros((coefficients * s, coefficients * s)) for s in sizes]
-    for i, s in enumerate(sizes):
-        diagonal[i] = pieces.get((i, i), diagonal[i])
-        diagonal[i].flat[:: coefficients * s + 1] += 1.0
+    diagonal = [pieces[i, i] for i in range(n)]
+    for block, s in zip(diagonal, sizes, strict=True):
+        block.flat[:: coefficients * s + 1] += 1.0
     if n == 1:
         return Dense(diagonal[0])
     whole = Cyclic(diagonal, [None] * n, [None] * n, _order(sizes, coefficients))

