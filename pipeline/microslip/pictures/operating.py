@@ -84,13 +84,13 @@ def over_normal_force_plot(
     axes.set(xlabel="normal force in N", ylabel=quantity, title=title)
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
-        _numbers_within(axis)
+        numbers_within(axis)
     if len(peaks) > 1:
         axes.legend(fontsize=9)
     return save_figure(figure, path)
 
 
-def _numbers_within(axis: Any) -> None:
+def numbers_within(axis: Any) -> None:
     """Numbers without powers of ten on a logarithmic axis; more of them where it spans less than a decade or two."""
     low, high = axis.get_view_interval()
     span = np.log10(high / low)
