@@ -58,6 +58,7 @@ def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -
         axes.semilogy(*through(x, y), color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
+    numbers_within(axes.yaxis)
     figure.legend(loc="outside lower center", ncols=6, fontsize=9)
     return save_figure(figure, path)
 

@@ -268,7 +268,8 @@ def _assessed(
     if wanted.pictures:
         report("pictures of stresses")
         scenes = _can_draw() is None
-        drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
+        name, contacts = result.settings.name, len(result.built.assembly.contacts)
+        drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 

@@ -205,7 +205,7 @@ def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders])
         return f"{what} is {where}{_known(best)}."
     forces = [r.normal_force for r in found]
     end = {min(forces): "smallest", max(forces): "largest"}.get(best.normal_force)
-    said = f"; it is the {end} compared, the optimum may lie beyond" if end else f" of {len(forces)} compared"
+    said = f" (the {end} compared, the optimum may lie beyond)" if end else f" ({len(forces)} compared)"
     return f"{what} is lowest under F_N = {best.normal_force:.6g} N{said}: {where}{_known(best)}."
 
 
