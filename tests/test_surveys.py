@@ -169,6 +169,24 @@ def test_over_orders_the_worst_stress_leads(ring: Path, capsys) -> None:
 
 
 @pytest.mark.slow
+def test_contacts_of_a_whole_ring_are_drawn_under_their_own_names(ring: Path, monkeypatch) -> None:
+    """Four of six: the picture says so, and each has a file of its own."""
+    from microslip.pictures import operating
+
+    titles, draw = list[str](), operating.contact_map_plot
+    monkeypatch.setattr(
+        operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or draw(maps, title, path)
+    )
+    write_basis(ring.with_name("basis.h5"), stressed())
+    near = RING.replace("start = 150.0\nstop = 600.0", "start = 225.0\nstop = 235.0").replace("31", "5")
+    ring.write_text(near.replace("blades = 6", 'blades = 6\nengine_order = 1\nmodel = "full"'))
+    assert main(["respond", "case.toml", "-q"]) == 0
+    assert titles[0].endswith("4 of 6 contacts are shown")
+    files = sorted(f.name for f in Path("build/ring").glob("contact_*.vtu"))
+    assert files == [f"contact_right_{j}.vtu" for j in range(4)]
+
+
+@pytest.mark.slow
 def test_surveys_that_are_interrupted_leave_what_was_finished(ring: Path) -> None:
     """Ctrl-C at the second engine order, combination: a table of the first, and nothing that says it is whole."""
     ring.write_text(RING + "[orders]\nengine_orders = [1, 2]\npoints = 11\n[ranges]\nload = [1.0, 2.0]\n")
