@@ -184,6 +184,17 @@ def test_a_plateau_has_one_row(response: Response, between: float, rows: int) ->
     assert len(found) == rows and found[-1]["frequency_Hz"] == found[-1]["frequency_of_stress_Hz"] == 101.0
 
 
+@pytest.mark.parametrize(("contacts", "said"), [(24, "1 of 24 contacts are shown"), (1, "")])
+def test_a_picture_of_some_contacts_says_how_many(response: Response, tmp_path, monkeypatch, contacts, said) -> None:
+    from microslip.pictures import operating
+
+    titles: list[str] = []
+    monkeypatch.setattr(operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or path)
+    found = assess(response, small_basis(), "tip-probe")
+    draw(found, small_basis(), "beam", tmp_path, False, {"contacts at resonance": [object()]}, contacts)
+    assert titles[0].partition("\n")[2] == said
+
+
 def test_stress_over_engine_orders(response: Response) -> None:
     """Twice the coordinates, twice the stress and strain; the gauge at the root reads its row."""
     series = tuple(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from test_assembly import blade
+from test_assembly import blade, sector
 from test_speed_range import ranged
 
 from microslip.basis import write_basis
@@ -15,8 +17,12 @@ from microslip.case import load_case
 from microslip.case.assemble import build
 from microslip.case.problem import problem_of
 from microslip.cli import main
-from microslip.harmonic_balance import identification, response
+from microslip.data import ModalBasis, StressSet
+from microslip.harmonic_balance import envelope, identification, response
+from microslip.harmonic_balance import problem as balance
 from microslip.stages.surveying import survey_stage
+from microslip.system.assembly import Load
+from microslip.system.component import Component, Ring
 
 RING = """
 name = "ring"
@@ -98,7 +104,86 @@ def test_respond_over_orders(ring: Path, capsys) -> None:
     assert found["engine_order"].tolist() == [1, 2]
     assert Path("build/ring/pictures/orders.png").is_file()
     page = Path("build/ring/orders.html").read_text()
-    assert "<h1>ring: orders</h1>" in page and "data:image/png" in page and page.count("<tr>") == 3
+    assert "<h1>ring: orders</h1>" in page and "data:image/png" in page and page.count("<tr>") == 5
+
+
+STRESS = 7e12
+"""Pa of uniaxial stress per m of the tip along x."""
+
+
+def stressed() -> ModalBasis:
+    """The blade with one place whose stress follows the tip along x."""
+    bare, place = blade(), np.zeros((1, 3))
+    group = bare.groups[0, 0]
+    along = np.zeros((1, 6, group.n_modes))
+    along[0, 0] = STRESS * group.monitors["tip"].rows[0]
+    held = StressSet("nodal-averaged", place, 0 * along, along, np.zeros((1, 6)), np.ones(1))
+    return replace(bare, groups={(0, 0): replace(group, stresses={"nodes": held})})
+
+
+def test_the_worst_engine_order_in_stress_and_its_best_normal_force() -> None:
+    """Stress follows the read-out, so its largest is that of the amplitude; the worst of the orders is the largest of
+    the table, and its lowest that of the forces under which no order is missing."""
+    one = sector(6, 1, normal=1e4, push=1.0)
+    held = replace(one, components=(Component("blade", {0: stressed().groups[0, 0]}),))
+
+    def build(order: int, push: float) -> balance.Problem:
+        driven = replace(held, ring=Ring(6, order), loads=(Load("blade", "gas", push),))
+        return balance.of(driven, harmonics=1, samples=16, cycles=10, length=1e-6)
+
+    found = [
+        replace(envelope.over_orders(partial(build, push=push), [1, 2], (200.0, 420.0), 45), normal_force=push)
+        for push in (2.0, 1.0)
+    ]
+    for r in found:
+        np.testing.assert_allclose(r.stress, STRESS * r.amplitude, rtol=1e-9)
+        np.testing.assert_allclose(r.stressed_at, r.frequency, rtol=1e-12)
+    rows = [row for r in found if (row := envelope.worst(r, "stress")) is not None]
+    assert [row.value for row in rows] == [r.stress.max() for r in found]
+    assert rows[0].value == pytest.approx(2 * rows[1].value, rel=1e-6)  # sticking: twice the load, twice the stress
+    assert rows[0].order == found[0].order[found[0].stress.argmax()]
+    assert envelope.lowest(rows).normal_force == 1.0
+    lost = replace(found[1], stress=np.array([np.nan, found[1].stress[1]]))
+    partly = envelope.worst(lost, "stress")
+    assert partly is not None and (partly.known, partly.count) == (1, 2)
+    assert envelope.lowest([rows[0], partly]).normal_force == 2.0
+    assert envelope.worst(replace(lost, stress=np.full(2, np.nan)), "stress") is None
+
+
+@pytest.mark.slow
+def test_over_orders_the_worst_stress_leads(ring: Path, capsys) -> None:
+    """The first sentence and the first table tell the worst stress over the engine orders, as the table of the orders
+    has it."""
+    write_basis(ring.with_name("basis.h5"), stressed())
+    near = RING.replace("start = 150.0\nstop = 600.0", "start = 200.0\nstop = 420.0").replace("31", "45")
+    ring.write_text(near.replace("[10000.0]", "[5000.0, 10000.0]") + "[orders]\nengine_orders = [1, 2]\n")
+    assert main(["respond", "case.toml", "--over", "orders"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("Over engine orders 1 and 2 the worst stress amplitude is lowest under F_N = ")
+    orders, told = rows("build/ring/orders.csv"), rows("build/ring/orders_worst.csv")
+    for force, most in zip(told["normal_force_N"], told["stress_amplitude_Pa"], strict=True):
+        assert most == orders[f"stress_amplitude_Pa_F_N_{force:g}_N"].max()
+    assert f"{1e-6 * told['stress_amplitude_Pa'].min():.4g} MPa" in first
+    assert Path("build/ring/pictures/orders_worst.png").stat().st_size > 10000
+    assert first.split(":")[0] in Path("build/ring/orders.html").read_text().replace("<sub>N</sub>", "_N")
+
+
+@pytest.mark.slow
+def test_contacts_of_a_whole_ring_are_drawn_under_their_own_names(ring: Path, monkeypatch) -> None:
+    """Four of six: the picture says so, and each has a file of its own."""
+    from microslip.pictures import operating
+
+    titles, draw = list[str](), operating.contact_map_plot
+    monkeypatch.setattr(
+        operating, "contact_map_plot", lambda maps, title, path: titles.append(title) or draw(maps, title, path)
+    )
+    write_basis(ring.with_name("basis.h5"), stressed())
+    near = RING.replace("start = 150.0\nstop = 600.0", "start = 225.0\nstop = 235.0").replace("31", "5")
+    ring.write_text(near.replace("blades = 6", 'blades = 6\nengine_order = 1\nmodel = "full"'))
+    assert main(["respond", "case.toml", "-q"]) == 0
+    assert titles[0].endswith("4 of 6 contacts are shown")
+    files = sorted(f.name for f in Path("build/ring").glob("contact_*.vtu"))
+    assert files == [f"contact_right_{j}.vtu" for j in range(4)]
 
 
 @pytest.mark.slow

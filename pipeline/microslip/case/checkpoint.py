@@ -161,7 +161,8 @@ def maps_at(built: Built, normal: float, row: Mapping[str, Any]) -> list[Contact
         side = next(iter(component.groups.values())).interfaces[contact.first.interface]
         c, force = seen[contact.name].cycle, np.asarray(seen[contact.name].force)
         what = c.dissipated, c.slipping, c.open
-        maps.append(contact_map(contact.patch, side, force, *what, problem.harmonics, contact.phase))
+        found_map = contact_map(contact.patch, side, force, *what, problem.harmonics, contact.phase)
+        maps.append(replace(found_map, name=contact.name))
     _check_energy([c.name for c in problem.assembly.contacts], maps, row)
     return maps
 

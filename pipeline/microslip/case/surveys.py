@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -82,15 +83,13 @@ def over_orders(
             return problem_of(at(order), normal)
 
         band, points = (sweep.start, sweep.stop), asked.points or sweep.points
-        so_far = partial(_so_far, keep, found, label)
-        found[label] = envelope.over_orders(problem, list(orders), band, points, report, under, so_far)
+        pressed = partial(replace, normal_force=np.nan if normal is None else normal)
+
+        def so_far(one: OverOrders, label: str = label, pressed: Callable[..., OverOrders] = pressed) -> None:
+            keep({**found, label: pressed(one)})
+
+        found[label] = pressed(envelope.over_orders(problem, list(orders), band, points, report, under, so_far))
     return found
-
-
-def _so_far(
-    keep: Callable[[dict[str, OverOrders]], None], found: dict[str, OverOrders], label: str, one: OverOrders
-) -> None:
-    keep({**found, label: one})
 
 
 def over_speeds(

@@ -161,10 +161,10 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
     for name, rows in _outputs(problem).items():
         kept[name] = found.outputs[list(rows.values())]
     for component in problem.assembly.components:
-        kept[f"bodies/{component.name}/q"] = _rectangle(found.q[component.name])
-        forces = [_beside(problem, component, h, found) for h in range(problem.harmonics + 1)]
+        kept[f"bodies/{component.name}/q"] = rectangle(found.q[component.name])
+        forces = [beside(problem, component, h, found) for h in range(problem.harmonics + 1)]
         if any(len(f) for f in forces):
-            kept[f"bodies/{component.name}/forces"] = _rectangle(forces)
+            kept[f"bodies/{component.name}/forces"] = rectangle(forces)
     for name, cycle in found.cycles.items():
         kept |= _of_contact(f"contacts/{name}", found.relative[name], found.force[name], cycle)
     return kept
@@ -238,7 +238,7 @@ def _outputs_of(problem: Problem, row: dict[str, Any]) -> ComplexArray:
     return np.array(found, dtype=complex).reshape(-1, problem.harmonics + 1)
 
 
-def _rectangle(rows: list[ComplexArray]) -> ComplexArray:
+def rectangle(rows: list[ComplexArray]) -> ComplexArray:
     """(H + 1, m) of rows that may differ in length from one nodal diameter to the next."""
     out = np.zeros((len(rows), max(len(r) for r in rows)), dtype=complex)
     for to, row in zip(out, rows, strict=True):
@@ -250,7 +250,7 @@ def _ragged(problem: Problem, component: Component, q: ComplexArray) -> list[Com
     return [row[: component.at(problem.assembly.index(h)).group.n_modes] for h, row in enumerate(q)]
 
 
-def _beside(problem: Problem, component: Component, harmonic: int, found: Operating) -> ComplexArray:
+def beside(problem: Problem, component: Component, harmonic: int, found: Operating) -> ComplexArray:
     """(r,) amplitudes of the forces on the rows of a component's residual shapes, N and N m; (0,) where it has none."""
     residual = component.at(problem.assembly.index(harmonic)).group.residual
     if residual is None:

@@ -7,22 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from ..continuation import CONVERGED
-from ..continuation import peak as climbed
 from ..data import Array, ComplexArray, Indices, UserError
+from ..operating.motion import Motion, motion_of
+from ..operating.stress import stress_peaks
 from ..units import METRES, Quantity
 from . import response
-from .peak import checked, resonance
+from .checkpoint import beside, rectangle
 from .problem import Problem
-from .readout import WithOutput, measured
+from .readout import measured
 from .reduced import stuck
-from .response import HarmonicResponse
-from .solver import Report
-from .sweeps import tops
+from .response import Operating
+from .solver import Report, sweep
+from .sweeps import brackets
 
 # --- resonance over engine order -------------------------------------------------------------------------------------
 
@@ -34,7 +34,9 @@ class OverOrders:
     Attributes:
         order: (e,) engine orders. index: (e,) of their waves. frequency: (e,) Hz and amplitude: (e,) m of the first
             read-out; NaN where the band holds no peak. stuck: (e,) Hz, the nearest mode with sticking
-            contacts, or NaN. failed: (e,) points that did not converge. quantity: what is read; m stands for its unit.
+            contacts, or NaN. failed: (e,) points that did not converge. stress: (e,) Pa, the largest stress amplitude
+            in the band of the body that is read, and stressed_at: (e,) Hz where; NaN where the band holds no peak or
+            the modal file no stress. quantity: what is read; m stands for its unit. normal_force: N, or NaN.
     """
 
     order: Indices
@@ -43,11 +45,14 @@ class OverOrders:
     amplitude: Array
     stuck: Array
     failed: Indices
+    stress: Array
+    stressed_at: Array
     quantity: Quantity = field(kw_only=True, default=METRES)
+    normal_force: float = field(kw_only=True, default=float("nan"))
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""
-        return {
+        found = {
             "engine_order": self.order.astype(float),
             "wave": self.index.astype(float),
             "resonance_Hz": self.frequency,
@@ -55,6 +60,42 @@ class OverOrders:
             "stuck_Hz": self.stuck,
             "failed_points": self.failed.astype(float),
         }
+        if np.isfinite(self.stress).any():
+            found |= {"stress_amplitude_Pa": self.stress, "frequency_of_stress_Hz": self.stressed_at}
+        return found
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The largest amplitude or stress over the engine orders under a normal force.
+
+    Attributes:
+        normal_force: N. value: m or Pa. order: the engine order that has it, at frequency: Hz. known: engine orders
+            whose resonance is known, of count.
+    """
+
+    normal_force: float
+    value: float
+    order: int
+    frequency: float
+    known: int
+    count: int
+
+
+def worst(one: OverOrders, of: Literal["amplitude", "stress"]) -> Worst | None:
+    """The worst engine order under a normal force; None where nothing is known."""
+    value, at = (one.amplitude, one.frequency) if of == "amplitude" else (one.stress, one.stressed_at)
+    known = np.isfinite(value)
+    if not known.any():
+        return None
+    i = int(np.nanargmax(value))
+    return Worst(one.normal_force, float(value[i]), int(one.order[i]), float(at[i]), int(known.sum()), len(value))
+
+
+def lowest(rows: Sequence[Worst]) -> Worst:
+    """Where the worst is lowest: among the normal forces under which most engine orders are known."""
+    most = max(row.known for row in rows)
+    return min((row for row in rows if row.known == most), key=lambda row: row.value)
 
 
 def over_orders(
@@ -64,47 +105,75 @@ def over_orders(
     """The largest resonance of every engine order.
 
     Args:
-        build: engine order -> problem. band: Hz, of the frequency of the order. points: of a sweep over it, from whose
-            largest peak the way uphill is followed (`peak`), round folds too. under: words for the report, such as
-            the normal force. keep: is given what there is after every engine order.
+        build: engine order -> problem. band: Hz, of the frequency of the order. points: of a sweep over it, beside
+            whose tops the peaks are looked for (`response.highest`), round folds too. under: words for the report,
+            such as the normal force. keep: is given what there is after every engine order.
     """
-    rows, whole = list[tuple[Any, ...]](), OverOrders(*6 * (np.zeros(0, dtype=int),))
+    rows, whole = list[tuple[Any, ...]](), OverOrders(*8 * (np.zeros(0, dtype=int),))
     for i, e in enumerate(orders):
         report(f"engine order {e}{under}, {i + 1} of {len(orders)}")
         problem = build(int(e))
-        f, a, failed = largest(problem, np.linspace(*band, points), report)
+        top = largest(problem, np.linspace(*band, points), report)
+        f = top.frequency
         modes = stuck(problem.parts[1][0], problem.stiffness[0]) if len(problem.parts[1]) == 1 else np.zeros(0)
         near = modes[np.abs(modes - f).argmin()] if len(modes) and np.isfinite(f) else np.nan
-        rows.append((int(e), problem.assembly.index(1), f, a, near, failed))
+        rows.append(
+            (int(e), problem.assembly.index(1), f, top.amplitude, near, top.failed, top.stress, top.stressed_at)
+        )
         columns = (np.array(column) for column in zip(*rows, strict=True))
         whole = OverOrders(*columns, quantity=measured(problem.assembly))
-        what = f"{f:.6g} Hz, {a:.4g} {whole.quantity.said}" if np.isfinite(f) else "no resonance in the band"
-        report(f"engine order {e}{under}: {what}")
+        what = f"{f:.6g} Hz, {top.amplitude:.4g} {whole.quantity.said}"
+        what += f", {1e-6 * top.stress:.4g} MPa" if np.isfinite(top.stress) else ""
+        report(f"engine order {e}{under}: {what if np.isfinite(f) else 'no resonance in the band'}")
         keep(whole)
     return whole
 
 
-def largest(problem: Problem, frequency: Array, report: Report = lambda _: None) -> tuple[float, float, int]:
-    """Hz, m and failed points of the largest resonance of a band; NaN where it has no peak."""
-    found = response.harmonic_response(problem, frequency, np.zeros(len(problem.assembly.contacts)), report)
-    failed, peaks = int((~found.converged).sum()), tops(found)
-    if not len(peaks):
-        return float("nan"), float("nan"), failed
-    i = max(peaks, key=lambda j: abs(found.monitor[j]))
-    report(f"peak near {frequency[i]:.6g} Hz")
-    top = resonance(checked(problem, climbed(WithOutput(problem, 0), *_near(problem, found, i))))
-    if top.status != CONVERGED:
-        return float(frequency[i]), float(abs(found.monitor[i])), failed + 1
-    return top.Omega / (2 * np.pi), top.amplitude, failed
+@dataclass(frozen=True)
+class Largest:
+    """The largest resonance of a band: Hz and m, NaN where it has no peak; points that did not converge; the largest
+    stress amplitude (Pa) in the band and its frequency (Hz), NaN where it is not known."""
+
+    frequency: float
+    amplitude: float
+    failed: int
+    stress: float = float("nan")
+    stressed_at: float = float("nan")
 
 
-def _near(problem: Problem, found: HarmonicResponse, i: int) -> tuple[Array, float]:
-    """x and Omega near the top about point i: the way uphill from the grid alone would take three times as long."""
-    names = ("frequency", "monitor", "converged", "x")
-    cut = replace(found, **{name: getattr(found, name)[i - 1 : i + 2] for name in names})
-    highest = response.highest(problem, cut, (0, 1, 2))
-    assert highest is not None  # a top has one
-    return highest[0].x, highest[0].Omega
+def largest(problem: Problem, frequency: Array, report: Report = lambda _: None) -> Largest:
+    """The largest resonance of a band, looked for beside every top of a sweep, and the largest stress on the way."""
+    points = sweep(problem, frequency, report)
+    motions = [response.operating(problem, p) for p in points]
+    found = response.of_points(problem, points, np.zeros(len(problem.assembly.contacts)), motions)
+    failed = int((~found.converged).sum())
+    report("resonances between the points")
+    peaks = [peak for bracket in brackets(found) if (peak := response.highest(problem, found, bracket)) is not None]
+    if not peaks:
+        return Largest(float("nan"), float("nan"), failed)
+    known = [m for m, ok in zip(motions, found.converged, strict=True) if ok]
+    motion = motion_of_read(problem, [*known, *(response.operating(problem, p) for p, _ in peaks)])
+    top, amplitude = max(peaks, key=lambda peak: peak[1])
+    one = Largest(top.Omega / (2 * np.pi), amplitude, failed)
+    if motion is None:
+        return one
+    stress = stress_peaks(motion, largest=False).amplitude
+    j = int(stress.argmax())
+    return replace(one, stress=float(stress[j]), stressed_at=float(motion.Omega[j]) / (2 * np.pi))
+
+
+def motion_of_read(problem: Problem, found: Sequence[Operating]) -> Motion | None:
+    """The motion of the body that the first read-out belongs to, in its modal coordinates; None where its modal file
+    holds no stress modes at the nodes."""
+    a, H = problem.assembly, range(problem.harmonics + 1)
+    body = next(m for m in a.components if m.name == a.outputs[0].component)
+    waves = [body.at(a.index(h)) for h in H]
+    if not all("nodes" in w.group.stresses for w in waves):
+        return None
+    q = np.array([rectangle(one.q[body.name]) for one in found])
+    forces = np.array([rectangle([beside(problem, body, h, one) for h in H]) for one in found])
+    Omega = np.array([one.Omega for one in found])
+    return motion_of(Omega, q, [w.group for w in waves], [w.conjugate for w in waves], forces)
 
 
 # --- envelopes -------------------------------------------------------------------------------------------------------

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ..data import Array
+from ..harmonic_balance.envelope import lowest, worst
 from ..units import METRES, Quantity
-from .operating import shades
-from .plots import empty_figure, plain_axes, plain_numbers, save_figure, single_panel, whole_numbers
+from .operating import numbers_within, shades
+from .plots import (
+    empty_figure,
+    plain_axes,
+    plain_numbers,
+    said_beside,
+    save_figure,
+    single_panel,
+    whole_numbers,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,9 +31,13 @@ if TYPE_CHECKING:
 
 def _in_millionths(axes: Axes, of: Quantity) -> None:
     """Amplitudes of a quantity on a logarithmic scale with plain numbers."""
+    _logarithmic(axes)
+    axes.set_ylabel(f"amplitude in {of.micro} (0-peak)")
+
+
+def _logarithmic(axes: Axes) -> None:
     axes.set_yscale("log")
     plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
-    axes.set_ylabel(f"amplitude in {of.micro} (0-peak)")
 
 
 def nodal_diameter_picture(
@@ -57,26 +70,58 @@ def nodal_diameter_picture(
 
 
 def over_orders_picture(found: Mapping[str, OverOrders], path: Path, title: str) -> Path:
-    """Resonance frequency and amplitude over the engine order (Sextro Figs. 5.5-2, 5.5-7b).
+    """Resonance frequency, amplitude and stress over the engine order (Sextro Figs. 5.5-2, 5.5-4, 5.5-7b).
 
     Args:
         found: label, such as a normal force, -> resonances.
     """
-    figure = empty_figure(9.0, 7.0)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    for axes in (upper, lower):
+    stressed = any(np.isfinite(r.stress).any() for r in found.values())
+    figure = empty_figure(9.0, 9.5 if stressed else 7.0)
+    upper, *lower = figure.subplots(3 if stressed else 2, 1, sharex=True)
+    for axes in (upper, *lower):
         plain_axes(axes)
     for colour, (label, r) in zip(shades(len(found)), found.items(), strict=True):
         upper.plot(r.order, r.frequency, "o-", color=colour, markersize=4, linewidth=1.3, label=label)
-        lower.plot(r.order, 1e6 * r.amplitude, "o-", color=colour, markersize=4, linewidth=1.3)
+        for axes, values in zip(lower, (1e6 * r.amplitude, 1e-6 * r.stress), strict=False):
+            axes.plot(r.order, values, "o-", color=colour, markersize=4, linewidth=1.3)
     last = list(found.values())[-1]
     upper.plot(last.order, last.stuck, color="0.6", linewidth=1, linestyle="--", label="sticking contacts")
     upper.set_ylabel("resonance in Hz")
-    _in_millionths(lower, last.quantity)
-    lower.set_xlabel("engine order")
-    whole_numbers(lower)
+    _in_millionths(lower[0], last.quantity)
+    if stressed:
+        _logarithmic(lower[1])
+        lower[1].set_ylabel("largest stress amplitude in MPa")
+    lower[-1].set_xlabel("engine order")
+    whole_numbers(lower[-1])
     upper.set_title(title)
     figure.legend(loc="outside lower center", ncols=4, fontsize=9)
+    return save_figure(figure, path)
+
+
+def worst_order_picture(found: Sequence[OverOrders], path: Path, title: str) -> Path:
+    """The worst of all engine orders over the normal force: stress where it is known, else amplitude; the lowest is
+    marked, and every point says its engine order."""
+    stressed = any(np.isfinite(r.stress).any() for r in found)
+    of: Literal["stress", "amplitude"] = "stress" if stressed else "amplitude"
+    rows = [w for r in found if (w := worst(r, of)) is not None]
+    best, scale = lowest(rows), 1e-6 if stressed else 1e6
+    figure, axes = single_panel(9.0, 5.5)
+    x, y = [w.normal_force for w in rows], [scale * w.value for w in rows]
+    axes.plot(x, y, "o-", color="#1f5f99", markersize=4, linewidth=1.6)
+    told = f"lowest: {scale * best.value:.3g} {'MPa' if stressed else found[0].quantity.micro}"
+    told += f" under {best.normal_force:.4g} N"
+    axes.plot(best.normal_force, scale * best.value, "o", ms=10, mfc="none", mec="#b3261e", mew=1.6, label=told)
+    for w in rows:
+        said_beside(axes, f"EO {w.order}", (w.normal_force, scale * w.value), (0, 9), ha="center", fontsize=8.5)
+    if min(x) > 0:
+        axes.set_xscale("log")
+        numbers_within(axes.xaxis)
+    axes.set_yscale("log")
+    axes.margins(y=0.15)
+    numbers_within(axes.yaxis)
+    what = "stress amplitude in MPa" if stressed else f"amplitude in {found[0].quantity.micro}"
+    axes.set(xlabel="normal force in N", ylabel=f"worst {what}", title=title)
+    axes.legend(fontsize=9)
     return save_figure(figure, path)
 
 

@@ -58,6 +58,7 @@ def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -
         axes.semilogy(*through(x, y), color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
+    numbers_within(axes.yaxis)
     figure.legend(loc="outside lower center", ncols=6, fontsize=9)
     return save_figure(figure, path)
 
@@ -84,13 +85,13 @@ def over_normal_force_plot(
     axes.set(xlabel="normal force in N", ylabel=quantity, title=title)
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
-        _numbers_within(axis)
+        numbers_within(axis)
     if len(peaks) > 1:
         axes.legend(fontsize=9)
     return save_figure(figure, path)
 
 
-def _numbers_within(axis: Any) -> None:
+def numbers_within(axis: Any) -> None:
     """Numbers without powers of ten on a logarithmic axis; more of them where it spans less than a decade or two."""
     low, high = axis.get_view_interval()
     span = np.log10(high / low)

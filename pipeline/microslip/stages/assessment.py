@@ -243,12 +243,13 @@ def has_stresses(basis: ModalBasis, response: Response, component: str = "") -> 
 
 def draw(
     found: Assessment, basis: ModalBasis, case: str, folder: Path, scenes: bool = True,
-    maps: Mapping[str, list[ContactMap]] | None = None,
+    maps: Mapping[str, list[ContactMap]] | None = None, contacts: int = 0,
 ) -> dict[str, Path]:  # fmt: skip
     """Stress over frequency and normal force, the most endangered body, its Haigh diagram, contact maps.
 
     Args:
         case: for titles. scenes: False leaves out what needs PyVista. maps: title -> patches.
+            contacts: of the case, of which the patches may be some.
 
     Returns:
         Name -> file; names are those under which the report shows them.
@@ -275,7 +276,8 @@ def draw(
     for title, patches in (maps or {}).items():
         path = folder / f"{title.replace(' ', '_')}.png"
         where = f", {top.stressed_at:.5g} Hz, $F_N$ = {top.normal_force:g} N" if top is not None else ""
-        drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}", path)
+        some = f"\n{len(patches)} of {contacts} contacts are shown" if len(patches) < contacts else ""
+        drawn[title] = operating.contact_map_plot(patches, f"{case}: {title}{where}{some}", path)
     return drawn
 
 

@@ -268,7 +268,9 @@ def _assessed(
     if wanted.pictures:
         report("pictures of stresses")
         scenes = _can_draw() is None
-        drawn = assessment.draw(found, basis, result.settings.name, folder / "pictures", scenes, maps)
+        name, arrays = result.settings.name, response.series[0].arrays
+        contacts = sum(n.startswith("contacts/") and n.endswith("/dissipated") for n in arrays)
+        drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
 
 

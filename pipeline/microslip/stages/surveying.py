@@ -3,11 +3,11 @@ arclength; identification."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -17,9 +17,12 @@ from ..case.curves import Followed, curves
 from ..data import Array, ModalBasis
 from ..files import store
 from ..files.tables import columns_csv
+from ..harmonic_balance.envelope import Worst, lowest, worst
 from ..report.response import survey_html
+from ..report.words import number_list
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
+from ..units import counted
 from .checkpoint import Checkpoint, hashes_of
 from .places import existing_files
 from .stage import Made, Report, Stage
@@ -133,7 +136,7 @@ def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
 
 
 def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
-    from ..pictures.coupled import over_orders_picture
+    from ..pictures.coupled import over_orders_picture, worst_order_picture
 
     def tables(found: Mapping[str, OverOrders]) -> Tables:
         first, columns = max(found.values(), key=lambda r: len(r.order)), dict[str, Array]()
@@ -142,13 +145,73 @@ def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
             missing = np.full(len(first.order) - len(r.order), np.nan)
             own = {f"{n}_{plain}": np.append(v, missing) for n, v in r.columns().items() if n not in of_all}
             columns |= {n: v for n, v in first.columns().items() if n in of_all} | own
-        return {"orders.csv": columns}
+        return {"orders_worst.csv": _worst_table(list(found.values())), "orders.csv": columns}
 
     of_all = {"engine_order", "wave"}
     found = surveys.over_orders(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: resonances over the engine order"
     failed = sum(int(r.failed.sum()) for r in found.values())
-    return Survey(tables(found), {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}, failed=failed)
+    draw: dict[str, Callable[[Path], Path]] = {"pictures/orders.png": lambda p: over_orders_picture(found, p, title)}
+    if len(found) > 1:
+        words = f"{settings.name}: the worst of all engine orders over the normal force"
+        draw = {"pictures/orders_worst.png": lambda p: worst_order_picture(list(found.values()), p, words)} | draw
+    return Survey(tables(found), draw, _worst_sentences(list(found.values())), failed)
+
+
+def _worst_table(found: Sequence[OverOrders]) -> dict[str, Array]:
+    """Column -> under every normal force: the largest amplitude and stress over the engine orders, and where."""
+    columns = {"normal_force_N": np.array([r.normal_force for r in found])}
+    for name, of in _judged(found):
+        told = [worst(r, of) for r in found]
+        values = [(np.nan,) * 3 if w is None else (w.value, w.order, w.frequency) for w in told]
+        names = name, f"engine_order_of_{of}", f"frequency_of_{of}_Hz"
+        columns |= dict(zip(names, np.array(values, dtype=float).T, strict=True))
+    for name, each in (
+        ("orders_without_resonance", [np.isnan(r.amplitude).sum() for r in found]),
+        ("failed_points", [r.failed.sum() for r in found]),
+    ):
+        columns[name] = np.array(each, dtype=float)
+    return columns
+
+
+def _judged(found: Sequence[OverOrders]) -> list[tuple[str, Literal["stress", "amplitude"]]]:
+    """Column and name of what the worst engine order is looked for in: the stress first, where it is known."""
+    columns: list[tuple[str, Literal["stress", "amplitude"]]] = [
+        ("stress_amplitude_Pa", "stress"),
+        (found[0].quantity.column("amplitude"), "amplitude"),
+    ]
+    return columns if any(np.isfinite(r.stress).any() for r in found) else columns[1:]
+
+
+def _worst_sentences(found: Sequence[OverOrders]) -> list[str]:
+    """The worst engine order, and under which normal force it is best."""
+    said = []
+    for _, of in _judged(found):
+        rows = [w for r in found if (w := worst(r, of)) is not None]
+        if rows:
+            said.append(_worst_sentence(rows, of, found))
+    if not any(np.isfinite(r.stress).any() for r in found):
+        said.append("Stresses are not known: the modal file holds none (output.nodal_stress = true in body.toml).")
+    return said or ["No resonance in the band."]
+
+
+def _worst_sentence(rows: Sequence[Worst], of: str, found: Sequence[OverOrders]) -> str:
+    best, orders = lowest(rows), number_list([int(e) for e in found[0].order])
+    quantity = found[0].quantity
+    value = f"{1e-6 * best.value:.4g} MPa" if of == "stress" else f"{1e6 * best.value:.4g} {quantity.micro}"
+    where = f"{value} at engine order {best.order}, {best.frequency:.5g} Hz"
+    what = f"Over engine orders {orders} the worst {of}{' amplitude' if of == 'stress' else ''}"
+    if len(found) == 1:
+        return f"{what} is {where}{_known(best)}."
+    forces = [r.normal_force for r in found]
+    end = {min(forces): "smallest", max(forces): "largest"}.get(best.normal_force)
+    said = f" (the {end} compared, the optimum may lie beyond)" if end else f" ({len(forces)} compared)"
+    return f"{what} is lowest under F_N = {best.normal_force:.6g} N{said}: {where}{_known(best)}."
+
+
+def _known(row: Worst) -> str:
+    missing = row.count - row.known
+    return f" ({counted(missing, 'engine order')} without a resonance in the band)" if missing else ""
 
 
 def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
