@@ -1237,6 +1237,18 @@ def laws() -> None:
     save(drawn(study.elements(figure(9.6, 3.8), plain)), "microslip_elements")
 
 
+def time_domain() -> None:
+    """The impact oscillator of section 4.2 from the pendulum's modal file, rigid and with its bending."""
+    import time_domain_study as study
+
+    basis = made("pendulum", "pendulum")
+    found = study.motions(basis)
+    fill("time_domain.md", "pendulum", table(*study.rows(found)))
+    fill("time_domain.md", "balanced", table(*study.against_balance()))
+    path = BUILD / "phase_portraits.png"
+    save(from_file(study.drawn(found, path)), "phase_portraits")
+
+
 def continuation() -> None:
     """Curves of solutions with kinks, folds and a narrow gap."""
     import curve_study as study
@@ -1444,6 +1456,7 @@ STUDIES = {
         rough,
         laws,
         microslip,
+        time_domain,
         continuation,
         followed,
         accuracy,

@@ -213,7 +213,9 @@ def test_pictures_are_drawn(tmp_path, basis: ModalBasis) -> None:
     found = identification.identify(ring(basis), known[1], 0.5, known)
     assert coupled.nodal_diameter_picture([diagram], tmp_path / "a.png", "a", found).stat().st_size > 10000
     gap = np.array([1.0, np.nan, 2.0])
-    orders = envelope.OverOrders(np.arange(3), np.arange(3), 100 * gap, 1e-6 * gap, 90 * gap, np.zeros(3, int))
+    orders = envelope.OverOrders(
+        np.arange(3), np.arange(3), 100 * gap, 1e-6 * gap, 90 * gap, np.zeros(3, int), 1e6 * gap, 99 * gap
+    )
     assert coupled.over_orders_picture({"100 N": orders}, tmp_path / "b.png", "b").stat().st_size > 10000
     f, a = np.linspace(10, 20, 5), np.outer([1, 2], 1e-6 * np.arange(1, 6))
     ok = np.ones((2, 5), dtype=bool)

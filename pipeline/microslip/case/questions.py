@@ -128,6 +128,13 @@ class IdentificationOfCase(Model):
     modes: Annotated[int, Field(ge=1, le=100)] = 3
 
 
+def _several(value: object) -> object:
+    return _finite_vector([value] if isinstance(value, int | float) and not isinstance(value, bool) else value)
+
+
+Several = Annotated[tuple[Positive, ...], BeforeValidator(_several, json_schema_input_type=Positive | list[Positive])]
+
+
 class OrbitOfCase(Model):
     """The motion in time from a start, by `microslip orbit`.
 
@@ -137,8 +144,8 @@ class OrbitOfCase(Model):
     loads, ``rest`` as preloaded. normal_force: N, of the contacts that the sweep presses.
     """
 
-    frequency: Positives | None = None
-    Omega: Positives | None = None
+    frequency: Several | None = None
+    Omega: Several | None = None
     settle: Annotated[int, Field(ge=0, le=1000000)] = 300
     keep: Annotated[int, Field(ge=1, le=100000)] = 40
     samples: Annotated[int, Field(ge=8, le=8192)] = 256

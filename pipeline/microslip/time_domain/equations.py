@@ -95,8 +95,16 @@ class Equations:
     def springs(self) -> Array:
         """(c, c) N/m of the closed, sticking contacts on bodies that yield at once by R; of one that stiffens as it is
         pressed, the stiffest within `DEEPEST`."""
-        k = scipy.linalg.block_diag(np.zeros((0, 0)), *map(_stiffest, self.contacts))
-        return k @ np.linalg.inv(np.eye(len(k)) + self.R @ k)
+        return self._own @ self.yields
+
+    @cached_property
+    def yields(self) -> Array:
+        """(c, c) share of the motion of the modes that is left to sticking contacts where R yields as well."""
+        return np.linalg.inv(np.eye(len(self.R)) + self.R @ self._own)
+
+    @cached_property
+    def _own(self) -> Array:
+        return scipy.linalg.block_diag(np.zeros((0, 0)), *map(_stiffest, self.contacts))
 
     @cached_property
     def fastest(self) -> float:

@@ -30,8 +30,12 @@ EVENTS = 8192
 
 KINDS = ("closes", "opens", "slips", "sticks")
 
+CHORDS = 12
+"""Iterations for contacts beside which the modes leave compliance out, with the slope of sticking contacts; modes leave
+out little beside what a contact yields, so few are needed."""
+
 ITERATIONS = 30
-"""Of Newton's method for contacts beside which the modes leave compliance out."""
+"""Of Newton's method, where they do not do."""
 
 
 class Group(NamedTuple):
@@ -49,7 +53,8 @@ class Bodies(NamedTuple):
 
     Attributes:
         flow. tau: s. D: (c, b, 2 p) and D_o (c, n): d of the contact coordinates. kick: (b, p, c) velocities per force.
-            R: (c, c), F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts.
+            R, yields: (c, c), see `Equations`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion
+            without contacts.
         reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
     """
 
@@ -59,6 +64,7 @@ class Bodies(NamedTuple):
     D_o: Any
     kick: Any
     R: Any
+    yields: Any
     F_0: Any
     omega2: Any
     steady: Any
@@ -177,7 +183,7 @@ class Stepper:
         reach = np.linalg.norm(rows, axis=(1, 2))
         drift = np.linalg.norm(np.abs((rows @ still + given) @ e.turning).sum(axis=2), axis=1)
         return Bodies(
-            flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.F_0)),
+            flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.yields, e.F_0)),
             *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift)),
         )  # fmt: skip
 
@@ -291,32 +297,38 @@ def _slope(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any
 
 
 def _placed(options: Options, groups: tuple[Group, ...], B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> tuple:
-    """d (c,) of contacts that bodies alone would have at `free`, where those yield at once; and the residual, m."""
+    """d (c,) of contacts that bodies alone would have at `free`, where those yield at once; the residual, m; and what
+    `_force` says there. With the slope of sticking contacts first, with their own where that does not do."""
+    count = len(free)
     if not options.yields:
-        return free, jnp.zeros(())
-    count, length = len(free), 1e-13
+        return free, jnp.zeros(()), _force(groups, free, v, dt, now.states, count)
+    enough = 1e-10 * jnp.abs(free).max() + 1e-17
 
-    def missing(d: Any) -> Any:
-        return d - free + B.R @ (_force(groups, d, v, dt, now.states, count)[0] - B.F_0)
+    def missing(d: Any) -> tuple:
+        there = _force(groups, d, v, dt, now.states, count)
+        return d, d - free + B.R @ (there[0] - B.F_0), there
 
-    def wanted(carried: tuple) -> Any:
-        _, r, i = carried
-        return (jnp.abs(r).max() > length * (1e-3 + jnp.abs(free).max())) & (i < ITERATIONS)
+    def wanted(most: int, carried: tuple) -> Any:
+        i, (_, r, _) = carried
+        return (jnp.abs(r).max() > enough) & (i < most)
+
+    def chord(carried: tuple) -> tuple:
+        i, (d, r, _) = carried
+        return i + 1, missing(d - B.yields @ r)
 
     def newton(carried: tuple) -> tuple:
-        d, r, i = carried
+        i, (d, r, _) = carried
         J = jnp.eye(count) + B.R @ _slope(groups, d, v, dt, now.states, count)
-        d = d - jnp.linalg.solve(J, r)
-        return d, missing(d), i + 1
+        return i + 1, missing(d - jnp.linalg.solve(J, r))
 
-    first = free - B.R @ (now.force - B.F_0)
-    d, r, _ = jax.lax.while_loop(wanted, newton, (first, missing(first), 0))
-    return d, jnp.abs(r).max()
+    first = missing(free - B.R @ (now.force - B.F_0))
+    _, found = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
+    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, found))
+    return d, jnp.abs(r).max(), there
 
 
 def _pressed(options: Options, groups: tuple, order: Any, B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> Pressed:
-    d, worst = _placed(options, groups, B, free, v, dt, now)
-    force, states, points = _force(groups, d, v, dt, now.states, len(free))
+    d, worst, (force, states, points) = _placed(options, groups, B, free, v, dt, now)
     places = tuple(_displaced(g, d) for g in groups)
     approach, slips, lost, stored = [], [], jnp.zeros(()), jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):

@@ -1,0 +1,78 @@
+"""Table and picture of docs/time_domain.md: the impact oscillator of section 4.2, and balance against time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+import microslip as ms
+from microslip.case import load_case
+from microslip.case.assemble import build
+from microslip.data import ModalBasis
+from microslip.pictures.orbit import portraits
+from microslip.time_domain import equations, orbit
+from microslip.time_domain.orbit import Orbit
+
+ROOT = Path(__file__).resolve().parents[1]
+CASE = ROOT / "pipeline" / "cases" / "pendulum.toml"
+WAYS = {"rigid": ["modes=1"], "1 %": ["damping_ratio=0.01"], "5 %": [], "10 %": ["damping_ratio=0.1"]}
+"""How the bending is taken -> changes of the case."""
+
+
+def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
+    """How the bending is taken -> rad/s -> motion."""
+    found: dict[str, dict[float, Orbit]] = {}
+    for name, changes in WAYS.items():
+        settings, _ = load_case(CASE, changes)
+        assembly, asked = build(settings, {"pendulum": basis}, CASE).assembly, settings.orbit
+        assert asked is not None and asked.Omega is not None
+        found[name] = {w: orbit.run(equations.of(assembly, w), asked.settle, asked.keep) for w in asked.Omega}
+    return found
+
+
+def rows(found: Mapping[str, Mapping[float, Orbit]]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows: periods after which the motion comes back, and impacts in them, or a period."""
+
+    def told(one: Orbit) -> str:
+        p = one.repeats
+        return f"{p}, {round(one.impacts * p)}" if p else f"-, {one.impacts:.3g} a period"
+
+    head = ["rad/s", *(f"bending {name}" if "%" in name else name for name in found)]
+    return head, [[f"{w:g}", *(told(way[w]) for way in found.values())] for w in next(iter(found.values()))]
+
+
+def drawn(found: Mapping[str, Mapping[float, Orbit]], path: Path) -> Path:
+    """Phase portraits as the case has them."""
+    named = [(f"{w:g} rad/s", one) for w, one in found["5 %"].items()]
+    return portraits(named, path, "Impact oscillator of section 4.2")
+
+
+def against_balance() -> tuple[list[str], list[list[str]]]:
+    """Head and rows: first harmonics of steady vibrations in time, and by harmonic balance with many harmonics."""
+    table = []
+    for name, system, frequency in systems():
+        in_time = ms.integrate(system, frequency, unit="rad/s", settle=400, keep=1, steps=4096)
+        one = 2 / in_time.samples * abs(np.fft.rfft(in_time.y[0])[1])
+        balanced = ms.harmonic_response(system, [frequency], harmonics=25, samples=4096, unit="rad/s").amplitude[0]
+        table.append([name, f"{frequency:g}", f"{balanced:.6g}", f"{one:.6g}", f"{abs(one / balanced - 1):.1e}"])
+    return ["system", "rad/s", "harmonic balance, 25 harmonics", "in time, 4096 steps", "difference"], table
+
+
+def systems() -> list[tuple[str, object, float]]:
+    """Name, system, rad/s."""
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+    duffing = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    stop = ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.stop(2.0, 0.2)])
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    two = ms.structure(np.eye(2), K, 0.05 * K, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.1, at=1), ms.stop(4.0, 0.5)])
+    rub = {"normal_stiffness": 2e6, "tangential_stiffness": 4e6, "includes": "surface", "friction": 0.2}
+    rub |= {"points": [4, 2], "normal_force": 20.0}
+    sides = [{"interface": side, **rub} for side in ("right", "left")]
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": sides}
+    vane = ms.assemble(case, vane=ms.sample())
+    return [
+        ("slider", slider, 1.0), ("hardening spring", duffing, 0.9), ("one-sided stop", stop, 0.8),
+        ("two masses, slider and stop", two, 1.1), ("vane that rubs on both sides", vane, 2 * np.pi * 872),
+    ]  # fmt: skip
