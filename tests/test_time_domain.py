@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import h5py
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import microslip as ms
+from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
 from microslip.contact.law import value
@@ -155,6 +158,86 @@ def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
     for Omega, periods, impacts in ((64.32, 1, 1), (30.84, 1, 2), (37.41, 2, 3)):
         found = orbit.run(equations.of(hitting(BOOK), Omega), 300, 8)
         assert (found.repeats, found.impacts * found.repeats) == (periods, impacts) and found.error < 1e-4
+
+
+CASE = """
+name = "hammer"
+body = "hammer"
+monitor = "head"
+
+[[springs]]
+row = "foot"
+stiffness = 99.085
+damping = 0.02046
+motion = 0.00047
+
+[[contacts]]
+interface = "face"
+interference = 0.0
+width = 0.01
+height = 0.01
+points = [1, 1]
+normal_stiffness = 3e5
+tangential_stiffness = 3e5
+includes = "bulk+surface"
+roughness = 5.2e-6
+friction = 0.0
+law = { kind = "rough", damping = 2e-5 }
+
+[orbit]
+Omega = 64.32
+settle = 200
+keep = 4
+samples = 64
+"""
+
+
+@pytest.fixture
+def hammer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the oscillator of section 4.2 as a system by hand, and its case."""
+    monkeypatch.chdir(tmp_path)
+    face, foot = Contact("face", "head", (1, 0, 0), t2=(0, 0, 1)), Force("foot", "head", (1, 0, 0))
+    system = System("hammer", [Body("head", MASS, (0, 0, 0), free="x")], [], [face], [foot], [Monitor("head", "head")])
+    (tmp_path / "build" / "hammer").mkdir(parents=True)
+    ms.write_basis("build/hammer/basis.h5", system.basis())
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path
+
+
+def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """The motion of `hitting`, by springs of the case; done once only."""
+    assert main(["orbit", "case.toml"]) == 0
+    assert "64.32 rad/s: comes back after 1 period, 1 impact in it" in capsys.readouterr().out
+    folder = hammer / "build" / "hammer"
+    head, row = (line.split(",") for line in (folder / "orbit.csv").read_text().splitlines())
+    told = dict(zip(head, map(float, row), strict=True))
+    by_hand = orbit.run(equations.of(hitting(BOOK), 64.32), 200, 4, 64)
+    assert told["largest_m"] == pytest.approx(by_hand.y[0].max(), rel=1e-6)
+    with h5py.File(folder / "orbit.h5") as file:
+        group = file["motion_1"]
+        assert group["displacement"][0].max() == pytest.approx(told["largest_m"], rel=1e-7)
+        assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
+    assert f"{told['largest_m']:.5g}" in (folder / "orbit.html").read_text().replace("·10<sup>−5</sup>", "e-05")
+    made = (folder / "orbit.h5").stat().st_mtime_ns
+    assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ("orbit.Omega=0.0", "orbit.Omega"),
+        ("orbit.frequency=10.0", "give frequency (Hz) or Omega (rad/s)"),
+        ("orbit.steps=20", "take"),
+        ("orbit.keep=0", "orbit.keep"),
+        ('springs.0.row="nope"', "there is no excitation 'nope'"),
+        ("springs.0.motion=0.0", "excitation: give excitation"),
+    ],
+)
+def test_what_an_orbit_cannot_do_is_refused(
+    hammer: Path, capsys: pytest.CaptureFixture, change: str, words: str
+) -> None:
+    assert main(["orbit", "case.toml", "-q", "--set", change]) == 2
+    assert words in capsys.readouterr().err and not (hammer / "build" / "hammer" / "orbit.csv").exists()
 
 
 def test_too_few_steps_are_refused_with_how_many_are_needed() -> None:

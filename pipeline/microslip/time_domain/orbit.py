@@ -117,7 +117,11 @@ class Orbit:
             return "too short to say whether it repeats"
         came = f"comes back after {counted(p, 'period')}" if p else f"does not come back within {kept // 2} periods"
         hits = counted(round(self.impacts * p), "impact")
-        per = f"{hits} in {'them' if p > 1 else 'it'}" if p else f"{self.impacts:.4g} impacts a period"
+        per = (
+            f"{hits} in {'them' if p > 1 else 'it'}"
+            if p
+            else f"{self.impacts:.4g} impact{'s' * (self.impacts != 1)} a period"
+        )
         return f"{came}, {per}" if self.equations.contacts else came
 
     @property
