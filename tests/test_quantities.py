@@ -46,7 +46,7 @@ def test_tables_of_surveys_and_curves() -> None:
     one, ok = np.ones(1), np.ones((1, 1), dtype=bool)
     row = {"parameter": 1.0, "fold": 0, "gauges/root": np.ones((1, 2), dtype=complex)}
     tables = [
-        OverOrders(one, one, one, one, one, one, quantity=STRAIN).columns(),
+        OverOrders(one, one, one, one, one, one, one, one, quantity=STRAIN).columns(),
         Envelope(one, ("load",), one[None], one[None], ok, one[None], quantity=STRAIN).columns(),
         Envelope(one, ("load",), one[None], one[None], ok, one[None], quantity=STRAIN).corners(),
         Followed("frequency", 1.0, None, (1.0, 2.0), "", (row,), "bound", STRAIN).columns(),

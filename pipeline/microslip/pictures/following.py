@@ -11,7 +11,17 @@ import numpy as np
 from ..data import Array
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import COLOURS, empty_figure, length_unit, plain_axes, plain_numbers, said_beside, save_figure, single_panel
+from .plots import (
+    COLOURS,
+    empty_figure,
+    length_scale,
+    length_unit,
+    plain_axes,
+    plain_numbers,
+    said_beside,
+    save_figure,
+    single_panel,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +79,7 @@ def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
 def _scale(values: Array, of: Quantity) -> tuple[float, str]:
     """Factor and unit in which values of a quantity need no powers of ten."""
     _, unit = length_unit(values)
-    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit], unit.removesuffix("m") + of.said
+    return length_scale(unit), unit.removesuffix("m") + of.said
 
 
 def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Quantity = METRES) -> Path:

@@ -115,8 +115,13 @@ def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
 def length_unit(values: Array) -> tuple[Array, str]:
     """Lengths (m) in a unit that needs no powers of ten."""
     top = float(np.abs(values).max())
-    scale, unit = next(((s, u) for s, u in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")) if top * s >= 0.1), (1e9, "nm"))
-    return values * scale, unit
+    unit = next((u for u in ("m", "mm", "µm") if top * length_scale(u) >= 0.1), "nm")
+    return values * length_scale(unit), unit
+
+
+def length_scale(unit: str) -> float:
+    """How many of a unit of `length_unit` are a metre."""
+    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
 
 
 # --- compliance ----------------------------------------------------------------------------------------------------

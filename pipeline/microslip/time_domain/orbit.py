@@ -116,7 +116,11 @@ class Orbit:
         if kept < 2:
             return "too short to say whether it repeats"
         came = f"comes back after {counted(p, 'period')}" if p else f"does not come back within {kept // 2} periods"
-        per = f"{round(self.impacts * p)} impacts in them" if p else f"{self.impacts:.4g} impacts a period"
+        per = (
+            f"{round(self.impacts * p)} impacts in {'them' if p > 1 else 'it'}"
+            if p
+            else f"{self.impacts:.4g} impacts a period"
+        )
         return f"{came}, {per}" if self.equations.contacts else came
 
     @property
