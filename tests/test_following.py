@@ -69,6 +69,24 @@ def test_backbone_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert len(f) > 5 and f[-1] < 0.9 * f[0]
 
 
+def test_a_backbone_without_normal_force_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing sticks under it: the others are followed, and their page tells lengths in units of people."""
+    one_point(tmp_path, monkeypatch, points=3)
+    assert main(["backbone", "case.toml", "--set", "sweep.normal_forces=[0.0,40.0]"]) == 0
+    assert {r["normal_force_N"] for r in table("backbone.csv")} == {"40"}
+    assert "left out" in capsys.readouterr().err
+    assert "m and " in Path("build/sled/backbone.html").read_text() and "e-0" not in words_of(
+        "build/sled/backbone.html"
+    )
+
+
+def words_of(page: str) -> str:
+    """What stands on a page before its first picture."""
+    return Path(page).read_text().partition("<body>")[2].partition("<img")[0]
+
+
 @pytest.mark.slow
 def test_stability_of_one_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A response that sticks is stable."""

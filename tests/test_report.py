@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from microslip.data import ModalBasis
 from microslip.report.body import report_html
 from microslip.report.page import text
+from microslip.report.response import response_html, survey_html
 from microslip.report.words import certificate, fit_sentence, number_list
 
 PNG = bytes.fromhex(
@@ -280,3 +281,27 @@ def test_load_faces_are_no_contacts() -> None:
     words = said(report_html(small.basis(), {}))
     assert "contact_left load" in words or "contact_leftload" in words
     assert "contact_left moves" not in words and "contact_left deforms" not in words
+
+
+def peak(force: float, frequency: float, amplitude: float, doubt: str = "") -> dict[str, float | str]:
+    row = {"normal_force_N": force, "frequency_Hz": frequency, "amplitude_m": amplitude, "damping_ratio": 0.01}
+    return row | ({"doubt": doubt} if doubt else {})
+
+
+def test_the_answer_is_a_resonance_that_is_valid() -> None:
+    """Contacts that would lift off make no highest resonance; numbers stand without powers of ten."""
+    rows = [peak(20.0, 23.4, 0.032, "contacts would lift off: not valid"), peak(80.0, 123.0, 12.74e-6)]
+    rows += [peak(1e4, 171.1, 80.65e-6)]
+    words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": 1.3e-13}, {}))
+    assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
+    assert "Under FN = 20 N contacts would lift off" in words
+    assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
+
+
+def test_what_stands_in_a_table_is_told_once_and_rounding_not_at_all() -> None:
+    modes = [{"frequency_Hz": 874.25, "damping_ratio": 0.01, "half_power_width_Hz": 17.5}]
+    told = {"stuck_modes": modes, "stuck_frequencies_Hz": [874.25], "rising_at_the_edge": []}
+    words = said(response_html(told, {}))
+    assert words.count("874.25") == 1 and "Modes with sticking contacts" in words and "rising" not in words
+    table = said(survey_html("t", [], {"t.csv": {"load_m": ["1.5e-3", "1e-16"], "speed_rad_s": ["2", "3"]}}, []))
+    assert "load in µm" in table and "1500" in table and "1e-10" not in table and "speed in rad/s" in table

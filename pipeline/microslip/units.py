@@ -85,6 +85,12 @@ class Quantity:
         """That of a millionth: µm, µrad, µm/m."""
         return f"µ{self.said}"
 
+    def sized(self, value: float, digits: int = 4) -> str:
+        """A value with the unit in which its number is neither long nor a power of ten: 0.00193 m -> "1.93 mm"."""
+        factors = (1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n")
+        factor, prefix = next(((f, p) for f, p in factors if abs(value) * f >= 1), factors[2])
+        return f"{value * factor:.{digits}g} {prefix}{self.said}"
+
 
 _COLUMNS = {"1": "strain"}
 METRES = Quantity()

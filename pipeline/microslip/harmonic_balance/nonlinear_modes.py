@@ -148,7 +148,7 @@ def backbone(
             report(f"{share} of 100 % of the amplitudes: {np.exp(points[-1].lam):.4g} m")
     A = np.exp([p.lam for p in points])
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
-    x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), -1)
+    x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = next((one.failure for one in found if one.failure), state.status)
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)

@@ -33,8 +33,6 @@ from .plots import (
     COLOURS,
     _end_labels,
     _order_label,
-    _per_minute,
-    _per_second,
     empty_figure,
     plain_axes,
     said_beside,
@@ -237,7 +235,7 @@ def _on_line(axes: Axes, text: str, k: int, hertz: float, direction: str, at_edg
     from matplotlib.patheffects import withStroke
 
     right = not at_edge
-    shift = {FORWARD: (7, 6), STANDING: (8, -2)}.get(direction, (7, -6)) if right else (-8, 0)
+    shift = {FORWARD: (9, 7), STANDING: (11, -2)}.get(direction, (9, -7)) if right else (-12, 0)
     how = {"ha": "left" if right else "right", "va": "center", "fontsize": 8, "color": "#3c424e", "zorder": 5}
     behind = [withStroke(linewidth=3, foreground="white")]
     said_beside(axes, text, (k, hertz), shift, path_effects=behind, **how)
@@ -282,8 +280,7 @@ def cyclic_campbell_plot(basis: ModalBasis, orders: Sequence[int], path: Path) -
     axes.set_ylim(0, top)
     axes.set_xlabel("rotation speed in rpm")
     axes.set_ylabel("frequency in Hz")
-    axes.secondary_xaxis("top", functions=(_per_second, _per_minute)).set_xlabel("rotation speed in rev/s")
-    axes.set_title(f"{basis.name}: Campbell diagram of {basis.sectors} sectors\n", fontweight="bold")
+    axes.set_title(f"{basis.name}: Campbell diagram of {basis.sectors} sectors", fontweight="bold")
     note = "one curve a family and nodal diameter k"
     if orders:
         note = "strong lines: nodal diameters k that an engine order excites; faint: all others; "

@@ -11,7 +11,17 @@ import numpy as np
 from ..data import Array
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import COLOURS, empty_figure, length_unit, plain_axes, plain_numbers, said_beside, save_figure, single_panel
+from .plots import (
+    COLOURS,
+    empty_figure,
+    length_scale,
+    length_unit,
+    plain_axes,
+    plain_numbers,
+    said_beside,
+    save_figure,
+    single_panel,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,14 +79,15 @@ def _for_reading(axes: Axes, found: Sequence[Followed], scale: float) -> None:
 def _scale(values: Array, of: Quantity) -> tuple[float, str]:
     """Factor and unit in which values of a quantity need no powers of ten."""
     _, unit = length_unit(values)
-    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit], unit.removesuffix("m") + of.said
+    return length_scale(unit), unit.removesuffix("m") + of.said
 
 
 def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Quantity = METRES) -> Path:
     """Frequency and damping ratio over the amplitude of what is read, a curve a normal force (N)."""
     figure = empty_figure(10.5, 4.4)
     left, right = figure.subplots(1, 2)
-    scale, unit = _scale(0.1 * np.concatenate([[1e-9], *(one.amplitude[-1:] for one in found.values())]), of)
+    ends = [np.sqrt(one.amplitude[:1] * one.amplitude[-1:]) for one in found.values()]
+    scale, unit = _scale(0.1 * np.concatenate([[1e-9], *ends]), of)
     for colour, (normal, one) in zip(shades(len(found)), sorted(found.items()), strict=True):
         x, label = scale * one.amplitude, f"$F_N$ = {normal:g} N"
         left.semilogx(x, one.Omega / (2 * np.pi), color=colour, linewidth=1.7, label=label)
@@ -85,6 +96,7 @@ def backbone_plot(found: Mapping[float, Backbone], title: str, path: Path, of: Q
     for axes, quantity in ((left, "frequency in Hz (dotted: contacts stuck)"), (right, "damping ratio in %")):
         plain_axes(axes)
         axes.set(xlabel=f"amplitude of the read-out in {unit} (0-peak)", ylabel=quantity)
+        plain_numbers(axes.xaxis, (1.0,))
     right.set_ylim(bottom=0)
     figure.suptitle(title, fontsize=12)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=9)

@@ -115,8 +115,13 @@ def closure_curve_plot(curve: ContactCurve, title: str, path: Path) -> Path:
 def length_unit(values: Array) -> tuple[Array, str]:
     """Lengths (m) in a unit that needs no powers of ten."""
     top = float(np.abs(values).max())
-    scale, unit = next(((s, u) for s, u in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")) if top * s >= 0.1), (1e9, "nm"))
-    return values * scale, unit
+    unit = next((u for u in ("m", "mm", "µm") if top * length_scale(u) >= 0.1), "nm")
+    return values * length_scale(unit), unit
+
+
+def length_scale(unit: str) -> float:
+    """How many of a unit of `length_unit` are a metre."""
+    return {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[unit]
 
 
 # --- compliance ----------------------------------------------------------------------------------------------------
@@ -282,21 +287,11 @@ def _mark(axes: Axes, found: Sequence[Crossing]) -> None:
     )
 
 
-def _per_second(rpm: Any) -> Any:
-    return rpm / 60
-
-
-def _per_minute(turns: Any) -> Any:
-    return turns * 60
-
-
 def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, tracks: Tracks) -> None:
     axes.set_xlim(rpm[0], rpm[-1])
     axes.set_ylim(0, top)
     axes.set_xlabel("rotation speed in rpm")
     axes.set_ylabel("frequency in Hz")
-    second = axes.secondary_xaxis("top", functions=(_per_second, _per_minute))
-    second.set_xlabel("rotation speed in rev/s")
     note = "dots: computed; curves joined by MAC; circles: engine order meets mode"
     if tracks.solved is not None:
         note = f"dots: computed; curves: {len(tracks.speeds)} speeds of the range, joined by MAC; circles: crossings"
@@ -307,7 +302,7 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
         note += f"; gyroscopic coupling changes them by {100 * change:.2g} % at most"
     if not shown.all():
         note += f"; {int((~shown).sum())} modes lie above"
-    axes.set_title(f"{basis.name}: Campbell diagram\n", fontweight="bold")
+    axes.set_title(f"{basis.name}: Campbell diagram", fontweight="bold")
     axes.text(0.5, -0.13, note, transform=axes.transAxes, ha="center", va="top", fontsize=8, color="#5b6270")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +15,11 @@ from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
-from .plots import said_beside, through
+from .operating import shades
+from .plots import plain_numbers, said_beside, through
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def response_picture(result: CaseResult, path: Path) -> None:
@@ -24,7 +29,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
     axes.plot(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
-    forces, colours = sorted(result.responses, reverse=True), _colours(len(result.responses))
+    forces, colours = sorted(result.responses), shades(len(result.responses))
     lifts = False
     for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
         r = result.responses[normal]
@@ -33,29 +38,52 @@ def response_picture(result: CaseResult, path: Path) -> None:
         on = ~np.isin(f, [at for at, _ in apart_from_it])
         if (off := lifted(result.built, r)).any():
             off = np.interp(f, r.frequency, off) > 0
-            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.2, ls=":")
+            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.8, ls=":")
             amplitude, lifts = np.where(off, np.nan, amplitude), True
+        line = "-" if np.isfinite(amplitude).any() else ":"
         axes.plot([at for at, _ in apart_from_it], [1e6 * a for _, a in apart_from_it], "o", color=colour, ms=4)
-        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, label=f"$F_N$ = {said} N")
+        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, ls=line, label=f"$F_N$ = {said} N")
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
+        plain_numbers(axes.yaxis, (1.0,))
     low, high = result.free.frequency[[0, -1]]
-    for f in result.stuck[(result.stuck > low) & (result.stuck < high)]:
-        axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
-        said_beside(axes, f"{f:.0f}", (f, 0.0), (2, 3), xycoords=("data", "axes fraction"), fontsize=8, color="0.45")
+    axes.set_xlim(low, high)
+    _stuck_lines(axes, result.stuck[(result.stuck > low) & (result.stuck < high)], (high - low) / 30)
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_ylabel(f"amplitude of {_read(s, result.quantity)}, in {result.quantity.micro} (0-peak)")
     to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
     axes.set_title(f"{s.name}: friction response{to}")
-    axes.set_xlim(low, high)
     axes.grid(True, which="both", alpha=0.25)
     told = "dashed: sticking contacts"
     if len(result.responses) > 1:
         told += f" at $F_N$ = {max(result.responses):g} N"
     told += "; dotted: contacts would lift off, not valid" if lifts else ""
-    figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told, title_fontsize=8)
+    handles, labels = _by_rows(*axes.get_legend_handles_labels(), LEGEND)
+    figure.legend(handles, labels, loc="outside lower center", ncols=LEGEND, fontsize=9, title=told, title_fontsize=8)
     figure.savefig(path, format="png")
+
+
+LEGEND = 6
+"""Columns of the legend."""
+
+
+def _by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[Any], list[str]]:
+    """A legend, which is filled by columns, in the order in which its rows are read."""
+    order = [i for column in range(columns) for i in range(column, len(labels), columns)]
+    return [handles[i] for i in order], [labels[i] for i in order]
+
+
+def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:
+    """A line at every frequency (Hz), its number beside it where there is so much room (Hz) for it."""
+    ends = np.append(frequencies[1:], axes.get_xlim()[1])
+    for f, end in zip(frequencies, ends, strict=True):
+        axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
+        where = ((2, 3), "left") if end - f > width else ((-2, 3), "right")
+        said_beside(
+            axes, f"{f:.0f}", (f, 0.0), where[0], xycoords=("data", "axes fraction"), fontsize=8, color="0.45",
+            ha=where[1],
+        )  # fmt: skip
 
 
 def _read(s: CaseSettings, of: Quantity) -> str:
@@ -102,9 +130,3 @@ def _with_peaks(r: FrequencyResponse, peaks: list[tuple[float, float]]) -> tuple
     amplitude = np.concatenate([np.where(r.converged, np.abs(r.monitor), np.nan), [a for _, a in peaks]])
     order = np.argsort(f, kind="stable")
     return f[order], 1e6 * amplitude[order]
-
-
-def _colours(count: int) -> list[tuple[float, ...]]:
-    from matplotlib import colormaps
-
-    return [tuple(colormaps["viridis"](x)) for x in np.linspace(0.05, 0.85, max(count, 1))]

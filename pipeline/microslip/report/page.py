@@ -48,8 +48,8 @@ def fold(title: str, *inside: Piece) -> Piece:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number of so many digits."""
-    return f"{value:.{digits}g}"
+    """A number of so many digits; whole ones in full, up to a million."""
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 class Album:

@@ -50,12 +50,18 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if not rows:
         return ["No resonance was found in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
-    said = [f"The highest resonance{' found' if doubtful else ''} is {_peak(max(rows, key=_size))}"]
-    tops = [max((r for r in rows if r["normal_force_N"] == n), key=_size) for n in {r["normal_force_N"] for r in rows}]
+    lifted = {row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", "")}
+    valid = [row for row in rows if row["normal_force_N"] not in lifted] or rows
+    said = [f"The highest resonance{' found' if doubtful else ''} is {_peak(max(valid, key=_size))}"]
+    forces = {r["normal_force_N"] for r in valid}
+    tops = [max((r for r in valid if r["normal_force_N"] == n), key=_size) for n in forces]
     ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}
     if len(tops) > 1 and not ends and not any(JUMPS in row.get("doubt", "") for row in rows):
         said[0] += f"; it is lowest with {_peak(min(tops, key=_size))}"
     said[0] += "."
+    if lifted:
+        named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
+        said.append(f"Under F_N = {named} N contacts would lift off: what was found there is not valid.")
     if stressed := [row for row in rows if "stress_amplitude_Pa" in row]:
         worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
         margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
@@ -67,7 +73,8 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     uncertain = response.get("estimated_error_of_harmonics")
     error = ""
     if isinstance(uncertain, float):
-        error = f"; amplitudes are uncertain by {percent(uncertain)} at most"
+        size = percent(uncertain) if uncertain > HARDLY else f"less than {percent(HARDLY)}"
+        error = f"; amplitudes are uncertain by {size}{' at most' * (uncertain > HARDLY)}"
         if not math.isfinite(uncertain):
             error = "; how uncertain amplitudes are is not known at some places"
     if doubtful:
@@ -78,6 +85,10 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     return said
 
 
+HARDLY = 1e-4
+"""Share of an amplitude below which an estimate of its error is told no closer."""
+NOT_VALID = "not valid"
+"""In what speaks against a resonance of contacts that would lift off."""
 JUMPS = "another motion"
 """In what speaks against a resonance beside which there is another motion, higher perhaps."""
 
@@ -110,7 +121,8 @@ def warnings(messages: Sequence[str]) -> Piece:
         alike.setdefault(_DIFFERS.sub("#", message), []).append(message)
     told, folded = list[str](), list[Piece]()
     for first, *others in alike.values():
-        told.append(first + (f" The same {len(others)} times more, below." if others else ""))
+        times = "once" if len(others) == 1 else f"{len(others)} times"
+        told.append(first + (f" The same {times} more, below." if others else ""))
         if others:
             folded.append(fold(f'{len(others)} more like "{first[:60].rstrip()} ..."', say(*others)))
     return Piece("box", [say(*told), *folded], tone="warn")
@@ -127,22 +139,26 @@ def survey_html(
     album = Album({p.name: p for p in pictures})
     pieces = [say(*sentences, tone="note"), *album.begun("")]
     for name, columns in tables.items():
-        rows = [[_number_or_words(v) for v in row] for row in zip(*columns.values(), strict=True)]
-        shown = table([_label(key) for key in columns], rows)
-        pieces += [Piece("h2", name), shown if len(rows) <= MOST_ROWS else fold(f"{len(rows)} rows", shown)]
+        rows = [
+            dict(zip(columns, map(_number_or_words, row), strict=True)) for row in zip(*columns.values(), strict=True)
+        ]
+        shown = _table_of(rows) if rows else say("")
+        heading = f"Numbers in {name}" if name.endswith(".csv") else name
+        pieces += [Piece("h2", heading), shown if len(rows) <= MOST_ROWS else fold(f"{len(rows)} rows", shown)]
     return page(title, pieces)
 
 
-def _number_or_words(value: Any) -> str:
+def _number_or_words(value: Any) -> float | str:
     try:
-        return number(float(value), 5)
+        return float(value)
     except ValueError:
         return str(value)
 
 
 def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     """What the case tells besides, its other tables, and every picture that no other section took."""
-    told = {k: v for k, v in response.items() if not k.endswith("sha256") and v not in ("", None)}
+    told = {k: v for k, v in response.items() if not k.endswith("sha256") and v not in ("", None, [])}
+    told = {k: v for k, v in told.items() if not response.get(_TOLD.get(k, ""))}
     words = told.pop("description", "")
     tables = {k: v for k, v in told.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)}
     facts = [(_label(k), _cell(v)) for k, v in told.items() if k not in tables]
@@ -150,10 +166,25 @@ def response_pieces(response: Mapping[str, Any], album: Album) -> list[Piece]:
     return [
         say(f"{words}." if words else ""),
         *map(album.take, SHOWN),
-        *(piece for k, v in tables.items() if k != "resonances" for piece in (Piece("h3", _label(k)), _table_of(v))),
+        *(
+            piece
+            for k, v in tables.items()
+            if k != "resonances"
+            for piece in (Piece("h3", _HEADINGS.get(k) or _label(k).capitalize()), _table_of(v))
+        ),
         *(album.take(name, name) for name in rest),
         table((), facts),
     ]
+
+
+_TOLD = {"stuck_frequencies_Hz": "stuck_modes", "estimated_error_of_harmonics": "resonances"}
+"""What need not be told again where the page has a table of something else, or sentences from it."""
+
+_HEADINGS = {
+    "stuck_modes": "Modes with sticking contacts",
+    "rising_at_the_edge": "Where the response still rises at an end of the band",
+}
+"""Titles of tables."""
 
 
 def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
@@ -165,12 +196,13 @@ def _table_of(rows: Sequence[Mapping[str, Any]]) -> Piece:
     largest: dict[str, float] = {}
     for row in values:
         for unit, v in zip(units, row, strict=True):
-            largest[unit] = max(largest.get(unit, 0.0), abs(v)) if isinstance(v, float) else largest.get(unit, 0.0)
+            known = isinstance(v, float) and math.isfinite(v)
+            largest[unit] = max(largest.get(unit, 0.0), abs(v) if known else 0.0)
 
     def shown(value: Any, unit: str) -> str:
         if not isinstance(value, float):
             return _cell(value)
-        return number(0.0 if abs(value) < ROUNDING * largest[unit] else value, 5 if unit == "Hz" else 4)
+        return number(0.0 if abs(value) < ROUNDING * largest[unit] else value, 5 if unit in _EXACT else 4)
 
     cells = [[shown(v, unit) for v, unit in zip(row, units, strict=True)] for row in values]
     return table([name for _, name in columns], cells)
@@ -182,10 +214,13 @@ ROUNDING = 1e-9
 _FACTORS = (
     *((Quantity(unit).column("amplitude"), (1e6, Quantity(unit).micro)) for unit in ("m", "rad", "1")),
     ("_Pa", (1e-6, "MPa")),
+    ("_m", (1e6, "µm")),
 )
 """Ends of names of numbers that are shown in another unit."""
 
-_UNITS = ("N", "Hz", "m", "mm", "µm", "m/m", "µm/m", "rad", "µrad", "s", "Pa", "MPa", "rpm", "W", "J", "K")
+_UNITS = ("N", "Hz", "m", "mm", "µm", "m/m", "µm/m", "rad", "µrad", "s", "Pa", "MPa", "rpm", "W", "J", "K", "rad/s")
+_EXACT = ("Hz", "rpm", "rad/s")
+"""Units of what is shown to a digit more."""
 
 
 _NAMED = {
@@ -194,6 +229,7 @@ _NAMED = {
     "open": (100.0, "open in %"),
     "estimated_error": (100.0, "error in %"),
     "doubt": (1.0, "validity"),
+    "normal_force": (1.0, "normal force in N"),
 }
 """Columns that people know by other names."""
 
@@ -210,7 +246,7 @@ def _column(key: str) -> tuple[float, str]:
 
 def _label(key: str) -> str:
     """``normal_force_N`` -> ``normal force in N``."""
-    *words, last = key.split("_")
+    *words, last = key.replace("rad_s", "rad/s").split("_")
     unit = "m/m" if last == "strain" else last
     return " ".join([*words, "in", unit] if words and unit in _UNITS else [*words, last])
 

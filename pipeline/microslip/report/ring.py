@@ -19,12 +19,13 @@ def frequencies(basis: ModalBasis, album: Album) -> list[Piece]:
     """Frequencies over the nodal diameters, and what the sector proves of the ring."""
     held = resonances.harmonics_of(basis)
     speeds = {s: rpm_text(basis.groups[s, held[0]].speed) for s in resonances.speeds_of(basis)}
-    out = []
+    told: dict[bool, list[str]] = {}
     for s, at in speeds.items():
         proof = certify_ring(basis, s)
         where = f"{at}: " if len(speeds) > 1 else ""
-        out.append(say(f"{where}{certificate_words(proof)}.", tone="note" if proof.certified else "warn"))
-    out += [
+        told.setdefault(proof.certified, []).append(f"{where}{certificate_words(proof)}.")
+    out = [
+        *(say(*words, tone="note" if certified else "warn") for certified, words in sorted(told.items())),
         Piece("paragraph", "waves"),
         album.take("nodal_diameters"),
         album.take("nodal_diameters_stuck"),
@@ -33,9 +34,9 @@ def frequencies(basis: ModalBasis, album: Album) -> list[Piece]:
     for i, (s, at) in enumerate(speeds.items()):
         groups = [basis.groups[s, k] for k in held]
         modes = [resonances.eigenmodes(g) for g in groups]
-        rows = [[j + 1, *(hertz(g.frequency, j) for g in modes)] for j in range(max(g.n_modes for g in modes))]
-        shown = table([f"Hz at {at}, mode", *(f"k = {k}" for k in held)], rows)
-        out += [fold(f"Frequencies at {at}", shown) if i else shown, *whirl(groups)]
+        rows = [[j + 1, *(hertz(g.frequency, j, 5) for g in modes)] for j in range(max(g.n_modes for g in modes))]
+        shown, title = table(["mode", *(f"k = {k}" for k in held)], rows), f"Frequencies in Hz at {at}"
+        out += [*([fold(title, shown)] if i else [Piece("h3", title), shown]), *whirl(groups)]
     return out
 
 

@@ -13,9 +13,9 @@ RIGID_ENOUGH = 0.05
 """A patch whose fit residual is below this moves as a rigid patch for most purposes."""
 
 
-def hertz(frequency: Array, j: int) -> str:
+def hertz(frequency: Array, j: int, digits: int = 6) -> str:
     """A frequency of mode j (0-based), nothing if there is no such mode."""
-    return f"{frequency[j]:#.6g}" if j < len(frequency) else ""
+    return f"{frequency[j]:#.{digits}g}" if j < len(frequency) else ""
 
 
 def number_list(numbers: Sequence[int]) -> str:

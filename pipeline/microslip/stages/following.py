@@ -117,7 +117,9 @@ def backbones(
     found: dict[float, Backbone] = {}
     built, of = case.with_({}), case.quantity
     band = [2 * np.pi * f for f in (built.settings.sweep.start, built.settings.sweep.stop)]
-    forces = normal_forces(built)
+    forces = [n for n in normal_forces(built) if n != 0] or normal_forces(built)
+    if 0.0 in normal_forces(built):
+        report("left out: a normal force of 0 N, under which nothing sticks")
     for i, normal in enumerate(forces):
         report(f"backbone at F_N = {normal or 0:g} N, {i + 1} of {len(forces)}")
         problem = problem_of(built, normal, form="relative")
@@ -130,8 +132,8 @@ def backbones(
         if len(one.amplitude):
             i = int(np.argmax(one.damping))
             said += (
-                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {one.amplitude[-1]:.3g} {of.said}; damping at most "
-                f"{100 * one.damping[i]:.3g} % at {one.amplitude[i]:.3g} {of.said}"
+                f", {one.Omega[-1] / 2 / np.pi:.6g} Hz at {of.sized(one.amplitude[-1], 3)}; damping at most "
+                f"{100 * one.damping[i]:.3g} % at {of.sized(one.amplitude[i], 3)}"
             )
             said += f"; {checked(largest(one.checks))}"
         report(f"F_N = {normal or 0:g} N: {said}" + ("" if one.complete else f" ({one.status})"))
@@ -155,7 +157,7 @@ def _backbone_message(normal: float, one: Backbone, of: Quantity) -> str:
     i, f = int(one.damping.argmax()), one.frequency
     said = (
         f"F_N = {normal:g} N: from {f[0]:.5g} Hz (sticking: {one.stuck / 2 / np.pi:.5g} Hz) to {f[-1]:.5g} Hz; most "
-        f"damped, {100 * one.damping[i]:.3g} %, at an amplitude of {one.amplitude[i]:.3g} {of.said} and {f[i]:.5g} Hz"
+        f"damped, {100 * one.damping[i]:.3g} %, at an amplitude of {of.sized(one.amplitude[i], 3)} and {f[i]:.5g} Hz"
     )
     return said + ("." if one.complete else f"; it ends early: {one.status}.")
 
@@ -264,10 +266,15 @@ def optimum_message(found: Optimum, over: str, of: Quantity = METRES) -> str:
     best, unit = found.resonance, " N" if over == NORMAL_FORCE else ""
     if best.status != "converged":
         return f"{over}: no resonance was found at any value"
-    where = f"{over} = {found.parameter:.6g}{unit}: the highest resonance, {best.amplitude:.4g} {of.said} at "
+    name = "normal force" if over == NORMAL_FORCE else over
+    where = f"{name} = {found.parameter:.6g}{unit}: the highest resonance, {of.sized(best.amplitude)} at "
     lines = f"{where}{best.Omega / 2 / np.pi:.6g} Hz, is lowest"
-    lines += f" ({found.status})" if is_optimum(found) else " of those that were found"
+    lines += _FOUND_AS.get(found.status, "") if is_optimum(found) else " of those that were found"
     return lines + _hardly(found) + _rising(found, unit)
+
+
+_FOUND_AS = {"kink": " (where it changes abruptly)", "two peaks": " (where two are equally high)"}
+"""What an optimum is that is no smooth lowest place."""
 
 
 def _rising(found: Optimum, unit: str) -> str:

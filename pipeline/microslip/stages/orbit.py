@@ -19,6 +19,7 @@ from ..files.tables import columns_csv
 from ..report.response import survey_html
 from ..time_domain import equations, orbit
 from ..time_domain.orbit import KINDS, Orbit
+from ..units import METRES, percent
 from .checkpoint import hashes_of
 from .stage import Made, Report, Stage
 
@@ -92,10 +93,10 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
 def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
-    size = 0.5 * np.ptp(one.y[0])
+    size = METRES.sized(0.5 * float(np.ptp(one.y[0])), 5)
     return (
-        f"{name}: {one.said}; {one.labels[0]} swings by {1e6 * size:.5g} µm on either side, its last period uncertain "
-        f"by {100 * one.error:.2g} %."
+        f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side, its last period uncertain by "
+        f"{percent(one.error)}."
     )
 
 

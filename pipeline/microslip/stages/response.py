@@ -352,7 +352,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         **truncation,
         "description": result.settings.description,
         "rotation_speed_rpm": to_rpm(result.speed),
-        "stuck_frequencies_Hz": [float(f) for f in result.stuck[:8]],
+        "stuck_frequencies_Hz": [float(f) for f in result.stuck[_rigid(result) :][:8]],
         "damping": result.settings.damping_as,
         "stuck_modes": _stuck_modes(result),
         **({"stuck_under_N": max(result.responses)} if result.responses else {}),
@@ -366,9 +366,20 @@ def summarise(result: CaseResult) -> dict[str, Any]:
     }
 
 
+RIGID = 1e-6
+"""Share of the highest frequency with sticking contacts below which another one is rounding: a rigid-body motion."""
+
+
+def _rigid(result: CaseResult) -> int:
+    """Number of rigid-body motions with sticking contacts."""
+    return int(np.searchsorted(result.stuck, RIGID * result.stuck.max(initial=0.0)))
+
+
 def _stuck_modes(result: CaseResult) -> list[dict[str, float]]:
-    """Damping of every mode with sticking contacts that the excited harmonics reach, and of the first one beyond."""
+    """Damping of every mode with sticking contacts that the excited harmonics reach, and of the first one beyond; not
+    of rigid-body motions."""
     most = result.settings.sweep.stop * result.settings.balanced
+    first = _rigid(result)
     count = int(np.searchsorted(result.stuck, most)) + 1
-    pairs = zip(result.stuck[:count].tolist(), result.stuck_damping[:count].tolist(), strict=True)
+    pairs = zip(result.stuck[first:count].tolist(), result.stuck_damping[first:count].tolist(), strict=True)
     return [{"frequency_Hz": f, "damping_ratio": D, "half_power_width_Hz": 2 * D * f} for f, D in pairs]

@@ -127,12 +127,16 @@ def _shown(found: Survey, kind: str, case: str, folder: Path) -> str:
     for name, draw in found.draw.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         draw(folder / name)
-    page, words = f"{kind}.html", kind
+    page, words = f"{kind}.html", _TITLES.get(kind, kind)
     if kind not in KINDS:
         page, words = f"over_{kind}.html", f"over the {kind.replace('_', ' ')}"
     pictures = [folder / name for name in found.draw]
     store.write_text(folder / page, survey_html(f"{case}: {words}", found.sentences, found.tables, pictures))
     return page
+
+
+_TITLES = {"orders": "engine orders", "speeds": "over the speed", "ranges": "over ranges of its settings"}
+"""What pages of surveys are called."""
 
 
 def _orders(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
@@ -225,7 +229,7 @@ def _speeds(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     title = f"{settings.name}: along engine order {r.order}"
     top = int(np.nanargmax(amplitude)) if r.converged.any() else 0
     drawn = r.rpm, r.frequency, amplitude, r.normal
-    size = f"{amplitude[top]:.4g} {r.quantity.said}"
+    size = r.quantity.sized(float(amplitude[top]))
     said = [f"Largest amplitude {size} at {r.rpm[top]:.6g} rpm, {r.frequency[top]:.6g} Hz."]
     if still := [b.name for b in settings.components if not bases[b.name].ranges]:
         said.append(f"The same at all speeds: {', '.join(still)} (no rotation.range_rpm in a body.toml).")
@@ -245,7 +249,7 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
 
     e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
-    most = f"{e.peaks.min():.4g} and {e.peaks.max():.4g} {e.quantity.said}"
+    most = " and ".join(e.quantity.sized(float(peak)) for peak in (e.peaks.min(), e.peaks.max()))
     said = [f"Largest amplitude between {most} on the grid of the sweep."]
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, said, int((~e.converged).sum())
