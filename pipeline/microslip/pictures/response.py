@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,8 +77,8 @@ def _by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[
 
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:
     """A line at every frequency (Hz), its number on a side where there is so much room (Hz) for it."""
-    ends, taken = np.append(frequencies[1:], axes.get_xlim()[1]), axes.get_xlim()[0]
-    for f, end in zip(frequencies, ends, strict=True):
+    taken, last = axes.get_xlim()
+    for f, end in pairwise([*frequencies, last]):
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
         right = end - f > width
         if right or f - width > taken:
