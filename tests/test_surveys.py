@@ -209,6 +209,9 @@ def test_respond_over_ranges(ring: Path) -> None:
     ring.write_text(near + "[ranges]\ndamping_ratio = [0.01, 0.02]\nload = [1.0, 2.0]\nfriction = [0.5]\n")
     assert main(["respond", "case.toml", "--over", "ranges", "-q"]) == 0
     all_of = rows("build/ring/ranges_combinations.csv")
+    top = {name: column[np.argmax(all_of["peak_m"])] for name, column in all_of.items()}
+    said = f"largest with damping ratio {top['damping_ratio']:g}, load {top['load']:g}, friction 0.5."
+    assert said in Path("build/ring/ranges.html").read_text()
     peak = {(d, x): p for d, x, p in zip(*(all_of[k] for k in ("damping_ratio", "load", "peak_m")), strict=True)}
     assert peak[0.01, 2.0] == pytest.approx(2 * peak[0.01, 1.0], rel=1e-6)
     assert peak[0.01, 1.0] > 1.5 * peak[0.02, 1.0]

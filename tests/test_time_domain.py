@@ -218,7 +218,7 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
         group = file["motion_1"]
         assert group["displacement"][0].max() == pytest.approx(told["largest_m"], rel=1e-7)
         assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
-    assert text(number(told["largest_m"])) in (folder / "orbit.html").read_text(encoding="utf-8")
+    assert text(number(1e6 * told["largest_m"])) in (folder / "orbit.html").read_text(encoding="utf-8")
     made = (folder / "orbit.h5").stat().st_mtime_ns
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
 

@@ -37,10 +37,10 @@ Curves = Mapping[float, tuple[Array, Array]]
 
 
 def shades(count: int) -> list[tuple[float, ...]]:
-    """Colours of a rising parameter, light to dark."""
+    """Colours of a rising parameter, light to dark; a single one is dark."""
     from matplotlib import colormaps
 
-    return [tuple(colormaps["viridis"](x)) for x in np.linspace(0.85, 0.05, max(count, 1))]
+    return [tuple(colormaps["viridis"](x)) for x in np.linspace(0.05, 0.85, max(count, 1))[::-1]]
 
 
 # over frequency, over normal force ---------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +49,7 @@ def response_picture(result: CaseResult, path: Path) -> None:
         plain_numbers(axes.yaxis, (1.0,))
     low, high = result.free.frequency[[0, -1]]
     axes.set_xlim(low, high)
-    _stuck_lines(axes, result.stuck[(result.stuck > low) & (result.stuck < high)], (high - low) / 30)
+    _stuck_lines(axes, result.stuck[(result.stuck > low) & (result.stuck < high)], (high - low) / 26)
     s = result.settings
     axes.set_xlabel("excitation frequency in Hz")
     axes.set_ylabel(f"amplitude of {_read(s, result.quantity)}, in {result.quantity.micro} (0-peak)")
@@ -75,15 +76,15 @@ def _by_rows(handles: list[Any], labels: list[str], columns: int) -> tuple[list[
 
 
 def _stuck_lines(axes: Axes, frequencies: Array, width: float) -> None:
-    """A line at every frequency (Hz), its number beside it where there is so much room (Hz) for it."""
-    ends = np.append(frequencies[1:], axes.get_xlim()[1])
-    for f, end in zip(frequencies, ends, strict=True):
+    """A line at every frequency (Hz), its number on a side where there is so much room (Hz) for it."""
+    taken, last = axes.get_xlim()
+    for f, end in pairwise([*frequencies, last]):
         axes.axvline(f, color="0.75", lw=0.8, ls="--", zorder=0)
-        where = ((2, 3), "left") if end - f > width else ((-2, 3), "right")
-        said_beside(
-            axes, f"{f:.0f}", (f, 0.0), where[0], xycoords=("data", "axes fraction"), fontsize=8, color="0.45",
-            ha=where[1],
-        )  # fmt: skip
+        right = end - f > width
+        if right or f - width > taken:
+            at = {"xycoords": ("data", "axes fraction"), "ha": "left" if right else "right"}
+            said_beside(axes, f"{f:.0f}", (f, 0.0), (2 if right else -2, 3), fontsize=8, color="0.45", **at)
+        taken = f + width if right else f
 
 
 def _read(s: CaseSettings, of: Quantity) -> str:

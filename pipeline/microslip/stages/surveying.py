@@ -245,12 +245,16 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
     from ..pictures.coupled import envelope_picture
 
     def tables(e: Envelope) -> Tables:
-        return {"ranges.csv": e.columns(), "ranges_combinations.csv": e.corners()}
+        return {"ranges_combinations.csv": e.corners(), "ranges.csv": e.columns()}
 
     e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
     most = " and ".join(e.quantity.sized(float(peak)) for peak in (e.peaks.min(), e.peaks.max()))
     said = [f"Largest amplitude between {most} on the grid of the sweep."]
+    if np.isfinite(e.peaks).any():
+        largest = {name: values[np.nanargmax(e.peaks)] for name, values in e.corners().items() if name in e.names}
+        named = ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in largest.items())
+        said.append(f"It is largest with {named}.")
     return Survey(
         tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, said, int((~e.converged).sum())
     )
