@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from microslip.basis import write_basis
 from microslip.case import load_case
 from microslip.case.assemble import build
+from microslip.case.curves import Followed
 from microslip.case.problem import problem_of
 from microslip.cli import main
 from microslip.continuation import Settings
@@ -144,6 +146,45 @@ def test_no_start_is_said(case: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert main(["respond", "case.toml", "--over", "frequency", "-q"]) == 1
     assert main(["respond", "case.toml", "--over", "frequency"]) == 1
     assert "no start: not a number; begin elsewhere than at 140 Hz (curve.band)." in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_one_that_comes_back_is_followed_by_another(case: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Begun among three motions, closed, the curve turns at lift-off and comes back: the one from the other end is the
+    curve of `over_frequency` from there. Interrupted in the second, both go on to the same points."""
+    there = ["curve.band=[103.0, 140.0]"]
+
+    def impatient(text: str) -> None:
+        begun.append(text)
+        if text.startswith("20 of") and any("from 140 Hz" in t for t in begun):
+            raise KeyboardInterrupt
+
+    begun: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        surveying.survey_stage(case, None, "frequency", there, report=impatient)
+    assert main(["respond", "case.toml", "--over", "frequency", "--set", *there]) == 0
+    said, found = capsys.readouterr().out, rows("over_frequency.csv")
+    assert "comes back to 103 Hz, where it began, and misses 140 Hz; another one begins there" in said
+    held = read_response("build/lifting/over_frequency.h5")
+    first, second = (s.parameter for s in held.series)
+    assert first[[0, -1]].tolist() == [103.0, 103.0] and second[[0, -1]].tolist() == [140.0, 103.0]
+    steps = Settings(points=3000, branch_points=False)
+    plain = over_frequency(problem(case), 140.0, 103.0, settings=steps)
+    np.testing.assert_allclose(second, plain.parameter, rtol=1e-9)
+    of = found["leg"] > found["leg"][len(first) - 1]
+    np.testing.assert_array_equal(of, np.arange(len(of)) >= len(first))
+    assert (found["leg"] == 1 + np.cumsum(found["fold"]) - found["fold"] + of).all()
+
+
+@pytest.mark.parametrize(("status", "last", "complete", "leaves_out"), [
+    ("bound: lambda has reached 880", 140.0, True, False), ("bound: lambda has reached 647", 103.0, False, True),
+    ("stuck: no step is short enough", 120.0, False, True), ("points: 2 are found", 120.0, False, False),
+])  # fmt: skip
+def test_which_end_was_reached(status: str, last: float, complete: bool, leaves_out: bool) -> None:
+    ends = [{"parameter": f, "fold": 0, "monitors/middle": np.ones((1, 2), dtype=complex)} for f in (103.0, last)]
+    one = Followed("frequency", 10.0, None, (103.0, 140.0), "", ends, status)
+    assert (one.complete, one.leaves_out) == (complete, leaves_out)
+    assert not replace(one, legs=1).leaves_out and len(one.sentences()) == 2 - complete
 
 
 @pytest.mark.slow

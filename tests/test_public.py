@@ -16,6 +16,7 @@ import microslip as ms
 from microslip.case import load_case, run_case
 from microslip.contact.elements import Polynomial, Stop
 from microslip.contact.patch import Patch
+from microslip.continuation import Settings
 from microslip.data import UserError
 from microslip.harmonic_balance.by_hand import ElasticSpring, model
 from microslip.harmonic_balance.forces import AFT
@@ -43,6 +44,21 @@ def test_both_folds_of_duffings_oscillator(curve):
     q, W = curve.harmonics()[:, 1], curve.parameter
     one = (1 - W**2 + 0.05j * W + 0.75 * 0.05 * abs(q) ** 2) * q  # of one harmonic
     assert np.abs(one - 0.4).max() < 0.05 * np.abs(q).max()
+
+
+def test_a_curve_that_comes_back_is_followed_by_another():
+    """From between the folds, on the small motion, the curve turns at the lower one; the large motion is on the other,
+    from the stop. The picture does not join them."""
+    found = ms.follow(duffing(), 1.4, 0.3, harmonics=3, unit="rad/s")
+    first = found.arrays["branch"] == 0
+    assert found.parameter[first][[0, -1]].tolist() == [1.4, 1.4]
+    np.testing.assert_allclose(found.parameter[~first][[0, -1]], [0.3, 1.4], rtol=1e-12)
+    three = found.amplitude[[0, first.sum() - 1, -1]]
+    passed = ms.follow(duffing(), 0.3, 2.5, harmonics=3, unit="rad/s", settings=Settings(targets=(1.4,)))
+    np.testing.assert_allclose(passed.amplitude[passed.parameter == 1.4], three[::-1], rtol=1e-6)
+    assert "begun at the stop: bound" in found.ended
+    x, _ = found.plot().get_lines()[0].get_data()
+    assert np.isnan(x).sum() == 1 and "branch" not in passed.arrays
 
 
 def test_linear_elements_are_entries_of_the_matrices():

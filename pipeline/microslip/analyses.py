@@ -128,8 +128,9 @@ def follow(
         settings: of the steps along the curve. report: is told what is under way.
 
     Returns:
-        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop, or
-        came back to the start: another branch is then left out). Whether a motion is stable is not told.
+        A `Motions`, with ``folds`` and, in ``ended``, why the curve ended ("bound: ..." where it reached the stop).
+        Where it comes back to the start or gets stuck, the points of another curve follow, begun at the stop
+        (``arrays["branch"]`` is 1 there), and ``ended`` tells of both. Whether a motion is stable is not told.
 
     Raises:
         UserError: a frequency that is not positive, or one that is missing.
@@ -155,17 +156,20 @@ def follow(
         family = make(problem, frequency * hertz, start, stop)
     else:
         raise UserError(f"over: '{over}' is none of frequency, load, normal_force")
-    found = families.followed(family, report, settings)
+    found = families.from_both_ends(family, report, settings)
     family = replace(family, unit=family.unit * hertz) if over == "frequency" else family
+    points = [p for one in found for p in one.points]
     known = {
-        "parameter": found.lam / family.unit,
-        "fold": np.array([p.kind == "fold" for p in found.points], dtype=float),
-        "kink": np.array([p.kink for p in found.points], dtype=float),
-        "arclength": np.array([p.arclength for p in found.points]),
+        "parameter": np.array([p.lam for p in points]) / family.unit,
+        "fold": np.array([p.kind == "fold" for p in points], dtype=float),
+        "kink": np.array([p.kink for p in points], dtype=float),
+        "arclength": np.array([p.arclength for p in points]),
     }
+    if len(found) > 1:
+        known["branch"] = np.repeat([0.0, 1.0], [len(one.points) for one in found])
     return Motions(
-        "curve", family.points(found), lambda v: family.problem(v * family.unit), over=_over(over, unit), known=known,
-        ended=found.status,
+        "curve", [p for one in found for p in family.points(one)], lambda v: family.problem(v * family.unit),
+        over=_over(over, unit), known=known, ended="; another curve, begun at the stop: ".join(b.status for b in found),
     )  # fmt: skip
 
 

@@ -45,7 +45,8 @@ class Followed:
         over: of `OVER`. normal: N of the contacts that the sweep presses; None where it presses none, or is what
             varies. frequency: Hz at which the others vary, or None. ends: of the parameter, as asked for. name: of its
             series. rows: points in order, see `harmonic_balance.checkpoint.resumed_curve`. status: why it ended.
-            quantity: what is read; m stands for its unit.
+            quantity: what is read; m stands for its unit. legs: of the curve from the first end, where this one begins
+            at the other because that one did not arrive there; None: this is the first.
     """
 
     over: str
@@ -56,6 +57,7 @@ class Followed:
     rows: Sequence[Mapping[str, Any]]
     status: str
     quantity: Quantity = METRES
+    legs: int | None = None
 
     @cached_property
     def parameter(self) -> Array:
@@ -81,12 +83,36 @@ class Followed:
     @property
     def complete(self) -> bool:
         """Whether the other end was reached."""
-        return self.status.startswith("bound")
+        begin, end = self.ends
+        return not self.early and abs(self.parameter[-1] - end) < 1e-9 * abs(end - begin)
+
+    @property
+    def early(self) -> bool:
+        """Whether it ended before it left the range, at whichever end."""
+        return not self.status.startswith("bound")
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether another curve is to be begun at the other end; one that has too few points goes on instead."""
+        return self.legs is None and not self.complete and not self.status.startswith("points")
+
+    @property
+    def turned(self) -> Followed:
+        """The curve from the other end, yet to be followed."""
+        legs = 1 + int(self.fold.sum()) if self.rows else 0
+        return replace(self, ends=self.ends[::-1], rows=(), status="interrupted", legs=legs).named
+
+    @property
+    def named(self) -> Followed:
+        """With the name of its series."""
+        begin, end = self.ends
+        return replace(self, name=f"{self.label_by(exact)}, {exact(begin)} to {exact(end)} {UNITS[self.over]}")
 
     @property
     def label(self) -> str:
         """What sets the curve apart from the others, for people."""
-        return self.label_by("{:g}".format)
+        begun = "" if self.legs is None else f", from {self.ends[0]:g} {UNITS[self.over]}"
+        return self.label_by("{:g}".format) + begun
 
     def label_by(self, number: Callable[[float], str]) -> str:
         """`label` with numbers written in a way of one's own."""
@@ -106,7 +132,7 @@ class Followed:
             "slipping": self._share("slipping"),
             "open": self._share("open"),
             "fold": self.fold.astype(float),
-            "leg": 1.0 + np.cumsum(self.fold) - self.fold,
+            "leg": 1.0 + (self.legs or 0) + np.cumsum(self.fold) - self.fold,
         }
 
     def _share(self, what: str) -> Array:
@@ -117,7 +143,7 @@ class Followed:
 
     def sentences(self) -> list[str]:
         """What was found."""
-        unit, (begin, end) = UNITS[self.over], self.ends
+        unit, begin = UNITS[self.over], self.ends[0]
         if not self.rows:
             key = "band" if self.over == "frequency" else self.over
             return [f"{self.label}: {self.status}; begin elsewhere than at {begin:.6g} {unit} (curve.{key})."]
@@ -128,16 +154,26 @@ class Followed:
             said += f"{len(folds)} folds between {folds.min():.6g} and {folds.max():.6g} {unit}."
         else:
             said += f"folds at {', '.join(f'{f:.6g}' for f in folds)} {unit}." if len(folds) else "no fold."
-        if self.complete:
-            return [said]
-        ended = f"{self.label}: the curve ends at {self.parameter[-1]:.6g} {unit}, not at {end:.6g}: {self.status}"
-        return [said, f"{ended} (curve.points)." if self.status.startswith("points") else f"{ended}."]
+        return [said] if self.complete else [said, self._missed()]
+
+    def _missed(self) -> str:
+        """Where it ended instead of at the other end, and what follows."""
+        unit, (begin, end) = UNITS[self.over], self.ends
+        if self.early:
+            said = f"{self.label}: the curve ends at {self.parameter[-1]:.6g} {unit}, not at {end:.6g}: {self.status}"
+            said += " (curve.points)" if self.status.startswith("points") else ""
+        else:
+            said = (
+                f"{self.label}: the curve comes back to {begin:.6g} {unit}, where it began, and misses {end:.6g} {unit}"
+            )
+        return f"{said}; another one begins there." if self.leaves_out else f"{said}."
 
 
 def curves(
     settings: CaseSettings, bases: Bases, path: Path | str, over: str, keep: Keep, report: Report
 ) -> tuple[list[Followed], bool]:
-    """The curves of a case, one for each normal force of its sweep.
+    """The curves of a case, one for each normal force of its sweep; a second one from the other end where the first
+    does not arrive there.
 
     Args:
         over: of `OVER`. keep: opens the journal of an assembly, in which points are kept as they are found.
@@ -161,15 +197,26 @@ def curves(
                 if over != "frequency":
                     at = asked.frequency or _resonance(built, problem, normal, journal, path, report)
                     one = replace(one, frequency=at)
-                one = replace(one, name=f"{one.label_by(exact)}, {exact(ends[0])} to {exact(ends[1])} {UNITS[over]}")
-                told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
-                journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": over})
-                report(f"curve over the {over.replace('_', ' ')}, {one.label}")
-                branch, rows = resumed_curve(_family(built, problem, one), journal, one.name, report, how)
+                one = one.named
+                found.append(_followed(_family(built, problem, one), problem, one, normal, journal, report, how))
+                if found[-1].leaves_out:
+                    one = found[-1].turned
+                    found.append(_followed(_family(built, problem, one), problem, one, normal, journal, report, how))
             except KeyboardInterrupt:
                 return [*found, replace(one, rows=points_of_curve(journal, one.name))], False
-            found.append(replace(one, rows=rows, status=branch.status))
     return found, True
+
+
+def _followed(
+    family: Family, problem: Problem, one: Followed, normal: float | None, journal: Journal, report: Report,
+    how: Settings,
+) -> Followed:  # fmt: skip
+    """A curve with its points, kept in a series of the journal."""
+    told = {**journal.head.get("parameters", {}), one.name: {"normal_force": normal or 0.0}}
+    journal.say({**journal.head, "parameters": told, "labels": labels(problem), "over": one.over})
+    report(f"curve over the {one.over.replace('_', ' ')}, {one.label}")
+    branch, rows = resumed_curve(family, journal, one.name, report, how)
+    return replace(one, rows=rows, status=branch.status)
 
 
 def _settings(asked: CurveOfCase) -> Any:

@@ -105,6 +105,15 @@ class Family:
     problem: Callable[[float], Problem]
     Omega: Callable[[float], float]
 
+    @property
+    def turned(self) -> Family:
+        """From the other end."""
+        return replace(self, begin=self.end, end=self.begin)
+
+    def reached(self, branch: Branch) -> bool:
+        """Whether a curve arrived at the other end, and did not come back to where it began."""
+        return branch.status.startswith("bound") and branch.points[-1].lam == self.end
+
     def points(self, branch: Branch) -> tuple[Point, ...]:
         """The motions of a branch."""
         return tuple(Point(self.Omega(p.lam), p.x, CONVERGED, 0.0, p.evaluations) for p in branch.points)
@@ -204,6 +213,20 @@ def followed(
             said = f"{points[-1].lam / family.unit:.6g} {family.words}"
             report(f"{len(points)} of {settings.points} points at most, {said}")
     return Branch(tuple(points), state.status, state)
+
+
+def from_both_ends(
+    family: Family, report: Report = lambda _: None, settings: Settings | None = None
+) -> tuple[Branch, ...]:
+    """The curve of a family, and another one from the other end where the first does not arrive there.
+
+    One that has too few points goes on with more of them, and needs no other.
+    """
+    first = followed(family, report, settings)
+    if family.reached(first) or first.status.startswith("points"):
+        return (first,)
+    report("the curve does not arrive at the other end; another one begins there")
+    return first, followed(family.turned, report, settings)
 
 
 class _Noted:

@@ -45,12 +45,12 @@ def curve_plot(found: Sequence[Followed], path: Path, title: str) -> Path:
             axes.plot(x[a : b + 1], y[a : b + 1], line, color=colour, linewidth=1.6, label=label)
         size = 6 if one.fold.sum() < 8 else 3.5
         axes.plot(x[one.fold], y[one.fold], "o", color=colour, markersize=size, markerfacecolor="white", zorder=4)
-        if not one.complete:
+        if one.early:
             axes.plot(x[-1], y[-1], "x", color="#c8382c", markersize=9, zorder=5)
     if any(one.fold.any() for one in found):
         axes.plot([], [], "o", color="0.3", markersize=6, markerfacecolor="white", label="fold")
         axes.plot([], [], "--", color="0.3", label="runs back")
-    if not all(one.complete for one in found):
+    if any(one.early for one in found):
         axes.plot([], [], "x", color="#c8382c", markersize=9, linestyle="none", label="ends early")
     _for_reading(axes, found, scale)
     axes.set(xlabel=_OVER[found[0].over], ylabel=f"amplitude of the read-out in {unit} (0-peak)", title=title)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data import Array, ComplexArray, UserError
+from ..data import Array, ComplexArray, Indices, UserError
 from ..units import Quantity, counted
 
 if TYPE_CHECKING:
@@ -261,15 +261,24 @@ class Series:
         return axes
 
     def _drawn(self, y: Array) -> tuple[Array, Array]:
-        """What a line is drawn through; of a curve, smooth between its points."""
-        s, ok = np.asarray(self.arrays.get("arclength", ())), np.isfinite(y)
+        """What a line is drawn through; of a curve, smooth between its points, and broken where another one begins."""
+        begins = np.flatnonzero(np.diff(self.arrays.get("branch", np.zeros(len(y))))) + 1
+        pieces = [self._smooth(part, y[part]) for part in np.split(np.arange(len(y)), begins)]
+        broken = [np.hstack([np.array(piece), [[np.nan], [np.nan]]]) for piece in pieces]
+        x, y = np.hstack(broken)[:, :-1]
+        return x, y
+
+    def _smooth(self, part: Indices, y: Array) -> tuple[Array, Array]:
+        """A line through some points that follow each other, y (part,)."""
+        s, x, ok = np.asarray(self.arrays.get("arclength", np.zeros(0))), self.parameter[part], np.isfinite(y)
+        s = s[part] if len(s) else s
         if len(s) != len(y) or ok.sum() < 4 or not ok.all() or not (np.diff(s) > 0).all():
-            return self.parameter, y
+            return x, y
         from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
         fine = np.interp(np.arange(0, len(s) - 1 + 1e-9, 0.125), np.arange(len(s)), s)
-        places = np.column_stack([self.parameter, y])
-        bends = "kink" not in self.arrays or np.any(self.arrays["kink"])
+        places = np.column_stack([x, y])
+        bends = "kink" not in self.arrays or np.any(self.arrays["kink"][part])
         line = Akima1DInterpolator(s, places, method="makima") if bends else CubicSpline(s, places)
         smooth = line(fine)
         return smooth[:, 0], smooth[:, 1]

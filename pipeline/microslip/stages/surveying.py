@@ -285,12 +285,12 @@ def _curve(over: str, points: Checkpoint, settings: CaseSettings, bases: Bases, 
     title, name = f"{settings.name}: over the {over.replace('_', ' ')}", f"over_{over}"
     response = _written(points, found, whole)
     failed = sum(int((~s.converged).sum()) for s in response.series)
-    drawn = [one for one in found if len(one.rows) > 1]
+    drawn, arrived = [one for one in found if len(one.rows) > 1], sum(one.complete for one in found)
     return Survey(
         {f"{name}.csv": columns},
         {f"pictures/{name}.png": lambda p: curve_plot(drawn, p, title)} if drawn else {},
         [*(words for one in found for words in one.sentences()), sentence(response, None)],
-        sum(not one.complete for one in found) + failed,
+        sum(one.early for one in found) + (arrived < sum(one.legs is None for one in found)) + failed,
         whole,
     )
 
