@@ -104,7 +104,7 @@ def test_optimum_over_the_normal_force(capsys: pytest.CaptureFixture[str]) -> No
     best = rows[-1]
     normal, height = float(best["normal_force"]), float(best["amplitude_m"])
     assert 8 < normal < 15 and best["what"] == "optimum: converged"
-    assert f"normal_force = {normal:.4g}"[:-1] in capsys.readouterr().out
+    assert f"normal force = {normal:.4g}"[:-1] in capsys.readouterr().out
     assert Path("build/sled/pictures/optimum.png").stat().st_size > 10_000
     settings, _ = load_case(Path("case.toml"), [f"sweep.normal_forces=[{0.9 * normal}, {normal}, {1.1 * normal}]"])
     peaks = [max(a for _, a in one) for one in run_case(settings, sled(), "case.toml").resonances.values()]
