@@ -72,13 +72,16 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
         found.append((name, orbit.run(driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start, tell)))
         stage.report(_sentence(*found[-1]))
     stage.begin()
-    sentences = [*(_sentence(*one) for one in found), *built.messages]
+    more = [f"{name}: {words}" for name, one in found for words in one.messages]
+    sentences = [*(_sentence(*one) for one in found), *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
     with store.complete_or_absent(folder / "orbit.h5") as temporary:
         _write(temporary, found)
     (folder / "pictures").mkdir(exist_ok=True)
-    drawn = [portraits(found, folder / "pictures" / "phase_portraits.png", f"{settings.name}: phase portraits")]
-    for i, (name, one) in enumerate(found, 1):
+    seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
+    if seen:  # one that diverges as it settles leaves nothing to draw
+        drawn.append(portraits(seen, folder / "pictures" / "phase_portraits.png", f"{settings.name}: phase portraits"))
+    for i, (name, one) in enumerate(seen, 1):
         title = f"{settings.name}: {name}, {one.said}"
         drawn.append(orbit_picture(one, folder / "pictures" / f"orbit_{i}.png", title))
     tables = {"Motions": _table(found)}
@@ -94,10 +97,8 @@ def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
     size = METRES.sized(0.5 * float(np.ptp(one.y[0])), 5)
-    return (
-        f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side, its last period uncertain by "
-        f"{percent(one.error)}."
-    )
+    error = f", its last period uncertain by {percent(one.error)}" if np.isfinite(one.error) else ""
+    return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
 def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:

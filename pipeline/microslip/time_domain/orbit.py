@@ -35,6 +35,9 @@ STABLE = 1.8
 CHUNK = 16
 """Periods between two reports."""
 
+UNSOLVED = 1e-6
+"""Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
+
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
@@ -185,7 +188,19 @@ def run(
             missed += max(0, int(now.count) - EVENTS)
         if done % CHUNK == 0 or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
-    return replace(_orbit(stepper, kept, events, missed, samples, each), error=_error(stepper, now, samples, each))
+    found = _orbit(stepper, kept, events, missed, samples, each)
+    error = _error(stepper, now, samples, each)
+    return replace(found, error=error, messages=_warnings(found, float(now.worst)))
+
+
+def _warnings(found: Orbit, worst: float) -> tuple[str, ...]:
+    """What a reader must know. worst: m, of the contacts that yield at once."""
+    said = []
+    if worst > UNSOLVED * np.abs(found.d).max(initial=0.0):
+        said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
+    if found.missed:
+        said.append(f"{counted(found.missed, 'event')} more than are listed, and counted, happened.")
+    return tuple(said)
 
 
 def _error(stepper: Stepper, now: Now, samples: int, each: int) -> float:
