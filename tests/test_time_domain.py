@@ -113,8 +113,8 @@ def test_leaps_over_flights_change_nothing() -> None:
     found = []
     for leaps in (True, False):
         s = Stepper(e, 2 * np.pi / 64.32 / 8192)
-        s.__dict__["options"] = Options(False, leaps, True)
-        _, seen = s.run(s.start(np.zeros(3), np.zeros(3)), np.full(128, 128))
+        s.__dict__["options"] = Options(leaps, True)
+        _, seen, *_ = s.run(s.start(np.zeros(3), np.zeros(3)), np.full(128, 128))
         found.append(np.asarray(seen.q))
     np.testing.assert_allclose(found[0], found[1], atol=1e-9 * np.abs(found[1]).max())
 
@@ -137,7 +137,7 @@ def test_a_viscous_contact_throws_back_what_its_closed_form_says() -> None:
     e = replace(e, omega2=np.zeros(3), C=np.zeros((3, 3)))
     s = Stepper(e, 1e-7)
     along = e.D[0] / (e.D[0] @ e.D[0])
-    _, seen = s.run(s.start(-1e-4 * along, speed * along), np.full(64, 2**11))
+    _, seen, *_ = s.run(s.start(-1e-4 * along, speed * along), np.full(64, 2**11))
     rates = np.asarray(seen.q_dot) @ e.D[0]
     w, D = np.sqrt(k / MASS), beta * np.sqrt(k / MASS) / 2
     root = np.sqrt(1 - D**2)

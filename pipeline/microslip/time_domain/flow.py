@@ -25,17 +25,16 @@ DOUBLINGS = 24
 
 
 class Flow(NamedTuple):
-    """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each. All are jax arrays.
+    """Flows over tau 2^k, k = 0, 1, ..., of b blocks of p modes each, s = 2 p + n. All are jax arrays.
 
     Attributes:
-        move: (K, b, 2 p, 2 p + n). turn: (K, n, n) of the oscillators. supplied, damped: (K, b, 2 p + n, 2 p + n), J as
-            quadratic forms: work of the loads and of the dampers.
+        stack: (K, b, 2 p + 2 s, s), one above the other: how (q_b, v_b, o) moves, and the symmetric matrices, J, of the
+            works of loads and of dampers as quadratic forms of it. turn: (K, n, n) of the oscillators. length: (K,) s.
     """
 
-    move: Any
+    stack: Any
     turn: Any
-    supplied: Any
-    damped: Any
+    length: Any
 
 
 def blocks(equations: Equations) -> tuple[int, int]:
@@ -60,7 +59,8 @@ def flow(equations: Equations, tau: float, doublings: int = DOUBLINGS) -> Flow:
         moves.append(twice[:, : 2 * p])
         turns.append(scipy.linalg.expm(e.turning * tau * 2.0 ** len(turns)))
     assert moves[0].shape == (b, 2 * p, 2 * p + n)
-    return Flow(*(jnp.asarray(np.array(x)) for x in (moves, turns, S, L)))
+    stack = np.concatenate([np.array(x) for x in (moves, S, L)], axis=2)
+    return Flow(jnp.asarray(stack), jnp.asarray(np.array(turns)), jnp.asarray(tau * 2.0 ** np.arange(len(turns))))
 
 
 def _whole(move: Array, turn: Array) -> Array:

@@ -15,7 +15,7 @@ from ..data import Array, NotConverged, UserError
 from ..settings.mistakes import bounded
 from ..units import counted
 from .equations import Equations
-from .stepper import EVENTS, KINDS, Now, Seen, Stepper, static_force
+from .stepper import KINDS, Now, Seen, Stepper, static_force
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -178,14 +178,14 @@ def run(
         before, dense = now, done >= settle
         ahead = 1 if dense else min(CHUNK, settle - done, samples)
         rows = np.full(samples, each) if dense else np.where(np.arange(samples) < ahead, each * samples, 0)
-        now, seen = stepper.run(now, rows)
+        now, seen, listed, count = stepper.run(now, rows)
         done += ahead
         if not np.isfinite(seen.mechanical[-1]):
             return _orbit(stepper, kept, events, missed, samples, each, diverged=float(before.time))
         if dense:
-            kept.append(Seen._make(map(np.asarray, seen)))
-            events.append(np.asarray(now.events)[: min(int(now.count), EVENTS)])
-            missed += max(0, int(now.count) - EVENTS)
+            kept.append(seen)
+            events.append(listed)
+            missed += count - len(listed)
         if done % CHUNK == 0 or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
     found = _orbit(stepper, kept, events, missed, samples, each)
@@ -205,12 +205,8 @@ def _warnings(found: Orbit, worst: float) -> tuple[str, ...]:
 
 def _error(stepper: Stepper, now: Now, samples: int, each: int) -> float:
     """Deviation of one more period from the same with half the step, over the largest read-out."""
-    fine = Stepper(stepper.equations, stepper.tau / 2, stepper.accounts)
-    half = 0.5 * (fine.tau - stepper.tau)
-    kick = np.einsum("bpc,c->bp", np.asarray(stepper.bodies.kick), np.asarray(now.force) - stepper.equations.F_0)
-    p = kick.shape[1]
-    finer = now._replace(y=now.y.at[:, p:].add(half * kick))
-    both = [s.run(n, np.full(samples, k))[1] for s, n, k in ((stepper, now, each), (fine, finer, 2 * each))]
+    fine = replace(stepper, tau=stepper.tau / 2)
+    both = [s.run(now, np.full(samples, k))[1] for s, k in ((stepper, each), (fine, 2 * each))]
     y = [_read(stepper.equations, seen) for seen in both]
     size = np.abs(y[1]).max(initial=0.0)
     return float(np.abs(y[0] - y[1]).max(initial=0.0) / size * 4 / 3) if size else 0.0
@@ -252,19 +248,19 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
 
 def _static(e: Equations, most: int = 60) -> Array:
     """(m,) where steady loads and contacts that came there on a straight way are in balance, by Newton's method."""
-    q, force = np.zeros(len(e.omega2)), static_force(Stepper(e, 1.0, False))
+    q, force = np.zeros(len(e.omega2)), static_force(Stepper(e, 1.0, accounts=False))
     scale = np.abs(e.B[:, 0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)
 
     def missing(q: Array) -> tuple[Array, Array]:
         F, S = force(q)
-        return e.omega2 * q - e.B[:, 0] + e.D.T @ (F - e.F_0), S
+        return e.omega2 * q - e.B[:, 0] + F, S
 
     R, S = missing(q)
     scale = max(scale, np.abs(R).max(initial=0.0))
     for _ in range(most):
         if np.abs(R).max(initial=0.0) <= 1e-10 * scale:
             return q
-        K = np.diag(e.omega2) + e.D.T @ S @ e.D
+        K = np.diag(e.omega2) + S
         step = -scipy.linalg.lstsq(K, R)[0]
         share = 1.0
         for _ in range(12):

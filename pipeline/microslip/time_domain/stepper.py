@@ -1,7 +1,7 @@
 """The compiled loop: exact flow, contact force, kick; leaps where nothing touches.
 
-A step of tau: the bodies flow for tau as if nothing touched (`flow`), the contacts say their force F at the place they
-came to, and F - F_0 kicks the velocities by tau, half of it before what is read out and half after: symmetric, and of
+A step of dt: the contacts' force F kicks the velocities by F - F_0 for dt / 2, the bodies flow for dt as if nothing
+touched (`flow`), the contacts say their force at the place they came to, and that kicks for dt / 2: symmetric, and of
 second order. What the bodies have of energy is what loads gave, less what dampers and kicks took, to rounding.
 
 Where nothing touches, the gap is at least g, and no point comes nearer faster than V by the energy of the motion about
@@ -19,53 +19,35 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.law import Law, Step
 from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
+from .contacts import Group, Held, Yielding, answer, force_at, slope_at, times, untouched
 from .equations import Equations
-from .flow import Flow, blocks, flow
+from .flow import DOUBLINGS, Flow, blocks, flow
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
 
 KINDS = ("closes", "opens", "slips", "sticks")
 
-CHORDS = 12
-"""Iterations for contacts beside which the modes leave compliance out, with the slope of sticking contacts; modes leave
-out little beside what a contact yields, so few are needed."""
-
-ITERATIONS = 30
-"""Of Newton's method, where they do not do."""
-
-
-class Group(NamedTuple):
-    """Equal contacts. law: of all of their points. G: (n, 3, k) of one. index, offset: (c, k) coordinates and preload
-    state of each."""
-
-    law: Law
-    G: Any
-    index: Any
-    offset: Any
-
 
 class Bodies(NamedTuple):
     """What the loop reads of the equations, as jax arrays in blocks of modes.
 
     Attributes:
-        flow. tau: s. D: (c, b, 2 p) and D_o (c, n): d of the contact coordinates. kick: (b, p, c) velocities per force.
-            R, yields: (c, c), see `Equations`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion
-            without contacts.
-        reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
+        flow. D: (c, m) and D_o, D_v (c, n): d and d' of the contact coordinates. kick: (m, c) velocities per force.
+        yielding: see `contacts`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without
+            contacts. reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most:
+            see `_leap`.
     """
 
     flow: Flow
-    tau: Any
+    yielding: Yielding | None
+    F_0: Any
     D: Any
     D_o: Any
+    D_v: Any
     kick: Any
-    R: Any
-    yields: Any
-    F_0: Any
     omega2: Any
     steady: Any
     reach: Any
@@ -76,28 +58,29 @@ class Now(NamedTuple):
     """Where the motion is.
 
     Attributes:
-        y: (b, 2 p) modal displacements and velocities, the kick's second half taken. o: (n,). force: (c,) N and N m.
-            states: of the laws, group by group; points, places: forces and displacements (c n, 3) of their points.
-            approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
-            (1 or 0). slips: (contacts,) bool.
+        y: (b, 2 p) modal displacements and velocities. o: (n,). push: (b, p) accelerations by contacts. held: by
+            them.
         energy: (5,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, and
             what contacts store now. worst: m, the largest residual of an implicit contact.
-        count: of events. events: (EVENTS, 3): time in s, contact, kind.
+        met: (4, contacts) the events of the last step, at: when, s.
     """
 
     y: Any
     o: Any
     time: Any
-    force: Any
-    states: tuple[Any, ...]
-    points: tuple[Any, ...]
-    places: tuple[Any, ...]
-    approach: Any
-    slips: Any
+    push: Any
+    held: Held
     energy: Any
     worst: Any
+    met: Any
+    at: Any
+
+
+class Listed(NamedTuple):
+    """Events. count: of them. rows: (EVENTS, 3): time in s, contact, kind."""
+
     count: Any
-    events: Any
+    rows: Any
 
 
 class Seen(NamedTuple):
@@ -114,10 +97,9 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Options:
-    """What the loop is compiled for. yields: whether modes leave out compliance. leaps: over flights without contact.
-    accounts: of the energy that contacts store and lose."""
+    """What the loop is compiled for. leaps: over flights without contact. accounts: of the energy that contacts store
+    and lose."""
 
-    yields: bool
     leaps: bool
     accounts: bool
 
@@ -136,15 +118,13 @@ class Stepper:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        contacts = self.equations.contacts
-        begins = np.cumsum([0, *(c.patch.count for c in contacts)])
-        found = []
+        contacts, found = self.equations.contacts, []
         for same in self.same:
             patch = contacts[same[0]].patch
-            index = np.array([np.arange(begins[i], begins[i + 1]) for i in same])
             offset = np.array([contacts[i].offset for i in same])
             law = repeated(patch.law, len(patch.points), len(same))
-            found.append(Group(law, jnp.asarray(patch.kinematics), jnp.asarray(index), jnp.asarray(offset)))
+            G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
+            found.append(Group(law, jnp.asarray(G), jnp.asarray(offset)))
         return tuple(found)
 
     @cached_property
@@ -156,49 +136,55 @@ class Stepper:
         return list(found.values())
 
     @cached_property
-    def order(self) -> Any:
-        """(contacts,) place of each contact where they stand group by group."""
-        return jnp.asarray(np.argsort([i for same in self.same for i in same]).astype(int))
+    def rows(self) -> Array:
+        """(c,) of the equations' contact coordinates, those of the loop."""
+        begins = np.cumsum([0, *(c.patch.count for c in self.equations.contacts)])
+        parts = [np.arange(begins[i], begins[i + 1]) for same in self.same for i in same]
+        return np.concatenate([np.zeros(0, int), *parts])
+
+    @cached_property
+    def numbers(self) -> Array:
+        """(contacts,) of the equations, those of the loop."""
+        return np.array([i for same in self.same for i in same], dtype=int)
 
     @cached_property
     def options(self) -> Options:
         e = self.equations
-        gapes = [g.law.overlap(jnp.zeros((len(g.index) * len(g.G), 3))) for g in self.groups]
+        gapes = [g.law.overlap(jnp.zeros((g.G.shape[0] * g.G.shape[1], 3))) for g in self.groups]
         opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
         leaps = opens and not e.F_0.any() and e.steady is not None and bool(dissipative)
-        return Options(bool(e.R.any()), leaps, self.accounts)
+        return Options(leaps, self.accounts)
 
     @cached_property
     def bodies(self) -> Bodies:
-        e = self.equations
+        e, rows = self.equations, self.rows
         b, p = blocks(e)
-        m, c, n = len(e.omega2), len(e.D), e.turning.shape[0]
-        D = np.zeros((c, b, 2 * p))
-        D[:, :, :p] = e.D.reshape(c, b, p)
-        steady, still = np.zeros((b, 2 * p, n)), np.zeros((m, n)) if e.steady is None else e.steady
+        n = e.turning.shape[0]
+        steady, still = np.zeros((b, 2 * p, n)), np.zeros((b * p, n)) if e.steady is None else e.steady
         steady[:, :p] = still.reshape(b, p, n)
         steady[:, p:] = (still @ e.turning).reshape(b, p, n)
-        rows, given = self._points
-        reach = np.linalg.norm(rows, axis=(1, 2))
-        drift = np.linalg.norm(np.abs((rows @ still + given) @ e.turning).sum(axis=2), axis=1)
-        return Bodies(
-            flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.yields, e.F_0)),
-            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift)),
-        )  # fmt: skip
+        moved, given = self._points
+        reach = np.linalg.norm(moved, axis=(1, 2))
+        drift = np.linalg.norm(np.abs((moved @ still + given) @ e.turning).sum(axis=2), axis=1)
+        D, D_o, F_0 = e.D[rows], e.D_o[rows], jnp.asarray(e.F_0[rows])
+        R, share = (jnp.asarray(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
+        arrays = map(jnp.asarray, (D, D_o, D_o @ e.turning, -D.T, e.omega2.reshape(b, p), steady, reach, drift))
+        flows = flow(e, self.tau, DOUBLINGS if self.options.leaps else 0)
+        return Bodies(flows, Yielding(R, share, F_0) if e.R.any() else None, F_0, *arrays)
 
     @property
     def _points(self) -> tuple[Array, Array]:
         """(points, 3, m) and (points, 3, n): motion of all points by modes and by what the loads move beside them."""
-        e, rows, given = (
-            self.equations,
-            [np.zeros((0, 3, len(self.equations.omega2)))],
-            [np.zeros((0, 3, self.equations.turning.shape[0]))],
-        )
+        e, begin = self.equations, 0
+        moved, given = [np.zeros((0, 3, len(e.omega2)))], [np.zeros((0, 3, e.turning.shape[0]))]
         for g in self.groups:
-            rows += [np.asarray(g.G) @ e.D[i] for i in np.asarray(g.index)]
-            given += [np.asarray(g.G) @ e.D_o[i] for i in np.asarray(g.index)]
-        return np.concatenate(rows), np.concatenate(given)
+            for G in np.asarray(g.G):
+                own = self.rows[begin : begin + G.shape[2]]
+                moved.append(G @ e.D[own])
+                given.append(G @ e.D_o[own])
+                begin += G.shape[2]
+        return np.concatenate(moved), np.concatenate(given)
 
     def start(self, q: Array, v: Array, time: float = 0.0) -> Now:
         """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from u = 0 on a straight
@@ -206,242 +192,141 @@ class Stepper:
         e = self.equations
         b, p = blocks(e)
         y = jnp.concatenate([jnp.asarray(q).reshape(b, p), jnp.asarray(v).reshape(b, p)], axis=1)
-        states = tuple(g.law.init(len(g.index) * len(g.G)) for g in self.groups)
-        points = tuple(jnp.zeros((len(g.index) * len(g.G), 3)) for g in self.groups)
-        none = jnp.zeros(len(e.contacts))
+        none = jnp.zeros((4, len(e.contacts)))
         now = Now(
-            y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros(len(e.D)), states, points, points,
-            none, none.astype(bool), jnp.zeros(5), jnp.zeros(()), jnp.zeros((), dtype=int), jnp.zeros((EVENTS, 3)),
+            y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros((b, p)),
+            untouched(self.groups), jnp.zeros(5), jnp.zeros(()), none.astype(bool), none,
         )  # fmt: skip
-        return _begun(self.options, self.groups, self.order, self.bodies, now)
+        return _begun(self.options, self.groups, self.bodies, now)
 
-    def run(self, now: Now, steps: Array) -> tuple[Now, Seen]:
-        """Samples (s,) further, each after so many steps; compiled anew for another s alone."""
+    def run(self, now: Now, steps: Array, events: int = EVENTS) -> tuple[Now, Seen, Array, int]:
+        """Samples (s,) further, each after so many steps of tau; compiled anew for another s alone.
+
+        Returns:
+            Where the motion is; the samples; (e, 3) events: time in s, contact, kind, an index of `KINDS`; how many
+            there were, which may be more.
+        """
         reached = float(now.time) + self.tau * np.cumsum(steps)
         o = jnp.asarray(self.equations.oscillators(reached))
-        now = now._replace(count=jnp.zeros((), dtype=int))
-        return _run(self.options, self.groups, self.order, self.bodies, now, o, jnp.asarray(steps))
+        listed = Listed(jnp.zeros((), int), jnp.zeros((events, 3)))
+        now, listed, seen = _run(self.options, self.groups, self.bodies, now, listed, o, jnp.asarray(steps))
+        count, back = int(listed.count), np.argsort(self.rows)
+        rows = np.array(listed.rows[: min(count, events)])
+        rows[:, 1] = self.numbers[rows[:, 1].astype(int)] if len(rows) else 0
+        seen = Seen._make(map(np.asarray, seen))
+        return now, seen._replace(d=seen.d[:, back], force=seen.force[:, back]), rows, count
 
 
 def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
-    """Function of modal displacements (m,): force (c,) of contacts that came there on a straight way, and (c, c) its
-    slope with respect to d."""
-    e, groups = stepper.equations, stepper.groups
-    states = tuple(g.law.init(len(g.index) * len(g.G)) for g in groups)
-    if e.R.any():
+    """Function of modal displacements (m,): modal forces (m,) of contacts that came there on a straight way, and (m, m)
+    their slope."""
+    groups, bodies = stepper.groups, stepper.bodies
+    states = untouched(groups).states
+    if bodies.yielding is not None:
         raise UserError('start: where modes leave compliance out of the contacts, begin from "rest"')
 
     @jax.jit
     def found(q: Any) -> tuple[Any, Any]:
-        d = jnp.asarray(e.D) @ q + jnp.asarray(e.D_o[:, 0])
+        d = bodies.D @ q + bodies.D_o[:, 0]
         still = jnp.zeros_like(d)
-        force = _force(groups, d, still, 1.0, states, len(d))[0]
-        return force, _slope(groups, d, still, 1.0, states, len(d))
+        force = force_at(groups, d, still, 1.0, states)[0]
+        return bodies.D.T @ (force - bodies.F_0), bodies.D.T @ slope_at(groups, d, still, 1.0, states) @ bodies.D
 
     return lambda q: tuple(np.asarray(x) for x in found(q))  # type: ignore[return-value]
 
 
-class Pressed(NamedTuple):
-    """What contacts answer to a step: see `Now`; energy lost in the step and stored after it, J."""
-
-    d: Any
-    force: Any
-    states: tuple[Any, ...]
-    points: tuple[Any, ...]
-    places: tuple[Any, ...]
-    approach: Any
-    slips: Any
-    lost: Any
-    stored: Any
-    worst: Any
-
-
-def _displaced(g: Group, d: Any) -> Any:
-    """(c n, 3) m of the points of a group."""
-    return jnp.einsum("nia,ca->cni", g.G, d[g.index] + g.offset).reshape(-1, 3)
-
-
-def _moving(g: Group, v: Any) -> Any:
-    return jnp.einsum("nia,ca->cni", g.G, v[g.index]).reshape(-1, 3)
-
-
-def _contracted(g: Group, points: Any) -> Any:
-    return jnp.einsum("nia,cni->ca", g.G, points.reshape(len(g.index), -1, 3))
-
-
-def _force(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...], count: int) -> tuple:
-    """Force (c,) at d with velocity v, states and points' forces of all groups."""
-    force, after, points = jnp.zeros(count), [], []
-    for g, state in zip(groups, states, strict=True):
-        f, s = g.law.step(_displaced(g, d), _moving(g, v), dt, state)
-        force = force.at[g.index].set(_contracted(g, f))
-        after.append(s)
-        points.append(f)
-    return force, tuple(after), tuple(points)
-
-
-def _slope(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...], count: int) -> Any:
-    """(c, c) derivative of the force, point by point."""
-    out = jnp.zeros((count, count))
-    for g, state in zip(groups, states, strict=True):
-        u, w = _displaced(g, d), _moving(g, v)
-
-        def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
-            tangent = jnp.broadcast_to(direction, u.shape)
-            return jax.jvp(lambda x: g.law.step(x, w, dt, state)[0], (u,), (tangent,))[1]
-
-        S = jax.vmap(along)(jnp.eye(3)).reshape(3, len(g.index), -1, 3)
-        k = jnp.einsum("nia,jcni,njb->cab", g.G, S, g.G)
-        out = out.at[g.index[:, :, None], g.index[:, None, :]].set(k)
-    return out
-
-
-def _placed(options: Options, groups: tuple[Group, ...], B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> tuple:
-    """d (c,) of contacts that bodies alone would have at `free`, where those yield at once; the residual, m; and what
-    `_force` says there. With the slope of sticking contacts first, with their own where that does not do."""
-    count = len(free)
-    if not options.yields:
-        return free, jnp.zeros(()), _force(groups, free, v, dt, now.states, count)
-    enough = 1e-10 * jnp.abs(free).max() + 1e-17
-
-    def missing(d: Any) -> tuple:
-        there = _force(groups, d, v, dt, now.states, count)
-        return d, d - free + B.R @ (there[0] - B.F_0), there
-
-    def wanted(most: int, carried: tuple) -> Any:
-        i, (_, r, _) = carried
-        return (jnp.abs(r).max() > enough) & (i < most)
-
-    def chord(carried: tuple) -> tuple:
-        i, (d, r, _) = carried
-        return i + 1, missing(d - B.yields @ r)
-
-    def newton(carried: tuple) -> tuple:
-        i, (d, r, _) = carried
-        J = jnp.eye(count) + B.R @ _slope(groups, d, v, dt, now.states, count)
-        return i + 1, missing(d - jnp.linalg.solve(J, r))
-
-    first = missing(free - B.R @ (now.force - B.F_0))
-    _, found = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
-    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, found))
-    return d, jnp.abs(r).max(), there
-
-
-def _pressed(options: Options, groups: tuple, order: Any, B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> Pressed:
-    d, worst, (force, states, points) = _placed(options, groups, B, free, v, dt, now)
-    places = tuple(_displaced(g, d) for g in groups)
-    approach, slips, lost, stored = [], [], jnp.zeros(()), jnp.zeros(())
-    for i, (g, u) in enumerate(zip(groups, places, strict=True)):
-        slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(now.states[i])) > SLID * jnp.abs(u - now.places[i])[:, 1:]
-        deep = g.law.overlap(u)
-        deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
-        approach.append(jnp.max(deep.reshape(len(g.index), -1), axis=1))
-        slips.append(jnp.any(slid.reshape(len(g.index), -1), axis=1))
-        if options.accounts:
-            moved = u - now.places[i]
-            lost += jnp.sum(g.law.lost(Step(u, moved, dt, now.points[i], points[i], now.states[i], states[i])))
-            stored += jnp.sum(g.law.stored(u, states[i]))
-    by_contact = [jnp.concatenate(x)[order] if x else jnp.zeros(0) for x in (approach, slips)]
-    return Pressed(d, force, states, points, places, by_contact[0], by_contact[1].astype(bool), lost, stored, worst)
-
-
-SLID = 1e-9
-"""Share of a way beyond which a slider has slid and not only rounding."""
+def _pushed(
+    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v: Any, o: Any, dt: Any, held: Held
+) -> tuple[Held, Any]:  # fmt: skip
+    """What contacts hold where the bodies are, and (b, p) their accelerations of the modes."""
+    free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
+    v = times(B.D, v.reshape(-1)) + times(B.D_v, o)
+    held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
+    return held, times(B.kick, held.force - B.F_0).reshape(B.omega2.shape)
 
 
 @partial(jax.jit, static_argnums=0)
-def _begun(options: Options, groups: tuple[Group, ...], order: Any, B: Bodies, now: Now) -> Now:
-    """The contacts where the bodies are, half a kick taken."""
-    p = B.omega2.shape[1]
-    free = jnp.einsum("cbi,bi->c", B.D, now.y) + B.D_o @ now.o
-    v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], now.y[:, p:]) + B.D_o @ (_turning(B) @ now.o)
-    found = _pressed(options, groups, order, B, free, v, B.tau, now)
-    half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, found.force - B.F_0)
-    y = now.y.at[:, p:].add(half)
-    done = -jnp.sum(half * (now.y[:, p:] + 0.5 * half))
-    return now._replace(
-        y=y, force=found.force, states=found.states, points=found.points, places=found.places, approach=found.approach,
-        slips=found.slips, energy=now.energy.at[2].set(done).at[4].set(found.stored), worst=found.worst,
-    )  # fmt: skip
-
-
-def _turning(B: Bodies) -> Any:
-    """(n, n) o' over o, from its flow over a step: exact for the rates that a contact's dampers need."""
-    turn = B.flow.turn[0]
-    return (turn - turn.T) / (2 * B.tau)
+def _begun(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
+    """The contacts where the bodies are."""
+    q, v = jnp.split(now.y, 2, axis=1)
+    held, push = _pushed(options, groups, B, q, v, now.o, B.flow.length[0], now.held)
+    return now._replace(push=push, held=held, energy=now.energy.at[4].set(held.stored), worst=held.missed)
 
 
 @partial(jax.jit, static_argnums=0)
 def _run(
-    options: Options, groups: tuple[Group, ...], order: Any, B: Bodies, now: Now, oscillators: Any, steps: Any
-) -> tuple[Now, Seen]:
+    options: Options, groups: tuple[Group, ...], B: Bodies, now: Now, listed: Listed, oscillators: Any, steps: Any
+) -> tuple[Now, Listed, Seen]:
     """Samples after (s,) steps each; oscillators: (s, n) o there, so that rounding does not add up."""
     p = B.omega2.shape[1]
+    step = partial(_step, options, groups, B)
 
-    def sample(now: Now, one: tuple) -> tuple[Now, Seen]:
+    def on(carried: tuple) -> tuple:
+        left, now, listed = carried
+        left, now = jax.lax.while_loop(lambda c: (c[0] > 0) & ~c[1].met.any(), lambda c: step(*c), (left, now))
+        return left, now._replace(met=jnp.zeros_like(now.met)), _noted(now, listed)
+
+    def sample(carried: tuple, one: tuple) -> tuple[tuple, Seen]:
         o, count = one
-        step = partial(_step, options, groups, order, B)
-        left, now = jax.lax.while_loop(lambda c: c[0] > 0, lambda c: step(*c), (count, now))
+        _, now, listed = jax.lax.while_loop(lambda c: c[0] > 0, on, (count, *carried))
         now = now._replace(o=o)
-        half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, now.force - B.F_0)
-        q, v = now.y[:, :p], now.y[:, p:] - half
-        energy = now.energy.at[2].add(jnp.sum(half * (v + 0.5 * half)))  # the second half of the kick is to come
+        q, v = now.y[:, :p], now.y[:, p:]
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
-        d = jnp.einsum("cbi,bi->c", B.D, now.y) + B.D_o @ o - B.R @ (now.force - B.F_0)
-        return now, Seen(q.reshape(-1), v.reshape(-1), d, now.force, energy, bodies, now.time)
+        seen = Seen(q.reshape(-1), v.reshape(-1), now.held.d, now.held.force, now.energy, bodies, now.time)
+        return (now, listed), seen
 
-    return jax.lax.scan(sample, now, (oscillators, steps))
+    (now, listed), seen = jax.lax.scan(sample, (now, listed), (oscillators, steps))
+    return now, listed, seen
 
 
-def _step(options: Options, groups: tuple, order: Any, B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
+def _step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> tuple[Any, Now]:
     """One step, or a leap over as many as no contact is met in."""
     p = B.omega2.shape[1]
-    k = _leap(groups, B, now, left) if options.leaps else 0
-    F, dt = B.flow, B.tau * 2.0**k
-    z = jnp.concatenate([now.y, jnp.broadcast_to(now.o, (len(now.y), len(now.o)))], axis=1)
-    y = jnp.einsum("bij,bj->bi", F.move[k], z)
-    o = F.turn[k] @ now.o
-    given, taken = (jnp.einsum("bi,bij,bj->", z, Q[k], z) for Q in (F.supplied, F.damped))
-    free = jnp.einsum("cbi,bi->c", B.D, y) + B.D_o @ o
-    half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, now.force - B.F_0)
-    v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], y[:, p:] + half) + B.D_o @ (_turning(B) @ o)
-    found = _pressed(options, groups, order, B, free, v, dt, now)
-    kick = B.tau * jnp.einsum("bpc,c->bp", B.kick, found.force - B.F_0)
-    work = -jnp.sum(kick * (y[:, p:] + 0.5 * kick))
-    energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, found.lost])), found.stored])
-    after = now._replace(
-        y=y.at[:, p:].add(kick), o=o, time=now.time + dt, force=found.force, states=found.states, points=found.points,
-        places=found.places, approach=found.approach, slips=found.slips, energy=energy,
-        worst=jnp.maximum(now.worst, found.worst),
+    k = _leap(groups, B, left, now) if options.leaps else 0
+    dt = B.flow.length[k]
+    before = 0.5 * dt * now.push
+    v = now.y[:, p:] + before
+    z = jnp.concatenate([now.y[:, :p], v, jnp.broadcast_to(now.o, (len(v), len(now.o)))], axis=1)
+    flown = times(B.flow.stack[k], z)
+    q, v_free = flown[:, :p], flown[:, p : 2 * p]
+    given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
+    o = times(B.flow.turn[k], now.o)
+    held, push = _pushed(options, groups, B, q, v_free + before, o, dt, now.held)
+    after = 0.5 * dt * push
+    work = -jnp.sum(before * (v - 0.5 * before)) - jnp.sum(after * (v_free + 0.5 * after))
+    y = jnp.concatenate([q, v_free + after], axis=1)
+    energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, held.lost])), held.stored])
+    met, at = _met(now, held, dt)
+    return left - 2**k, Now(
+        y, o, now.time + dt, push, held, energy, jnp.maximum(now.worst, held.missed), met, at
     )  # fmt: skip
-    return left - 2**k, _noted(now, after, dt)
 
 
-def _leap(groups: tuple[Group, ...], B: Bodies, now: Now, left: Any) -> Any:
+def _leap(groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> Any:
     """k of the longest leap of 2^k steps, of those that are left, that no point of contact can close its gap in."""
     p = B.omega2.shape[1]
-    z = now.y - jnp.einsum("bin,n->bi", B.steady, now.o)
+    z = now.y - times(B.steady, now.o)
     swings = jnp.sqrt(jnp.sum(z[:, p:] ** 2 + B.omega2 * z[:, :p] ** 2))
-    gaps = -jnp.concatenate([g.law.overlap(u) for g, u in zip(groups, now.places, strict=True)])
-    steps = jnp.min(gaps / (B.reach * swings + B.drift + 1e-300)) / B.tau
+    gaps = -jnp.concatenate([g.law.overlap(u) for g, u in zip(groups, now.held.places, strict=True)])
+    steps = jnp.min(gaps / (B.reach * swings + B.drift + 1e-300)) / B.flow.length[0]
     longest = jnp.minimum(jnp.maximum(steps, 1.0), left)
     k = jnp.floor(jnp.log2(longest) + 1e-12).astype(int)
-    return jnp.clip(k, 0, len(B.flow.turn) - 1)
+    return jnp.clip(k, 0, len(B.flow.length) - 1)
 
 
-def _noted(before: Now, after: Now, dt: Any) -> Now:
-    """Events of a step: where the deepest point of a contact passes zero; where sliding begins and ends in it."""
-    a, b = before.approach, after.approach
-    met = (a <= 0) & (b > 0), (a > 0) & (b <= 0), after.slips & ~before.slips, before.slips & ~after.slips
-    happens = jnp.stack(met)
+def _met(before: Now, held: Held, dt: Any) -> tuple[Any, Any]:
+    """(4, contacts) events of a step and when: where the deepest point of a contact passes zero; where sliding begins
+    and ends in it."""
+    a, b = before.held.approach, held.approach
+    met = (a <= 0) & (b > 0), (a > 0) & (b <= 0), held.slips & ~before.held.slips, before.held.slips & ~held.slips
+    share = jnp.where((a > 0) != (b > 0), -a / jnp.where(b == a, 1.0, b - a), 0.5)
+    half = jnp.full_like(a, 0.5)
+    return jnp.stack(met), before.time + dt * jnp.stack([share, share, half, half])
 
-    def write(now: Now) -> Now:
-        share = jnp.where(happens[:2].any(axis=0), -a / jnp.where(b == a, 1.0, b - a), 0.5)
-        times = now.time - dt + dt * jnp.stack([share, share, 0.5 + 0 * a, 0.5 + 0 * a])
-        kind, contact = jnp.meshgrid(jnp.arange(4.0), jnp.arange(1.0 * len(a)), indexing="ij")
-        place = now.count + jnp.cumsum(happens.reshape(-1)).reshape(happens.shape) - 1
-        rows = jnp.stack([times, contact, kind], axis=-1)
-        events = now.events.at[jnp.where(happens, place, EVENTS)].set(rows, mode="drop")
-        return now._replace(events=events, count=now.count + jnp.sum(happens))
 
-    return jax.lax.cond(happens.any(), write, lambda now: now, after)
+def _noted(now: Now, listed: Listed) -> Listed:
+    kind, contact = jnp.meshgrid(jnp.arange(4.0), jnp.arange(1.0 * now.met.shape[1]), indexing="ij")
+    place = listed.count + jnp.cumsum(now.met.reshape(-1)).reshape(now.met.shape) - 1
+    rows = jnp.stack([now.at, contact, kind], axis=-1)
+    rows = listed.rows.at[jnp.where(now.met, place, len(listed.rows))].set(rows, mode="drop")
+    return Listed(listed.count + jnp.sum(now.met), rows)

@@ -1,0 +1,184 @@
+"""What contacts answer to a motion in time: their laws' forces where they are, or where the bodies yield at once."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from ..contact.law import Law, Step
+
+CHORDS = 12
+"""Iterations for contacts beside which the modes leave compliance out, with the slope of sticking contacts; modes leave
+out little beside what a contact yields, so few are needed."""
+
+ITERATIONS = 30
+"""Of Newton's method, where they do not do."""
+
+SLID = 1e-9
+"""Share of a way beyond which a slider has slid and not only rounding."""
+
+FEW = 4096
+"""Numbers of a matrix up to which a product is faster as a sum that is compiled together with what surrounds it."""
+
+
+class Group(NamedTuple):
+    """Equal contacts, whose coordinates stand one after the other. law: of all of their points. G: (c, n, 3, k) of
+    each. offset: (c, k) where they stand at d = 0."""
+
+    law: Law
+    G: Any
+    offset: Any
+
+
+class Yielding(NamedTuple):
+    """R: (c, c) m/N. share: (c, c), `Equations.yields`. F_0: (c,) N."""
+
+    R: Any
+    share: Any
+    F_0: Any
+
+
+class Held(NamedTuple):
+    """What contacts hold.
+
+    Attributes:
+        d, force: (c,) of the coordinates. states: of the laws, group by group; forces, places: (c n, 3) N and m of
+            their points.
+        approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
+            (1 or 0). slips: (contacts,) bool.
+        lost, stored: J, in the last step and after it. missed: m, the largest residual of implicit contacts.
+    """
+
+    d: Any
+    force: Any
+    states: tuple[Any, ...]
+    forces: tuple[Any, ...]
+    places: tuple[Any, ...]
+    approach: Any
+    slips: Any
+    lost: Any
+    stored: Any
+    missed: Any
+
+
+def times(A: Any, x: Any) -> Any:
+    """A x over the last axis."""
+    return (A * x[..., None, :]).sum(axis=-1) if A.size <= FEW else jnp.einsum("...ij,...j->...i", A, x)
+
+
+def untouched(groups: tuple[Group, ...]) -> Held:
+    """Contacts that were never loaded, at u = 0."""
+    d = jnp.zeros(sum(g.offset.size for g in groups))
+    states = tuple(g.law.init(_count(g)) for g in groups)
+    points = tuple(jnp.zeros((_count(g), 3)) for g in groups)
+    none, zero = jnp.zeros(sum(len(g.G) for g in groups)), jnp.zeros(())
+    return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero)
+
+
+def _count(g: Group) -> int:
+    return int(g.G.shape[0] * g.G.shape[1])
+
+
+def _parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
+    """(c, k) of each group."""
+    found, begin = [], 0
+    for g in groups:
+        found.append(d[begin : begin + g.offset.size].reshape(g.offset.shape))
+        begin += g.offset.size
+    return found
+
+
+def _moved(g: Group, d: Any) -> Any:
+    """(c n, 3) of the points, by coordinates (c, k)."""
+    return (g.G * d[:, None, None, :]).sum(axis=-1).reshape(-1, 3)
+
+
+def _contracted(g: Group, points: Any) -> Any:
+    """(c k,) forces of the coordinates."""
+    return (g.G * points.reshape(*g.G.shape[:3], 1)).sum(axis=(1, 2)).reshape(-1)
+
+
+def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
+    """Force (c,) at d with velocity v, states and points' forces of all groups."""
+    forces, after, points = [jnp.zeros(0)], [], []
+    for g, state, at, rate in zip(groups, states, _parts(groups, d), _parts(groups, v), strict=True):
+        f, s = g.law.step(_moved(g, at + g.offset), _moved(g, rate), dt, state)
+        forces.append(_contracted(g, f))
+        after.append(s)
+        points.append(f)
+    return jnp.concatenate(forces), tuple(after), tuple(points)
+
+
+def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
+    """(c, c) derivative of the force, point by point."""
+    blocks = list[Any]()
+    for g, state, at, rate in zip(groups, states, _parts(groups, d), _parts(groups, v), strict=True):
+        u, w = _moved(g, at + g.offset), _moved(g, rate)
+
+        def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
+            tangent = jnp.broadcast_to(direction, u.shape)
+            return jax.jvp(lambda x: g.law.step(x, w, dt, state)[0], (u,), (tangent,))[1]
+
+        S = jax.vmap(along)(jnp.eye(3)).reshape(3, *g.G.shape[:3])
+        blocks += list(jnp.einsum("cnia,jcni,cnjb->cab", g.G, S, g.G))
+    return jax.scipy.linalg.block_diag(jnp.zeros((0, 0)), *blocks)
+
+
+def _placed(groups: tuple[Group, ...], bodies: Yielding, free: Any, v: Any, dt: Any, held: Held) -> tuple:
+    """d (c,) of contacts that modes alone would have at `free`, where bodies yield at once; the residual, m; and what
+    `force_at` says there. With the slope of sticking contacts first, with their own where that does not do."""
+    enough = 1e-10 * jnp.abs(free).max() + 1e-17
+
+    def missing(d: Any) -> tuple:
+        there = force_at(groups, d, v, dt, held.states)
+        return d, d - free + times(bodies.R, there[0] - bodies.F_0), there
+
+    def wanted(most: int, carried: tuple) -> Any:
+        i, (_, r, _) = carried
+        return (jnp.abs(r).max() > enough) & (i < most)
+
+    def chord(carried: tuple) -> tuple:
+        i, (d, r, _) = carried
+        return i + 1, missing(d - times(bodies.share, r))
+
+    def newton(carried: tuple) -> tuple:
+        i, (d, r, _) = carried
+        J = jnp.eye(len(free)) + bodies.R @ slope_at(groups, d, v, dt, held.states)
+        return i + 1, missing(d - jnp.linalg.solve(J, r))
+
+    first = missing(free - times(bodies.R, held.force - bodies.F_0))
+    _, found = jax.lax.while_loop(partial(wanted, CHORDS), chord, (0, first))
+    _, (d, r, there) = jax.lax.while_loop(partial(wanted, ITERATIONS), newton, (0, found))
+    return d, jnp.abs(r).max(), there
+
+
+def answer(
+    groups: tuple[Group, ...], bodies: Yielding | None, free: Any, v: Any, dt: Any, held: Held, accounts: bool
+) -> Held:  # fmt: skip
+    """What contacts hold after a step of dt to where modes alone have them, `free` (c,), with velocities v.
+
+    Args:
+        bodies: None: they yield by their modes only. accounts: whether energies are asked for.
+    """
+    if bodies is None:
+        d, missed, (force, states, points) = free, jnp.zeros(()), force_at(groups, free, v, dt, held.states)
+    else:
+        d, missed, (force, states, points) = _placed(groups, bodies, free, v, dt, held)
+    places = tuple(_moved(g, at + g.offset) for g, at in zip(groups, _parts(groups, d), strict=True))
+    approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
+    for i, (g, u) in enumerate(zip(groups, places, strict=True)):
+        moved = u - held.places[i]
+        slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(moved)[:, 1:]
+        deep = g.law.overlap(u)
+        deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
+        approach.append(jnp.max(deep.reshape(len(g.G), -1), axis=1))
+        slips.append(jnp.any(slid.reshape(len(g.G), -1), axis=1))
+        if accounts:
+            lost += jnp.sum(g.law.lost(Step(u, moved, dt, held.forces[i], points[i], held.states[i], states[i])))
+            stored += jnp.sum(g.law.stored(u, states[i]))
+    return Held(
+        d, force, states, points, places, jnp.concatenate(approach), jnp.concatenate(slips), lost, stored, missed
+    )
