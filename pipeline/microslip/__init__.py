@@ -20,7 +20,7 @@ PUBLIC = {
     "harmonic_balance.solved": "load",
     "exchange.labelled": "to_xarray",
     "bodies": "modes assemble sample",
-    "system.structure": "structure polynomial jenkins stop Element",
+    "system.structure": "structure polynomial jenkins stop friction Element",
     "analyses": "harmonic_response follow backbone integrate",
 }
 """Module -> the names of it that are public."""

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,9 +16,12 @@ import numpy as np
 import scipy.linalg
 
 from ..contact.elements import Polynomial, Stop
+from ..contact.friction import Coulomb
 from ..contact.jenkins import Jenkins
 from ..contact.law import Law
+from ..contact.normal import Preload
 from ..contact.patch import Patch
+from ..contact.set_valued import SetValued
 from ..data import Array, Compliance, ModalGroup, Rows, UserError
 from ..settings.mistakes import bounded
 from .assembly import Assembly, Contact, ContactFace, Load, Output
@@ -102,24 +106,50 @@ def jenkins(stiffness: float, limit: float, at: Any = 0, to: Any = None, name: s
     return Element(law, at, to, name=name, length=limit / stiffness)
 
 
+def friction(limit: float, at: Any = 0, to: Any = None, name: str | None = None) -> Element:
+    """Dry friction that holds a force limit and does not yield before it slides: only motions in time can take it.
+
+    Args:
+        limit: N. at, to, name: see `Element`.
+
+    Raises:
+        UserError: a negative limit.
+    """
+    bounded("friction: limit", limit, ge=0)
+    one, zero, force = _numbers(1.0, 0.0, limit)
+    return Element(SetValued(Coulomb(one), zero, zero, Preload(force)), at, to, name=name)
+
+
 def stop(
-    stiffness: float, gap: float, at: Any = 0, to: Any = None, both: bool = False, name: str | None = None
-) -> Element:
+    stiffness: float, gap: float, at: Any = 0, to: Any = None, both: bool = False, name: str | None = None,
+    restitution: float = 0.0,
+) -> Element:  # fmt: skip
     """A spring that is met beyond a gap and cannot pull.
 
     Args:
-        stiffness: N/m. gap: m. both: whether there is one in the other direction too. at, to, name: see `Element`.
+        stiffness: N/m; infinity: a rigid stop, for motions in time only. gap: m. both: whether there is one in the
+            other direction too. at, to, name: see `Element`. restitution: of a rigid stop, 0 to 1.
 
     Raises:
-        UserError: a stiffness that is not positive.
+        UserError: a stiffness that is not positive; restitution of a stop that is not rigid; a rigid one on both sides.
     """
+    if stiffness == math.inf:
+        bounded("stop: gap", gap)
+        bounded("stop: restitution", restitution, ge=0, le=1)
+        if both:
+            raise UserError("stop: both: a rigid stop has one side; give another at the negative weights for the other")
+        law = SetValued(Coulomb(_numbers(0.0)[0]), *_numbers(restitution, gap))
+        return Element(law, at, to, "n", name=name)
     bounded("stop: stiffness", stiffness, gt=0)
     bounded("stop: gap", gap, **({"ge": 0} if both else {}))
+    if restitution:
+        raise UserError("stop: restitution: only a rigid stop has one; give stiffness = math.inf, or a damper")
     return Element(Stop(_numbers(stiffness)[0], _numbers(gap)[0], both), at, to, name=name, length=abs(gap) or None)
 
 
 def structure(
     M: Any, K: Any, C: Any = None, *, force: Mapping[int, complex] | Array | None = None,
+    steady: Mapping[int, float] | Array | None = None,
     elements: Sequence[Element] = (), output: int | Sequence[int] | None = None,
     damping_ratio: float | Sequence[float] = 0.0, name: str = "structure",
 ) -> Assembly:  # fmt: skip
@@ -129,8 +159,9 @@ def structure(
         M, K, C: (n, n) mass (kg), stiffness (N/m) and damping (N s/m), or numbers where there is one coordinate. M and
             K are symmetric; C may hold gyroscopic forces, its skew part.
         force: coordinate -> 0-peak amplitude (N) of the harmonic force, or (n,) of all.
-        elements: see `polynomial`, `jenkins`, `stop` and `Element`.
-        output: coordinates that are read; where the force acts, if not given.
+        steady: coordinate -> force (N) that does not change, or (n,) of all.
+        elements: see `polynomial`, `jenkins`, `stop`, `friction` and `Element`.
+        output: coordinates that are read; where a force acts, if not given.
         damping_ratio: of the modes without elements, one for all or one a mode from the lowest, beside C.
 
     Raises:
@@ -155,19 +186,19 @@ def structure(
             "its symmetric part, and gyroscopic forces in C"
         )
     C = C + _modal_damping(M, K, damping_ratio)
-    f = _force(force, n)
-    watched = [int(i) for i in (np.flatnonzero(f) if output is None else np.atleast_1d(output))]
+    f, f_0 = _force(force, n), _force(steady, n, "steady").real
+    watched = [int(i) for i in (np.flatnonzero(np.abs(f) + np.abs(f_0)) if output is None else np.atleast_1d(output))]
     rows = np.array([_row(i, n, "structure: output") for i in watched]).reshape(-1, n)
     nowhere = np.zeros(3)
     group = ModalGroup(
         speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
         G_r=np.zeros((n, n)), phi=np.zeros((0, 3, n)), interfaces={},
-        excitations={"force": Rows(f[None].conj(), ("force",), "m", nowhere)},
+        excitations={k: Rows(x[None].conj(), (k,), "m", nowhere) for k, x in (("force", f), ("steady", f_0))},
         monitors={"q": Rows(rows, tuple(map(str, watched)), "m", nowhere)}, gauges={},
         compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
         checks={},
     )  # fmt: skip
-    loads = (Load(name, "force"),) if f.any() else ()
+    loads = tuple(Load(name, k, 1.0, h) for k, x, h in (("force", f, 1), ("steady", f_0, 0)) if x.any())
     outputs = tuple(Output(name, "q", str(i)) for i in watched)
     return Assembly((Component(name, {0: group}),), _contacts(elements, name, K, f), loads, outputs)
 
@@ -202,18 +233,18 @@ def _modal_damping(M: Array, K: Array, ratio: float | Sequence[float]) -> Array:
     return M @ X @ np.diag(2 * D * np.sqrt(np.maximum(squares, 0.0))) @ X.T @ M
 
 
-def _force(force: Any, n: int) -> Array:
+def _force(force: Any, n: int, key: str = "force") -> Array:
     if force is None:
         return np.zeros(n, dtype=complex)
     if isinstance(force, Mapping):
         f = sum(
-            (v * _row(i, n, "structure: force").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex)
+            (v * _row(i, n, f"structure: {key}").astype(complex) for i, v in force.items()), np.zeros(n, dtype=complex)
         )
     else:
         f = np.atleast_1d(np.asarray(force, dtype=complex))
     if f.shape != (n,):
-        raise UserError(f"structure: force: has shape {f.shape}; the structure has {n} coordinates")
-    bounded("structure: force", [*f.real, *f.imag])
+        raise UserError(f"structure: {key}: has shape {f.shape}; the structure has {n} coordinates")
+    bounded(f"structure: {key}", [*f.real, *f.imag])
     return f
 
 

@@ -7,8 +7,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from ..contact.law import Law, Step
+from ..contact.law import Step, norm
+from ..contact.set_valued import SetValued
+from .inclusion import Meets, solve
 
 CHORDS = 12
 """Iterations for contacts beside which the modes leave compliance out, with the slope of sticking contacts; modes leave
@@ -20,6 +23,9 @@ ITERATIONS = 30
 SLID = 1e-9
 """Share of a way beyond which a slider has slid and not only rounding."""
 
+SLIDES = 1e-9
+"""Share of the largest way of points that is found by iteration, beyond which one slides."""
+
 FEW = 4096
 """Numbers of a matrix up to which a product is faster as a sum that is compiled together with what surrounds it."""
 
@@ -28,9 +34,14 @@ class Group(NamedTuple):
     """Equal contacts, whose coordinates stand one after the other. law: of all of their points. G: (c, n, 3, k) of
     each. offset: (c, k) where they stand at d = 0."""
 
-    law: Law
+    law: Any
     G: Any
     offset: Any
+
+    @property
+    def rigid(self) -> bool:
+        """Whether its law is set-valued."""
+        return isinstance(self.law, SetValued)
 
 
 class Yielding(NamedTuple):
@@ -103,13 +114,18 @@ def _contracted(g: Group, points: Any) -> Any:
 
 def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
-    forces, after, points = [jnp.zeros(0)], [], []
+    after, points = [], []
     for g, state, at, rate in zip(groups, states, _parts(groups, d), _parts(groups, v), strict=True):
-        f, s = g.law.step(_moved(g, at + g.offset), _moved(g, rate), dt, state)
-        forces.append(_contracted(g, f))
+        u = _moved(g, at + g.offset)
+        f, s = (jnp.zeros_like(u), state) if g.rigid else g.law.step(u, _moved(g, rate), dt, state)
         after.append(s)
         points.append(f)
-    return jnp.concatenate(forces), tuple(after), tuple(points)
+    return joined(groups, points), tuple(after), tuple(points)
+
+
+def joined(groups: tuple[Group, ...], points: Any) -> Any:
+    """(c,) forces of the coordinates, by those (c n, 3) of the points of all groups."""
+    return jnp.concatenate([jnp.zeros(0), *(_contracted(g, f) for g, f in zip(groups, points, strict=True))])
 
 
 def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
@@ -167,18 +183,74 @@ def answer(
         d, missed, (force, states, points) = free, jnp.zeros(()), force_at(groups, free, v, dt, held.states)
     else:
         d, missed, (force, states, points) = _placed(groups, bodies, free, v, dt, held)
+    return _told(groups, d, dt, held, accounts, force, states, points, missed)
+
+
+def _told(
+    groups: tuple[Group, ...], d: Any, dt: Any, held: Held, accounts: bool, force: Any, states: Any, points: Any,
+    missed: Any, by_law: bool = True,
+) -> Held:  # fmt: skip
+    """What contacts hold, with events and energies; by_law: whether set-valued laws say what they lose."""
     places = tuple(_moved(g, at + g.offset) for g, at in zip(groups, _parts(groups, d), strict=True))
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
         moved = u - held.places[i]
         slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(moved)[:, 1:]
-        deep = g.law.overlap(u)
+        deep = jnp.full(len(u), jnp.nan) if g.rigid else g.law.overlap(u)
         deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
         approach.append(jnp.max(deep.reshape(len(g.G), -1), axis=1))
         slips.append(jnp.any(slid.reshape(len(g.G), -1), axis=1))
-        if accounts:
+        if accounts and (by_law or not g.rigid):
             lost += jnp.sum(g.law.lost(Step(u, moved, dt, held.forces[i], points[i], held.states[i], states[i])))
+        if accounts:
             stored += jnp.sum(g.law.stored(u, states[i]))
     return Held(
         d, force, states, points, places, jnp.concatenate(approach), jnp.concatenate(slips), lost, stored, missed
     )
+
+
+def rigid_answer(
+    groups: tuple[Group, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
+    others: tuple, accounts: bool,
+) -> Held:  # fmt: skip
+    """What contacts hold, some of them set-valued, see `inclusion`.
+
+    Args:
+        meets: of the points of set-valued laws. bodies: None: masses meet, and a force moves the next step. free: (c,)
+            of the coordinates without the forces of set-valued laws. ahead: (c,) after the next step without them; of
+            masses. held: before the step. others: states and points' forces of all groups, zero of set-valued ones.
+    """
+    states, points = map(list, others)
+    spots = [i for i, g in enumerate(groups) if g.rigid]
+    ways, pressed = zip(*(_asked(groups, i, bodies is None, free, ahead, held) for i in spots), strict=True)
+    ends = np.cumsum([len(w) for w in ways])[:-1]
+
+    def mu(way: Any) -> Any:
+        each = zip(spots, jnp.split(way, ends), pressed, strict=True)
+        return jnp.concatenate([groups[i].law.friction.coefficient(x / dt, jnp.nan_to_num(n)) for i, x, n in each])
+
+    first = jnp.concatenate([held.forces[i] for i in spots])
+    f, w, missed = solve(meets, jnp.concatenate(ways), mu, jnp.concatenate(pressed), first)
+    slid = jnp.where((norm(w[:, 1:].T) > SLIDES * jnp.abs(w).max())[:, None], w[:, 1:], 0.0)
+    for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slid, ends), strict=True):
+        points[i], states[i] = force, held.states[i] + way.T
+    force = joined(groups, points)
+    if bodies is not None:
+        return _told(
+            groups, free - times(bodies.R, force), dt, held, accounts, force, tuple(states), tuple(points), missed
+        )
+    return _told(groups, free, dt, held, accounts, force, tuple(states), tuple(points), missed, by_law=False)
+
+
+def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, held: Held) -> tuple[Any, Any]:
+    """w_0 and `pressed` of `inclusion.solve` for the points of a group."""
+    g, law = groups[i], groups[i].law
+    u, then = (_moved(g, _parts(groups, d)[i] + g.offset) for d in (free, ahead))
+    pressed = jnp.full(len(u), jnp.nan) if law.normal is None else law.normal.force(u[:, 0])
+    gap = jnp.broadcast_to(law.gap, len(u))
+    if not masses:
+        return u - held.places[i].at[:, 0].set(gap), pressed
+    along = (then - u)[:, 0] + law.restitution * (u - held.places[i])[:, 0]
+    if law.normal is None:
+        along = jnp.where(u[:, 0] >= gap, along, -jnp.inf)
+    return (then - u).at[:, 0].set(along), pressed

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.linalg
 
 from ..contact.patch import stuck_stiffness
+from ..contact.set_valued import SetValued
 from ..data import Array, UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Contact, Linear
@@ -94,7 +95,9 @@ class Equations:
     @cached_property
     def springs(self) -> Array:
         """(c, c) N/m of the closed, sticking contacts on bodies that yield at once by R; of one that stiffens as it is
-        pressed, the stiffest within `DEEPEST`."""
+        pressed, the stiffest within `DEEPEST`; of set-valued ones, that of the bodies themselves."""
+        if any(isinstance(c.patch.law, SetValued) for c in self.contacts):
+            return np.linalg.pinv(self.R, rcond=1e-12, hermitian=True) + self._own
         return self._own @ self.yields
 
     @cached_property
@@ -126,6 +129,8 @@ DEEPEST = 6.6e-5
 
 def _stiffest(contact: Contact) -> Array:
     """(k, k) N/m."""
+    if isinstance(contact.patch.law, SetValued):
+        return np.zeros(2 * contact.offset.shape)
     found, at = contact.stiffness, np.zeros_like(contact.offset)
     for at[0] in DEEPEST / 4.0 ** np.arange(9):
         k = stuck_stiffness(contact.patch, at)

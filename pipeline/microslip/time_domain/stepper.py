@@ -18,12 +18,14 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.linalg
 
 from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
-from .contacts import Group, Held, Yielding, answer, force_at, slope_at, times, untouched
+from .contacts import Group, Held, Yielding, answer, force_at, rigid_answer, slope_at, times, untouched
 from .equations import Equations
 from .flow import DOUBLINGS, Flow, blocks, flow
+from .inclusion import Meets, meets
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -35,14 +37,15 @@ class Bodies(NamedTuple):
     """What the loop reads of the equations, as jax arrays in blocks of modes.
 
     Attributes:
-        flow. D: (c, m) and D_o, D_v (c, n): d and d' of the contact coordinates. kick: (m, c) velocities per force.
-        yielding: see `contacts`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without
-            contacts. reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most:
-            see `_leap`.
+        flow. yielding: see `contacts`. meets: of set-valued points, None: there are none. F_0: (c,). D: (c, m) and
+            D_o, D_v (c, n): d and d' of the contact coordinates. kick: (m, c) velocities per force.
+        omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
+            motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
     """
 
     flow: Flow
     yielding: Yielding | None
+    meets: Meets | None
     F_0: Any
     D: Any
     D_o: Any
@@ -171,20 +174,55 @@ class Stepper:
         R, share = (jnp.asarray(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
         arrays = map(jnp.asarray, (D, D_o, D_o @ e.turning, -D.T, e.omega2.reshape(b, p), steady, reach, drift))
         flows = flow(e, self.tau, DOUBLINGS if self.options.leaps else 0)
-        return Bodies(flows, Yielding(R, share, F_0) if e.R.any() else None, F_0, *arrays)
+        return Bodies(flows, Yielding(R, share, F_0) if e.R.any() else None, self._meets(flows), F_0, *arrays)
+
+    def _meets(self, flows: Flow) -> Meets | None:
+        """Of set-valued points, see `inclusion`.
+
+        Raises:
+            UserError: they stand beside other laws on bodies that yield, or some yield and some do not.
+        """
+        e, rigid = self.equations, np.array([r for G, r in self._spots for _ in G], dtype=bool)
+        if not rigid.any():
+            return None
+        if not e.R.any():
+            p = blocks(e)[1]
+            speeds = scipy.linalg.block_diag(*np.asarray(flows.stack[0][:, :p, p : 2 * p]))
+            D = self._points[0][rigid].reshape(-1, len(e.omega2))
+            return meets(jnp.asarray(D @ speeds @ D.T * self.tau))
+        names = ", ".join(c.name for c in e.contacts)
+        if not rigid.all() or any(g.law.normal is not None for g in self.groups):
+            raise UserError(
+                f"contacts {names}: on bodies that yield beside their modes, set-valued laws stand alone and press of "
+                'themselves; give all of them law = "set-valued" and no normal stiffness'
+            )
+        rows = np.concatenate([G for G, _ in self._spots]).reshape(-1, len(e.D))
+        yields, moves = rows @ e.R[np.ix_(self.rows, self.rows)] @ rows.T, np.abs(rows).any(axis=1)
+        if np.diag(yields)[moves].min() <= 1e-9 * np.diag(yields).max():
+            raise UserError(
+                f"contacts {names}: some of these bodies yield beside their modes and some do not; keep the residual "
+                "compliance of all contacts, or of none"
+            )
+        return meets(jnp.asarray(yields))
+
+    @cached_property
+    def _spots(self) -> list[tuple[Array, bool]]:
+        """Of each contact as the loop has them: (n, 3, c) of its points, and whether its law is set-valued."""
+        begin, found = 0, []
+        for g in self.groups:
+            for G in np.asarray(g.G):
+                rows = np.zeros((*G.shape[:2], len(self.rows)))
+                rows[:, :, begin : begin + G.shape[2]] = G
+                found.append((rows, g.rigid))
+                begin += G.shape[2]
+        return found
 
     @property
     def _points(self) -> tuple[Array, Array]:
         """(points, 3, m) and (points, 3, n): motion of all points by modes and by what the loads move beside them."""
-        e, begin = self.equations, 0
-        moved, given = [np.zeros((0, 3, len(e.omega2)))], [np.zeros((0, 3, e.turning.shape[0]))]
-        for g in self.groups:
-            for G in np.asarray(g.G):
-                own = self.rows[begin : begin + G.shape[2]]
-                moved.append(G @ e.D[own])
-                given.append(G @ e.D_o[own])
-                begin += G.shape[2]
-        return np.concatenate(moved), np.concatenate(given)
+        e = self.equations
+        spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
+        return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
 
     def start(self, q: Array, v: Array, time: float = 0.0) -> Now:
         """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from u = 0 on a straight
@@ -236,20 +274,49 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
 
 def _pushed(
-    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v: Any, o: Any, dt: Any, held: Held
+    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, dt: Any, held: Held
 ) -> tuple[Held, Any]:  # fmt: skip
-    """What contacts hold where the bodies are, and (b, p) their accelerations of the modes."""
+    """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
+
+    Args:
+        v_free: (b, p) velocities without the kick at the step's end. half: (b, p) that kick, as far as it is known.
+    """
     free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
-    v = times(B.D, v.reshape(-1)) + times(B.D_v, o)
-    held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
-    return held, times(B.kick, held.force - B.F_0).reshape(B.omega2.shape)
+    v = times(B.D, (v_free + half).reshape(-1)) + times(B.D_v, o)
+    if B.meets is None:
+        held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
+        return held, _by_force(B, held.force)
+    force, *others = force_at(groups, free, v, dt, held.states)
+    ahead = free
+    if B.yielding is None:
+        ahead = _ahead(B, q, v_free + dt * _by_force(B, force), o)
+    else:
+        free = free + times(B.yielding.R, B.F_0)
+    held = rigid_answer(groups, B.meets, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
+    push = _by_force(B, held.force)
+    if B.yielding is None and options.accounts:
+        v = times(B.D, (v_free + 0.5 * dt * push).reshape(-1)) + times(B.D_v, o)
+        held = held._replace(lost=held.lost + dt * jnp.sum((held.force - force) * v))
+    return held, push
+
+
+def _by_force(B: Bodies, force: Any) -> Any:
+    """(b, p) m/s2 of the modes by forces (c,) of the contact coordinates."""
+    return times(B.kick, force - B.F_0).reshape(B.omega2.shape)
+
+
+def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
+    """(c,) of the contact coordinates after another step."""
+    z = jnp.concatenate([q, v, jnp.broadcast_to(o, (len(q), len(o)))], axis=1)
+    then = times(B.flow.stack[0][:, : q.shape[1]], z)
+    return times(B.D, then.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
 
 
 @partial(jax.jit, static_argnums=0)
 def _begun(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     """The contacts where the bodies are."""
     q, v = jnp.split(now.y, 2, axis=1)
-    held, push = _pushed(options, groups, B, q, v, now.o, B.flow.length[0], now.held)
+    held, push = _pushed(options, groups, B, q, v, 0 * v, now.o, B.flow.length[0], now.held)
     return now._replace(push=push, held=held, energy=now.energy.at[4].set(held.stored), worst=held.missed)
 
 
@@ -291,7 +358,7 @@ def _step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now
     q, v_free = flown[:, :p], flown[:, p : 2 * p]
     given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
     o = times(B.flow.turn[k], now.o)
-    held, push = _pushed(options, groups, B, q, v_free + before, o, dt, now.held)
+    held, push = _pushed(options, groups, B, q, v_free, before, o, dt, now.held)
     after = 0.5 * dt * push
     work = -jnp.sum(before * (v - 0.5 * before)) - jnp.sum(after * (v_free + 0.5 * after))
     y = jnp.concatenate([q, v_free + after], axis=1)
