@@ -213,7 +213,8 @@ def rigid_answer(
     groups: tuple[Group, ...], meets: Meets, bodies: Yielding | None, free: Any, ahead: Any, dt: Any, held: Held,
     others: tuple, accounts: bool,
 ) -> Held:  # fmt: skip
-    """What contacts hold, some of them set-valued, see `inclusion`.
+    """What contacts hold, some of them set-valued, see `inclusion`. A point sticks where the coefficient at rest can
+    hold it, and slides with that of its speed where it cannot.
 
     Args:
         meets: of the points of set-valued laws. bodies: None: masses meet, and a force moves the next step. free: (c,)
@@ -222,17 +223,22 @@ def rigid_answer(
     """
     states, points = map(list, others)
     spots = [i for i, g in enumerate(groups) if g.rigid]
-    ways, pressed = zip(*(_asked(groups, i, bodies is None, free, ahead, held) for i in spots), strict=True)
-    ends = np.cumsum([len(w) for w in ways])[:-1]
+    asked = [_asked(groups, i, bodies is None, free, ahead, held) for i in spots]
+    ways, pressed = (jnp.concatenate(x) for x in zip(*asked, strict=True))
+    ends = np.cumsum([len(w) for w, _ in asked])[:-1]
 
-    def mu(way: Any) -> Any:
-        each = zip(spots, jnp.split(way, ends), pressed, strict=True)
-        return jnp.concatenate([groups[i].law.friction.coefficient(x / dt, jnp.nan_to_num(n)) for i, x, n in each])
+    def coefficients(speed: Any) -> Any:
+        each = zip(spots, jnp.split(speed, ends), jnp.split(pressed, ends), strict=True)
+        return jnp.concatenate([groups[i].law.friction.coefficient(x, jnp.nan_to_num(n)) for i, x, n in each])
 
+    highest = coefficients(jnp.zeros(len(ways)))
     first = jnp.concatenate([held.forces[i] for i in spots])
-    f, w, missed = solve(meets, jnp.concatenate(ways), mu, jnp.concatenate(pressed), first)
-    slid = jnp.where((norm(w[:, 1:].T) > SLIDES * jnp.abs(w).max())[:, None], w[:, 1:], 0.0)
-    for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slid, ends), strict=True):
+    f, w, missed = solve(meets, ways, lambda _: highest, pressed, first)
+    if not all(groups[i].law.friction.constant for i in spots):
+        slides = slid(w, ways)
+        f, w, missed = solve(meets, ways, lambda x: jnp.where(slides, coefficients(x / dt), highest), pressed, f)
+    slipped = jnp.where(slid(w, ways)[:, None], w[:, 1:], 0.0)
+    for i, force, way in zip(spots, jnp.split(f, ends), jnp.split(slipped, ends), strict=True):
         points[i], states[i] = force, held.states[i] + way.T
     force = joined(groups, points)
     if bodies is not None:
@@ -240,6 +246,11 @@ def rigid_answer(
             groups, free - times(bodies.R, force), dt, held, accounts, force, tuple(states), tuple(points), missed
         )
     return _told(groups, free, dt, held, accounts, force, tuple(states), tuple(points), missed, by_law=False)
+
+
+def slid(w: Any, free: Any) -> Any:
+    """(p,) whether points slide, by their motions (p, 3), and those without forces."""
+    return norm(w[:, 1:].T) > SLIDES * jnp.maximum(jnp.abs(w), jnp.abs(free))[:, 1:].max()
 
 
 def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, held: Held) -> tuple[Any, Any]:

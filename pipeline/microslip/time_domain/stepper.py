@@ -274,12 +274,14 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
 
 def _pushed(
-    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, dt: Any, held: Held
+    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, dt: Any, held: Held,
+    share: float = 1.0,
 ) -> tuple[Held, Any]:  # fmt: skip
     """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
 
     Args:
         v_free: (b, p) velocities without the kick at the step's end. half: (b, p) that kick, as far as it is known.
+            share: of a whole kick that is still to come before the bodies flow on.
     """
     free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
     v = times(B.D, (v_free + half).reshape(-1)) + times(B.D_v, o)
@@ -289,10 +291,11 @@ def _pushed(
     force, *others = force_at(groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
-        ahead = _ahead(B, q, v_free + dt * _by_force(B, force), o)
+        ahead = _ahead(B, q, v_free + share * dt * _by_force(B, force), o)
     else:
         free = free + times(B.yielding.R, B.F_0)
-    held = rigid_answer(groups, B.meets, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
+    points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
+    held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
     push = _by_force(B, held.force)
     if B.yielding is None and options.accounts:
         v = times(B.D, (v_free + 0.5 * dt * push).reshape(-1)) + times(B.D_v, o)
@@ -316,7 +319,7 @@ def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
 def _begun(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     """The contacts where the bodies are."""
     q, v = jnp.split(now.y, 2, axis=1)
-    held, push = _pushed(options, groups, B, q, v, 0 * v, now.o, B.flow.length[0], now.held)
+    held, push = _pushed(options, groups, B, q, v, 0 * v, now.o, B.flow.length[0], now.held, 0.5)
     return now._replace(push=push, held=held, energy=now.energy.at[4].set(held.stored), worst=held.missed)
 
 
