@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +27,7 @@ from microslip.report.page import number, text
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
-from microslip.time_domain import equations, orbit
+from microslip.time_domain import equations, orbit, recorded, samples
 from microslip.time_domain.stepper import Options, Stepper
 
 MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
@@ -254,3 +257,163 @@ def test_a_static_start_is_the_balance_of_steady_loads_and_contact() -> None:
     e = equations.of(pressed, 10.0)
     assert (e.output @ q)[0] == pytest.approx(2.0 / (3e5 + STIFFNESS), rel=1e-9)
     assert jnp.isfinite(q).all()
+
+
+# files -------------------------------------------------------------------------------------------------------------
+
+SLIPS = patch(Penalty(value(2e5)), mu=0.3, stiffness=1e5)
+ARRAYS = ("time", "y", "v", "q", "q_dot", "d", "force", "events")
+
+
+def same(a: orbit.Orbit, b: orbit.Orbit) -> None:
+    """To the last bit."""
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    for name, values in a.energy.items():
+        np.testing.assert_array_equal(values, b.energy[name], err_msg=name)
+    for name in ("Omega", "labels", "contacts", "samples", "steps", "missed", "error", "diverged", "messages"):
+        np.testing.assert_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    np.testing.assert_equal((a.said, a.repeats, a.drift, a.balance), (b.said, b.repeats, b.drift, b.balance))
+
+
+def test_a_motion_is_saved_and_read_with_all_that_it_says(tmp_path: Path) -> None:
+    found = orbit.run(equations.of(hitting(SLIPS, normal=0.5, push=1.5), 300.0), 2, 3, 64, 2048)
+    loaded = ms.load(found.save(tmp_path / "motion.h5"))
+    same(found, loaded)
+    with pytest.raises(UserError, match="integrate the assembly again"):
+        loaded.equations  # noqa: B018
+    table, data = loaded.to_dataframe(), loaded.to_xarray()
+    assert len(table) == 3 * 64 and table["mass u_x_m"].iloc[-1] == found.y[0, -1]
+    assert data["displacement"].sel(read_out="mass u_y").values[-1] == found.y[1, -1]
+    assert (data["event_kind"].values == "slips").sum() == found.count("slips") > 0
+    assert data["contact_force"].attrs["units"] == "N, N m" and set(data["event_contact"].values) == {"stop"}
+    assert np.array_equal(loaded.plot().lines[0].get_xdata(), found.y[0])
+
+
+def test_what_is_no_whole_file_of_one_motion_is_refused(tmp_path: Path) -> None:
+    path = orbit.run(equations.of(hitting(SLIPS, normal=0.5), 300.0), 0, 1, 8).save(tmp_path / "motion.h5")
+    data = path.read_bytes()
+    for spoilt, words in ((data[: len(data) // 2], "damaged"), (data[:-200] + data[-123:], "damaged")):
+        (tmp_path / "bad.h5").write_bytes(spoilt)
+        with pytest.raises(UserError, match=words):
+            ms.read_orbits(tmp_path / "bad.h5")
+    with h5py.File(path, "r+") as file:
+        del file["motion_1/energy_lost"]
+    with pytest.raises(UserError, match="incomplete"):
+        ms.load(path)
+    with pytest.raises(UserError, match="no such file"):
+        ms.read_orbits(tmp_path / "none.h5")
+
+
+class Killed(Exception):
+    pass
+
+
+@pytest.mark.parametrize("at", [16, 48, 70])
+def test_a_run_that_is_ended_goes_on_with_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    """While it settles, while samples are kept, and after the last one; two motions in the file, one of them whole."""
+    monkeypatch.setattr(samples, "PAUSE", 0.0)
+    e = equations.of(hitting(SLIPS, normal=0.5, push=1.5), 300.0)
+    asked = [recorded.Asked(name, e, 30, 40, 16, 1024) for name in ("first", "second")]
+    seen: list[str] = []
+
+    def killing(text: str) -> None:
+        seen.append(text)
+        if text.startswith(f"second: period {at} "):
+            raise Killed
+
+    with pytest.raises(Killed):
+        recorded.run(tmp_path / "orbit.h5", asked, report=killing)
+    assert not (tmp_path / "orbit.h5").exists()
+    told: list[str] = []
+    found = recorded.run(tmp_path / "orbit.h5", asked, report=told.append)
+    assert not any(text.startswith("first") or f"period {at} " in text for text in told)
+    for one in found:
+        same(orbit.run(e, 30, 40, 16, 1024), one)
+    assert [p.name for p in tmp_path.iterdir()] == ["orbit.h5"] and ms.read_orbits(tmp_path / "orbit.h5")[1].error > 0
+
+
+def test_another_motion_is_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the one that was left is of another frequency."""
+    monkeypatch.setattr(samples, "PAUSE", 0.0)
+    one, other = (recorded.Asked("it", equations.of(hitting(SLIPS, 0.5), w), 0, 40, 8, 1024) for w in (300.0, 310.0))
+
+    def killing(text: str) -> None:
+        raise Killed
+
+    with pytest.raises(Killed):
+        recorded.run(tmp_path / "orbit.h5", [one], report=killing)
+    same(orbit.run(other.equations, 0, 40, 8, 1024), recorded.run(tmp_path / "orbit.h5", [other])[0])
+
+
+def test_a_long_motion_needs_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
+    """While it is computed, and for what it says of itself."""
+    e, peaks = equations.of(hitting(BOOK), 64.32), []
+    for keep in (8, 256):
+        tracemalloc.start()
+        found = recorded.run(tmp_path / f"{keep}.h5", [recorded.Asked("it", e, 0, keep, 1024, 1024)])[0]
+        assert found.balance < 1e-8 and found.said
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    whole = 256 * 1024 * sum(sizes_of(e)) * 8
+    assert peaks[1] < 0.5 * whole and (tmp_path / "256.h5").stat().st_size > whole
+
+
+def sizes_of(e: equations.Equations) -> list[int]:
+    rows = samples.sizes(e)
+    return [rows.get(name, 1) for name in samples.UNITS]
+
+
+KILLED = """
+import sys
+import numpy as np
+from microslip.time_domain import equations, recorded, samples
+import microslip as ms
+samples.PAUSE = 0.0
+slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+asked = recorded.Asked("it", equations.of(slider, 0.8), 5, 1000, 16, 512)
+found = recorded.run(sys.argv[1], [asked], report=lambda text: print(text, flush=True))[0]
+print(found.said)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_process_leaves_what_the_next_one_goes_on_with(tmp_path: Path) -> None:
+    """SIGKILL at some instants."""
+    words = [sys.executable, "-c", KILLED, str(tmp_path / "orbit.h5")]
+    reached = []
+    for lines in (3, 9, 17):
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            for _ in range(lines):
+                text = process.stdout.readline()
+            reached.append(int(text.split("period ")[1].split()[0]))
+            process.kill()
+    assert reached == sorted(set(reached))
+    subprocess.run(words, check=True, capture_output=True)
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+    same(orbit.run(equations.of(slider, 0.8), 5, 1000, 16, 512), ms.load(tmp_path / "orbit.h5"))
+
+
+def test_a_motion_that_diverges_keeps_what_was_computed_and_says_why(tmp_path: Path) -> None:
+    """x'' - x' + x = cos t grows as exp(t / 2)."""
+    growing = ms.structure(1.0, 1.0, -1.0, force={0: 1.0}, output=0)
+    found = ms.integrate(growing, 1.0, unit="rad/s", settle=0, keep=200, file=tmp_path / "orbit.h5")
+    assert 600 < found.diverged < 2 * np.log(1e155) and "its energy was" in found.messages[0]
+    assert found.time[-1] == found.diverged and np.isfinite(found.y).all() and found.y.shape[1] == len(found.time)
+    same(ms.integrate(growing, 1.0, unit="rad/s", settle=0, keep=200), found)
+
+
+def test_a_case_that_diverges_ends_with_exit_code_1(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """Its body takes energy from nowhere: a damper with the wrong sign."""
+    basis = ms.read_basis("build/hammer/basis.h5")
+    group = basis.groups[0, 0]
+    ms.write_basis("build/hammer/basis.h5", replace(basis, groups={(0, 0): replace(group, C_r=group.C_r - 50.0)}))
+    words = ["orbit", "case.toml", "-q", "--set", "contacts.0.interference=-1.0", "--set", "orbit.settle=0"]
+    assert main([*words, "--set", "orbit.keep=300"]) == 1
+    assert "diverged" in capsys.readouterr().err
+    page = (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
+    assert "its energy was" in page
+    assert len(ms.load(hammer / "build" / "hammer" / "orbit.h5").time) > 1000

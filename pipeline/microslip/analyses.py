@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -213,7 +214,7 @@ def _hertz(unit: str) -> float:
 def integrate(
     system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
     samples: int = 256, steps: int | None = None, start: Literal["static", "rest"] = "static",
-    report: Report = lambda _: None,
+    file: Path | str | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -226,10 +227,12 @@ def integrate(
             that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
             if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
         start: ``static``, at rest under the steady loads, or ``rest``, at rest in the preloaded state.
-        report: is told what is under way.
+        file: samples are written there as they come and read when they are asked for, so that a long motion needs no
+            more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
     Returns:
-        An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``; ``error`` of its last period.
+        An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``, ``to_dataframe()``, ``to_xarray()``,
+        ``save(path)``; ``error`` of its last period.
 
     Raises:
         UserError: steps that are too few for the springs of the contacts. NotConverged: no state of rest is found.
@@ -242,10 +245,13 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit
+    from .time_domain import equations, orbit, recorded
 
     if isinstance(system, Built):
         system = _pressed(system)
     assembly = system.assembly if isinstance(system, Problem) else system
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
-    return orbit.run(found, settle, keep, samples, steps, start, report)
+    if file is None:
+        return orbit.run(found, settle, keep, samples, steps, start, report)
+    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, start)
+    return recorded.run(file, [asked], report=report)[0]

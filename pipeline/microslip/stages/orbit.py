@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,13 @@ from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import build, swept
 from ..data import UserError
 from ..files import store
-from ..files.hdf5 import create, put
 from ..files.tables import columns_csv
 from ..report.response import survey_html
-from ..time_domain import equations, orbit
-from ..time_domain.orbit import KINDS, Orbit
+from ..time_domain import equations, recorded
+from ..time_domain.orbit import Orbit
 from ..units import METRES, percent
 from .checkpoint import hashes_of
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, hash_of_code
 
 
 def orbit_stage(
@@ -48,12 +47,13 @@ def orbit_stage(
         "basis": hashes_of(files),
         "files": hashes_of(checkpoint.files_of(settings, case_path)),
     }
-    stage.make(inputs, lambda: _work(stage, settings, case_path, files))
+    told = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
+    stage.make(inputs, lambda: _work(stage, settings, case_path, files, told))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["sentences"], not told["diverged"]
 
 
-def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path]) -> Made:
+def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], inputs: str) -> Made:
     from ..pictures.orbit import orbit_picture, portraits
 
     folder, asked = stage.product.parent, settings.orbit
@@ -61,22 +61,18 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
-    assembly, found = built.pressed(asked.normal_force), list[tuple[str, Orbit]]()
+    assembly, motions = built.pressed(asked.normal_force), list[recorded.Asked]()
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
-
-        def tell(text: str, name: str = name) -> None:
-            stage.report(f"{name}: {text}")
-
         driven = equations.of(assembly, 2 * np.pi * f)
-        found.append((name, orbit.run(driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start, tell)))
-        stage.report(_sentence(*found[-1]))
+        motions.append(
+            recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start)
+        )
     stage.begin()
+    found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
     more = [f"{name}: {words}" for name, one in found for words in one.messages]
     sentences = [*(_sentence(*one) for one in found), *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
-    with store.complete_or_absent(folder / "orbit.h5") as temporary:
-        _write(temporary, found)
     (folder / "pictures").mkdir(exist_ok=True)
     seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
     if seen:  # one that diverges as it settles leaves nothing to draw
@@ -101,12 +97,12 @@ def _sentence(name: str, one: Orbit) -> str:
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
-def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:
+def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:
     """Column -> values, one a motion."""
     rows = [
         {
-            "frequency_Hz": one.equations.Omega / (2 * np.pi),
-            "angular_frequency_rad_s": one.equations.Omega,
+            "frequency_Hz": one.Omega / (2 * np.pi),
+            "angular_frequency_rad_s": one.Omega,
             "repeats_after_periods": one.repeats,
             "impacts_per_period": one.impacts,
             "slips_per_period": one.count("slips") / max(len(one.time) // one.samples, 1),
@@ -120,23 +116,3 @@ def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:
         for _, one in found
     ]
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
-
-
-def _write(path: Path, found: list[tuple[str, Orbit]]) -> None:
-    """``orbit.h5``: a group a motion, with its samples and events; units stand beside."""
-    with create(path) as file:
-        for i, (name, one) in enumerate(found, 1):
-            group = file.create_group(f"motion_{i}")
-            group.attrs["name"], group.attrs["said"] = name, one.said
-            group.attrs["Omega"], group.attrs["samples_per_period"] = one.equations.Omega, one.samples
-            group.attrs["read_outs"] = ", ".join(one.labels)
-            group.attrs["events"] = "rows of time in s, number of the contact, kind: " + ", ".join(
-                f"{k} {kind}" for k, kind in enumerate(KINDS)
-            )
-            for key, values, unit in (
-                ("time", one.time, "s"), ("displacement", one.y, "m"), ("velocity", one.v, "m/s"),
-                ("modal_displacement", one.q, "m kg^1/2"), ("modal_velocity", one.q_dot, "m kg^1/2 / s"),
-                ("contact_displacement", one.d, "m, rad"), ("contact_force", one.force, "N, N m"),
-                ("event", one.events, ""), *((f"energy_{k}", v, "J") for k, v in one.energy.items()),
-            ):  # fmt: skip
-                put(group, key, values, unit)
