@@ -15,6 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import microslip as ms
+from microslip.analyses import balanced
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
@@ -27,7 +28,7 @@ from microslip.report.page import number, text
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
-from microslip.time_domain import equations, orbit, recorded, samples
+from microslip.time_domain import equations, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Options, Stepper
 
 MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
@@ -257,6 +258,76 @@ def test_a_static_start_is_the_balance_of_steady_loads_and_contact() -> None:
     e = equations.of(pressed, 10.0)
     assert (e.output @ q)[0] == pytest.approx(2.0 / (3e5 + STIFFNESS), rel=1e-9)
     assert jnp.isfinite(q).all()
+
+
+# starts ------------------------------------------------------------------------------------------------------------
+
+
+def systems() -> dict[str, tuple[object, float]]:
+    """Name -> system and rad/s."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    both = [ms.jenkins(1.0, 0.1, at=1), ms.stop(4.0, 0.5)]
+    rub = {"normal_stiffness": 2e6, "tangential_stiffness": 4e6, "includes": "surface", "friction": 0.2}
+    rub |= {"points": [4, 2], "normal_force": 20.0}
+    sides = [{"interface": side, **rub} for side in ("right", "left")]
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": sides}
+    return {
+        "slider": (ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)]), 1.0),
+        "spring": (ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})]), 0.9),
+        "stop": (ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.stop(2.0, 0.2)]), 0.8),
+        "two": (ms.structure(np.eye(2), K, 0.05 * K, force={0: 0.3}, elements=both), 1.1),
+        "vane": (balanced(ms.assemble(case, vane=ms.sample()), 15, 1024), 2 * np.pi * 872),
+    }
+
+
+@pytest.mark.parametrize("name", ["slider", "spring", "stop", "two", "vane"])
+def test_a_motion_begun_on_a_balance_is_periodic_from_its_first_period(name: str) -> None:
+    """Begun at rest the second period differs from the first by half of the amplitude or more."""
+    system, frequency = systems()[name]
+    found = ms.integrate(system, frequency, unit="rad/s", settle=0, keep=2, steps=2048, start="balance")
+    first, second = np.split(found.y, 2, axis=1)
+    size = np.abs(found.y).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(second / size, first / size, atol=2e-4)
+    assert found.repeats == 1
+
+
+def test_contacts_remember_the_balance_that_a_motion_begins_on() -> None:
+    """A slider that has not been dragged along the balance's motion stands elsewhere, and the motion is another."""
+    slider, frequency = systems()["slider"][0], 1.2
+    e = equations.of(slider, frequency)
+    start = starts.of_balance(e, balanced(slider, 25, 400))
+    s = Stepper(e, 2 * np.pi / frequency / 2048)
+    led, fresh = starts.begun(s, start), s.start(start.q, start.v)
+    assert abs(float(led.force[0] - fresh.force[0])) > 0.05
+    assert float(led.force[0]) == pytest.approx(found_force(slider, frequency), abs=2e-3)
+
+
+def found_force(system: object, frequency: float) -> float:
+    """N, of the only contact at t = 0, by 101 harmonics."""
+    motion = ms.harmonic_response(system, [frequency], harmonics=101, unit="rad/s").motion(0)
+    (force,) = motion.force.values()
+    return float(force[0, 0] + force[0, 1::2].sum())
+
+
+def test_a_start_that_presses_contacts_deeper_than_loads_do_is_refused() -> None:
+    """Two micrometres of interference between a soft spring and a stiff stop: at rest nearly all of it is gone."""
+    base = hitting(patch(Penalty(value(3e5))))
+    tight = preloaded_contact("stop", base.contacts[0].patch, ContactFace("mass", "stop"), None, None, 2e-6)
+    e = equations.of(replace(base, contacts=(tight,)), 64.32)
+    with pytest.raises(UserError, match=r"stop 2e-06 m deep, where steady loads press it 6.6\d+e-10 m"):
+        orbit.run(e, 0, 1, start="rest")
+    depth = orbit.run(e, 0, 1, start="static").d[0, 0] + 2e-6
+    assert abs(depth) < 1e-6
+
+
+def test_a_case_begins_on_its_balance(hammer: Path) -> None:
+    """One period is enough, where there is no impact."""
+    words = ["orbit", "case.toml", "-q", "--set", "contacts.0.interference=-1.0", "--set", "orbit.settle=0"]
+    assert main([*words, "--set", 'orbit.start="balance"', "--set", "orbit.Omega=30.0"]) == 0
+    found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
+    assert found.repeats == 1
+    size = STIFFNESS * FOOT / abs(STIFFNESS - MASS * 30.0**2 + 30.0j * DAMPING)
+    assert np.abs(found.y[0]).max() == pytest.approx(size, rel=2e-3)
 
 
 # files -------------------------------------------------------------------------------------------------------------

@@ -29,6 +29,9 @@ Report = Callable[[str], None]
 System = Assembly | Built | Problem
 """What is analysed: bodies with contacts, loads and read-outs; such as a case describes; or their balance."""
 
+IN_TIME = 25
+"""Harmonics of the vibration that a motion in time starts on."""
+
 HERTZ = {"Hz": 1.0, "rad/s": 1 / (2 * np.pi)}
 
 
@@ -213,7 +216,7 @@ def _hertz(unit: str) -> float:
 
 def integrate(
     system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
-    samples: int = 256, steps: int | None = None, start: Literal["static", "rest"] = "static",
+    samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
     file: Path | str | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
@@ -226,7 +229,9 @@ def integrate(
         system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. settle: periods
             that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
             if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
-        start: ``static``, at rest under the steady loads, or ``rest``, at rest in the preloaded state.
+        start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
+            the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
+            are taken; a balance or a case has its own.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
             more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
@@ -235,7 +240,8 @@ def integrate(
         ``save(path)``; ``error`` of its last period.
 
     Raises:
-        UserError: steps that are too few for the springs of the contacts. NotConverged: no state of rest is found.
+        UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
+            steady loads do. NotConverged: no state of rest, or no vibration to start on, is found.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -245,13 +251,18 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit, recorded
+    from .time_domain import equations, orbit, recorded, starts
 
-    if isinstance(system, Built):
-        system = _pressed(system)
-    assembly = system.assembly if isinstance(system, Problem) else system
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    begin: orbit.Start | starts.Periodic
+    if start == "balance":
+        many = IN_TIME if isinstance(system, Assembly) else None
+        begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
+    else:
+        begin = start
     if file is None:
-        return orbit.run(found, settle, keep, samples, steps, start, report)
-    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, start)
+        return orbit.run(found, settle, keep, samples, steps, begin, report)
+    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]

@@ -141,7 +141,8 @@ class OrbitOfCase(Model):
     frequency: Hz, or Omega: rad/s, of the first harmonic of the excitations: one, or several to look at one after the
     other. settle: periods that are left to themselves. keep: periods that are kept. samples: of each. steps: of each,
     if not given as many as the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
-    loads, ``rest`` as preloaded. normal_force: N, of the contacts that the sweep presses.
+    loads, ``rest`` as preloaded; or ``balance``, on the vibration that harmonic balance finds with the case's
+    harmonics. normal_force: N, of the contacts that the sweep presses.
     """
 
     frequency: Several | None = None
@@ -150,7 +151,7 @@ class OrbitOfCase(Model):
     keep: Annotated[int, Field(ge=1, le=100000)] = 40
     samples: Annotated[int, Field(ge=8, le=8192)] = 256
     steps: Annotated[int, Field(ge=1, le=100000000)] | None = None
-    start: Literal["static", "rest"] = "static"
+    start: Literal["static", "rest", "balance"] = "static"
     normal_force: NotNegative | None = None
 
     @model_validator(mode="after")

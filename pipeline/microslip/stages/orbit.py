@@ -12,11 +12,12 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import build, swept
+from ..case.problem import problem_of
 from ..data import UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.response import survey_html
-from ..time_domain import equations, recorded
+from ..time_domain import equations, orbit, recorded, starts
 from ..time_domain.orbit import Orbit
 from ..units import METRES, percent
 from .checkpoint import hashes_of
@@ -65,9 +66,12 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
-        motions.append(
-            recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start)
-        )
+        start: orbit.Start | starts.Periodic
+        if asked.start == "balance":
+            start = starts.of_balance(driven, problem_of(built, asked.normal_force))
+        else:
+            start = asked.start
+        motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     stage.begin()
     found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
     more = [f"{name}: {words}" for name, one in found for words in one.messages]

@@ -20,6 +20,8 @@ from ..units import counted
 from . import samples as kept_samples
 from .equations import Equations
 from .samples import ROWS, UNITS, InMemory, Kept
+from .starts import Periodic
+from .starts import begun as on_its_way
 from .stepper import EVENTS, KINDS, Now, Seen, Stepper, static_force
 
 if TYPE_CHECKING:
@@ -39,6 +41,9 @@ STABLE = 1.8
 
 CHUNK = 16
 """Periods between two reports."""
+
+PENETRATES = 1e-6
+"""Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
 
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
@@ -294,7 +299,7 @@ class Ended:
 
 def run(
     equations: Equations, settle: int, keep: int, samples: int = 256, steps: int | None = None,
-    start: Start = "static", report: Report = lambda _: None,
+    start: Start | Periodic = "static", report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time from a start: see `microslip.integrate`.
 
@@ -316,7 +321,8 @@ def run(
 
 
 def march(
-    equations: Equations, settle: int, keep: int, samples: int, steps: int | None, start: Start, report: Report,
+    equations: Equations, settle: int, keep: int, samples: int, steps: int | None, start: Start | Periodic,
+    report: Report,
     kept: Kept,
 ) -> Ended:  # fmt: skip
     """`run`, its samples kept elsewhere, and gone on with where that has been begun."""
@@ -324,7 +330,8 @@ def march(
         bounded(name, value, ge=least)
     each = steps_of_a_sample(equations, samples, steps)
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
-    now, done = kept.begun(stepper.start(*begun(equations, start)))
+    first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
+    now, done = kept.begun(first)
     while done < settle + keep:
         before, dense = now, done >= settle
         ahead = 1 if dense else min(CHUNK, settle - done, samples)
@@ -407,14 +414,25 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     Raises:
         NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start.
     """
-    zero = np.zeros(len(e.omega2))
+    zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
     if start == "rest":
+        if any(tight) and not e.R.any():
+            _refuse_penetration(e, _static(e))
         return zero, zero
     if start != "static":
-        raise UserError(f"start: '{start}' is none of static, rest")
-    if not e.B[:, 0].any() and not any(c.offset[0] > 0 and not c.preload.any() for c in e.contacts):
+        raise UserError(f"start: '{start}' is none of static, rest, balance")
+    if not e.B[:, 0].any() and not any(tight):
         return zero, zero  # preloads are in balance there
     return _static(e), zero
+
+
+def _refuse_penetration(e: Equations, q: Array) -> None:
+    """Contacts that are pressed deeper at q = 0 than under the steady loads would throw the bodies apart."""
+    nearer, begins = e.D @ q + e.D_o[:, 0], np.cumsum([0, *(c.patch.count for c in e.contacts)])
+    for c, i in zip(e.contacts, begins, strict=False):
+        if c.offset[0] > 0 and nearer[i] < -PENETRATES * c.offset[0]:
+            depth = f"{c.offset[0]:.4g} m deep, where steady loads press it {c.offset[0] + nearer[i]:.4g} m"
+            raise UserError(f'start: "rest" begins with {c.name} {depth}; write start = "static"')
 
 
 def _static(e: Equations, most: int = 60) -> Array:

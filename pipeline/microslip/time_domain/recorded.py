@@ -18,6 +18,7 @@ from ..results.series import Series
 from . import orbit, samples
 from .equations import Equations
 from .orbit import Orbit, Start
+from .starts import Periodic
 
 
 class Recorded(Orbit):
@@ -100,7 +101,7 @@ class Asked:
     keep: int
     samples: int = 256
     steps: int | None = None
-    start: Start = "static"
+    start: Start | Periodic = "static"
 
     @property
     def fingerprint(self) -> str:

@@ -100,6 +100,14 @@ class Now(NamedTuple):
     events: Any
 
 
+class Memory(NamedTuple):
+    """What contacts bring along: see `Now`."""
+
+    states: tuple[Any, ...]
+    points: tuple[Any, ...]
+    places: tuple[Any, ...]
+
+
 class Seen(NamedTuple):
     """A sample: (m,) q and q', (c,) d and force, (5,) energies (see `Now`) and the bodies' own, J; time, s."""
 
@@ -200,17 +208,22 @@ class Stepper:
             given += [np.asarray(g.G) @ e.D_o[i] for i in np.asarray(g.index)]
         return np.concatenate(rows), np.concatenate(given)
 
-    def start(self, q: Array, v: Array, time: float = 0.0) -> Now:
-        """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from u = 0 on a straight
-        way."""
+    @property
+    def fresh(self) -> Memory:
+        """Of contacts that have not moved."""
+        zero = tuple(jnp.zeros((len(g.index) * len(g.G), 3)) for g in self.groups)
+        return Memory(tuple(g.law.init(len(g.index) * len(g.G)) for g in self.groups), zero, zero)
+
+    def start(self, q: Array, v: Array, time: float = 0.0, memory: Memory | None = None) -> Now:
+        """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from where their memory
+        leaves them, u = 0 if there is none, on a straight way."""
         e = self.equations
         b, p = blocks(e)
         y = jnp.concatenate([jnp.asarray(q).reshape(b, p), jnp.asarray(v).reshape(b, p)], axis=1)
-        states = tuple(g.law.init(len(g.index) * len(g.G)) for g in self.groups)
-        points = tuple(jnp.zeros((len(g.index) * len(g.G), 3)) for g in self.groups)
+        memory = memory or self.fresh
         none = jnp.zeros(len(e.contacts))
         now = Now(
-            y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros(len(e.D)), states, points, points,
+            y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros(len(e.D)), *memory,
             none, none.astype(bool), jnp.zeros(5), jnp.zeros(()), jnp.zeros((), dtype=int), jnp.zeros((EVENTS, 3)),
         )  # fmt: skip
         return _begun(self.options, self.groups, self.order, self.bodies, now)
@@ -256,12 +269,12 @@ class Pressed(NamedTuple):
     worst: Any
 
 
-def _displaced(g: Group, d: Any) -> Any:
+def displaced(g: Group, d: Any) -> Any:
     """(c n, 3) m of the points of a group."""
     return jnp.einsum("nia,ca->cni", g.G, d[g.index] + g.offset).reshape(-1, 3)
 
 
-def _moving(g: Group, v: Any) -> Any:
+def moving(g: Group, v: Any) -> Any:
     return jnp.einsum("nia,ca->cni", g.G, v[g.index]).reshape(-1, 3)
 
 
@@ -273,7 +286,7 @@ def _force(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
     force, after, points = jnp.zeros(count), [], []
     for g, state in zip(groups, states, strict=True):
-        f, s = g.law.step(_displaced(g, d), _moving(g, v), dt, state)
+        f, s = g.law.step(displaced(g, d), moving(g, v), dt, state)
         force = force.at[g.index].set(_contracted(g, f))
         after.append(s)
         points.append(f)
@@ -284,7 +297,7 @@ def _slope(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any
     """(c, c) derivative of the force, point by point."""
     out = jnp.zeros((count, count))
     for g, state in zip(groups, states, strict=True):
-        u, w = _displaced(g, d), _moving(g, v)
+        u, w = displaced(g, d), moving(g, v)
 
         def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
             tangent = jnp.broadcast_to(direction, u.shape)
@@ -329,7 +342,7 @@ def _placed(options: Options, groups: tuple[Group, ...], B: Bodies, free: Any, v
 
 def _pressed(options: Options, groups: tuple, order: Any, B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> Pressed:
     d, worst, (force, states, points) = _placed(options, groups, B, free, v, dt, now)
-    places = tuple(_displaced(g, d) for g in groups)
+    places = tuple(displaced(g, d) for g in groups)
     approach, slips, lost, stored = [], [], jnp.zeros(()), jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
         slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(now.states[i])) > SLID * jnp.abs(u - now.places[i])[:, 1:]
