@@ -21,7 +21,7 @@ PUBLIC = {
     "exchange.labelled": "to_xarray",
     "bodies": "modes assemble sample",
     "system.structure": "structure polynomial jenkins stop Element",
-    "analyses": "harmonic_response follow backbone integrate",
+    "analyses": "harmonic_response follow backbone integrate run_up",
 }
 """Module -> the names of it that are public."""
 

@@ -266,3 +266,49 @@ def integrate(
         return orbit.run(found, settle, keep, samples, steps, begin, report)
     asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
+
+
+def run_up(
+    system: System, start: float, stop: float, time: float, *, unit: Literal["Hz", "rad/s"] = "Hz",
+    order: int = 1, euler: tuple[str, ...] = (), samples: int = 256, steps: int | None = None,
+    begin: Literal["static", "rest"] = "static", file: Path | str | None = None, report: Report = lambda _: None,
+) -> Orbit:  # fmt: skip
+    """Motion in time from rest while the frequency of the loads goes linearly from one to another, up or down.
+
+    The phase of the loads is the integral of their frequency. Centrifugal loads follow the square of the rotation
+    speed; matrices stay those of the modal files' speeds.
+
+    Args:
+        system: what vibrates, with its loads. start, stop: of the loads' first harmonic, in the unit. time: s, from one
+            to the other. order: engine order of the first harmonic: the rotation speed is the frequency over it.
+            euler: names of bodies that turn with it and feel its change as a load (Sextro Eq. (2.3-19)).
+        samples, steps: of a period of the highest frequency. begin, file, report: as start, file, report of
+            `integrate`.
+
+    Returns:
+        An `Orbit`: ``frequency`` of every sample; see `integrate`.
+
+    Raises:
+        UserError: see `integrate`; a body without an Euler load. NotConverged: no state of rest is found.
+
+    Examples:
+        The faster, the later the resonance at 1 rad/s is seen:
+
+        >>> import microslip as ms
+        >>> one = ms.structure(1.0, 1.0, 0.05, force={0: 1.0}, output=0)
+        >>> ways = [ms.run_up(one, 0.5, 1.5, time, unit="rad/s") for time in (800.0, 200.0)]
+        >>> [f"{2 * 3.14159 * way.frequency[abs(way.y[0]).argmax()]:.2f}" for way in ways]
+        ['1.05', '1.12']
+    """
+    from .time_domain import equations, orbit, recorded
+    from .time_domain.ramp import Ramp
+
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    turn = 2 * np.pi * _hertz(unit)
+    ramp = Ramp(turn * start, turn * stop, time, order, euler)
+    found = equations.of_ramp(assembly, ramp)
+    if file is None:
+        return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
+    asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
+    return recorded.run(file, [asked], report=report)[0]

@@ -13,12 +13,15 @@ from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import build, swept
 from ..case.problem import problem_of
+from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.response import survey_html
+from ..system.assembly import Assembly
 from ..time_domain import equations, orbit, recorded, starts
 from ..time_domain.orbit import Orbit
+from ..time_domain.ramp import Ramp
 from ..units import METRES, percent
 from .checkpoint import hashes_of
 from .stage import Made, Report, Stage, hash_of_code
@@ -41,7 +44,7 @@ def orbit_stage(
     """
     settings, raw = load_case(case_path, assignments)
     if settings.orbit is None:
-        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz) or Omega (rad/s)")
+        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
     stage = Stage(folder / "orbit.json", ("stages.orbit",), force, report)
     inputs = {
         "case": checkpoint.without_defaults(raw),
@@ -63,6 +66,8 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
     assembly, motions = built.pressed(asked.normal_force), list[recorded.Asked]()
+    if asked.run_up is not None:
+        motions.append(_run_up(assembly, asked, asked.run_up))
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
         driven = equations.of(assembly, 2 * np.pi * f)
@@ -75,6 +80,8 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     stage.begin()
     found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
     more = [f"{name}: {words}" for name, one in found for words in one.messages]
+    turning = [m.name for m in assembly.components if asked.run_up and m.at(0).group.speed]
+    more += [f"{name}: its matrices stay those of one speed." for name in turning]
     sentences = [*(_sentence(*one) for one in found), *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
     (folder / "pictures").mkdir(exist_ok=True)
@@ -91,6 +98,14 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     told = {"files": names, "sentences": sentences, "diverged": diverged}
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
     return Made([folder / name for name in names])
+
+
+def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorded.Asked:
+    ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
+    name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
+    assert asked.start != "balance"
+    driven = equations.of_ramp(assembly, ramp)
+    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, asked.start)
 
 
 def _sentence(name: str, one: Orbit) -> str:

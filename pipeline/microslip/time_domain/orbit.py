@@ -22,7 +22,7 @@ from .equations import Equations
 from .samples import ROWS, UNITS, InMemory, Kept
 from .starts import Periodic
 from .starts import begun as on_its_way
-from .stepper import EVENTS, KINDS, Now, Seen, Stepper, static_force
+from .stepper import EVENTS, KINDS, Now, Seen, Stepper, kicks, static_force
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,6 +120,8 @@ class Orbit:
             "time": self.time, "displacement": self.y, "velocity": self.v, "modal_displacement": self.q,
             "modal_velocity": self.q_dot, "contact_displacement": self.d, "contact_force": self.force,
         }  # fmt: skip
+        if name == "angular_frequency":
+            return self.equations.frequency(self.time[part])
         found = own[name] if name in own else self.energy[name.removeprefix("energy_")]
         return np.asarray(found[..., part])
 
@@ -162,6 +164,8 @@ class Orbit:
         """What motion it is, in words."""
         if math.isfinite(self.diverged):
             return f"diverged at {self.diverged:.6g} s"
+        if run_up := self._run_up:
+            return run_up
         kept, p = len(self.time) // self.samples, self.repeats
         if kept < 2:
             return "too short to say whether it repeats"
@@ -173,6 +177,25 @@ class Orbit:
             else f"{self.impacts:.4g} impact{'s' * (self.impacts != 1)} a period"
         )
         return f"{came}, {per}" if self.contacts else came
+
+    @property
+    def frequency(self) -> Array:
+        """(s,) Hz of the excitation; it changes in a run-up."""
+        return self.array("angular_frequency") / (2 * np.pi)
+
+    @property
+    def _run_up(self) -> str:
+        """What a run-up met, in words; empty if it is none."""
+        ends = [self.array("angular_frequency", part) for part in (slice(1), slice(-1, None))]
+        if not len(self.time) or np.ptp(ends) == 0:
+            return ""
+        top, at = -1.0, 0.0
+        for y, w in self._strips("displacement", "angular_frequency"):
+            if len(y) and (high := float(np.abs(y[0]).max())) > top:
+                top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
+        way = "up" if ends[1] > ends[0] else "down"
+        said = f"run-{way} from {ends[0][0] / 2 / np.pi:.6g} to {ends[1][0] / 2 / np.pi:.6g} Hz"
+        return f"{said}, largest at {at:.6g} Hz" if self.labels else said
 
     @property
     def drift(self) -> float:
@@ -381,7 +404,7 @@ def _error(stepper: Stepper, now: Now, samples: int, each: int) -> float:
     """Deviation of one more period from the same with half the step, over the largest read-out."""
     fine = Stepper(stepper.equations, stepper.tau / 2, stepper.accounts)
     half = 0.5 * (fine.tau - stepper.tau)
-    kick = np.einsum("bpc,c->bp", np.asarray(stepper.bodies.kick), np.asarray(now.force) - stepper.equations.F_0)
+    kick = np.sum(kicks(stepper.options, stepper.bodies, now.force, now.o), axis=0) / stepper.tau
     p = kick.shape[1]
     finer = now._replace(y=now.y.at[:, p:].add(half * kick))
     both = [s.run(n, np.full(samples, k))[1] for s, n, k in ((stepper, now, each), (fine, finer, 2 * each))]
@@ -421,14 +444,14 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
         return zero, zero
     if start != "static":
         raise UserError(f"start: '{start}' is none of static, rest, balance")
-    if not e.B[:, 0].any() and not any(tight):
+    if not e.still[0].any() and not any(tight):
         return zero, zero  # preloads are in balance there
     return _static(e), zero
 
 
 def _refuse_penetration(e: Equations, q: Array) -> None:
     """Contacts that are pressed deeper at q = 0 than under the steady loads would throw the bodies apart."""
-    nearer, begins = e.D @ q + e.D_o[:, 0], np.cumsum([0, *(c.patch.count for c in e.contacts)])
+    nearer, begins = e.D @ q + e.still[1], np.cumsum([0, *(c.patch.count for c in e.contacts)])
     for c, i in zip(e.contacts, begins, strict=False):
         if c.offset[0] > 0 and nearer[i] < -PENETRATES * c.offset[0]:
             depth = f"{c.offset[0]:.4g} m deep, where steady loads press it {c.offset[0] + nearer[i]:.4g} m"
@@ -438,11 +461,11 @@ def _refuse_penetration(e: Equations, q: Array) -> None:
 def _static(e: Equations, most: int = 60) -> Array:
     """(m,) where steady loads and contacts that came there on a straight way are in balance, by Newton's method."""
     q, force = np.zeros(len(e.omega2)), static_force(Stepper(e, 1.0, False))
-    scale = np.abs(e.B[:, 0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)
+    scale = np.abs(e.still[0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)
 
     def missing(q: Array) -> tuple[Array, Array]:
         F, S = force(q)
-        return e.omega2 * q - e.B[:, 0] + e.D.T @ (F - e.F_0), S
+        return e.omega2 * q - e.still[0] + e.D.T @ (F - e.F_0), S
 
     R, S = missing(q)
     scale = max(scale, np.abs(R).max(initial=0.0))

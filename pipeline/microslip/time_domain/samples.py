@@ -31,7 +31,7 @@ FORMAT_VERSION = "0.1"
 ENERGIES = ("mechanical", "given", "damped", "contacts", "lost", "stored")
 
 UNITS = {
-    "time": "s", "displacement": "m", "velocity": "m/s", "modal_displacement": "m kg^1/2",
+    "time": "s", "angular_frequency": "rad/s", "displacement": "m", "velocity": "m/s", "modal_displacement": "m kg^1/2",
     "modal_velocity": "m kg^1/2 / s", "contact_displacement": "m, rad", "contact_force": "N, N m",
     **{f"energy_{name}": "J" for name in ENERGIES},
 }  # fmt: skip
@@ -56,8 +56,8 @@ PAUSE = 1.0
 def of_period(e: Equations, seen: Seen) -> dict[str, Array]:
     """Name -> (rows, s) or (s,) of samples."""
     seen = Seen._make(map(np.asarray, seen))
-    rates = seen.q_dot @ e.output.T + e.oscillators(seen.time) @ (e.output_given @ e.turning).T
-    found = (seen.time, read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T)
+    rates = seen.q_dot @ e.output.T + e.rates(seen.time) @ e.output_given.T
+    found = (seen.time, e.frequency(seen.time), read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T)
     return dict(zip(UNITS, (*found, *energies(e, seen).values()), strict=True))
 
 

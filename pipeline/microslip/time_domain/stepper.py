@@ -24,6 +24,7 @@ from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
 from .equations import Equations
 from .flow import Flow, blocks, flow
+from .ramp import Ramp
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -56,6 +57,7 @@ class Bodies(NamedTuple):
             R, yields: (c, c), see `Equations`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion
             without contacts.
         reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
+        push: (b, p, n) modal forces of o that kick, of a run-up.
     """
 
     flow: Flow
@@ -70,6 +72,7 @@ class Bodies(NamedTuple):
     steady: Any
     reach: Any
     drift: Any
+    push: Any
 
 
 class Now(NamedTuple):
@@ -123,11 +126,12 @@ class Seen(NamedTuple):
 @dataclass(frozen=True)
 class Options:
     """What the loop is compiled for. yields: whether modes leave out compliance. leaps: over flights without contact.
-    accounts: of the energy that contacts store and lose."""
+    accounts: of the energy that contacts store and lose. ramp: o is that of a run-up, whose loads kick."""
 
     yields: bool
     leaps: bool
     accounts: bool
+    ramp: tuple[Ramp, tuple[int, ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +179,7 @@ class Stepper:
         opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
         leaps = opens and not e.F_0.any() and e.steady is not None and bool(dissipative)
-        return Options(bool(e.R.any()), leaps, self.accounts)
+        return Options(bool(e.R.any()), leaps, self.accounts, (e.ramp, e.harmonics) if e.ramp else None)
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -188,11 +192,12 @@ class Stepper:
         steady[:, :p] = still.reshape(b, p, n)
         steady[:, p:] = (still @ e.turning).reshape(b, p, n)
         rows, given = self._points
+        push = (np.zeros((m, n)) if e.push is None else e.push).reshape(b, p, n)
         reach = np.linalg.norm(rows, axis=(1, 2))
         drift = np.linalg.norm(np.abs((rows @ still + given) @ e.turning).sum(axis=2), axis=1)
         return Bodies(
             flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.yields, e.F_0)),
-            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift)),
+            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift, push)),
         )  # fmt: skip
 
     @property
@@ -246,7 +251,7 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
     @jax.jit
     def found(q: Any) -> tuple[Any, Any]:
-        d = jnp.asarray(e.D) @ q + jnp.asarray(e.D_o[:, 0])
+        d = jnp.asarray(e.D) @ q + jnp.asarray(e.still[1])
         still = jnp.zeros_like(d)
         force = _force(groups, d, still, 1.0, states, len(d))[0]
         return force, _slope(groups, d, still, 1.0, states, len(d))
@@ -369,13 +374,21 @@ def _begun(options: Options, groups: tuple[Group, ...], order: Any, B: Bodies, n
     free = jnp.einsum("cbi,bi->c", B.D, now.y) + B.D_o @ now.o
     v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], now.y[:, p:]) + B.D_o @ (_turning(B) @ now.o)
     found = _pressed(options, groups, order, B, free, v, B.tau, now)
-    half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, found.force - B.F_0)
-    y = now.y.at[:, p:].add(half)
-    done = -jnp.sum(half * (now.y[:, p:] + 0.5 * half))
+    touched, pushed = (0.5 * kick for kick in kicks(options, B, found.force, now.o))
+    y = now.y.at[:, p:].add(touched + pushed)
+    mean = now.y[:, p:] + 0.5 * (touched + pushed)
+    done, given = -jnp.sum(touched * mean), jnp.sum(pushed * mean)
+    energy = jnp.stack([given, jnp.zeros(()), done, jnp.zeros(()), found.stored])
     return now._replace(
         y=y, force=found.force, states=found.states, points=found.points, places=found.places, approach=found.approach,
-        slips=found.slips, energy=now.energy.at[2].set(done).at[4].set(found.stored), worst=found.worst,
+        slips=found.slips, energy=energy, worst=found.worst,
     )  # fmt: skip
+
+
+def kicks(options: Options, B: Bodies, force: Any, o: Any) -> tuple[Any, Any]:
+    """(b, p) velocities that contacts, and loads of a run-up, give in a step."""
+    touched = B.tau * jnp.einsum("bpc,c->bp", B.kick, force - B.F_0)
+    return touched, B.tau * B.push @ o if options.ramp else jnp.zeros_like(touched)
 
 
 def _turning(B: Bodies) -> Any:
@@ -396,9 +409,10 @@ def _run(
         step = partial(_step, options, groups, order, B)
         left, now = jax.lax.while_loop(lambda c: c[0] > 0, lambda c: step(*c), (count, now))
         now = now._replace(o=o)
-        half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, now.force - B.F_0)
-        q, v = now.y[:, :p], now.y[:, p:] - half
-        energy = now.energy.at[2].add(jnp.sum(half * (v + 0.5 * half)))  # the second half of the kick is to come
+        touched, pushed = (0.5 * kick for kick in kicks(options, B, now.force, o))
+        q, v = now.y[:, :p], now.y[:, p:] - touched - pushed
+        mean = v + 0.5 * (touched + pushed)  # the second half of the kick is to come
+        energy = now.energy.at[2].add(jnp.sum(touched * mean)).at[0].add(-jnp.sum(pushed * mean))
         bodies = 0.5 * jnp.sum(v**2 + B.omega2 * q**2)
         d = jnp.einsum("cbi,bi->c", B.D, now.y) + B.D_o @ o - B.R @ (now.force - B.F_0)
         return now, Seen(q.reshape(-1), v.reshape(-1), d, now.force, energy, bodies, now.time)
@@ -413,14 +427,17 @@ def _step(options: Options, groups: tuple, order: Any, B: Bodies, left: Any, now
     F, dt = B.flow, B.tau * 2.0**k
     z = jnp.concatenate([now.y, jnp.broadcast_to(now.o, (len(now.y), len(now.o)))], axis=1)
     y = jnp.einsum("bij,bj->bi", F.move[k], z)
-    o = F.turn[k] @ now.o
+    o = options.ramp[0].driving(now.time + dt, options.ramp[1], jnp) if options.ramp else F.turn[k] @ now.o
     given, taken = (jnp.einsum("bi,bij,bj->", z, Q[k], z) for Q in (F.supplied, F.damped))
     free = jnp.einsum("cbi,bi->c", B.D, y) + B.D_o @ o
-    half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, now.force - B.F_0)
-    v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], y[:, p:] + half) + B.D_o @ (_turning(B) @ o)
+    half = 0.5 * sum(kicks(options, B, now.force, now.o))
+    v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], y[:, p:] + half)
+    v += B.D_o @ ((o - now.o) / dt if options.ramp else _turning(B) @ o)
     found = _pressed(options, groups, order, B, free, v, dt, now)
-    kick = B.tau * jnp.einsum("bpc,c->bp", B.kick, found.force - B.F_0)
-    work = -jnp.sum(kick * (y[:, p:] + 0.5 * kick))
+    touched, pushed = kicks(options, B, found.force, o)
+    kick = touched + pushed
+    mean = y[:, p:] + 0.5 * kick
+    work, given = -jnp.sum(touched * mean), given + jnp.sum(pushed * mean)
     energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, found.lost])), found.stored])
     after = now._replace(
         y=y.at[:, p:].add(kick), o=o, time=now.time + dt, force=found.force, states=found.states, points=found.points,
