@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import microslip as ms
+from microslip.analyses import balanced
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
@@ -19,12 +23,12 @@ from microslip.contact.law import value
 from microslip.contact.normal import Normal, Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.data import UserError
+from microslip.data import CENTRIFUGAL, RunUp, UserError
 from microslip.report.page import number, text
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
-from microslip.time_domain import equations, orbit
+from microslip.time_domain import equations, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Options, Stepper
 
 MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
@@ -157,7 +161,7 @@ def test_a_steady_vibration_is_that_of_harmonic_balance(frequency: float) -> Non
 def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
     """Section 4.2: what the book calls period two at 30.84 rad/s is two impacts in one period of the excitation."""
     for Omega, periods, impacts in ((64.32, 1, 1), (30.84, 1, 2), (37.41, 2, 3)):
-        found = orbit.run(equations.of(hitting(BOOK), Omega), 300, 8)
+        found = orbit.run(equations.of(hitting(BOOK), Omega), 600, 8)
         assert (found.repeats, found.impacts * found.repeats) == (periods, impacts) and found.error < 1e-4
 
 
@@ -254,3 +258,299 @@ def test_a_static_start_is_the_balance_of_steady_loads_and_contact() -> None:
     e = equations.of(pressed, 10.0)
     assert (e.output @ q)[0] == pytest.approx(2.0 / (3e5 + STIFFNESS), rel=1e-9)
     assert jnp.isfinite(q).all()
+
+
+# starts ------------------------------------------------------------------------------------------------------------
+
+
+def systems() -> dict[str, tuple[object, float]]:
+    """Name -> system and rad/s."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    both = [ms.jenkins(1.0, 0.1, at=1), ms.stop(4.0, 0.5)]
+    rub = {"normal_stiffness": 2e6, "tangential_stiffness": 4e6, "includes": "surface", "friction": 0.2}
+    rub |= {"points": [4, 2], "normal_force": 20.0}
+    sides = [{"interface": side, **rub} for side in ("right", "left")]
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": sides}
+    return {
+        "slider": (ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)]), 1.0),
+        "spring": (ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})]), 0.9),
+        "stop": (ms.structure(1.0, 1.0, 0.1, force={0: 0.3}, elements=[ms.stop(2.0, 0.2)]), 0.8),
+        "two": (ms.structure(np.eye(2), K, 0.05 * K, force={0: 0.3}, elements=both), 1.1),
+        "vane": (balanced(ms.assemble(case, vane=ms.sample()), 15, 1024), 2 * np.pi * 872),
+    }
+
+
+@pytest.mark.parametrize("name", ["slider", "spring", "stop", "two", "vane"])
+def test_a_motion_begun_on_a_balance_is_periodic_from_its_first_period(name: str) -> None:
+    """Begun at rest the second period differs from the first by half of the amplitude or more."""
+    system, frequency = systems()[name]
+    found = ms.integrate(system, frequency, unit="rad/s", settle=0, keep=2, steps=2048, start="balance")
+    first, second = np.split(found.y, 2, axis=1)
+    size = np.abs(found.y).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(second / size, first / size, atol=2e-4)
+    assert found.repeats == 1
+
+
+def test_contacts_remember_the_balance_that_a_motion_begins_on() -> None:
+    """A slider that has not been dragged along the balance's motion stands elsewhere, and the motion is another."""
+    slider, frequency = systems()["slider"][0], 1.2
+    e = equations.of(slider, frequency)
+    start = starts.of_balance(e, balanced(slider, 25, 400))
+    s = Stepper(e, 2 * np.pi / frequency / 2048)
+    led, fresh = starts.begun(s, start), s.start(start.q, start.v)
+    assert abs(float(led.held.force[0] - fresh.held.force[0])) > 0.05
+    assert float(led.held.force[0]) == pytest.approx(found_force(slider, frequency), abs=2e-3)
+
+
+def found_force(system: object, frequency: float) -> float:
+    """N, of the only contact at t = 0, by 101 harmonics."""
+    motion = ms.harmonic_response(system, [frequency], harmonics=101, unit="rad/s").motion(0)
+    (force,) = motion.force.values()
+    return float(force[0, 0] + force[0, 1::2].sum())
+
+
+def test_a_start_that_presses_contacts_deeper_than_loads_do_is_refused() -> None:
+    """Two micrometres of interference between a soft spring and a stiff stop: at rest nearly all of it is gone."""
+    base = hitting(patch(Penalty(value(3e5))))
+    tight = preloaded_contact("stop", base.contacts[0].patch, ContactFace("mass", "stop"), None, None, 2e-6)
+    e = equations.of(replace(base, contacts=(tight,)), 64.32)
+    with pytest.raises(UserError, match=r"stop 2e-06 m deep, where steady loads press it 6.6\d+e-10 m"):
+        orbit.run(e, 0, 1, start="rest")
+    depth = orbit.run(e, 0, 1, start="static").d[0, 0] + 2e-6
+    assert abs(depth) < 1e-6
+
+
+def test_a_case_begins_on_its_balance(hammer: Path) -> None:
+    """One period is enough, where there is no impact."""
+    words = ["orbit", "case.toml", "-q", "--set", "contacts.0.interference=-1.0", "--set", "orbit.settle=0"]
+    assert main([*words, "--set", 'orbit.start="balance"', "--set", "orbit.Omega=30.0"]) == 0
+    found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
+    assert found.repeats == 1
+    size = STIFFNESS * FOOT / abs(STIFFNESS - MASS * 30.0**2 + 30.0j * DAMPING)
+    assert np.abs(found.y[0]).max() == pytest.approx(size, rel=2e-3)
+
+
+# run-up ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("first, last", [(0.5, 1.5), (1.5, 0.5)])
+def test_a_run_up_is_that_of_a_fine_integration_in_second_order(first: float, last: float) -> None:
+    """x'' + 0.05 x' + x = cos psi, psi' linear: the peak lags behind 1 rad/s and is lower than the steady one, 20."""
+    one, duration, errors = ms.structure(1.0, 1.0, 0.05, force={0: 1.0}, output=0), 200.0, []
+    a = (last - first) / duration
+
+    def rate(t: float, z: np.ndarray) -> list[float]:
+        s = min(t, duration)
+        return [z[1], np.cos(first * s + 0.5 * a * s**2 + last * (t - s)) - z[0] - 0.05 * z[1]]
+
+    exact = None
+    for steps in (256, 512):
+        found = ms.run_up(one, first, last, duration, unit="rad/s", samples=64, steps=steps)
+        t = found.time
+        if exact is None:
+            exact = solve_ivp(rate, (0, t[-1]), [0, 0], "DOP853", t, rtol=1e-11, atol=1e-12).y
+        errors.append(np.abs(found.y[0] - exact[0]).max() / np.abs(exact[0]).max())
+        np.testing.assert_allclose(found.v[0], exact[1], atol=1e-4 * np.abs(exact[1]).max())
+    assert errors[0] < 5e-6 and errors[1] == pytest.approx(errors[0] / 4, rel=0.02)
+    assert found.balance < 1e-11 and 10 < np.abs(found.y).max() < 14
+    met = 2 * np.pi * found.frequency[np.abs(found.y[0]).argmax()]
+    assert (met - 1.0) * np.sign(last - first) > 0.1 and found.said.startswith("run-up" if last > first else "run-down")
+
+
+def test_centrifugal_loads_follow_the_square_of_the_speed_and_bodies_feel_its_change() -> None:
+    """A heavy body on a stiff spring is where the loads put it: x = row n^2 + euler n'; engine order 2."""
+    e0 = hitting(patch(Penalty(value(3e5)))).components[0].groups[0]
+    euler = 3.0 * e0.excitations["foot"].rows[0]
+    m = len(e0.M_r)
+    turning = RunUp(np.zeros((m, m)), np.zeros((m, m)), euler, np.zeros(m))
+    rows = {**e0.excitations, "spin": replace(e0.excitations["foot"], unit=CENTRIFUGAL)}
+    group = replace(e0, excitations=rows, run_up=turning, C_r=e0.C_r + 4 * np.eye(m))
+    loads = (Load("mass", "spin", 1e4, 0),)
+    free = Assembly((Component("mass", {0: group}),), (), loads, (Output("mass", "mass", "u_x"),))
+    found = ms.run_up(free, 2.0, 4.0, 20.0, order=2, euler=("mass",), samples=32)
+    speed = np.pi * found.frequency
+    rising = 2 * np.pi * 0.1 / 2
+    late = (found.time > 8.0) & (found.time < 20.0)
+    np.testing.assert_allclose(found.y[0][late], (speed**2 + 3 * rising)[late] / STIFFNESS, rtol=0.02)
+    without = ms.run_up(free, 2.0, 4.0, 20.0, order=2, samples=32)
+    np.testing.assert_allclose((found.y - without.y)[0][late], 3 * rising / STIFFNESS, rtol=1e-3)
+    with pytest.raises(UserError, match="no body 'other'"):
+        ms.run_up(free, 2.0, 4.0, 1.0, euler=("other",))
+    bare = replace(free, components=(Component("mass", {0: replace(group, run_up=None)}),))
+    with pytest.raises(UserError, match="has no Euler load"):
+        ms.run_up(bare, 2.0, 4.0, 1.0, euler=("mass",))
+
+
+def test_a_case_runs_up_into_its_stop(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """What it says is in the file, with the frequency of every sample; what belongs to one frequency is refused."""
+    case = hammer / "case.toml"
+    case.write_text(case.read_text().split("Omega = 64.32")[0] + "run_up = { start = 3.0, stop = 8.0, time = 3.0 }\n")
+    assert main(["orbit", "case.toml", "-q"]) == 0
+    found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
+    assert found.frequency[0] == pytest.approx(3.0, abs=0.01) and found.frequency[-1] == pytest.approx(8.0, abs=1e-9)
+    assert found.said in (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
+    assert found.count("closes") > 5 and found.balance < 1e-8 and found.drift < 1e-2
+    for change in ("orbit.keep=3", "orbit.frequency=3.0", 'orbit.start="balance"', "orbit.run_up.stop=3.0"):
+        assert main(["orbit", "case.toml", "-q", "--set", change]) == 2
+        assert "orbit" in capsys.readouterr().err
+
+
+# files -------------------------------------------------------------------------------------------------------------
+
+SLIPS = patch(Penalty(value(2e5)), mu=0.3, stiffness=1e5)
+ARRAYS = ("time", "y", "v", "q", "q_dot", "d", "force", "events")
+
+
+def same(a: orbit.Orbit, b: orbit.Orbit) -> None:
+    """To the last bit."""
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    for name, values in a.energy.items():
+        np.testing.assert_array_equal(values, b.energy[name], err_msg=name)
+    for name in ("Omega", "labels", "contacts", "samples", "steps", "missed", "error", "diverged", "messages"):
+        np.testing.assert_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    np.testing.assert_equal((a.said, a.repeats, a.drift, a.balance), (b.said, b.repeats, b.drift, b.balance))
+
+
+def test_a_motion_is_saved_and_read_with_all_that_it_says(tmp_path: Path) -> None:
+    found = orbit.run(equations.of(hitting(SLIPS, normal=0.5, push=1.5), 300.0), 2, 3, 64, 2048)
+    loaded = ms.load(found.save(tmp_path / "motion.h5"))
+    same(found, loaded)
+    with pytest.raises(UserError, match="integrate the assembly again"):
+        loaded.equations  # noqa: B018
+    table, data = loaded.to_dataframe(), loaded.to_xarray()
+    assert len(table) == 3 * 64 and table["mass u_x_m"].iloc[-1] == found.y[0, -1]
+    assert data["displacement"].sel(read_out="mass u_y").values[-1] == found.y[1, -1]
+    assert (data["event_kind"].values == "slips").sum() == found.count("slips") > 0
+    assert data["contact_force"].attrs["units"] == "N, N m" and set(data["event_contact"].values) == {"stop"}
+    assert np.array_equal(loaded.plot().lines[0].get_xdata(), found.y[0])
+
+
+def test_what_is_no_whole_file_of_one_motion_is_refused(tmp_path: Path) -> None:
+    path = orbit.run(equations.of(hitting(SLIPS, normal=0.5), 300.0), 0, 1, 8).save(tmp_path / "motion.h5")
+    data = path.read_bytes()
+    for spoilt, words in ((data[: len(data) // 2], "damaged"), (data[:-200] + data[-123:], "damaged")):
+        (tmp_path / "bad.h5").write_bytes(spoilt)
+        with pytest.raises(UserError, match=words):
+            ms.read_orbits(tmp_path / "bad.h5")
+    with h5py.File(path, "r+") as file:
+        del file["motion_1/energy_lost"]
+    with pytest.raises(UserError, match="incomplete"):
+        ms.load(path)
+    with pytest.raises(UserError, match="no such file"):
+        ms.read_orbits(tmp_path / "none.h5")
+
+
+class Killed(Exception):
+    pass
+
+
+@pytest.mark.parametrize("at", [16, 48, 70])
+def test_a_run_that_is_ended_goes_on_with_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    """While it settles, while samples are kept, and after the last one; two motions in the file, one of them whole."""
+    monkeypatch.setattr(samples, "PAUSE", 0.0)
+    e = equations.of(hitting(SLIPS, normal=0.5, push=1.5), 300.0)
+    asked = [recorded.Asked(name, e, 30, 40, 16, 1024) for name in ("first", "second")]
+    seen: list[str] = []
+
+    def killing(text: str) -> None:
+        seen.append(text)
+        if text.startswith(f"second: period {at} "):
+            raise Killed
+
+    with pytest.raises(Killed):
+        recorded.run(tmp_path / "orbit.h5", asked, report=killing)
+    assert not (tmp_path / "orbit.h5").exists()
+    told: list[str] = []
+    found = recorded.run(tmp_path / "orbit.h5", asked, report=told.append)
+    assert not any(text.startswith("first") or f"period {at} " in text for text in told)
+    for one in found:
+        same(orbit.run(e, 30, 40, 16, 1024), one)
+    assert [p.name for p in tmp_path.iterdir()] == ["orbit.h5"] and ms.read_orbits(tmp_path / "orbit.h5")[1].error > 0
+
+
+def test_another_motion_is_begun_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the one that was left is of another frequency."""
+    monkeypatch.setattr(samples, "PAUSE", 0.0)
+    one, other = (recorded.Asked("it", equations.of(hitting(SLIPS, 0.5), w), 0, 40, 8, 1024) for w in (300.0, 310.0))
+
+    def killing(text: str) -> None:
+        raise Killed
+
+    with pytest.raises(Killed):
+        recorded.run(tmp_path / "orbit.h5", [one], report=killing)
+    same(orbit.run(other.equations, 0, 40, 8, 1024), recorded.run(tmp_path / "orbit.h5", [other])[0])
+
+
+@pytest.mark.slow
+def test_a_long_motion_needs_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
+    """While it is computed, and for what it says of itself."""
+    e, peaks = equations.of(hitting(BOOK), 64.32), []
+    for keep in (4, 128):
+        tracemalloc.start()
+        found = recorded.run(tmp_path / f"{keep}.h5", [recorded.Asked("it", e, 0, keep, 1024, 1024)])[0]
+        assert found.balance < 1e-8 and found.said
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    whole = 128 * 1024 * sum(sizes_of(e)) * 8
+    assert peaks[1] < 0.5 * whole and (tmp_path / "128.h5").stat().st_size > whole
+
+
+def sizes_of(e: equations.Equations) -> list[int]:
+    rows = samples.sizes(e)
+    return [rows.get(name, 1) for name in samples.UNITS]
+
+
+KILLED = """
+import sys
+import numpy as np
+from microslip.time_domain import equations, recorded, samples
+import microslip as ms
+samples.PAUSE = 0.0
+slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+asked = recorded.Asked("it", equations.of(slider, 0.8), 5, 1000, 16, 512)
+found = recorded.run(sys.argv[1], [asked], report=lambda text: print(text, flush=True))[0]
+print(found.said)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_process_leaves_what_the_next_one_goes_on_with(tmp_path: Path) -> None:
+    """SIGKILL at some instants."""
+    words = [sys.executable, "-c", KILLED, str(tmp_path / "orbit.h5")]
+    reached = []
+    for lines in (3, 9, 17):
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            for _ in range(lines):
+                text = process.stdout.readline()
+            reached.append(int(text.split("period ")[1].split()[0]))
+            process.kill()
+    assert reached == sorted(set(reached))
+    subprocess.run(words, check=True, capture_output=True)
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+    same(orbit.run(equations.of(slider, 0.8), 5, 1000, 16, 512), ms.load(tmp_path / "orbit.h5"))
+
+
+def test_a_motion_that_diverges_keeps_what_was_computed_and_says_why(tmp_path: Path) -> None:
+    """x'' - x' + x = cos t grows as exp(t / 2)."""
+    growing = ms.structure(1.0, 1.0, -1.0, force={0: 1.0}, output=0)
+    found = ms.integrate(growing, 1.0, unit="rad/s", settle=0, keep=200, file=tmp_path / "orbit.h5")
+    assert 600 < found.diverged < 2 * np.log(1e155) and "its energy was" in found.messages[0]
+    assert found.time[-1] == found.diverged and np.isfinite(found.y).all() and found.y.shape[1] == len(found.time)
+    same(ms.integrate(growing, 1.0, unit="rad/s", settle=0, keep=200), found)
+
+
+def test_a_case_that_diverges_ends_with_exit_code_1(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """Its body takes energy from nowhere: a damper with the wrong sign."""
+    basis = ms.read_basis("build/hammer/basis.h5")
+    group = basis.groups[0, 0]
+    ms.write_basis("build/hammer/basis.h5", replace(basis, groups={(0, 0): replace(group, C_r=group.C_r - 500.0)}))
+    words = ["orbit", "case.toml", "-q", "--set", "contacts.0.interference=-1.0", "--set", "orbit.settle=0"]
+    assert main([*words, "--set", "orbit.keep=30"]) == 1
+    assert "diverged" in capsys.readouterr().err
+    page = (hammer / "build" / "hammer" / "orbit.html").read_text(encoding="utf-8")
+    assert "its energy was" in page
+    assert len(ms.load(hammer / "build" / "hammer" / "orbit.h5").time) > 200

@@ -17,11 +17,11 @@ __version__ = "0.1.0"
 PUBLIC = {
     "basis": "read_basis write_basis",
     "results.files": "read_response",
-    "harmonic_balance.solved": "load",
+    "time_domain.recorded": "load read_orbits",
     "exchange.labelled": "to_xarray",
     "bodies": "modes assemble sample",
     "system.structure": "structure polynomial jenkins stop friction Element",
-    "analyses": "harmonic_response follow backbone integrate",
+    "analyses": "harmonic_response follow backbone integrate run_up",
 }
 """Module -> the names of it that are public."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 Report = Callable[[str], None]
 System = Assembly | Built | Problem
 """What is analysed: bodies with contacts, loads and read-outs; such as a case describes; or their balance."""
+
+IN_TIME = 25
+"""Harmonics of the vibration that a motion in time starts on."""
 
 HERTZ = {"Hz": 1.0, "rad/s": 1 / (2 * np.pi)}
 
@@ -212,8 +216,8 @@ def _hertz(unit: str) -> float:
 
 def integrate(
     system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
-    samples: int = 256, steps: int | None = None, start: Literal["static", "rest"] = "static",
-    report: Report = lambda _: None,
+    samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
+    file: Path | str | None = None, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -225,14 +229,19 @@ def integrate(
         system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. settle: periods
             that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
             if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
-        start: ``static``, at rest under the steady loads, or ``rest``, at rest in the preloaded state.
-        report: is told what is under way.
+        start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
+            the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
+            are taken; a balance or a case has its own.
+        file: samples are written there as they come and read when they are asked for, so that a long motion needs no
+            more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
     Returns:
-        An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``; ``error`` of its last period.
+        An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``, ``to_dataframe()``, ``to_xarray()``,
+        ``save(path)``; ``error`` of its last period.
 
     Raises:
-        UserError: steps that are too few for the springs of the contacts. NotConverged: no state of rest is found.
+        UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
+            steady loads do. NotConverged: no state of rest, or no vibration to start on, is found.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -242,10 +251,64 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit
+    from .time_domain import equations, orbit, recorded, starts
 
-    if isinstance(system, Built):
-        system = _pressed(system)
-    assembly = system.assembly if isinstance(system, Problem) else system
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
-    return orbit.run(found, settle, keep, samples, steps, start, report)
+    begin: orbit.Start | starts.Periodic
+    if start == "balance":
+        many = IN_TIME if isinstance(system, Assembly) else None
+        begin = starts.of_balance(found, balanced(system, many, many and 16 * many))
+    else:
+        begin = start
+    if file is None:
+        return orbit.run(found, settle, keep, samples, steps, begin, report)
+    asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
+    return recorded.run(file, [asked], report=report)[0]
+
+
+def run_up(
+    system: System, start: float, stop: float, time: float, *, unit: Literal["Hz", "rad/s"] = "Hz",
+    order: int = 1, euler: tuple[str, ...] = (), samples: int = 256, steps: int | None = None,
+    begin: Literal["static", "rest"] = "static", file: Path | str | None = None, report: Report = lambda _: None,
+) -> Orbit:  # fmt: skip
+    """Motion in time from rest while the frequency of the loads goes linearly from one to another, up or down.
+
+    The phase of the loads is the integral of their frequency. Centrifugal loads follow the square of the rotation
+    speed; matrices stay those of the modal files' speeds.
+
+    Args:
+        system: what vibrates, with its loads. start, stop: of the loads' first harmonic, in the unit. time: s, from one
+            to the other. order: engine order of the first harmonic: the rotation speed is the frequency over it.
+            euler: names of bodies that turn with it and feel its change as a load (Sextro Eq. (2.3-19)).
+        samples, steps: of a period of the highest frequency. begin, file, report: as start, file, report of
+            `integrate`.
+
+    Returns:
+        An `Orbit`: ``frequency`` of every sample; see `integrate`.
+
+    Raises:
+        UserError: see `integrate`; a body without an Euler load. NotConverged: no state of rest is found.
+
+    Examples:
+        The faster, the later the resonance at 1 rad/s is seen:
+
+        >>> import microslip as ms
+        >>> one = ms.structure(1.0, 1.0, 0.05, force={0: 1.0}, output=0)
+        >>> ways = [ms.run_up(one, 0.5, 1.5, time, unit="rad/s") for time in (800.0, 200.0)]
+        >>> [f"{2 * 3.14159 * way.frequency[abs(way.y[0]).argmax()]:.2f}" for way in ways]
+        ['1.05', '1.12']
+    """
+    from .time_domain import equations, orbit, recorded
+    from .time_domain.ramp import Ramp
+
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    turn = 2 * np.pi * _hertz(unit)
+    ramp = Ramp(turn * start, turn * stop, time, order, euler)
+    found = equations.of_ramp(assembly, ramp)
+    if file is None:
+        return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
+    asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
+    return recorded.run(file, [asked], report=report)[0]

@@ -135,28 +135,56 @@ def _several(value: object) -> object:
 Several = Annotated[tuple[Positive, ...], BeforeValidator(_several, json_schema_input_type=Positive | list[Positive])]
 
 
+class RunUpOfCase(Model):
+    """An excitation whose frequency goes linearly from one to another, up or down.
+
+    start, stop: Hz, of the first harmonic. time: s, from one to the other. engine_order: of the first harmonic; the
+    rotation speed is the frequency over it, and centrifugal excitations (speed_rpm) follow its square. euler: bodies
+    that turn with it and feel its change as a load in their frame.
+    """
+
+    start: Positive
+    stop: Positive
+    time: Positive
+    engine_order: Annotated[int, Field(ge=1, le=1000)] = 1
+    euler: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
+
+    @model_validator(mode="after")
+    def _apart(self) -> RunUpOfCase:
+        if self.start == self.stop:
+            raise ValueError("start and stop: give two different frequencies")
+        return self
+
+
 class OrbitOfCase(Model):
     """The motion in time from a start, by `microslip orbit`.
 
     frequency: Hz, or Omega: rad/s, of the first harmonic of the excitations: one, or several to look at one after the
-    other. settle: periods that are left to themselves. keep: periods that are kept. samples: of each. steps: of each,
-    if not given as many as the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
-    loads, ``rest`` as preloaded. normal_force: N, of the contacts that the sweep presses.
+    other; or run_up, all of which is kept, in samples and steps of a period of its highest frequency. settle: periods
+    that are left to themselves. keep: periods that are kept. samples: of each. steps: of each, if not given as many as
+    the fastest motion with closed contacts needs. start: at rest, ``static`` under the steady
+    loads, ``rest`` as preloaded; or ``balance``, on the vibration that harmonic balance finds with the case's
+    harmonics. normal_force: N, of the contacts that the sweep presses.
     """
 
     frequency: Several | None = None
     Omega: Several | None = None
+    run_up: RunUpOfCase | None = None
     settle: Annotated[int, Field(ge=0, le=1000000)] = 300
     keep: Annotated[int, Field(ge=1, le=100000)] = 40
     samples: Annotated[int, Field(ge=8, le=8192)] = 256
     steps: Annotated[int, Field(ge=1, le=100000000)] | None = None
-    start: Literal["static", "rest"] = "static"
+    start: Literal["static", "rest", "balance"] = "static"
     normal_force: NotNegative | None = None
 
     @model_validator(mode="after")
     def _one_of_both(self) -> OrbitOfCase:
-        if not self.frequency and not self.Omega or self.frequency and self.Omega:
-            raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, and not both")
+        if sum(map(bool, (self.frequency, self.Omega, self.run_up))) != 1:
+            raise ValueError("frequency: give frequency (Hz) or Omega (rad/s), one or more of them, or run_up")
+        if self.run_up and (wrong := sorted(self.model_fields_set & {"settle", "keep"})):
+            raise ValueError(f"{wrong[0]}: a run-up is kept from its beginning to its end; leave it out")
+        if self.run_up and self.start == "balance":
+            raise ValueError('start: a run-up begins at rest; write "static" or "rest"')
         return self
 
     @property

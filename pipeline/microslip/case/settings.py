@@ -488,8 +488,9 @@ class CaseSettings(Model):
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
     """Start and stop (Hz) of the sweep of a case that has none: an octave around what is asked of its motion in time;
     nothing where that says no numbers."""
-    for key, unit in (("frequency", 1.0), ("Omega", 2 * math.pi)):
-        values = orbit.get(key)
+    ramp = orbit.get("run_up")
+    ends = [ramp.get("start"), ramp.get("stop")] if isinstance(ramp, Mapping) else None
+    for values, unit in ((orbit.get("frequency"), 1.0), (orbit.get("Omega"), 2 * math.pi), (ends, 1.0)):
         asked = [v for v in (values if isinstance(values, list | tuple) else [values]) if isinstance(v, int | float)]
         if asked and min(asked) > 0:
             return {"start": 0.5 * min(asked) / unit, "stop": 2.0 * max(asked) / unit}

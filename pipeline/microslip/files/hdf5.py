@@ -59,16 +59,17 @@ class _Sink:
 
 
 @contextlib.contextmanager
-def create(path: Path) -> Iterator[h5py.File]:
-    """A new HDF5 file for writing, without time stamps (h5py 3.15 and newer leave them out of groups too).
+def create(path: Path, again: bool = False) -> Iterator[h5py.File]:
+    """A new HDF5 file for writing, or one to be changed, without time stamps (h5py 3.15 and newer leave them out of
+    groups too).
 
     Raises:
         OSError: the disk is full or the file too large, once and with its errno.
     """
-    with open(path, "w+b") as raw:
+    with open(path, "r+b" if again else "w+b") as raw:
         sink = _Sink(raw)
         try:
-            with h5py.File(sink, "w", libver=("v108", "v110")) as file:
+            with h5py.File(sink, "r+" if again else "w", libver=("v108", "v110")) as file:
                 yield file
         finally:
             if sink.error is not None:

@@ -77,17 +77,22 @@ def complete_or_absent(path: Path | str) -> Iterator[Path]:
         os.close(handle)
         temporary = Path(name)
         yield temporary
-        os.chmod(temporary, 0o666 & ~_umask())
-        _sync(temporary)
-        os.replace(temporary, path)
+        put_in_place(temporary, path)
         temporary = None
-        _sync(path.parent)
     except OSError as error:
         raise UserError(refused(path, error)) from error
     finally:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+def put_in_place(temporary: Path, path: Path) -> None:
+    """Give a whole file, on the same disk, the name of a product."""
+    os.chmod(temporary, 0o666 & ~_umask())
+    _sync(temporary)
+    os.replace(temporary, path)
+    _sync(path.parent)
 
 
 def open_to_append(path: Path | str) -> int:

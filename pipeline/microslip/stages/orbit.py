@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +12,19 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import build, swept
+from ..case.problem import problem_of
+from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
 from ..files import store
-from ..files.hdf5 import create, put
 from ..files.tables import columns_csv
 from ..report.response import survey_html
-from ..time_domain import equations, orbit
-from ..time_domain.orbit import KINDS, Orbit
+from ..system.assembly import Assembly
+from ..time_domain import equations, orbit, recorded, starts
+from ..time_domain.orbit import Orbit
+from ..time_domain.ramp import Ramp
 from ..units import METRES, percent
 from .checkpoint import hashes_of
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, hash_of_code
 
 
 def orbit_stage(
@@ -41,19 +44,20 @@ def orbit_stage(
     """
     settings, raw = load_case(case_path, assignments)
     if settings.orbit is None:
-        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz) or Omega (rad/s)")
+        raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
     stage = Stage(folder / "orbit.json", ("stages.orbit",), force, report)
     inputs = {
         "case": checkpoint.without_defaults(raw),
         "basis": hashes_of(files),
         "files": hashes_of(checkpoint.files_of(settings, case_path)),
     }
-    stage.make(inputs, lambda: _work(stage, settings, case_path, files))
+    told = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
+    stage.make(inputs, lambda: _work(stage, settings, case_path, files, told))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["sentences"], not told["diverged"]
 
 
-def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path]) -> Made:
+def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], inputs: str) -> Made:
     from ..pictures.orbit import orbit_picture, portraits
 
     folder, asked = stage.product.parent, settings.orbit
@@ -61,22 +65,25 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
-    assembly, found = built.pressed(asked.normal_force), list[tuple[str, Orbit]]()
+    assembly, motions = built.pressed(asked.normal_force), list[recorded.Asked]()
+    if asked.run_up is not None:
+        motions.append(_run_up(assembly, asked, asked.run_up))
     for f in asked.hertz:
         name = f"{2 * np.pi * f:.6g} rad/s" if asked.Omega else f"{f:.6g} Hz"
-
-        def tell(text: str, name: str = name) -> None:
-            stage.report(f"{name}: {text}")
-
         driven = equations.of(assembly, 2 * np.pi * f)
-        found.append((name, orbit.run(driven, asked.settle, asked.keep, asked.samples, asked.steps, asked.start, tell)))
-        stage.report(_sentence(*found[-1]))
+        start: orbit.Start | starts.Periodic
+        if asked.start == "balance":
+            start = starts.of_balance(driven, problem_of(built, asked.normal_force))
+        else:
+            start = asked.start
+        motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
     stage.begin()
+    found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
     more = [f"{name}: {words}" for name, one in found for words in one.messages]
+    turning = [m.name for m in assembly.components if asked.run_up and m.at(0).group.speed]
+    more += [f"{name}: its matrices stay those of one speed." for name in turning]
     sentences = [*(_sentence(*one) for one in found), *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
-    with store.complete_or_absent(folder / "orbit.h5") as temporary:
-        _write(temporary, found)
     (folder / "pictures").mkdir(exist_ok=True)
     seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
     if seen:  # one that diverges as it settles leaves nothing to draw
@@ -93,6 +100,14 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     return Made([folder / name for name in names])
 
 
+def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorded.Asked:
+    ramp = Ramp(2 * np.pi * how.start, 2 * np.pi * how.stop, how.time, how.engine_order, how.euler)
+    name = f"{how.start:.6g} to {how.stop:.6g} Hz in {how.time:.6g} s"
+    assert asked.start != "balance"
+    driven = equations.of_ramp(assembly, ramp)
+    return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, asked.start)
+
+
 def _sentence(name: str, one: Orbit) -> str:
     if not len(one.time):
         return f"{name}: {one.said}."
@@ -101,12 +116,12 @@ def _sentence(name: str, one: Orbit) -> str:
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
-def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:
+def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:
     """Column -> values, one a motion."""
     rows = [
         {
-            "frequency_Hz": one.equations.Omega / (2 * np.pi),
-            "angular_frequency_rad_s": one.equations.Omega,
+            "frequency_Hz": one.Omega / (2 * np.pi),
+            "angular_frequency_rad_s": one.Omega,
             "repeats_after_periods": one.repeats,
             "impacts_per_period": one.impacts,
             "slips_per_period": one.count("slips") / max(len(one.time) // one.samples, 1),
@@ -120,23 +135,3 @@ def _table(found: list[tuple[str, Orbit]]) -> dict[str, Any]:
         for _, one in found
     ]
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
-
-
-def _write(path: Path, found: list[tuple[str, Orbit]]) -> None:
-    """``orbit.h5``: a group a motion, with its samples and events; units stand beside."""
-    with create(path) as file:
-        for i, (name, one) in enumerate(found, 1):
-            group = file.create_group(f"motion_{i}")
-            group.attrs["name"], group.attrs["said"] = name, one.said
-            group.attrs["Omega"], group.attrs["samples_per_period"] = one.equations.Omega, one.samples
-            group.attrs["read_outs"] = ", ".join(one.labels)
-            group.attrs["events"] = "rows of time in s, number of the contact, kind: " + ", ".join(
-                f"{k} {kind}" for k, kind in enumerate(KINDS)
-            )
-            for key, values, unit in (
-                ("time", one.time, "s"), ("displacement", one.y, "m"), ("velocity", one.v, "m/s"),
-                ("modal_displacement", one.q, "m kg^1/2"), ("modal_velocity", one.q_dot, "m kg^1/2 / s"),
-                ("contact_displacement", one.d, "m, rad"), ("contact_force", one.force, "N, N m"),
-                ("event", one.events, ""), *((f"energy_{k}", v, "J") for k, v in one.energy.items()),
-            ):  # fmt: skip
-                put(group, key, values, unit)

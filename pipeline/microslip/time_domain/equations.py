@@ -12,7 +12,7 @@ with the sign corrected). Contacts see d = D q + D_o o - R (F - F_0); R is the c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from ..contact.set_valued import SetValued
 from ..data import Array, UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Contact, Linear
+from .ramp import Ramp, turning_loads
 
 SEEN = 1e-12
 """Share of the largest entry below which a coupling of modes by dampers counts as rounding."""
@@ -39,6 +40,7 @@ class Equations:
         D: (c, m), D_o: (c, 1 + 2 H) motion of the contact coordinates. R: (c, c) m/N. F_0: (c,) preload, N and N m.
         output: (w, m), output_given: (w, 1 + 2 H), output_residual: (w, c); the read-outs are
             y = output q + output_given o - output_residual (F - F_0).
+        ramp: of a run-up, whose o is `Ramp.driving`. push: (m, n) modal forces of it that kick, B those that flow.
     """
 
     assembly: Assembly
@@ -55,6 +57,8 @@ class Equations:
     output: Array
     output_given: Array
     output_residual: Array
+    ramp: Ramp | None = None
+    push: Array | None = None
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -62,20 +66,44 @@ class Equations:
 
     @cached_property
     def turning(self) -> Array:
-        """(1 + 2 H, 1 + 2 H) o' over o."""
+        """(n, n) o' over o; zero of a run-up, whose o does not turn with one frequency."""
+        if self.ramp:
+            return np.zeros((self.B.shape[1], self.B.shape[1]))
         turns = [np.array([[0.0, -1.0], [1.0, 0.0]]) * h * self.Omega for h in self.harmonics]
         return scipy.linalg.block_diag(np.zeros((1, 1)), *turns)
 
     def oscillators(self, time: Array | float) -> Array:
-        """(..., 1 + 2 H) o at times (s)."""
+        """(..., n) o at times (s), n = 1 + 2 H."""
+        if self.ramp:
+            return np.asarray(self.ramp.driving(time, self.harmonics))
         angle = np.asarray(time)[..., None] * self.Omega * np.array(self.harmonics, dtype=float)
         pairs = np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(*np.shape(time), -1)
         return np.concatenate([np.ones((*np.shape(time), 1)), pairs], axis=-1)
 
+    def rates(self, time: Array) -> Array:
+        """(s, n) o' at times (s)."""
+        if self.ramp is None:
+            return self.oscillators(time) @ self.turning.T
+        h = 1e-4 / self.Omega
+        return (self.oscillators(time + h) - self.oscillators(time - h)) / (2 * h)
+
+    def frequency(self, time: Array) -> Array:
+        """rad/s of the loads' first harmonic at times (s)."""
+        return self.ramp.omega(time) if self.ramp else np.full(np.shape(time), self.Omega)
+
+    @cached_property
+    def still(self) -> tuple[Array, Array]:
+        """(m,) modal forces and (c,) motion of the contacts by loads that do not vibrate, at the start."""
+        if self.ramp is None or self.push is None:
+            return self.B[:, 0], self.D_o[:, 0]
+        return self.B[:, 0] + self.push[:, -2] * (self.ramp.first / self.ramp.order) ** 2, self.D_o[:, 0]
+
     @cached_property
     def steady(self) -> Array | None:
         """(m, 1 + 2 H) the periodic motion q = steady o that open contacts leave; None: there is none (a resonance
-        without damping, a body that nothing holds under a force)."""
+        without damping, a body that nothing holds under a force, a run-up)."""
+        if self.ramp:
+            return None
         m = len(self.omega2)
         found = np.zeros((m, 1 + 2 * len(self.harmonics)))
         K = np.diag(self.omega2)
@@ -182,3 +210,27 @@ def _of_harmonics(parts: dict[int, Linear], harmonics: Sequence[int], of: Callab
         a = of(parts[h])
         columns += [a.real, -a.imag]
     return np.stack(columns, axis=1)
+
+
+def of_ramp(assembly: Assembly, ramp: Ramp) -> Equations:
+    """The equations of an assembly whose loads' frequency changes.
+
+    Loads in rad2/s2 (centrifugal) follow the square of the rotation speed. Matrices stay as they are: those of the
+    modal files' speeds. Loss factors of bodies count as dampers that take as much at the highest frequency.
+
+    Raises:
+        UserError: see `of` and `ramp.turning_loads`.
+    """
+    assembly = assembly.unrolled()
+    rest, square, rising = turning_loads(assembly, ramp)
+    e = of(rest, max(ramp.first, ramp.last))
+    turning = e.shapes.T @ np.stack([square, rising], axis=1)
+    push = np.concatenate([np.zeros((len(e.B), 1)), e.B[:, 1:], turning], axis=1)
+    flowing = np.concatenate([e.B[:, :1], np.zeros((len(e.B), push.shape[1] - 1))], axis=1)
+
+    def wider(given: Array) -> Array:
+        return np.concatenate([given, np.zeros((len(given), 2))], axis=1)
+
+    return replace(
+        e, B=flowing, D_o=wider(e.D_o), output_given=wider(e.output_given), ramp=ramp, push=push, assembly=assembly
+    )

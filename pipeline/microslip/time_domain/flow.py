@@ -53,9 +53,10 @@ def flow(equations: Equations, tau: float, doublings: int = DOUBLINGS) -> Flow:
     moves, turns, S, L = ([x] for x in one)
     for _ in range(doublings):
         full = _whole(moves[-1], turns[-1])
-        twice = full @ full
-        for kept in (S, L):
-            kept.append(kept[-1] + full.transpose(0, 2, 1) @ kept[-1] @ full)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a motion that grows, which takes no leaps
+            twice = full @ full
+            for kept in (S, L):
+                kept.append(kept[-1] + full.transpose(0, 2, 1) @ kept[-1] @ full)
         moves.append(twice[:, : 2 * p])
         turns.append(scipy.linalg.expm(e.turning * tau * 2.0 ** len(turns)))
     assert moves[0].shape == (b, 2 * p, 2 * p + n)

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy.linalg
 
 from ..data import Array, NotConverged, UserError
+from ..files.hdf5 import create, put, seal
+from ..files.store import complete_or_absent
 from ..settings.mistakes import bounded
 from ..units import counted
+from . import samples as kept_samples
 from .equations import Equations
+from .samples import ROWS, UNITS, InMemory, Kept
+from .starts import Periodic
+from .starts import begun as on_its_way
 from .stepper import KINDS, Now, Seen, Stepper, static_force
 
 if TYPE_CHECKING:
@@ -35,8 +42,14 @@ STABLE = 1.8
 CHUNK = 16
 """Periods between two reports."""
 
+PENETRATES = 1e-6
+"""Share of an interference by which a contact may be pressed deeper than it is under the steady loads."""
+
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
+
+STRIP = 1 << 16
+"""Samples of a long motion that are looked at together."""
 
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
@@ -76,23 +89,59 @@ class Orbit:
     messages: tuple[str, ...] = field(default=())
 
     def __repr__(self) -> str:
-        w = self.equations.Omega
+        w = self.Omega
         return (
             f"<Orbit: {len(self.time) // self.samples} periods at {w / 2 / np.pi:.6g} Hz ({w:.6g} rad/s); {self.said}>"
         )
 
     @property
+    def Omega(self) -> float:
+        """rad/s of the excitation."""
+        return self.equations.Omega
+
+    @property
+    def omega2(self) -> Array:
+        """(m,) (rad/s)^2 of the modal coordinates."""
+        return self.equations.omega2
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Their names, in the order in which events count them."""
+        return tuple(c.name for c in self.equations.contacts)
+
+    @property
     def period(self) -> float:
         """s, of the excitation."""
-        return 2 * np.pi / self.equations.Omega
+        return 2 * np.pi / self.Omega
+
+    def array(self, name: str, part: slice = slice(None)) -> Array:
+        """What a file has under a name (`samples.UNITS`), or a part of the samples of it."""
+        own = {
+            "time": self.time, "displacement": self.y, "velocity": self.v, "modal_displacement": self.q,
+            "modal_velocity": self.q_dot, "contact_displacement": self.d, "contact_force": self.force,
+        }  # fmt: skip
+        if name == "angular_frequency":
+            return self.equations.frequency(self.time[part])
+        found = own[name] if name in own else self.energy[name.removeprefix("energy_")]
+        return np.asarray(found[..., part])
+
+    def _strips(self, *names: str) -> Iterator[list[Array]]:
+        """Arrays, so many samples at a time."""
+        for begin in range(0, len(self.time), STRIP):
+            yield [self.array(name, slice(begin, begin + STRIP)) for name in names]
 
     @cached_property
     def repeats(self) -> int:
         """After how many periods of the excitation the motion comes back within `REPEATS`; 0: it does not within half
         of the periods that are kept."""
-        z = np.concatenate([np.sqrt(np.abs(self.equations.omega2))[:, None] * self.q, self.q_dot])
-        stroboscopic = z[:, self.samples - 1 :: self.samples]
-        size, count = np.abs(z).max(initial=0.0), stroboscopic.shape[1]
+        size, after, begin = 0.0, list[Array](), 0
+        for q, q_dot in self._strips("modal_displacement", "modal_velocity"):
+            z = np.concatenate([np.sqrt(np.abs(self.omega2))[:, None] * q, q_dot])
+            size = max(size, float(np.abs(z).max(initial=0.0)))
+            after.append(z[:, (-1 - begin) % self.samples :: self.samples])
+            begin += z.shape[1]
+        stroboscopic = np.concatenate([np.zeros((2 * len(self.omega2), 0)), *after], axis=1)
+        count = stroboscopic.shape[1]
         for p in range(1, count // 2 + 1):
             if np.abs(stroboscopic[:, p:] - stroboscopic[:, :-p]).max(initial=0.0) <= REPEATS * size:
                 return p
@@ -115,6 +164,8 @@ class Orbit:
         """What motion it is, in words."""
         if math.isfinite(self.diverged):
             return f"diverged at {self.diverged:.6g} s"
+        if run_up := self._run_up:
+            return run_up
         kept, p = len(self.time) // self.samples, self.repeats
         if kept < 2:
             return "too short to say whether it repeats"
@@ -125,23 +176,109 @@ class Orbit:
             if p
             else f"{self.impacts:.4g} impact{'s' * (self.impacts != 1)} a period"
         )
-        return f"{came}, {per}" if self.equations.contacts else came
+        return f"{came}, {per}" if self.contacts else came
+
+    @property
+    def frequency(self) -> Array:
+        """(s,) Hz of the excitation; it changes in a run-up."""
+        return self.array("angular_frequency") / (2 * np.pi)
+
+    @property
+    def _run_up(self) -> str:
+        """What a run-up met, in words; empty if it is none."""
+        ends = [self.array("angular_frequency", part) for part in (slice(1), slice(-1, None))]
+        if not len(self.time) or np.ptp(ends) == 0:
+            return ""
+        top, at = -1.0, 0.0
+        for y, w in self._strips("displacement", "angular_frequency"):
+            if len(y) and (high := float(np.abs(y[0]).max())) > top:
+                top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
+        way = "up" if ends[1] > ends[0] else "down"
+        said = f"run-{way} from {ends[0][0] / 2 / np.pi:.6g} to {ends[1][0] / 2 / np.pi:.6g} Hz"
+        return f"{said}, largest at {at:.6g} Hz" if self.labels else said
 
     @property
     def drift(self) -> float:
         """Share of the energy that passed through the contacts by which what they store and lost differs from it."""
-        E = self.energy
-        gone = np.abs(E["contacts"] - E["stored"] - E["lost"] - (E["contacts"] - E["stored"] - E["lost"])[0])
-        passed = np.ptp(E["contacts"]) if len(self.time) else 0.0
-        return float(gone.max() / passed) if passed else 0.0
+        gone, passed, first = 0.0, Range(), None
+        for contacts, stored, lost in self._energies("contacts", "stored", "lost"):
+            first = (contacts - stored - lost)[0] if first is None else first
+            gone = np.maximum(gone, np.abs(contacts - stored - lost - first).max())
+            passed.see(contacts)
+        return float(gone / passed.width) if passed.width else 0.0
 
     @property
     def balance(self) -> float:
         """Largest deviation of the bodies' energy from what they got, a share of what was given or is there at most."""
-        E = self.energy
-        left = E["mechanical"] - E["given"] + E["damped"] + E["contacts"]
-        size = max(np.abs(E["mechanical"]).max(initial=0.0), np.ptp(E["given"]) if len(self.time) else 0.0)
-        return float(np.ptp(left) / size) if size else 0.0
+        left, given, most = Range(), Range(), 0.0
+        for mechanical, supplied, damped, contacts in self._energies("mechanical", "given", "damped", "contacts"):
+            left.see(mechanical - supplied + damped + contacts)
+            given.see(supplied)
+            most = max(most, float(np.abs(mechanical).max(initial=0.0)))
+        size = max(most, given.width)
+        return left.width / size if size else 0.0
+
+    def _energies(self, *names: str) -> Iterator[list[Array]]:
+        return self._strips(*(f"energy_{name}" for name in names))
+
+    # tables and files ------------------------------------------------------------------------------------------------
+
+    def to_dataframe(self) -> Any:
+        """Read-outs, their velocities and energies as a `pandas.DataFrame`, a row a sample."""
+        import pandas
+
+        y, v = self.y, self.v
+        columns = {"time_s": self.time}
+        for i, label in enumerate(self.labels):
+            columns |= {f"{label}_m": y[i], f"{label}_m_per_s": v[i]}
+        return pandas.DataFrame({**columns, **{f"{name}_J": values for name, values in self.energy.items()}})
+
+    def to_xarray(self) -> Any:
+        """Everything as an `xarray.Dataset` over the axis ``time``; events have an axis of their own, units are
+        attributes."""
+        import xarray
+
+        variables = {
+            name: ((ROWS[name], "time") if name in ROWS else ("time",), self.array(name), {"units": unit})
+            for name, unit in UNITS.items()
+            if name != "time"
+        }
+        when, where, kind = self.events.T
+        variables |= {
+            "event_time": (("event",), when, {"units": "s"}),
+            "event_contact": (("event",), np.array(self.contacts, dtype=str)[where.astype(int)], {}),
+            "event_kind": (("event",), np.array(KINDS)[kind.astype(int)], {}),
+        }
+        coords = {"time": ("time", self.time, {"units": "s"}), "read_out": list(self.labels)}
+        attrs = {"Omega": self.Omega, "samples_per_period": self.samples, "said": self.said, **self._told}
+        return xarray.Dataset(variables, coords=coords, attrs={**attrs, "messages": list(self.messages)})
+
+    @property
+    def _told(self) -> dict[str, Any]:
+        return {
+            "steps_per_period": self.steps, "missed_events": self.missed, "error": self.error,
+            "diverged": self.diverged, "messages": list(self.messages),
+        }  # fmt: skip
+
+    def save(self, path: Path | str) -> Path:
+        """Write a file of this motion (``docs/time_domain.md``), complete or absent; `load` reads it.
+
+        Raises:
+            UserError: no permission, no space.
+        """
+        with complete_or_absent(path) as temporary:
+            with create(temporary) as file:
+                kept_samples.head(file)
+                group = file.create_group("motion_1")
+                kept_samples.describe(
+                    group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.contacts, self.samples
+                )
+                for name, unit in UNITS.items():
+                    put(group, name, self.array(name), unit)
+                put(group, "event", self.events)
+                kept_samples.tell(group, self._told)
+            seal(temporary)
+        return Path(path)
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:
         """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period."""
@@ -156,9 +293,36 @@ class Orbit:
         return axes
 
 
+@dataclass
+class Range:
+    """Between what some numbers lie."""
+
+    low: float = math.inf
+    high: float = -math.inf
+
+    def see(self, values: Array) -> None:
+        self.low = np.minimum(self.low, values.min(initial=math.inf))
+        self.high = np.maximum(self.high, values.max(initial=-math.inf))
+
+    @property
+    def width(self) -> float:
+        """0 where there were none; nan where one was."""
+        return 0.0 if self.low > self.high else float(self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a motion ended, see `Orbit`."""
+
+    steps: int
+    error: float = math.nan
+    diverged: float = math.inf
+    messages: tuple[str, ...] = ()
+
+
 def run(
     equations: Equations, settle: int, keep: int, samples: int = 256, steps: int | None = None,
-    start: Start = "static", report: Report = lambda _: None,
+    start: Start | Periodic = "static", report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time from a start: see `microslip.integrate`.
 
@@ -168,12 +332,29 @@ def run(
     Raises:
         UserError: steps that are too few for the contacts' springs. NotConverged: no state of rest is found.
     """
+    kept = InMemory()
+    ended = march(equations, settle, keep, samples, steps, start, report, kept)
+    a = kept.arrays(equations)
+    return Orbit(
+        equations, kept_samples.labels_of(equations), samples, ended.steps, a["time"], a["displacement"], a["velocity"],
+        a["modal_displacement"], a["modal_velocity"], a["contact_displacement"], a["contact_force"],
+        {name: a[f"energy_{name}"] for name in kept_samples.ENERGIES}, a["event"], kept.missed, ended.error,
+        ended.diverged, ended.messages,
+    )  # fmt: skip
+
+
+def march(
+    equations: Equations, settle: int, keep: int, samples: int, steps: int | None, start: Start | Periodic,
+    report: Report,
+    kept: Kept,
+) -> Ended:  # fmt: skip
+    """`run`, its samples kept elsewhere, and gone on with where that has been begun."""
     for name, value, least in (("settle", settle, 0), ("keep", keep, 1), ("samples", samples, 8)):
         bounded(name, value, ge=least)
     each = steps_of_a_sample(equations, samples, steps)
     stepper = Stepper(equations, 2 * np.pi / equations.Omega / (each * samples))
-    now = stepper.start(*begun(equations, start))
-    kept, done, missed, events = list[Seen](), 0, 0, list[Array]()
+    first = on_its_way(stepper, start) if isinstance(start, Periodic) else stepper.start(*begun(equations, start))
+    now, done = kept.begun(first)
     while done < settle + keep:
         before, dense = now, done >= settle
         ahead = 1 if dense else min(CHUNK, settle - done, samples)
@@ -181,25 +362,40 @@ def run(
         now, seen, listed, count = stepper.run(now, rows)
         done += ahead
         if not np.isfinite(seen.mechanical[-1]):
-            return _orbit(stepper, kept, events, missed, samples, each, diverged=float(before.time))
+            when, why = _divergence(stepper, before, seen, kept if dense else None)
+            return Ended(each * samples, diverged=when, messages=(why,))
         if dense:
-            kept.append(seen)
-            events.append(listed)
-            missed += count - len(listed)
+            kept.keep(kept_samples.of_period(equations, seen), listed, count - len(listed))
+        kept.mark(now, done)
         if done % CHUNK == 0 or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
-    found = _orbit(stepper, kept, events, missed, samples, each)
     error = _error(stepper, now, samples, each)
-    return replace(found, error=error, messages=_warnings(found, float(now.worst)))
+    return Ended(each * samples, error, messages=_warnings(kept, float(now.worst)))
 
 
-def _warnings(found: Orbit, worst: float) -> tuple[str, ...]:
+def _divergence(stepper: Stepper, before: Now, seen: Seen, kept: Kept | None) -> tuple[float, str]:
+    """When a motion became infinite, s, and why; what is finite of its last period is kept."""
+    finite = np.isfinite(np.asarray(seen.mechanical))
+    whole = int(np.argmin(finite))
+    sound = Seen._make(np.asarray(x)[:whole] for x in seen)
+    if kept is not None and whole:
+        kept.keep(kept_samples.of_period(stepper.equations, sound), np.zeros((0, 3)), 0)
+    when = float(sound.time[-1]) if whole else float(before.time)
+    energy = float(sound.mechanical[-1]) if whole else math.nan
+    wrong = ~np.isfinite(np.asarray(seen.force)[whole])
+    owners = [c.name for c in stepper.equations.contacts for _ in c.offset]
+    named = ", ".join(dict.fromkeys(name for name, bad in zip(owners, wrong, strict=True) if bad))
+    reached = f"its energy was {energy:.3g} J until then" + (f", the force of {named} is none" if named else "")
+    return when, f"From {when:.6g} s on it is no number: {reached}; take more steps, or look for what drives it."
+
+
+def _warnings(kept: Kept, worst: float) -> tuple[str, ...]:
     """What a reader must know. worst: m, of the contacts that yield at once."""
     said = []
-    if worst > UNSOLVED * np.abs(found.d).max(initial=0.0):
+    if worst > UNSOLVED * kept.widest:
         said.append(f"Contacts were not solved for in every step, to {worst:.2g} m at worst; take more steps.")
-    if found.missed:
-        said.append(f"{counted(found.missed, 'event')} more than are listed, and counted, happened.")
+    if kept.missed:
+        said.append(f"{counted(kept.missed, 'event')} more than are listed, and counted, happened.")
     return tuple(said)
 
 
@@ -207,7 +403,7 @@ def _error(stepper: Stepper, now: Now, samples: int, each: int) -> float:
     """Deviation of one more period from the same with half the step, over the largest read-out."""
     fine = replace(stepper, tau=stepper.tau / 2)
     both = [s.run(now, np.full(samples, k))[1] for s, k in ((stepper, each), (fine, 2 * each))]
-    y = [_read(stepper.equations, seen) for seen in both]
+    y = [kept_samples.read(stepper.equations, seen) for seen in both]
     size = np.abs(y[1]).max(initial=0.0)
     return float(np.abs(y[0] - y[1]).max(initial=0.0) / size * 4 / 3) if size else 0.0
 
@@ -236,24 +432,35 @@ def begun(e: Equations, start: Start) -> tuple[Array, Array]:
     Raises:
         NotConverged: Newton's method finds no rest under the steady loads. UserError: no such start.
     """
-    zero = np.zeros(len(e.omega2))
+    zero, tight = np.zeros(len(e.omega2)), [c.offset[0] > 0 and not c.preload.any() for c in e.contacts]
     if start == "rest":
+        if any(tight) and not e.R.any():
+            _refuse_penetration(e, _static(e))
         return zero, zero
     if start != "static":
-        raise UserError(f"start: '{start}' is none of static, rest")
-    if not e.B[:, 0].any() and not any(c.offset[0] > 0 and not c.preload.any() for c in e.contacts):
+        raise UserError(f"start: '{start}' is none of static, rest, balance")
+    if not e.still[0].any() and not any(tight):
         return zero, zero  # preloads are in balance there
     return _static(e), zero
+
+
+def _refuse_penetration(e: Equations, q: Array) -> None:
+    """Contacts that are pressed deeper at q = 0 than under the steady loads would throw the bodies apart."""
+    nearer, begins = e.D @ q + e.still[1], np.cumsum([0, *(c.patch.count for c in e.contacts)])
+    for c, i in zip(e.contacts, begins, strict=False):
+        if c.offset[0] > 0 and nearer[i] < -PENETRATES * c.offset[0]:
+            depth = f"{c.offset[0]:.4g} m deep, where steady loads press it {c.offset[0] + nearer[i]:.4g} m"
+            raise UserError(f'start: "rest" begins with {c.name} {depth}; write start = "static"')
 
 
 def _static(e: Equations, most: int = 60) -> Array:
     """(m,) where steady loads and contacts that came there on a straight way are in balance, by Newton's method."""
     q, force = np.zeros(len(e.omega2)), static_force(Stepper(e, 1.0, accounts=False))
-    scale = np.abs(e.B[:, 0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)
+    scale = np.abs(e.still[0]).max(initial=0.0) + np.abs(e.D.T @ e.F_0).max(initial=0.0)
 
     def missing(q: Array) -> tuple[Array, Array]:
         F, S = force(q)
-        return e.omega2 * q - e.B[:, 0] + F, S
+        return e.omega2 * q - e.still[0] + F, S
 
     R, S = missing(q)
     scale = max(scale, np.abs(R).max(initial=0.0))
@@ -270,36 +477,3 @@ def _static(e: Equations, most: int = 60) -> Array:
             share *= 0.5
         q, R, S = q + share * step, trial, slope
     raise NotConverged('no rest under the steady loads was found; write start = "rest" to begin at q = 0')
-
-
-def _orbit(
-    stepper: Stepper, kept: list[Seen], events: list[Array], missed: int, samples: int, each: int,
-    diverged: float = math.inf,
-) -> Orbit:  # fmt: skip
-    e, c = stepper.equations, len(stepper.equations.D)
-    m = len(e.omega2)
-    none = Seen._make([*(np.zeros((0, n)) for n in (m, m, c, c, 5)), np.zeros(0), np.zeros(0)])
-    seen = Seen._make(np.concatenate(x) for x in zip(none, *kept, strict=True))
-    listed = np.concatenate([np.zeros((0, 3)), *events])
-    rates = seen.q_dot @ e.output.T + e.oscillators(seen.time) @ (e.output_given @ e.turning).T
-    return Orbit(
-        e, tuple(f"{w.monitor} {w.label}" for w in e.assembly.outputs), samples, each * samples, seen.time,
-        _read(e, seen), rates.T, seen.q.T, seen.q_dot.T, seen.d.T, seen.force.T, _energies(e, seen), listed, missed,
-        diverged=diverged,
-    )  # fmt: skip
-
-
-def _read(e: Equations, seen: Seen) -> Array:
-    """(w, s) read-outs, m."""
-    q, force, o = np.asarray(seen.q), np.asarray(seen.force), e.oscillators(np.asarray(seen.time))
-    return (q @ e.output.T - (force - e.F_0) @ e.output_residual.T + o @ e.output_given.T).T
-
-
-def _energies(e: Equations, seen: Seen) -> dict[str, Array]:
-    """See `Orbit`: preloads count as loads, and what bodies hold beside their modes as theirs."""
-    named = dict(zip(("given", "damped", "contacts", "lost", "stored"), seen.energy.T, strict=True))
-    more, preloads = seen.force - e.F_0, seen.d @ e.F_0
-    beside = 0.5 * np.einsum("sc,cd,sd->s", more, e.R, more)
-    named["given"] = named["given"] + preloads
-    named["contacts"] = named["contacts"] + preloads - beside
-    return {"mechanical": seen.mechanical + beside, **named}

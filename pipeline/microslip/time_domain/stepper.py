@@ -26,6 +26,7 @@ from .contacts import Group, Held, Yielding, answer, force_at, rigid_answer, slo
 from .equations import Equations
 from .flow import DOUBLINGS, Flow, blocks, flow
 from .inclusion import Meets, meets
+from .ramp import Ramp
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -38,9 +39,10 @@ class Bodies(NamedTuple):
 
     Attributes:
         flow. yielding: see `contacts`. meets: of set-valued points, None: there are none. F_0: (c,). D: (c, m) and
-            D_o, D_v (c, n): d and d' of the contact coordinates. kick: (m, c) velocities per force.
+            D_o (c, n): d of the contact coordinates. rate: (n, n) o' over o. kick: (m, c) velocities per force.
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
-            motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
+            motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`. loads: (b, p, n) modal
+            forces of o that kick, of a run-up.
     """
 
     flow: Flow
@@ -49,12 +51,13 @@ class Bodies(NamedTuple):
     F_0: Any
     D: Any
     D_o: Any
-    D_v: Any
+    rate: Any
     kick: Any
     omega2: Any
     steady: Any
     reach: Any
     drift: Any
+    loads: Any
 
 
 class Now(NamedTuple):
@@ -101,10 +104,11 @@ class Seen(NamedTuple):
 @dataclass(frozen=True)
 class Options:
     """What the loop is compiled for. leaps: over flights without contact. accounts: of the energy that contacts store
-    and lose."""
+    and lose. ramp: o is that of a run-up, with these harmonics, whose loads kick."""
 
     leaps: bool
     accounts: bool
+    ramp: tuple[Ramp, tuple[int, ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +161,7 @@ class Stepper:
         opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
         leaps = opens and not e.F_0.any() and e.steady is not None and bool(dissipative)
-        return Options(leaps, self.accounts)
+        return Options(leaps, self.accounts, (e.ramp, e.harmonics) if e.ramp else None)
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -172,7 +176,8 @@ class Stepper:
         drift = np.linalg.norm(np.abs((moved @ still + given) @ e.turning).sum(axis=2), axis=1)
         D, D_o, F_0 = e.D[rows], e.D_o[rows], jnp.asarray(e.F_0[rows])
         R, share = (jnp.asarray(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
-        arrays = map(jnp.asarray, (D, D_o, D_o @ e.turning, -D.T, e.omega2.reshape(b, p), steady, reach, drift))
+        loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
+        arrays = map(jnp.asarray, (D, D_o, e.turning, -D.T, e.omega2.reshape(b, p), steady, reach, drift, loads))
         flows = flow(e, self.tau, DOUBLINGS if self.options.leaps else 0)
         return Bodies(flows, Yielding(R, share, F_0) if e.R.any() else None, self._meets(flows), F_0, *arrays)
 
@@ -224,16 +229,16 @@ class Stepper:
         spots = np.concatenate([np.zeros((0, 3, len(e.D))), *(G for G, _ in self._spots)])
         return spots @ e.D[self.rows], spots @ e.D_o[self.rows]
 
-    def start(self, q: Array, v: Array, time: float = 0.0) -> Now:
-        """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from u = 0 on a straight
-        way."""
+    def start(self, q: Array, v: Array, time: float = 0.0, held: Held | None = None) -> Now:
+        """At rest or moving, from modal coordinates (m,) and velocities; contacts come there on a straight way from
+        what they held, from u = 0 if it is not given."""
         e = self.equations
         b, p = blocks(e)
         y = jnp.concatenate([jnp.asarray(q).reshape(b, p), jnp.asarray(v).reshape(b, p)], axis=1)
         none = jnp.zeros((4, len(e.contacts)))
         now = Now(
             y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros((b, p)),
-            untouched(self.groups), jnp.zeros(5), jnp.zeros(()), none.astype(bool), none,
+            held or untouched(self.groups), jnp.zeros(5), jnp.zeros(()), none.astype(bool), none,
         )  # fmt: skip
         return _begun(self.options, self.groups, self.bodies, now)
 
@@ -265,7 +270,7 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
     @jax.jit
     def found(q: Any) -> tuple[Any, Any]:
-        d = bodies.D @ q + bodies.D_o[:, 0]
+        d = bodies.D @ q + jnp.asarray(stepper.equations.still[1][stepper.rows])
         still = jnp.zeros_like(d)
         force = force_at(groups, d, still, 1.0, states)[0]
         return bodies.D.T @ (force - bodies.F_0), bodies.D.T @ slope_at(groups, d, still, 1.0, states) @ bodies.D
@@ -274,31 +279,32 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
 
 def _pushed(
-    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, dt: Any, held: Held,
-    share: float = 1.0,
+    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, moves: Any, dt: Any,
+    held: Held, share: float = 1.0,
 ) -> tuple[Held, Any]:  # fmt: skip
     """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
 
     Args:
         v_free: (b, p) velocities without the kick at the step's end. half: (b, p) that kick, as far as it is known.
-            share: of a whole kick that is still to come before the bodies flow on.
+            moves: (n,) o'. share: of a whole kick that is still to come before the bodies flow on.
     """
     free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
-    v = times(B.D, (v_free + half).reshape(-1)) + times(B.D_v, o)
+    given = times(B.D_o, moves)
+    v = times(B.D, (v_free + half).reshape(-1)) + given
     if B.meets is None:
         held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
         return held, _by_force(B, held.force)
     force, *others = force_at(groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
-        ahead = _ahead(B, q, v_free + share * dt * _by_force(B, force), o)
+        ahead = _ahead(B, q, v_free + share * dt * (_by_force(B, force) + times(B.loads, o)), o)
     else:
         free = free + times(B.yielding.R, B.F_0)
     points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
     held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
     push = _by_force(B, held.force)
     if B.yielding is None and options.accounts:
-        v = times(B.D, (v_free + 0.5 * dt * push).reshape(-1)) + times(B.D_v, o)
+        v = times(B.D, (v_free + 0.5 * dt * (push + times(B.loads, o))).reshape(-1)) + given
         held = held._replace(lost=held.lost + dt * jnp.sum((held.force - force) * v))
     return held, push
 
@@ -319,7 +325,7 @@ def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
 def _begun(options: Options, groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     """The contacts where the bodies are."""
     q, v = jnp.split(now.y, 2, axis=1)
-    held, push = _pushed(options, groups, B, q, v, 0 * v, now.o, B.flow.length[0], now.held, 0.5)
+    held, push = _pushed(options, groups, B, q, v, 0 * v, now.o, times(B.rate, now.o), B.flow.length[0], now.held, 0.5)
     return now._replace(push=push, held=held, energy=now.energy.at[4].set(held.stored), worst=held.missed)
 
 
@@ -354,22 +360,35 @@ def _step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now
     p = B.omega2.shape[1]
     k = _leap(groups, B, left, now) if options.leaps else 0
     dt = B.flow.length[k]
-    before = 0.5 * dt * now.push
-    v = now.y[:, p:] + before
+    touched, pushed = 0.5 * dt * now.push, 0.5 * dt * times(B.loads, now.o)
+    v = now.y[:, p:] + touched + pushed
     z = jnp.concatenate([now.y[:, :p], v, jnp.broadcast_to(now.o, (len(v), len(now.o)))], axis=1)
     flown = times(B.flow.stack[k], z)
     q, v_free = flown[:, :p], flown[:, p : 2 * p]
     given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
-    o = times(B.flow.turn[k], now.o)
-    held, push = _pushed(options, groups, B, q, v_free, before, o, dt, now.held)
-    after = 0.5 * dt * push
-    work = -jnp.sum(before * (v - 0.5 * before)) - jnp.sum(after * (v_free + 0.5 * after))
-    y = jnp.concatenate([q, v_free + after], axis=1)
+    o, moves = _driven(options, B, now, k, dt)
+    held, push = _pushed(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
+    y, work = jnp.concatenate([q, v_free], axis=1), jnp.zeros(())
+    after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
+    for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
+        work -= jnp.sum(contacts * mean)
+        given += jnp.sum(loads * mean)
+    y = y.at[:, p:].add(sum(after))
     energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, held.lost])), held.stored])
     met, at = _met(now, held, dt)
     return left - 2**k, Now(
         y, o, now.time + dt, push, held, energy, jnp.maximum(now.worst, held.missed), met, at
     )  # fmt: skip
+
+
+def _driven(options: Options, B: Bodies, now: Now, k: Any, dt: Any) -> tuple[Any, Any]:
+    """(n,) o after a step, and o' there."""
+    if options.ramp is None:
+        o = times(B.flow.turn[k], now.o)
+        return o, times(B.rate, o)
+    ramp, harmonics = options.ramp
+    o = ramp.driving(now.time + dt, harmonics, jnp)
+    return o, (o - now.o) / dt
 
 
 def _leap(groups: tuple[Group, ...], B: Bodies, left: Any, now: Now) -> Any:

@@ -1,0 +1,87 @@
+"""Where a motion begins: at rest, or on the periodic motion of a harmonic balance with what its contacts remember."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..data import Array, NotConverged
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.response import operating
+from ..harmonic_balance.solver import sweep
+from .contacts import Group, Held, answer, untouched
+from .equations import Equations
+from .stepper import Now, Stepper
+
+CYCLES = 30
+"""Cycles at most in which contacts come to remember a periodic motion."""
+
+SAMPLES = 4096
+"""Of each of them."""
+
+PERIODIC = 1e-12
+"""Share of the largest force of a point within which the end of a cycle is that of the one before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Periodic:
+    """A periodic motion to start on.
+
+    Attributes:
+        q, v: (m,) modal displacements and velocities at t = 0. d: (c, W) mean, cos, sin, cos 2, ... of the contact
+            coordinates, m and rad.
+    """
+
+    q: Array
+    v: Array
+    d: Array
+
+
+def of_balance(e: Equations, problem: Problem) -> Periodic:
+    """The solution of a harmonic balance of the same assembly at the frequency of the equations.
+
+    Raises:
+        NotConverged: there is none.
+    """
+    point = sweep(problem, np.array([e.Omega / (2 * np.pi)]))[0]
+    if not point.converged:
+        raise NotConverged(f'start: harmonic balance found no vibration ({point.status}); write start = "static"')
+    found, contacts = operating(problem, point), e.contacts
+    bodies = [np.concatenate(parts) for parts in zip(*found.q.values(), strict=True)]
+    M = e.assembly.joined(1).M.real
+    q = np.array([e.shapes.T @ (M @ one) for one in bodies])
+    turns = 1j * e.Omega * np.arange(len(q))
+    relative = [found.relative[c.name].copy() for c in contacts]
+    for one, c in zip(relative, contacts, strict=True):
+        one[:, 0] -= c.offset
+    d = np.concatenate(relative) if relative else np.zeros((0, problem.coefficients))
+    return Periodic(q.sum(axis=0).real, (turns @ q).real, d)
+
+
+def begun(stepper: Stepper, start: Periodic) -> Now:
+    """On a periodic motion, the contacts led along it until what they remember is periodic too."""
+    e, H = stepper.equations, start.d.shape[1] // 2
+    angle = 2 * np.pi / SAMPLES * np.arange(1, SAMPLES + 1)[:, None] * np.arange(1, H + 1)
+    cos, sin = start.d[:, 1::2].T, start.d[:, 2::2].T
+    d = start.d[:, 0] + np.cos(angle) @ cos + np.sin(angle) @ sin
+    h = e.Omega * np.arange(1, H + 1)[:, None]
+    v = np.cos(angle) @ (h * sin) - np.sin(angle) @ (h * cos)
+    d, v = d[:, stepper.rows], v[:, stepper.rows]
+    held, before = untouched(stepper.groups), np.full(1, np.inf)
+    for _ in range(CYCLES):
+        held = _led(stepper.groups, held, jnp.asarray(d), jnp.asarray(v), 2 * np.pi / e.Omega / SAMPLES)
+        points = np.concatenate([np.zeros((1, 3)), *(np.asarray(p) for p in held.forces)])
+        if np.abs(points - before).max(initial=0.0) <= PERIODIC * np.abs(points).max(initial=0.0):
+            break
+        before = points
+    return stepper.start(start.q, start.v, held=held)
+
+
+@jax.jit
+def _led(groups: tuple[Group, ...], held: Held, d: Any, v: Any, dt: Any) -> Held:
+    """What contacts hold after a path (s, c)."""
+    return jax.lax.scan(lambda h, one: (answer(groups, None, *one, dt, h, False), None), held, (d, v))[0]
