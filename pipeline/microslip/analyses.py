@@ -213,7 +213,7 @@ def _hertz(unit: str) -> float:
 def integrate(
     system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
     samples: int = 256, steps: int | None = None, start: Literal["static", "rest"] = "static",
-    report: Report = lambda _: None,
+    method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -226,13 +226,16 @@ def integrate(
             that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
             if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
         start: ``static``, at rest under the steady loads, or ``rest``, at rest in the preloaded state.
+        method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
+            tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         report: is told what is under way.
 
     Returns:
         An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``; ``error`` of its last period.
 
     Raises:
-        UserError: steps that are too few for the springs of the contacts. NotConverged: no state of rest is found.
+        UserError: steps that are too few for the springs of the contacts; a law that ``reference`` cannot integrate.
+        NotConverged: no state of rest is found, or ``reference`` gave up.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -242,10 +245,14 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit
+    from .time_domain import equations, orbit, reference
 
+    if method not in ("stepper", "reference"):
+        raise UserError(f"method: '{method}' is none of stepper, reference")
     if isinstance(system, Built):
         system = _pressed(system)
     assembly = system.assembly if isinstance(system, Problem) else system
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    if method == "reference":
+        return reference.run(found, settle, keep, samples, start, tolerance, report)
     return orbit.run(found, settle, keep, samples, steps, start, report)
