@@ -72,3 +72,11 @@ def test_the_benchmark_of_small_systems_follows_the_curves_that_its_peer_follows
     rows = [[c.strip() for c in line.strip("|").split("|")] for line in said.splitlines() if "| pyHarm" in line]
     assert all(float(r[-1]) < 1e-7 for r in rows)  # its tolerance
     assert said.count("First curve of a process") == 2
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_motions_in_time_reaches_its_errors_by_all_methods():
+    said = printed("time_domain.py")
+    rows = [[c.strip() for c in line.strip("|").split("|")] for line in said.splitlines() if line.startswith("| 1e-")]
+    assert len(rows) == 12 and {r[1] for r in rows} == {"microslip", "LSODA", "Radau"}
+    assert all(float(r[3]) <= float(r[0]) for r in rows)

@@ -217,7 +217,8 @@ def _hertz(unit: str) -> float:
 def integrate(
     system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
     samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
-    file: Path | str | None = None, report: Report = lambda _: None,
+    method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, file: Path | str | None = None,
+    report: Report = lambda _: None,
 ) -> Orbit:  # fmt: skip
     """Motion in time under harmonic loads, from rest (Sextro, section 4.1).
 
@@ -232,6 +233,8 @@ def integrate(
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
             are taken; a balance or a case has its own.
+        method: ``reference`` is CVODE, an integrator for stiff equations that chooses its own steps by a relative
+            tolerance: slower, of laws that are differential equations, and what the stepper is proved on.
         file: samples are written there as they come and read when they are asked for, so that a long motion needs no
             more memory than a short one; a run that was killed is gone on with. report: is told what is under way.
 
@@ -241,7 +244,8 @@ def integrate(
 
     Raises:
         UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
-            steady loads do. NotConverged: no state of rest, or no vibration to start on, is found.
+            steady loads do; a law that ``reference`` cannot integrate, a start or a file that it does not take.
+        NotConverged: no state of rest, or no vibration to start on, is found, or ``reference`` gave up.
 
     Examples:
         A mass that hits a stop once in every period:
@@ -251,11 +255,17 @@ def integrate(
         >>> ms.integrate(hammer, 1.5, unit="rad/s").repeats
         1
     """
-    from .time_domain import equations, orbit, recorded, starts
+    from .time_domain import equations, orbit, recorded, reference, starts
 
     assembly = _pressed(system) if isinstance(system, Built) else system
+    if method not in ("stepper", "reference"):
+        raise UserError(f"method: '{method}' is none of stepper, reference")
     assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
     found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    if method == "reference":
+        if start == "balance" or file is not None:
+            raise UserError('method: "reference" begins from "static" or "rest", and writes no file; use the stepper')
+        return reference.run(found, settle, keep, samples, start, tolerance, report)
     begin: orbit.Start | starts.Periodic
     if start == "balance":
         many = IN_TIME if isinstance(system, Assembly) else None

@@ -32,6 +32,13 @@ class Spring(Law):
         force = self.force(u[:, 1])
         return jnp.stack([0 * force, force, 0 * force], axis=1), state
 
+    @property
+    def remembers(self) -> int | None:
+        return 0
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        return self.step(u, v, 0.0, x)[0], x
+
     def limit(self, force: Array, state: Array) -> Array:
         return jnp.full(force.shape[:1], jnp.inf)
 

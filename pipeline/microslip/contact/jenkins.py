@@ -61,6 +61,18 @@ class Jenkins(Law):
         after = JenkinsState(way, jnp.stack([elastic, jnp.zeros_like(elastic)]), slipped)
         return self._frame(self.normal * u[:, 0], elastic, self.across * other), after
 
+    @property
+    def remembers(self) -> int | None:
+        return 1
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        """x: force of the spring with the slider, N, which grows no more where the slider holds it."""
+        stretching = self.along * v[:, self.slider]
+        slides = (jnp.abs(x[0]) >= self.held) & (stretching * x[0] > 0)
+        force = jnp.clip(x[0], -self.held, self.held)
+        rate = jnp.where(slides, 0.0, stretching)
+        return self._frame(self.normal * u[:, 0], force, self.across * u[:, 3 - self.slider]), rate[None]
+
     def _frame(self, normal: Array, along: Array, across: Array) -> Array:
         """(n, 3) along n, t1, t2."""
         return jnp.stack([normal, along, across] if self.slider == 1 else [normal, across, along], axis=1)

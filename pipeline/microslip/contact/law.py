@@ -179,6 +179,24 @@ class Law:
         """
         raise NotImplementedError
 
+    @property
+    def remembers(self) -> int | None:
+        """k numbers of a point in the law's differential equation, see `rates`; None, the default: it has none."""
+        return None
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        """The law as a differential equation, for integrators that choose their own steps.
+
+        Args:
+            u: (n, 3) m. v: (n, 3) m/s. x: (k, n) what it remembers, zero at first. time: s.
+            lag: s, of the damper (stiffness times lag) that is put beside springs with a slider and without one, lest
+                integrators meet a jump wherever it begins to slide or to stick.
+
+        Returns:
+            (n, 3) force in N and (k, n) the time derivative of x.
+        """
+        raise NotImplementedError
+
     def memory(self, force: Array, state: State) -> Array:
         """(..., n) forces in N that come back with the cycle once it is periodic, and that the next one depends on.
 

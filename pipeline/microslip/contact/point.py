@@ -100,6 +100,25 @@ class PointContact(Law):
         after = PointState(tangential, elastic, held, share, slipped, time)
         return jnp.concatenate([pressed[None], force]).T, after
 
+    @property
+    def remembers(self) -> int | None:
+        """Two, of contacts of one coefficient and one stiffness."""
+        return 2 if self.stiffness_2 is None and self.friction.constant else None
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        """x: tangential force of the springs, N. Friction holds them and the damper beside them, one of the
+        lag where the law has none."""
+        share, growth = jax.jvp(self.normal.share, (u[:, 0],), (v[:, 0],))
+        pressed = self._pressed(u[:, 0], v[:, 0])
+        held = self.friction.coefficient(jnp.zeros_like(pressed), pressed, time) * pressed
+        beta = lag if self.damping is None else self.damping
+        stretching = self.stiffness_1 * share * v.T[1:]
+        trial = x + beta * stretching
+        beyond = jnp.maximum(1 - ratio(held, norm(trial), 1.0), 0.0) * trial
+        lets_go = ratio(jnp.minimum(growth, 0.0), share) * x
+        rate = jnp.where(share > 0, stretching - beyond / beta + lets_go, -x / beta)
+        return jnp.concatenate([pressed[None], trial - beyond]).T, rate
+
     def memory(self, force: Array, state: PointState) -> Array:
         return state.elastic
 

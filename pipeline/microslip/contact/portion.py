@@ -32,6 +32,14 @@ class Portion(Law):
         force, after = self.whole.step(u, v, dt, state)
         return (self.share * force.T).T, after
 
+    @property
+    def remembers(self) -> int | None:
+        return self.whole.remembers
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        force, rate = self.whole.rates(u, v, x, time, lag)
+        return (self.share * force.T).T, rate
+
     def memory(self, force: Array, state: State) -> Array:
         return self.share * self.whole.memory((force.T / self.share).T, state)
 

@@ -138,6 +138,19 @@ class MassContact(Law):
         pull = self._springs() * (state.stretch + self.damping * (v.T[1:] - state.velocity))
         return jnp.concatenate([self._pressed(u[:, 0], v[:, 0])[None], share * pull]).T
 
+    @property
+    def remembers(self) -> int | None:
+        return 4
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        """x: stretch of the springs, m, and velocity of P, m/s; open, P follows M on springs and dampers."""
+        share = self.normal.share(u[:, 0])
+        state = MassState(u.T[1:], x[:2], x[2:], share, 0 * x[:2], jnp.broadcast_to(time, share.shape))
+        rate = self.rate(u, v, state)
+        pulled = self._springs() * (x[:2] + self.damping * (v.T[1:] - x[2:])) / self.mass
+        moving = jnp.where(share > 0, rate.velocity, pulled)
+        return self.force(u, v, state), jnp.concatenate([rate.stretch, moving])
+
     def _pressed(self, u: Array, v: Array) -> Array:
         return jnp.maximum(self.normal.force(u) + self.damping * self.normal.stiffness(u) * v, 0.0)
 

@@ -93,7 +93,7 @@ def _count(g: Group) -> int:
     return int(g.G.shape[0] * g.G.shape[1])
 
 
-def _parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
+def parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
     """(c, k) of each group."""
     found, begin = [], 0
     for g in groups:
@@ -102,7 +102,7 @@ def _parts(groups: tuple[Group, ...], d: Any) -> list[Any]:
     return found
 
 
-def _moved(g: Group, d: Any) -> Any:
+def moved(g: Group, d: Any) -> Any:
     """(c n, 3) of the points, by coordinates (c, k)."""
     return (g.G * d[:, None, None, :]).sum(axis=-1).reshape(-1, 3)
 
@@ -115,9 +115,9 @@ def _contracted(g: Group, points: Any) -> Any:
 def force_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> tuple:
     """Force (c,) at d with velocity v, states and points' forces of all groups."""
     after, points = [], []
-    for g, state, at, rate in zip(groups, states, _parts(groups, d), _parts(groups, v), strict=True):
-        u = _moved(g, at + g.offset)
-        f, s = (jnp.zeros_like(u), state) if g.rigid else g.law.step(u, _moved(g, rate), dt, state)
+    for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
+        u = moved(g, at + g.offset)
+        f, s = (jnp.zeros_like(u), state) if g.rigid else g.law.step(u, moved(g, rate), dt, state)
         after.append(s)
         points.append(f)
     return joined(groups, points), tuple(after), tuple(points)
@@ -131,8 +131,8 @@ def joined(groups: tuple[Group, ...], points: Any) -> Any:
 def slope_at(groups: tuple[Group, ...], d: Any, v: Any, dt: Any, states: tuple[Any, ...]) -> Any:
     """(c, c) derivative of the force, point by point."""
     blocks = list[Any]()
-    for g, state, at, rate in zip(groups, states, _parts(groups, d), _parts(groups, v), strict=True):
-        u, w = _moved(g, at + g.offset), _moved(g, rate)
+    for g, state, at, rate in zip(groups, states, parts(groups, d), parts(groups, v), strict=True):
+        u, w = moved(g, at + g.offset), moved(g, rate)
 
         def along(direction: Any, g: Group = g, u: Any = u, w: Any = w, state: Any = state) -> Any:
             tangent = jnp.broadcast_to(direction, u.shape)
@@ -191,17 +191,17 @@ def _told(
     missed: Any, by_law: bool = True,
 ) -> Held:  # fmt: skip
     """What contacts hold, with events and energies; by_law: whether set-valued laws say what they lose."""
-    places = tuple(_moved(g, at + g.offset) for g, at in zip(groups, _parts(groups, d), strict=True))
+    places = tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
-        moved = u - held.places[i]
-        slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(moved)[:, 1:]
+        way = u - held.places[i]
+        slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(way)[:, 1:]
         deep = jnp.full(len(u), jnp.nan) if g.rigid else g.law.overlap(u)
         deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
         approach.append(jnp.max(deep.reshape(len(g.G), -1), axis=1))
         slips.append(jnp.any(slid.reshape(len(g.G), -1), axis=1))
         if accounts and (by_law or not g.rigid):
-            lost += jnp.sum(g.law.lost(Step(u, moved, dt, held.forces[i], points[i], held.states[i], states[i])))
+            lost += jnp.sum(g.law.lost(Step(u, way, dt, held.forces[i], points[i], held.states[i], states[i])))
         if accounts:
             stored += jnp.sum(g.law.stored(u, states[i]))
     return Held(
@@ -256,7 +256,7 @@ def slid(w: Any, free: Any) -> Any:
 def _asked(groups: tuple[Group, ...], i: int, masses: bool, free: Any, ahead: Any, held: Held) -> tuple[Any, Any]:
     """w_0 and `pressed` of `inclusion.solve` for the points of a group."""
     g, law = groups[i], groups[i].law
-    u, then = (_moved(g, _parts(groups, d)[i] + g.offset) for d in (free, ahead))
+    u, then = (moved(g, parts(groups, d)[i] + g.offset) for d in (free, ahead))
     pressed = jnp.full(len(u), jnp.nan) if law.normal is None else law.normal.force(u[:, 0])
     gap = jnp.broadcast_to(law.gap, len(u))
     if not masses:

@@ -1,0 +1,164 @@
+"""Motions in time, as a user calls for them, against SciPy's integrators on the same equations in one run.
+
+    python benchmarks/time_domain.py            # minutes
+    python benchmarks/time_domain.py --quick    # 20 periods, and 2 of a ring of 4 blades
+
+impact: the impact oscillator of Sextro, section 4.2, at 64.32 rad/s over 1,000 periods. SciPy integrates its one
+equation in scalar Python: LSODA by odeint, whose loop is compiled, and Radau. ring: 24 vanes of three modes that rub on
+their neighbours in three dimensions and lift off, with dampers in the contacts and without residual compliance, over 10
+periods; SciPy integrates the compiled equations with their exact Jacobian (`time_domain.reference.Rates`).
+
+Every method is taken with its cheapest setting whose error is below the goal: the largest deviation of the read-outs in
+the last period from a tight solution by LSODA (impact) and by the reference (ring), a share of the largest. Times are
+CPU seconds of the process, the least of some rounds after one that compiles.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import platform
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.integrate import odeint, solve_ivp
+
+import microslip as ms
+from microslip.contact.friction import Coulomb
+from microslip.contact.heights import Polynomial
+from microslip.contact.law import value
+from microslip.contact.normal import Rough
+from microslip.contact.point import PointContact
+from microslip.time_domain import equations, orbit, reference
+
+GOALS = (1e-3, 1e-5)
+SAMPLES = 64
+MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
+STOP, DEPTH, STICKY = 0.3e6, 5.2e-6, 6.0
+"""Of section 4.2: kg, N/m, N s/m, m; c_N0 in N/m, R_Z in m, beta c_N0 in N s/m."""
+
+Method = tuple[str, Iterable[float], Callable[[float], np.ndarray]]
+"""Name, settings from the cheapest on, and what makes of one the read-outs of the last period."""
+
+
+def spent(run: Callable[[], Any], rounds: int) -> tuple[Any, float]:
+    """Result and least CPU seconds of some rounds."""
+    times = []
+    for _ in range(rounds):
+        began = time.process_time()
+        found = run()
+        times.append(time.process_time() - began)
+    return found, min(times)
+
+
+def compared(exact: np.ndarray, methods: list[Method], rounds: int) -> None:
+    """The table of one system."""
+    print("| error below | method | setting | error | CPU s | CPU / microslip |\n|--:|---|--:|--:|--:|--:|")
+    size = np.abs(exact).max()
+    tried: dict[tuple[str, float], float] = {}
+    for goal in GOALS:
+        own = math.nan
+        for name, settings, run in methods:
+            for setting in settings:
+                if (name, setting) not in tried:
+                    found = run(setting)
+                    tried[name, setting] = float(np.abs(found - exact).max() / size)
+                if tried[name, setting] <= goal:
+                    break
+            else:
+                print(f"| {goal:.0e} | {name} | | not reached | | |", flush=True)
+                continue
+            cpu = spent(lambda run=run, setting=setting: run(setting), rounds if name == "microslip" else 1)[1]
+            own = cpu if name == "microslip" else own
+            told = f"{setting:g} | {tried[name, setting]:.1e} | {cpu:.3f} | {cpu / own:.1f}"
+            print(f"| {goal:.0e} | {name} | {told} |", flush=True)
+
+
+def impact(periods: int, rounds: int) -> None:
+    Omega = 64.32
+    law = PointContact(
+        Rough(value(STOP), value(DEPTH), Polynomial()), Coulomb(value(0.0)), value(0.0), None, value(STICKY / STOP)
+    )
+    element = ms.Element(law, 0, along="n")
+    system = ms.structure(MASS, STIFFNESS, DAMPING, force={0: STIFFNESS * FOOT}, elements=[element])
+    T = 2 * math.pi / Omega
+    times = np.append(0.0, T * (periods - 1) + T / SAMPLES * np.arange(1, SAMPLES + 1))
+
+    def rate(t: float, z: Any) -> tuple[float, float]:
+        u, v = z
+        f, x = 0.0, u / DEPTH
+        if x > 0:
+            c = min(x, 1.0)
+            f = STOP * DEPTH * (c**3 * (1 - 0.5 * c) + max(x - 1, 0.0)) + STICKY * c * c * (3 - 2 * c) * v
+        push = STIFFNESS * (FOOT * math.cos(Omega * t) - u) - DAMPING * v
+        return v, (push - max(f, 0.0)) / MASS
+
+    def lsoda(tolerance: float, **more: float) -> np.ndarray:
+        told = {"rtol": tolerance, "atol": 1e-5 * tolerance, "hmax": T / 8, "mxstep": 10_000_000} | more
+        return odeint(rate, [0.0, 0.0], times, tfirst=True, **told)[1:, 0][None]
+
+    def radau(tolerance: float) -> np.ndarray:
+        return solve_ivp(rate, (0, times[-1]), [0, 0], "Radau", times[1:], rtol=tolerance, atol=1e-5 * tolerance,
+                         max_step=T / 8).y[:1]  # fmt: skip
+
+    def own(steps: float) -> np.ndarray:
+        found = ms.integrate(system, Omega, unit="rad/s", settle=periods - 1, keep=1, samples=SAMPLES,
+                             steps=int(steps), start="rest")  # fmt: skip
+        return found.y
+
+    print(f"\n## Impact oscillator, {periods} periods\n")
+    exact = lsoda(1e-12, atol=1e-17, hmax=T / 100)
+    tolerances = 10.0 ** -np.arange(3, 11)
+    compared(exact, [("microslip", 2.0 ** np.arange(9, 17), own), ("LSODA", tolerances, lsoda),
+                     ("Radau", tolerances[:6], radau)], rounds)  # fmt: skip
+
+
+def ring(blades: int, periods: int, rounds: int) -> None:
+    w = {"normal_stiffness": 2e6, "tangential_stiffness": 4e6, "includes": "surface", "friction": 0.2,
+         "points": [2, 1], "normal_force": 20.0, "law": {"kind": "smooth", "damping": 2e-5}}  # fmt: skip
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 40.0, "monitor": "probe", "modes": 3, "harmonics": 1,
+            "contacts": [{"interface": "right", "against": "left", "against_sector": 1, **w}],
+            "ring": {"blades": blades, "engine_order": blades // 4, "model": "full"}}  # fmt: skip
+    built = ms.assemble(case, vane=ms.sample()).assembly
+    system = replace(built, components=tuple(replace(c, residual_share=None) for c in built.components))
+    e = equations.of(system, 2 * np.pi * 600.0)
+    rates = reference.Rates(e)
+    begin = rates.start(*orbit.begun(e, "rest"))
+    times = np.append(0.0, (periods - 1 + np.arange(1, SAMPLES + 1) / SAMPLES) / 600.0)
+
+    def read(states: np.ndarray) -> np.ndarray:
+        return e.output @ states[: len(e.omega2)] + e.output_given @ e.oscillators(times[1:]).T
+
+    def own(steps: float) -> np.ndarray:
+        how = {"settle": periods - 1, "keep": 1, "samples": SAMPLES, "steps": int(steps)}
+        return ms.integrate(system, 600.0, start="rest", **how).y
+
+    def scipy(method: str) -> Callable[[float], np.ndarray]:
+        def run(tolerance: float) -> np.ndarray:
+            options = {"rtol": tolerance, "atol": reference.SMALL * tolerance * rates.size, "jac": rates.slope}
+            return read(solve_ivp(rates.rate, (0, times[-1]), begin, method, times[1:], **options).y)
+
+        return run
+
+    exact = read(reference.solve(rates, begin, times[1:], 1e-10).y[1:].T)
+    print(f"\n## Ring of {blades} blades, {periods} periods, {len(begin)} unknowns\n")
+    compared(exact, [("microslip", 2.0 ** np.arange(9, 18), own), ("LSODA", 10.0 ** -np.arange(3, 9), scipy("LSODA")),
+                     ("Radau", 10.0 ** -np.arange(3, 8), scipy("Radau"))], rounds)  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true")
+    asked = parser.parse_args()
+    load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
+    print(f"{platform.platform()}, {os.cpu_count()} cores, load {load}; Python {platform.python_version()}")
+    impact(*((20, 1) if asked.quick else (1000, 3)))
+    ring(*((4, 2, 1) if asked.quick else (24, 10, 2)))
+
+
+if __name__ == "__main__":
+    main()
