@@ -14,6 +14,8 @@ import scipy.linalg
 from ..data import Array, NotConverged, UserError
 from ..settings.mistakes import bounded
 from ..units import counted
+from . import classification
+from .classification import Exponent
 from .equations import Equations
 from .stepper import KINDS, Now, Seen, Stepper, static_force
 
@@ -55,6 +57,7 @@ class Orbit:
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
         error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
             read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
+        exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
     """
 
     equations: Equations
@@ -73,6 +76,7 @@ class Orbit:
     missed: int = 0
     error: float = math.nan
     diverged: float = math.inf
+    exponent: Exponent | None = None
     messages: tuple[str, ...] = field(default=())
 
     def __repr__(self) -> str:
@@ -90,7 +94,7 @@ class Orbit:
     def repeats(self) -> int:
         """After how many periods of the excitation the motion comes back within `REPEATS`; 0: it does not within half
         of the periods that are kept."""
-        z = np.concatenate([np.sqrt(np.abs(self.equations.omega2))[:, None] * self.q, self.q_dot])
+        z = classification.phase(self)
         stroboscopic = z[:, self.samples - 1 :: self.samples]
         size, count = np.abs(z).max(initial=0.0), stroboscopic.shape[1]
         for p in range(1, count // 2 + 1):
@@ -111,21 +115,15 @@ class Orbit:
         return self.count("closes") / max(len(self.time) // self.samples, 1)
 
     @property
+    def slips(self) -> float:
+        """Times that a contact with friction begins to slide, per period of the excitation."""
+        rubbing = [i for i in range(len(self.equations.contacts)) if classification.rubs(self, i)]
+        return sum(self.count("slips", i) for i in rubbing) / max(len(self.time) // self.samples, 1)
+
+    @cached_property
     def said(self) -> str:
         """What motion it is, in words."""
-        if math.isfinite(self.diverged):
-            return f"diverged at {self.diverged:.6g} s"
-        kept, p = len(self.time) // self.samples, self.repeats
-        if kept < 2:
-            return "too short to say whether it repeats"
-        came = f"comes back after {counted(p, 'period')}" if p else f"does not come back within {kept // 2} periods"
-        hits = counted(round(self.impacts * p), "impact")
-        per = (
-            f"{hits} in {'them' if p > 1 else 'it'}"
-            if p
-            else f"{self.impacts:.4g} impact{'s' * (self.impacts != 1)} a period"
-        )
-        return f"{came}, {per}" if self.equations.contacts else came
+        return classification.said(self)
 
     @property
     def drift(self) -> float:
@@ -190,7 +188,8 @@ def run(
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
     found = _orbit(stepper, kept, events, missed, samples, each)
     error = _error(stepper, now, samples, each)
-    return replace(found, error=error, messages=_warnings(found, float(now.worst)))
+    found = replace(found, error=error, messages=_warnings(found, float(now.worst)))
+    return classification.with_exponent(found, stepper, now, settle + keep)
 
 
 def _warnings(found: Orbit, worst: float) -> tuple[str, ...]:
