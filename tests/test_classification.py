@@ -132,3 +132,14 @@ def test_rebounds_that_come_to_rest_are_found_and_counted() -> None:
     assert found.impacts == 9 and found.flight == pytest.approx(shrinking[-1]) and found.stays == pytest.approx(0.05)
     assert not classification.chatter(bouncing(shrinking, 0.001, 0.0015), 0)
     assert not classification.chatter(bouncing(shrinking[::-1], 0.001, 0.05), 0)
+
+
+def test_the_area_of_a_hysteresis_loop_is_the_energy_lost_in_the_steps() -> None:
+    """And that of a slider under a given swing: 4 F_H (U - F_H / k), its picture's number."""
+    k, held = 1.0, 0.2
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(k, held)])
+    found = ms.integrate(slider, 1.0, unit="rad/s", settle=150, keep=4, samples=1024, steps=4096)
+    (area,) = classification.loops(found)
+    assert area == pytest.approx(classification.lost(found), rel=1e-4)
+    assert area == pytest.approx(4 * held * (0.5 * np.ptp(found.y[0]) - held / k), rel=1e-4)
+    assert found.slips == 2 and classification.rubs(found, 0) and found.said.endswith("2 slips in it")

@@ -26,6 +26,7 @@ from microslip.system.assembly import Assembly, ContactFace, Load, Output, prelo
 from microslip.system.component import Component
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.stepper import Options, Stepper
+from microslip.units import METRES
 
 MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
 """Of the impact oscillator of Sextro, section 4.2: kg, N/m, N s/m, m."""
@@ -218,7 +219,10 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
         group = file["motion_1"]
         assert group["displacement"][0].max() == pytest.approx(told["largest_m"], rel=1e-7)
         assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
-    assert text(number(1e6 * told["largest_m"])) in (folder / "orbit.html").read_text(encoding="utf-8")
+        assert group["contact_loop"].shape == group["contact_force"].shape[:1]
+    page = (folder / "orbit.html").read_text(encoding="utf-8")
+    assert METRES.sized(max(abs(told["smallest_m"]), abs(told["largest_m"]))) in page and "periodic" in page
+    assert text(number(told["lost_in_contacts_J_per_period"])) in page and page.count("<img") == 2
     made = (folder / "orbit.h5").stat().st_mtime_ns
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
 

@@ -17,10 +17,11 @@ import numpy as np
 import scipy.optimize
 import scipy.stats
 
+from ..contact.elements import Spring
 from ..data import Array
 from ..system.assembly import Contact
 from ..units import counted
-from .stepper import KINDS, Now, Stepper
+from .stepper import Now, Stepper
 
 if TYPE_CHECKING:
     from .orbit import Orbit
@@ -163,8 +164,11 @@ def coordinates(orbit: Orbit, contact: int) -> slice:
 
 
 def rubs(orbit: Orbit, contact: int) -> bool:
-    """Whether a contact has friction: a force along what moves its points in their plane."""
-    tangential = np.abs(orbit.equations.contacts[contact].patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
+    """Whether a contact has friction: a force along what moves its points in their plane, and no spring's."""
+    patch = orbit.equations.contacts[contact].patch
+    if isinstance(patch.law, Spring):
+        return False
+    tangential = np.abs(patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
     force = np.abs(orbit.force[coordinates(orbit, contact)]).max(axis=1, initial=0.0)
     return bool((force * tangential).max() > 1e-9 * force.max())
 
@@ -243,11 +247,35 @@ def _per_period(rate: float, what: str, p: int, inside: str) -> str:
     return f"{rate:.4g} {what}{'s' * (rate != 1)} a period"
 
 
+def loops(orbit: Orbit) -> Array:
+    """(c,) J a period: area of the loop of force over displacement of every contact coordinate, by the trapezoidal rule
+    over the samples of the last periods after which the motion comes back, else over all that are kept."""
+    count = (orbit.repeats or len(orbit.time) // orbit.samples - 1) * orbit.samples
+    if count <= 0:
+        return np.full(len(orbit.d), math.nan)
+    F, d = orbit.force[:, -count - 1 :], orbit.d[:, -count - 1 :]
+    work = 0.5 * (F[:, 1:] + F[:, :-1]) * np.diff(d, axis=1)
+    return work.sum(axis=1) * orbit.samples / count
+
+
+def lost(orbit: Orbit) -> float:
+    """J a period that contacts take for good, counted in every step; nan: less than two periods are kept, or a law does
+    not tell."""
+    periods = len(orbit.time) // orbit.samples - 1
+    taken = orbit.energy["lost"]
+    return float(taken[-1] - taken[-1 - periods * orbit.samples]) / periods if periods > 0 else math.nan
+
+
+def largest_force(orbit: Orbit) -> float:
+    """N on any contact."""
+    parts = [coordinates(orbit, i) for i in range(len(orbit.equations.contacts))]
+    return max((float(np.linalg.norm(orbit.force[s][:3], axis=0).max(initial=0.0)) for s in parts), default=0.0)
+
+
 def chatter(orbit: Orbit, contact: int) -> list[Chatter]:
     """Where rebounds of a contact come to rest: every flight was shorter than the one before, `REBOUNDS` at least, and
     then it stays closed for twice as long as in any of these impacts."""
-    own = orbit.events[orbit.events[:, 1] == contact]
-    closes, opens = (own[own[:, 2] == KINDS.index(k), 0] for k in ("closes", "opens"))
+    closes, opens = orbit.times("closes", contact), orbit.times("opens", contact)
     closes = closes[closes > opens[0]] if len(opens) else closes[:0]
     flights = closes - opens[np.searchsorted(opens, closes) - 1]
     leaves = np.append(opens, orbit.time[-1:])[np.searchsorted(opens, closes)]

@@ -13,7 +13,7 @@ import scipy.linalg
 
 from ..data import Array, NotConverged, UserError
 from ..settings.mistakes import bounded
-from ..units import counted
+from ..units import METRES, counted
 from . import classification
 from .classification import Exponent
 from .equations import Equations
@@ -102,12 +102,16 @@ class Orbit:
                 return p
         return 0
 
-    def count(self, kind: str, contact: int | None = None) -> int:
-        """Number of events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
+    def times(self, kind: str, contact: int | None = None) -> Array:
+        """Times (s) of the events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
         if kind not in KINDS:
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
         own = self.events[:, 2] == KINDS.index(kind)
-        return int((own if contact is None else own & (self.events[:, 1] == contact)).sum())
+        return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
+
+    def count(self, kind: str, contact: int | None = None) -> int:
+        """Number of those events."""
+        return len(self.times(kind, contact))
 
     @property
     def impacts(self) -> float:
@@ -148,9 +152,10 @@ class Orbit:
 
             axes = plt.subplots(layout="constrained")[1]
         y, v, last = self.y[read_out], self.v[read_out], slice(self.samples - 1, None, self.samples)
-        axes.plot(y, v, linewidth=0.8)
-        axes.plot(y[last], v[last], "o", label="after every period")
-        axes.set(xlabel=f"{self.labels[read_out]} in m", ylabel="velocity in m/s")
+        (by, unit), (rate, per_second) = (METRES.scale(np.abs(x).max(initial=0.0)) for x in (y, v))
+        axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
+        axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
+        axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
         return axes
 
 
