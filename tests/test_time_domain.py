@@ -30,6 +30,7 @@ from microslip.system.assembly import Assembly, ContactFace, Load, Output, prelo
 from microslip.system.component import Component
 from microslip.time_domain import equations, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Options, Stepper
+from microslip.units import METRES
 
 MASS, STIFFNESS, DAMPING, FOOT = 0.092, 99.085, 0.02046, 0.00047
 """Of the impact oscillator of Sextro, section 4.2: kg, N/m, N s/m, m."""
@@ -222,7 +223,9 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
         group = file["motion_1"]
         assert group["displacement"][0].max() == pytest.approx(told["largest_m"], rel=1e-7)
         assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
-    assert text(number(1e6 * told["largest_m"])) in (folder / "orbit.html").read_text(encoding="utf-8")
+    page = (folder / "orbit.html").read_text(encoding="utf-8")
+    assert METRES.sized(max(abs(told["smallest_m"]), abs(told["largest_m"]))) in page and "periodic" in page
+    assert text(number(told["lost_in_contacts_J_per_period"])) in page and page.count("<img") == 2
     made = (folder / "orbit.h5").stat().st_mtime_ns
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
 
@@ -423,7 +426,7 @@ def test_a_motion_is_saved_and_read_with_all_that_it_says(tmp_path: Path) -> Non
     assert data["displacement"].sel(read_out="mass u_y").values[-1] == found.y[1, -1]
     assert (data["event_kind"].values == "slips").sum() == found.count("slips") > 0
     assert data["contact_force"].attrs["units"] == "N, N m" and set(data["event_contact"].values) == {"stop"}
-    assert np.array_equal(loaded.plot().lines[0].get_xdata(), found.y[0])
+    np.testing.assert_allclose(loaded.plot().lines[0].get_xdata(), 1e6 * found.y[0])
 
 
 def test_what_is_no_whole_file_of_one_motion_is_refused(tmp_path: Path) -> None:

@@ -371,8 +371,9 @@ def _survey(case: Path, basis: Path | None, kind: str, set_: Sequence[str], forc
 
 @app.command
 def orbit(
-    case: Path, basis: Path | None = None, /, *, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:
+    case: Path, basis: Path | None = None, /, *, no_pictures: NoPictures = False, set_: Set = (),
+    force: Force = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
     """Motion in time of a case from rest, as [orbit] asks: phase portraits, impacts, periods after which it comes back.
 
     Args:
@@ -387,7 +388,8 @@ def orbit(
     with progress(f"orbit {case}", quiet) as report:
         settings, _ = load_case(case, list(set_))
         files = existing_files(settings, case, basis, Path("."))
-        made, sentences, fine = orbit_stage(case, files, Path("build") / settings.name, list(set_), force, report)
+        folder = Path("build") / settings.name
+        made, sentences, fine = orbit_stage(case, files, folder, list(set_), force, report, not no_pictures)
     _say("\n".join([*sentences, *map(str, made)]), quiet)
     if not fine:
         raise NotConverged(f"a motion diverged; {made[0]} holds what was found until then")

@@ -87,9 +87,14 @@ class Quantity:
 
     def sized(self, value: float, digits: int = 4) -> str:
         """A value with the unit in which its number is neither long nor a power of ten: 0.00193 m -> "1.93 mm"."""
+        factor, unit = self.scale(value)
+        return f"{value * factor:.{digits}g} {unit}"
+
+    def scale(self, value: float) -> tuple[float, str]:
+        """Factor and name of that unit: 0.00193 m -> (1e3, "mm")."""
         factors = (1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n")
         factor, prefix = next(((f, p) for f, p in factors if abs(value) * f >= 1), factors[2])
-        return f"{value * factor:.{digits}g} {prefix}{self.said}"
+        return factor, f"{prefix}{self.said}"
 
 
 _COLUMNS = {"1": "strain"}

@@ -1,14 +1,17 @@
-"""Pictures of motions in time: phase portraits with the points after every period, and the last periods over time."""
+"""Pictures of motions in time: phase portrait, last periods with events, spectrum, what contacts do, chatter."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Array
+from ..time_domain.classification import Chatter, chatter, coordinates, loops, rubs
+from ..units import METRES
 from .plots import COLOURS, empty_figure, length_scale, length_unit, plain_axes, plain_numbers, save_figure
 
 if TYPE_CHECKING:
@@ -16,22 +19,45 @@ if TYPE_CHECKING:
 
     from ..time_domain.orbit import Orbit
 
+Panel = Callable[["Axes"], object]
+
 SHOWN = 4
 """Periods that are drawn over time."""
 SPECTRUM = 1e-5
 """Share of its largest amplitude down to which a spectrum is drawn."""
+HIGHEST = 12.0
+"""Multiples of the excitation up to which it is drawn."""
+OF_CONTACTS = 3
+"""Contacts that are drawn, those that lose most."""
+WINDOW = 8
+"""Periods in each window of a spectrogram."""
+EVENT_MARKS = (("closes", "v", 4, "meets"), ("slips", "|", 9, "begins to slip"))
 
 
 def orbit_picture(orbit: Orbit, path: Path, title: str, read_out: int = 0) -> Path:
-    """Phase portrait of a read-out, its last periods over time, and its spectrum."""
-    figure = empty_figure(13.0, 4.3)
-    left, middle, right = figure.subplots(1, 3)
-    for axes in (left, middle, right):
+    """Phase portrait of a read-out, its last periods with events, its spectrum; how that changes, where the motion does
+    not repeat; where there is friction, the ways of contacts in their plane and their loops."""
+    panels: list[Panel] = [
+        partial(orbit.plot, read_out=read_out),
+        partial(_history, orbit, read_out=read_out),
+        partial(_spectrum, orbit, read_out=read_out),
+    ]
+    if not orbit.repeats and len(orbit.time) >= 2 * WINDOW * orbit.samples:
+        panels.append(partial(_spectrogram, orbit, read_out=read_out))
+    areas = loops(orbit)
+    rubbing = [i for i in range(len(orbit.touching)) if rubs(orbit, i)]
+    for i in sorted(rubbing, key=lambda i: -np.nansum(areas[coordinates(orbit, i)]))[:OF_CONTACTS]:
+        panels += _of_contact(orbit, i, areas)
+    columns = 2 if len(panels) == 4 else 3
+    rows = -(-len(panels) // columns)
+    figure = empty_figure(4.4 * columns, 0.4 + 3.9 * rows)
+    places = figure.subplots(rows, columns).ravel()
+    for axes, draw in zip(places, panels, strict=False):
         plain_axes(axes)
-    portrait(orbit, left, read_out)
-    _history(orbit, middle, read_out)
-    _spectrum(orbit, right, read_out)
-    left.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
+        draw(axes)
+    for axes in places[len(panels) :]:
+        axes.set_visible(False)
+    places[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     figure.suptitle(title, fontweight="bold")
     return save_figure(figure, path)
 
@@ -43,7 +69,7 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
     panels = np.atleast_1d(figure.subplots(rows, min(len(orbits), 3))).ravel()
     for axes, (name, orbit) in zip(panels, orbits, strict=False):
         plain_axes(axes)
-        portrait(orbit, axes)
+        orbit.plot(axes)
         axes.set_title("\n".join([name, *orbit.said.split(", ")]), fontsize=9)
     for axes in panels[len(orbits) :]:
         axes.set_visible(False)
@@ -52,22 +78,32 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
     return save_figure(figure, path)
 
 
-def portrait(orbit: Orbit, axes: Axes, read_out: int = 0) -> None:
-    """Velocity over displacement, and a point after every period of the excitation."""
-    y, unit = length_unit(orbit.y[read_out])
-    v, per_second = length_unit(orbit.v[read_out])
-    axes.plot(y, v, color=COLOURS[0], linewidth=0.7)
-    last = slice(orbit.samples - 1, None, orbit.samples)
-    axes.plot(y[last], v[last], "o", color=COLOURS[1], markersize=4, label="after every period", zorder=4)
-    axes.set(xlabel=f"{orbit.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
-
-
 def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
     shown = slice(-SHOWN * orbit.samples, None)
-    y, unit = length_unit(orbit.y[read_out])
-    periods = (orbit.time[shown] - orbit.time[shown][0]) / orbit.period
-    axes.plot(periods, y[shown], color=COLOURS[0], linewidth=1.0)
+    y, unit = _sized(orbit.y[read_out][shown])
+    time = orbit.time[shown]
+    axes.plot((time - time[0]) / orbit.period, y, color=COLOURS[0], linewidth=1.0)
+    for kind, mark, size, words in EVENT_MARKS:
+        at = _times(orbit, kind)
+        at = at[at >= time[0]]
+        if len(at):
+            place = np.interp(at, time, y)
+            axes.plot((at - time[0]) / orbit.period, place, mark, color=COLOURS[1], markersize=size, label=words, ls="")
+    if len(axes.lines) > 1:
+        axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     axes.set(xlabel="time in periods of the excitation", ylabel=f"{orbit.labels[read_out]} in {unit}")
+
+
+def _sized(values: Array) -> tuple[Array, str]:
+    """In the unit that the phase portrait takes."""
+    factor, unit = METRES.scale(np.abs(values).max(initial=0.0))
+    return factor * values, unit
+
+
+def _times(orbit: Orbit, kind: str, contact: int | None = None) -> Array:
+    """s, of the events of a kind; slips of contacts with friction alone."""
+    chosen = [i for i in range(len(orbit.touching)) if kind != "slips" or rubs(orbit, i)]
+    return np.sort(np.concatenate([np.zeros(0), *(orbit.times(kind, i) for i in chosen if contact in (None, i))]))
 
 
 def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
@@ -75,12 +111,93 @@ def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
     `SPECTRUM` of the largest."""
     y = orbit.y[read_out]
     window = np.hanning(len(y))
-    amplitude: Array = np.abs(np.fft.rfft(window * (y - y.mean()))) * 2 / window.sum()
+    amplitude: Array = np.abs(np.fft.rfft(window * (y - np.average(y, weights=window)))) * 2 / window.sum()
     multiples = np.arange(len(amplitude)) * orbit.samples / len(y)
-    seen = multiples <= min(12.0, orbit.samples / 2)
+    seen = multiples <= min(HIGHEST, orbit.samples / 2)
     _, unit = length_unit(1e-2 * amplitude)
     scaled, top = length_scale(unit) * amplitude, length_scale(unit) * amplitude.max(initial=1e-300)
     axes.semilogy(multiples[seen], np.maximum(scaled, 1e-300)[seen], color=COLOURS[2], lw=0.9)
     axes.set(xlabel="multiples of the excitation frequency", ylabel=f"amplitude in {unit}")
     axes.set_ylim(SPECTRUM * top, 2 * top)
     plain_numbers(axes.yaxis, (1.0,))
+
+
+def _spectrogram(orbit: Orbit, axes: Axes, read_out: int) -> None:
+    """Spectra of windows of `WINDOW` periods that overlap, in dB of the largest amplitude."""
+    y, n = orbit.y[read_out] - orbit.y[read_out].mean(), WINDOW * orbit.samples
+    begins = np.arange(0, len(y) - n + 1, orbit.samples)
+    sizes = np.abs(np.fft.rfft(np.hanning(n) * y[begins[:, None] + np.arange(n)], axis=1))
+    multiples = np.arange(sizes.shape[1]) / WINDOW
+    seen = multiples <= min(HIGHEST, orbit.samples / 2)
+    decibels = 20 * np.log10(np.maximum(sizes[:, seen] / sizes.max(), 1e-300))
+    middle = begins / orbit.samples + 0.5 * WINDOW
+    drawn = axes.pcolormesh(middle, multiples[seen], decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest")
+    axes.figure.colorbar(drawn, ax=axes, label="amplitude in dB")  # type: ignore[union-attr]
+    axes.set(xlabel="time in periods of the excitation", ylabel="multiples of its frequency")
+    axes.grid(False)
+
+
+def _of_contact(orbit: Orbit, contact: int, areas: Array) -> list[Panel]:
+    """Its way in its plane, where it has one, and loops of the coordinates that lose a hundredth of what it loses."""
+    rows, met = coordinates(orbit, contact), orbit.touching[contact]
+    plane = len(met.tangential) >= 3
+    found: list[Panel] = [partial(_way, orbit, contact)] if plane else []
+    names = {1: "t1", 2: "t2"} if plane else {0: "along it"}
+    own = areas[rows]
+    for k, name in names.items():
+        if abs(own[k]) >= 0.01 * np.abs(own).max():
+            found.append(partial(_loop, orbit, rows.start + k, f"{met.name}, {name}", float(own[k])))
+    return found
+
+
+def _way(orbit: Orbit, contact: int, axes: Axes) -> None:
+    rows = coordinates(orbit, contact)
+    (one, other), unit = _sized(orbit.d[rows][1:3, -SHOWN * orbit.samples :])
+    axes.plot(one, other, color=COLOURS[3], linewidth=1.0)
+    name = orbit.contacts[contact]
+    axes.set(xlabel=f"slip plane of {name}: t1 in {unit}", ylabel=f"t2 in {unit}")
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def _loop(orbit: Orbit, row: int, name: str, area: float, axes: Axes) -> None:
+    """Force over displacement of the periods that `classification.loops` takes; that area stands above."""
+    count = (orbit.repeats or SHOWN) * orbit.samples + 1
+    d, unit = _sized(orbit.d[row, -count:])
+    axes.plot(d, orbit.force[row, -count:], color=COLOURS[4], linewidth=1.0)
+    axes.set(xlabel=f"{name}: displacement in {unit}", ylabel="force in N")
+    axes.set_title(f"loses {area:.4g} J a period", fontsize=9)
+
+
+def chatter_picture(orbit: Orbit, contact: int, path: Path, title: str, read_out: int = 0) -> Path:
+    """Displacement and velocity over the time of two periods, and the phase portrait, as in Sextro Fig. 4.2-3: impacts
+    and where it comes to rest are marked."""
+    figure = empty_figure(13.0, 4.3)
+    first = chatter(orbit, contact)
+    begin = orbit.time[-2 * orbit.samples] if len(orbit.time) > 2 * orbit.samples else orbit.time[0]
+    seen = orbit.time >= begin
+    panels = figure.subplots(1, 3)
+    impacts = _times(orbit, "closes", contact)
+    for axes, values, what, per in (
+        (panels[0], orbit.y[read_out], orbit.labels[read_out], ""),
+        (panels[1], orbit.v[read_out], "velocity", "/s"),
+    ):
+        plain_axes(axes)
+        scaled, unit = _sized(values[seen])
+        axes.plot(orbit.time[seen] - begin, scaled, color=COLOURS[0], linewidth=0.9)
+        shown = impacts[impacts >= begin]
+        axes.plot(shown - begin, np.interp(shown, orbit.time[seen], scaled), "|", color=COLOURS[1], label="meets")
+        _rests(axes, [c for c in first if c.time + c.stays >= begin], begin)
+        axes.set(xlabel="time in s", ylabel=f"{what} in {unit}{per}")
+    plain_axes(panels[2])
+    orbit.plot(panels[2], read_out)
+    panels[0].legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
+    figure.suptitle(title, fontweight="bold")
+    return save_figure(figure, path)
+
+
+def _rests(axes: Axes, found: Sequence[Chatter], begin: float) -> None:
+    for i, one in enumerate(found):
+        axes.axvspan(
+            max(one.time - begin, 0.0), one.time + one.stays - begin, color="#f2d9a0", lw=0, zorder=0,
+            label="" if i else "rests",
+        )  # fmt: skip

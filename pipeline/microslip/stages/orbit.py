@@ -17,19 +17,20 @@ from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
 from ..files import store
 from ..files.tables import columns_csv
-from ..report.response import survey_html
+from ..report.orbit import orbit_html
 from ..system.assembly import Assembly
-from ..time_domain import equations, orbit, recorded, starts
+from ..time_domain import classification, equations, orbit, recorded, starts
+from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
-from ..units import METRES, percent
+from ..units import METRES, counted, percent
 from .checkpoint import hashes_of
 from .stage import Made, Report, Stage, hash_of_code
 
 
 def orbit_stage(
     case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    force: bool = False, report: Report = lambda _: None,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
 ) -> tuple[list[Path], list[str], bool]:  # fmt: skip
     """The motions in time that a case asks for, in a folder.
 
@@ -49,17 +50,18 @@ def orbit_stage(
     inputs = {
         "case": checkpoint.without_defaults(raw),
         "basis": hashes_of(files),
+        "pictures": pictures,
         "files": hashes_of(checkpoint.files_of(settings, case_path)),
     }
     told = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
-    stage.make(inputs, lambda: _work(stage, settings, case_path, files, told))
+    stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures, told))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["sentences"], not told["diverged"]
 
 
-def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], inputs: str) -> Made:
-    from ..pictures.orbit import orbit_picture, portraits
-
+def _work(
+    stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], pictures: bool, inputs: str
+) -> Made:  # fmt: skip
     folder, asked = stage.product.parent, settings.orbit
     assert asked is not None
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
@@ -82,17 +84,15 @@ def _work(stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[
     more = [f"{name}: {words}" for name, one in found for words in one.messages]
     turning = [m.name for m in assembly.components if asked.run_up and m.at(0).group.speed]
     more += [f"{name}: its matrices stay those of one speed." for name in turning]
-    sentences = [*(_sentence(*one) for one in found), *more, *built.messages]
+    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
+    sentences = [*notes, *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
-    (folder / "pictures").mkdir(exist_ok=True)
-    seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
-    if seen:  # one that diverges as it settles leaves nothing to draw
-        drawn.append(portraits(seen, folder / "pictures" / "phase_portraits.png", f"{settings.name}: phase portraits"))
-    for i, (name, one) in enumerate(seen, 1):
-        title = f"{settings.name}: {name}, {one.said}"
-        drawn.append(orbit_picture(one, folder / "pictures" / f"orbit_{i}.png", title))
-    tables = {"Motions": _table(found)}
-    store.write_text(folder / "orbit.html", survey_html(f"{settings.name}: motion in time", sentences, tables, drawn))
+    drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
+    rows = [
+        {"name": name, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for name, one in found
+    ]
+    page = orbit_html(f"{settings.name}: motion in time", rows, notes, [*more, *built.messages], drawn)
+    store.write_text(folder / "orbit.html", page)
     names = ["orbit.html", "orbit.csv", "orbit.h5", *(f"pictures/{p.name}" for p in drawn)]
     diverged = [name for name, one in found if np.isfinite(one.diverged)]
     told = {"files": names, "sentences": sentences, "diverged": diverged}
@@ -116,22 +116,66 @@ def _sentence(name: str, one: Orbit) -> str:
     return f"{name}: {one.said}; {one.labels[0]} swings by {size} on either side{error}."
 
 
+KIND = {"open": "not back yet", "short": "too short to say"}
+"""Of `classification.kind`, what needs other words in a table."""
+
+
+def _chatter(name: str, one: Orbit) -> list[str]:
+    """A sentence for every contact that comes to rest after rebounds."""
+    said = []
+    for i, contact in enumerate(one.contacts):
+        if found := classification.chatter(one, i):
+            impacts = sorted({c.impacts for c in found})
+            counts = f"{impacts[0]}" if len(impacts) == 1 else f"{impacts[0]} to {impacts[-1]}"
+            flight, steps = min((c.flight, c.flight / c.step) for c in found)
+            said.append(
+                f"{name}: {contact} comes to rest after {counts} impacts, {counted(len(found), 'time')} in "
+                f"what is kept; the shortest flight is {1e3 * flight:.3g} ms, {steps:.0f} steps."
+            )
+    return said
+
+
+def _pictures(found: Sequence[tuple[str, Orbit]], folder: Path, case: str) -> list[Path]:
+    """Phase portraits together, a sheet a motion, and one more for each contact that chatters."""
+    from ..pictures.orbit import chatter_picture, orbit_picture, portraits
+
+    folder.mkdir(exist_ok=True)
+    seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
+    if seen:  # one that diverges as it settles leaves nothing to draw
+        drawn.append(portraits(seen, folder / "phase_portraits.png", f"{case}: phase portraits"))
+    for i, (name, one) in enumerate(seen, 1):
+        drawn.append(orbit_picture(one, folder / f"orbit_{i}.png", f"{case}: {name}, {one.said}"))
+        for k, contact in enumerate(one.contacts):
+            if classification.chatter(one, k):
+                title = f"{case}: {name}, chatter of {contact}"
+                drawn.append(chatter_picture(one, k, folder / f"chatter_{i}_{contact}.png", title))
+    return drawn
+
+
 def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:
     """Column -> values, one a motion."""
-    rows = [
-        {
-            "frequency_Hz": one.Omega / (2 * np.pi),
-            "angular_frequency_rad_s": one.Omega,
-            "repeats_after_periods": one.repeats,
-            "impacts_per_period": one.impacts,
-            "slips_per_period": one.count("slips") / max(len(one.time) // one.samples, 1),
-            "smallest_m": one.y[0].min(initial=np.inf),
-            "largest_m": one.y[0].max(initial=-np.inf),
-            "steps_per_period": one.steps,
-            "estimated_error": one.error,
-            "energy_balance": one.balance,
-            "contact_energy_drift": one.drift,
-        }
-        for _, one in found
-    ]
+    rows = [_row(one) for _, one in found]
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+def _row(one: Orbit) -> dict[str, float]:
+    grows = one.exponent or Exponent(np.nan, np.nan, 0)
+    return {
+        "frequency_Hz": one.Omega / (2 * np.pi),
+        "angular_frequency_rad_s": one.Omega,
+        "repeats_after_periods": one.repeats,
+        "impacts_per_period": one.impacts,
+        "slips_per_period": one.slips,
+        "smallest_m": one.y[0].min(initial=np.inf),
+        "largest_m": one.y[0].max(initial=-np.inf),
+        "largest_velocity_m_s": np.abs(one.v[0]).max(initial=0.0),
+        "largest_contact_force_N": classification.largest_force(one),
+        "lost_in_contacts_J_per_period": classification.lost(one),
+        "lyapunov_exponent_1_s": grows.value,
+        "lyapunov_uncertainty_1_s": grows.uncertainty,
+        "second_frequency": classification.second_frequency(one) if one.repeats == 0 else np.nan,
+        "steps_per_period": one.steps,
+        "estimated_error": one.error,
+        "energy_balance": one.balance,
+        "contact_energy_drift": one.drift,
+    }

@@ -61,7 +61,7 @@ def _answered(
     if not case.is_only_in_time:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
     if case.orbit is not None:
-        converged = orbit_stage(path, files, folder, assignments, force, report)[2] and converged
+        converged = orbit_stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
     return response, converged
 
 

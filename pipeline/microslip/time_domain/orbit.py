@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,8 +16,10 @@ from ..data import Array, NotConverged, UserError
 from ..files.hdf5 import create, put, seal
 from ..files.store import complete_or_absent
 from ..settings.mistakes import bounded
-from ..units import counted
+from ..units import METRES, counted
+from . import classification
 from . import samples as kept_samples
+from .classification import Exponent
 from .equations import Equations
 from .samples import ROWS, UNITS, InMemory, Kept
 from .starts import Periodic
@@ -48,9 +50,6 @@ PENETRATES = 1e-6
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
 
-STRIP = 1 << 16
-"""Samples of a long motion that are looked at together."""
-
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
@@ -68,6 +67,7 @@ class Orbit:
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
         error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
             read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
+        exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
     """
 
     equations: Equations
@@ -86,6 +86,7 @@ class Orbit:
     missed: int = 0
     error: float = math.nan
     diverged: float = math.inf
+    exponent: Exponent | None = None
     messages: tuple[str, ...] = field(default=())
 
     def __repr__(self) -> str:
@@ -105,9 +106,14 @@ class Orbit:
         return self.equations.omega2
 
     @property
+    def touching(self) -> tuple[kept_samples.Touch, ...]:
+        """Contacts, in the order in which events count them."""
+        return kept_samples.touches(self.equations)
+
+    @property
     def contacts(self) -> tuple[str, ...]:
-        """Their names, in the order in which events count them."""
-        return tuple(c.name for c in self.equations.contacts)
+        """Their names."""
+        return tuple(c.name for c in self.touching)
 
     @property
     def period(self) -> float:
@@ -125,34 +131,33 @@ class Orbit:
         found = own[name] if name in own else self.energy[name.removeprefix("energy_")]
         return np.asarray(found[..., part])
 
-    def _strips(self, *names: str) -> Iterator[list[Array]]:
+    def strips(self, *names: str) -> Iterator[list[Array]]:
         """Arrays, so many samples at a time."""
-        for begin in range(0, len(self.time), STRIP):
-            yield [self.array(name, slice(begin, begin + STRIP)) for name in names]
+        for begin in range(0, len(self.time), kept_samples.STRIP):
+            yield [self.array(name, slice(begin, begin + kept_samples.STRIP)) for name in names]
 
     @cached_property
     def repeats(self) -> int:
         """After how many periods of the excitation the motion comes back within `REPEATS`; 0: it does not within half
         of the periods that are kept."""
-        size, after, begin = 0.0, list[Array](), 0
-        for q, q_dot in self._strips("modal_displacement", "modal_velocity"):
-            z = np.concatenate([np.sqrt(np.abs(self.omega2))[:, None] * q, q_dot])
-            size = max(size, float(np.abs(z).max(initial=0.0)))
-            after.append(z[:, (-1 - begin) % self.samples :: self.samples])
-            begin += z.shape[1]
-        stroboscopic = np.concatenate([np.zeros((2 * len(self.omega2), 0)), *after], axis=1)
-        count = stroboscopic.shape[1]
-        for p in range(1, count // 2 + 1):
-            if np.abs(stroboscopic[:, p:] - stroboscopic[:, :-p]).max(initial=0.0) <= REPEATS * size:
-                return p
-        return 0
+        return comes_back(*self.stroboscopic)
 
-    def count(self, kind: str, contact: int | None = None) -> int:
-        """Number of events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
+    @cached_property
+    def stroboscopic(self) -> tuple[Array, float]:
+        """(2 m, periods) modal coordinates, times their frequency, and velocities after every period; the largest of
+        them at any time, m kg^1/2 / s."""
+        return stroboscopic(self.strips("modal_displacement", "modal_velocity"), self.omega2, self.samples)
+
+    def times(self, kind: str, contact: int | None = None) -> Array:
+        """Times (s) of the events of a kind ("closes", "opens", "slips", "sticks") in the periods that are kept."""
         if kind not in KINDS:
             raise UserError(f"kind: '{kind}' is none of {', '.join(KINDS)}")
         own = self.events[:, 2] == KINDS.index(kind)
-        return int((own if contact is None else own & (self.events[:, 1] == contact)).sum())
+        return self.events[own if contact is None else own & (self.events[:, 1] == contact), 0]
+
+    def count(self, kind: str, contact: int | None = None) -> int:
+        """Number of those events."""
+        return len(self.times(kind, contact))
 
     @property
     def impacts(self) -> float:
@@ -160,23 +165,15 @@ class Orbit:
         return self.count("closes") / max(len(self.time) // self.samples, 1)
 
     @property
+    def slips(self) -> float:
+        """Times that a contact with friction begins to slide, per period of the excitation."""
+        rubbing = [i for i in range(len(self.touching)) if classification.rubs(self, i)]
+        return sum(self.count("slips", i) for i in rubbing) / max(len(self.time) // self.samples, 1)
+
+    @cached_property
     def said(self) -> str:
         """What motion it is, in words."""
-        if math.isfinite(self.diverged):
-            return f"diverged at {self.diverged:.6g} s"
-        if run_up := self._run_up:
-            return run_up
-        kept, p = len(self.time) // self.samples, self.repeats
-        if kept < 2:
-            return "too short to say whether it repeats"
-        came = f"comes back after {counted(p, 'period')}" if p else f"does not come back within {kept // 2} periods"
-        hits = counted(round(self.impacts * p), "impact")
-        per = (
-            f"{hits} in {'them' if p > 1 else 'it'}"
-            if p
-            else f"{self.impacts:.4g} impact{'s' * (self.impacts != 1)} a period"
-        )
-        return f"{came}, {per}" if self.contacts else came
+        return classification.said(self)
 
     @property
     def frequency(self) -> Array:
@@ -184,13 +181,13 @@ class Orbit:
         return self.array("angular_frequency") / (2 * np.pi)
 
     @property
-    def _run_up(self) -> str:
+    def run_up(self) -> str:
         """What a run-up met, in words; empty if it is none."""
         ends = [self.array("angular_frequency", part) for part in (slice(1), slice(-1, None))]
         if not len(self.time) or np.ptp(ends) == 0:
             return ""
         top, at = -1.0, 0.0
-        for y, w in self._strips("displacement", "angular_frequency"):
+        for y, w in self.strips("displacement", "angular_frequency"):
             if len(y) and (high := float(np.abs(y[0]).max())) > top:
                 top, at = high, float(w[np.abs(y[0]).argmax()]) / (2 * np.pi)
         way = "up" if ends[1] > ends[0] else "down"
@@ -219,7 +216,7 @@ class Orbit:
         return left.width / size if size else 0.0
 
     def _energies(self, *names: str) -> Iterator[list[Array]]:
-        return self._strips(*(f"energy_{name}" for name in names))
+        return self.strips(*(f"energy_{name}" for name in names))
 
     # tables and files ------------------------------------------------------------------------------------------------
 
@@ -257,7 +254,7 @@ class Orbit:
     def _told(self) -> dict[str, Any]:
         return {
             "steps_per_period": self.steps, "missed_events": self.missed, "error": self.error,
-            "diverged": self.diverged, "messages": list(self.messages),
+            "diverged": self.diverged, "messages": list(self.messages), **told_of(self.exponent),
         }  # fmt: skip
 
     def save(self, path: Path | str) -> Path:
@@ -271,7 +268,7 @@ class Orbit:
                 kept_samples.head(file)
                 group = file.create_group("motion_1")
                 kept_samples.describe(
-                    group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.contacts, self.samples
+                    group, f"{self.Omega:.6g} rad/s", self.Omega, self.omega2, self.labels, self.touching, self.samples
                 )
                 for name, unit in UNITS.items():
                     put(group, name, self.array(name), unit)
@@ -287,9 +284,10 @@ class Orbit:
 
             axes = plt.subplots(layout="constrained")[1]
         y, v, last = self.y[read_out], self.v[read_out], slice(self.samples - 1, None, self.samples)
-        axes.plot(y, v, linewidth=0.8)
-        axes.plot(y[last], v[last], "o", label="after every period")
-        axes.set(xlabel=f"{self.labels[read_out]} in m", ylabel="velocity in m/s")
+        (by, unit), (rate, per_second) = (METRES.scale(np.abs(x).max(initial=0.0)) for x in (y, v))
+        axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
+        axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
+        axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
         return axes
 
 
@@ -318,6 +316,42 @@ class Ended:
     error: float = math.nan
     diverged: float = math.inf
     messages: tuple[str, ...] = ()
+    exponent: Exponent | None = None
+
+
+def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> tuple[Array, float]:
+    """See `Orbit.stroboscopic`, of strips of modal displacements and velocities."""
+    size, after, begin = 0.0, [np.zeros((2 * len(omega2), 0))], 0
+    for q, q_dot in strips:
+        z = np.concatenate([np.sqrt(np.abs(omega2))[:, None] * q, q_dot])
+        size = max(size, float(np.abs(z).max(initial=0.0)))
+        after.append(z[:, (-1 - begin) % samples :: samples])
+        begin += z.shape[1]
+    return np.concatenate(after, axis=1), size
+
+
+def comes_back(after: Array, size: float) -> int:
+    """See `Orbit.repeats`."""
+    for p in range(1, after.shape[1] // 2 + 1):
+        if np.abs(after[:, p:] - after[:, :-p]).max(initial=0.0) <= REPEATS * size:
+            return p
+    return 0
+
+
+def told_of(exponent: Exponent | None) -> dict[str, Any]:
+    """An exponent as a file has it; nothing where none was looked for."""
+    if exponent is None:
+        return {}
+    names = ("lyapunov_exponent", "lyapunov_uncertainty", "lyapunov_periods")
+    return dict(zip(names, exponent[:3], strict=True))
+
+
+def exponent_of(told: Mapping[str, Any]) -> Exponent | None:
+    """What `told_of` has told."""
+    if "lyapunov_exponent" not in told:
+        return None
+    value, around, periods = (told[f"lyapunov_{key}"] for key in ("exponent", "uncertainty", "periods"))
+    return Exponent(float(value), float(around), int(periods))
 
 
 def run(
@@ -339,7 +373,7 @@ def run(
         equations, kept_samples.labels_of(equations), samples, ended.steps, a["time"], a["displacement"], a["velocity"],
         a["modal_displacement"], a["modal_velocity"], a["contact_displacement"], a["contact_force"],
         {name: a[f"energy_{name}"] for name in kept_samples.ENERGIES}, a["event"], kept.missed, ended.error,
-        ended.diverged, ended.messages,
+        ended.diverged, ended.exponent, ended.messages,
     )  # fmt: skip
 
 
@@ -370,7 +404,21 @@ def march(
         if done % CHUNK == 0 or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
     error = _error(stepper, now, samples, each)
-    return Ended(each * samples, error, messages=_warnings(kept, float(now.worst)))
+    exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
+    more = (exponent.message,) if exponent and exponent.message else ()
+    return Ended(each * samples, error, messages=(*_warnings(kept, float(now.worst)), *more), exponent=exponent)
+
+
+def _exponent(stepper: Stepper, now: Now, kept: Kept, samples: int, each: int, done: int) -> Exponent | None:
+    """The largest Lyapunov exponent of a motion that has not come back in what was kept; of so many periods at most as
+    were done."""
+    periods = min(classification.MOST, done - classification.ALIGNED) // classification.BATCHES
+    periods *= classification.BATCHES
+    after, size = stroboscopic(kept.strips("modal_displacement", "modal_velocity"), stepper.equations.omega2, samples)
+    few = periods < classification.FEWEST or after.shape[1] < classification.FEWEST
+    if few or stepper.equations.ramp or comes_back(after, size):
+        return None
+    return classification.exponent(stepper, now, samples, each, periods)
 
 
 def _divergence(stepper: Stepper, before: Now, seen: Seen, kept: Kept | None) -> tuple[float, str]:

@@ -40,8 +40,9 @@ class Recorded(Orbit):
             "path": path, "number": number, "name": str(told["name"]), "labels": tuple(json.loads(told["read_outs"])),
             "samples": int(told["samples_per_period"]), "steps": int(told["steps_per_period"]),
             "missed": int(told["missed_events"]), "error": float(told["error"]), "diverged": float(told["diverged"]),
-            "messages": tuple(json.loads(told["messages"])), "_omega": float(told["Omega"]),
-            "_omega2": group["omega2"][()], "_contacts": tuple(json.loads(told["contacts"])), "_equations": equations,
+            "messages": tuple(json.loads(told["messages"])), "exponent": orbit.exponent_of(told),
+            "_omega": float(told["Omega"]),
+            "_omega2": group["omega2"][()], "_touching": samples.touches_of(told), "_equations": equations,
         }  # fmt: skip
         self.__dict__.update(own)
 
@@ -58,8 +59,8 @@ class Recorded(Orbit):
         return np.asarray(self.__dict__["_omega2"])
 
     @property
-    def contacts(self) -> tuple[str, ...]:
-        return tuple(self.__dict__["_contacts"])
+    def touching(self) -> tuple[samples.Touch, ...]:
+        return tuple(self.__dict__["_touching"])
 
     @property
     def equations(self) -> Equations:  # type: ignore[override]
@@ -141,7 +142,7 @@ def run(
             kept.end(
                 {
                     "steps_per_period": ended.steps, "error": ended.error, "diverged": ended.diverged,
-                    "messages": list(ended.messages),
+                    "messages": list(ended.messages), **orbit.told_of(ended.exponent),
                 }
             )  # fmt: skip
     with h5py.File(path, "r") as whole:

@@ -13,11 +13,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import h5py
+import jax.numpy as jnp
 import numpy as np
 
+from ..contact.elements import Spring
 from ..data import Array, UserError
 from ..files.hdf5 import create, put, seal, seal_state
 from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
@@ -42,6 +44,9 @@ ROWS = {
     "contact_displacement": "contact_coordinate", "contact_force": "contact_coordinate",
 }  # fmt: skip
 """What the first axis of an array is over; others have time alone."""
+
+STRIP = 1 << 16
+"""Samples of a long motion that are looked at together."""
 
 PART = 1 << 17
 """Numbers of an array that are together in the file."""
@@ -83,6 +88,31 @@ def sizes(e: Equations) -> dict[str, int]:
     return {name: of[axis] for name, axis in ROWS.items()}
 
 
+class Touch(NamedTuple):
+    """A contact: its name, whether each of its coordinates moves points in their plane against friction, and whether
+    its law knows where it opens."""
+
+    name: str
+    tangential: tuple[bool, ...]
+    opens: bool
+
+
+def touches(e: Equations) -> tuple[Touch, ...]:
+    found = []
+    for c in e.contacts:
+        law, points = c.patch.law, len(c.patch.points)
+        plane = np.abs(c.patch.kinematics[:, 1:]).max(axis=(0, 1)) > 0
+        rubs = plane & (not isinstance(law, Spring))
+        opens = not np.isnan(np.asarray(law.overlap(jnp.zeros((points, 3))))).any()
+        found.append(Touch(c.name, tuple(map(bool, rubs)), opens))
+    return tuple(found)
+
+
+def touches_of(told: Mapping[str, Any]) -> tuple[Touch, ...]:
+    """Those that a motion in a file tells of."""
+    return tuple(Touch(name, tuple(tangential), opens) for name, tangential, opens in json.loads(told["contacts"]))
+
+
 class Kept(Protocol):
     """Where the samples of a motion go."""
 
@@ -101,6 +131,10 @@ class Kept(Protocol):
 
     def mark(self, now: Now, done: int) -> None:
         """All that was kept belongs to so many periods."""
+        ...
+
+    def strips(self, *names: str) -> Iterator[list[Array]]:
+        """Arrays that were kept, so many samples at a time."""
         ...
 
 
@@ -124,6 +158,10 @@ class InMemory:
 
     def mark(self, now: Now, done: int) -> None:
         pass
+
+    def strips(self, *names: str) -> Iterator[list[Array]]:
+        for part in self.parts:
+            yield [part[name] for name in names]
 
     def arrays(self, e: Equations) -> dict[str, Array]:
         """Name -> (rows, s) or (s,), and ``event`` (e, 3)."""
@@ -183,6 +221,10 @@ class InFile:
     def mark(self, now: Now, done: int) -> None:
         if time.monotonic() - self.recording.marked >= PAUSE:
             self.recording.mark(self, now, done)
+
+    def strips(self, *names: str) -> Iterator[list[Array]]:
+        for begin in range(0, self.filled, STRIP):
+            yield [self.group[name][..., begin : min(begin + STRIP, self.filled)] for name in names]
 
     def end(self, attributes: Mapping[str, Any]) -> None:
         """The motion is whole: what a reader is told of it beside its arrays."""
@@ -296,7 +338,7 @@ def _reserve(file: h5py.File, plan: Sequence[Planned]) -> None:
     for i, one in enumerate(plan, 1):
         group, s = file.create_group(f"motion_{i}"), one.samples * one.keep
         e = one.equations
-        describe(group, one.name, e.Omega, e.omega2, labels_of(e), [c.name for c in e.contacts], one.samples)
+        describe(group, one.name, e.Omega, e.omega2, labels_of(e), touches(e), one.samples)
         rows = sizes(one.equations)
         for name, unit in UNITS.items():
             _room(group, name, (rows[name], s) if name in rows else (s,), unit)
@@ -354,7 +396,7 @@ def head(file: h5py.File) -> None:
 
 
 def describe(
-    group: h5py.Group, name: str, Omega: float, omega2: Array, labels: Sequence[str], contacts: Sequence[str],
+    group: h5py.Group, name: str, Omega: float, omega2: Array, labels: Sequence[str], contacts: Sequence[Touch],
     samples: int,
 ) -> None:  # fmt: skip
     """What is known of a motion before it is."""
