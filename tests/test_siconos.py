@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from closed_forms.impacts import bounces, height_of_ball
+
+import microslip as ms
+from microslip.contact.friction import Coulomb
+from microslip.contact.law import value
+from microslip.contact.patch import Patch
+from microslip.contact.set_valued import SetValued
+from microslip.system.assembly import Contact, ContactFace
+from microslip.time_domain import equations
+from microslip.time_domain.stepper import Stepper
 
 PYTHON = "/usr/bin/python3"
 
@@ -78,3 +88,39 @@ def test_siconos_keeps_the_laws_of_contact_in_a_chain(tmp_path: Path) -> None:
     slides = np.abs(rate) > 1e-6
     np.testing.assert_allclose(friction[slides], -0.1 * np.sign(rate[slides]), rtol=1e-6)
     assert 0.005 < 1 - slides.mean() < 0.8
+
+
+def of_package(job: dict[str, Any]) -> Stepper:
+    """The stepper of a job whose coordinates all have mass; contacts with friction in two directions."""
+    structure = ms.structure(
+        np.array(job["M"]), np.array(job["K"]), np.array(job["C"]), force=np.array(job["force"], dtype=float),
+        steady=np.array(job["weight"], dtype=float), output=list(range(len(job["M"]))),
+    )  # fmt: skip
+    contacts = []
+    for i, c in enumerate(job["contacts"]):
+        law = SetValued(Coulomb(value(c["mu"])), value(c["restitution"]), value(0.0))
+        shapes = np.zeros((1, 3, 2))
+        shapes[0, 0, 0] = shapes[0, 1, 1] = 1.0
+        patch = Patch("ground", np.zeros((1, 2)), np.ones(1), law, shapes)
+        rows = np.array([np.negative(c["normal"]), c["along"]], dtype=float)
+        face = ContactFace("structure", f"ground {i}", rows={0: rows})
+        contacts.append(Contact(f"ground {i}", patch, face, None, np.array([-c["gap"], 0.0]), np.zeros(2)))
+    e = equations.of(replace(structure, contacts=tuple(contacts)), job["omega"])
+    return Stepper(e, job["step"])
+
+
+@pytest.mark.slow
+def test_the_package_moves_a_chain_as_siconos_does(tmp_path: Path) -> None:
+    """Friction, lift-off and impacts coupled: both of first order, their difference falls with the step."""
+    differences = []
+    for step in (1e-3, 2.5e-4):
+        job = chain(step, 6 * np.pi / 1.1)
+        found, stepper = siconos(job, tmp_path), of_package(job)
+        every = round(0.01 / step)
+        start = np.zeros(5), np.zeros(5)
+        _, seen, events, _ = stepper.run(stepper.start(*start), np.full(len(found["time"]) // every, every))
+        x = seen.q @ stepper.equations.output.T
+        theirs = np.array([np.interp(seen.time, found["time"], found["q"][:, i]) for i in (0, 1)]).T
+        differences.append(np.abs(x[:, :2] - theirs).max())
+        assert (events[:, 1] == 2).any() and set(events[:, 2]) == {0, 1, 2, 3}
+    assert differences[1] < 0.5 * differences[0] < 5e-3
