@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ..time_domain.orbit import Orbit
 
-Panel = Callable[["Axes"], None]
+Panel = Callable[["Axes"], object]
 
 SHOWN = 4
 """Periods that are drawn over time."""

@@ -157,6 +157,14 @@ def phase(orbit: Orbit) -> Array:
     return np.concatenate([np.sqrt(np.abs(orbit.equations.omega2))[:, None] * orbit.q, orbit.q_dot])
 
 
+def of_body(orbit: Orbit, component: int, at: Array) -> Array:
+    """(f, m) coordinates of a component at samples."""
+    e = orbit.equations
+    counts = [c.at(0).group.n_modes for c in e.assembly.components]
+    begin = sum(counts[:component])
+    return (e.shapes[begin : begin + counts[component]] @ orbit.q[:, at]).T
+
+
 def coordinates(orbit: Orbit, contact: int) -> slice:
     """Rows of `Orbit.d` and `Orbit.force` of a contact."""
     begins = np.cumsum([0, *(c.patch.count for c in orbit.equations.contacts)])
