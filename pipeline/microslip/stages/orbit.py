@@ -132,7 +132,7 @@ def _pictures(found: list[tuple[str, Orbit]], folder: Path, case: str) -> list[P
 
     folder.mkdir(exist_ok=True)
     seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
-    if seen:  # one that diverges as it settles leaves nothing to draw
+    if len(seen) > 1:  # one that diverges as it settles leaves nothing to draw
         drawn.append(portraits(seen, folder / "phase_portraits.png", f"{case}: phase portraits"))
     for i, (name, one) in enumerate(seen, 1):
         drawn.append(orbit_picture(one, folder / f"orbit_{i}.png", f"{case}: {name}, {one.said}"))
