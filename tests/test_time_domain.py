@@ -239,6 +239,22 @@ def test_pictures_are_left_out_when_asked_and_several_motions_stand_together(ham
     assert {path.name for path in (folder / "pictures").iterdir()} == names  # no mesh, nothing that moves
 
 
+@pytest.mark.slow
+def test_chatter_is_said_with_its_impacts_and_drawn(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """At 9.845 rad/s with a contact that takes more: it comes to rest once a period, after as many impacts as the file
+    lists between the longest flight and the rest."""
+    set_ = [x for pair in (
+        "orbit.Omega=9.845", "orbit.settle=5", "orbit.keep=4", 'contacts.0.law={kind="rough", damping=2e-4}',
+    ) for x in ("--set", pair)]  # fmt: skip
+    assert main(["orbit", "case.toml", *set_]) == 0
+    told = re.search(r"face comes to rest after (\d+) impacts, (\d+) times", capsys.readouterr().out)
+    with h5py.File(hammer / "build" / "hammer" / "orbit.h5") as file:
+        event = file["motion_1"]["event"][:]
+    meets = (event[:, 2] == 0).sum() / 4
+    assert told and int(told[1]) == pytest.approx(meets, abs=1) and 3 <= int(told[2]) <= 4
+    assert (hammer / "build" / "hammer" / "pictures" / "chatter_1_face.png").is_file()
+
+
 def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> None:
     """Files over the last period, their times in s, displacements those of the modes: the tip follows the read-out."""
     basis = ms.read_basis(Path(ms.__file__).parent / "samples" / "basis.h5")
