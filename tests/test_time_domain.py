@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tracemalloc
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import h5py
 import jax.numpy as jnp
+import meshio
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -23,12 +25,13 @@ from microslip.contact.law import value
 from microslip.contact.normal import Normal, Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
-from microslip.data import CENTRIFUGAL, RunUp, UserError
+from microslip.data import CENTRIFUGAL, Rows, RunUp, UserError
+from microslip.exchange.vtu import write_motion
 from microslip.report.page import number, text
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
 from microslip.system.component import Component
-from microslip.time_domain import equations, orbit, recorded, samples, starts
+from microslip.time_domain import classification, equations, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Options, Stepper
 from microslip.units import METRES
 
@@ -225,9 +228,55 @@ def test_orbit_of_a_case_says_the_same_in_table_page_and_file(hammer: Path, caps
         assert len(group["event"]) == by_hand.count("closes") + by_hand.count("opens")
     page = (folder / "orbit.html").read_text(encoding="utf-8")
     assert METRES.sized(max(abs(told["smallest_m"]), abs(told["largest_m"]))) in page and "periodic" in page
-    assert text(number(told["lost_in_contacts_J_per_period"])) in page and page.count("<img") == 2
+    assert text(number(told["lost_in_contacts_J_per_period"])) in page and page.count("<img") == 1
     made = (folder / "orbit.h5").stat().st_mtime_ns
     assert main(["orbit", "case.toml", "-q"]) == 0 and (folder / "orbit.h5").stat().st_mtime_ns == made
+
+
+def test_pictures_are_left_out_when_asked_and_several_motions_stand_together(hammer: Path) -> None:
+    folder = hammer / "build" / "hammer"
+    assert main(["orbit", "case.toml", "-q", "--no-pictures"]) == 0
+    assert not (folder / "pictures").exists() and "<img" not in (folder / "orbit.html").read_text(encoding="utf-8")
+    assert main(["orbit", "case.toml", "-q", "--set", "orbit.Omega=[64.32, 30.84]", "--set", "orbit.settle=20"]) == 0
+    names = {"phase_portraits.png", "orbit_1.png", "orbit_2.png"}
+    assert {path.name for path in (folder / "pictures").iterdir()} == names  # no mesh, nothing that moves
+
+
+@pytest.mark.slow
+def test_chatter_is_said_with_its_impacts_and_drawn(hammer: Path, capsys: pytest.CaptureFixture) -> None:
+    """At 9.845 rad/s with a contact that takes more: it comes to rest once a period, after as many impacts as the file
+    lists between the longest flight and the rest."""
+    set_ = [x for pair in (
+        "orbit.Omega=9.845", "orbit.settle=5", "orbit.keep=4", 'contacts.0.law={kind="rough", damping=2e-4}',
+    ) for x in ("--set", pair)]  # fmt: skip
+    assert main(["orbit", "case.toml", *set_]) == 0
+    told = re.search(r"face comes to rest after (\d+) impacts, (\d+) times", capsys.readouterr().out)
+    with h5py.File(hammer / "build" / "hammer" / "orbit.h5") as file:
+        event = file["motion_1"]["event"][:]
+    meets = (event[:, 2] == 0).sum() / 4
+    assert told and int(told[1]) == pytest.approx(meets, abs=1) and 3 <= int(told[2]) <= 4
+    assert (hammer / "build" / "hammer" / "pictures" / "chatter_1_face.png").is_file()
+
+
+def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> None:
+    """Files over the last period, their times in s, displacements those of the modes: the tip follows the read-out."""
+    basis = ms.read_basis(Path(ms.__file__).parent / "samples" / "basis.h5")
+    group = basis.groups[min(basis.groups)]
+    load, tip = Load("vane", "magnet", 1.0), int(np.argmax(np.abs(group.phi[:, 0, 0])))
+    seen = Rows(group.phi[tip], ("u_x", "u_y", "u_z"), "m", basis.mesh.points[tip])
+    vane = Component("vane", {0: replace(group, monitors={"tip": seen})})
+    found = orbit.run(equations.of(Assembly((vane,), (), (load,), (Output("vane", "tip", "u_x"),)), 900.0), 2, 2, 64)
+    at = np.arange(64, 128, 8)
+    moved = np.einsum("pxm,fm->fpx", group.phi, classification.of_body(found, 0, at))
+    first, *files = write_motion(basis, found.time[at], moved, tmp_path / "vane.pvd")
+    times = [float(x) for x in re.findall(r'timestep="([^"]+)"', first.read_text())]
+    np.testing.assert_array_equal(times, found.time[at])
+    for file, read in zip(files, found.y[0][at], strict=True):
+        mesh = meshio.read(file)
+        nearest = np.argmin(np.linalg.norm(mesh.points - basis.mesh.points[tip], axis=1))
+        assert mesh.point_data["displacement"][nearest, 0] == pytest.approx(
+            read, rel=1e-6, abs=1e-6 * np.abs(moved).max()
+        )
 
 
 @pytest.mark.parametrize(

@@ -390,7 +390,7 @@ def orbit(
         files = existing_files(settings, case, basis, Path("."))
         folder = Path("build") / settings.name
         made, sentences, fine = orbit_stage(case, files, folder, list(set_), force, report, not no_pictures)
-    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    _say("\n".join([*sentences, *(str(path) for path in made if path.suffix != ".vtu")]), quiet)
     if not fine:
         raise NotConverged(f"a motion diverged; {made[0]} holds what was found until then")
 

@@ -74,6 +74,31 @@ def write_pvd(basis: ModalBasis, path: Path | str) -> None:
     write_text(path, collection(files))
 
 
+def write_motion(basis: ModalBasis, times: Array, moved: Array, path: Path | str) -> list[Path]:
+    """Write the outside of a moving body as a VTU file a time, bound together by a PVD file with times in s.
+
+    Point data: ``displacement`` (n, 3) m, about the mesh at rest; ParaView's filter Warp By Vector moves it.
+
+    Args:
+        times: (f,) s. moved: (f, points, 3) m. path: of the PVD file; the others stand beside it.
+
+    Returns:
+        All files, the PVD file first.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    import meshio
+
+    path, files, (outside, used) = Path(path), dict[float, Path](), _outside(basis)
+    for i, (time, shape) in enumerate(zip(times, moved, strict=True)):
+        files[float(time)] = path.with_name(f"{path.stem}_{i:03d}.vtu")
+        data = {"displacement": single(shape[used])}
+        save(meshio.Mesh(outside.points, dict(outside.cells), point_data=data), files[float(time)])
+    write_text(path, collection(files))
+    return [path, *files.values()]
+
+
 COMMENT = f"<!--microslip: {STATEMENT}; vectors x y z; phi^H M phi = 1; stress xx yy zz xy yz xz-->"
 
 
@@ -203,8 +228,8 @@ def _write_ring_group(basis: ModalBasis, ring: Mesh, group: ModalGroup, path: Pa
     save(meshio.Mesh(ring.points, dict(ring.cells), point_data=data, cell_data={"sector": sector}), path)
 
 
-def collection(files: Mapping[int, Path]) -> str:
-    """A PVD file: the nodal diameter, or the number of the mode, stands as the time."""
+def collection(files: Mapping[int, Path] | Mapping[float, Path]) -> str:
+    """A PVD file: the nodal diameter, or the number of the mode, stands as the time, or time itself in s."""
     sets = "".join(f'    <DataSet timestep="{k}" part="0" file="{escape(f.name)}"/>\n' for k, f in files.items())
     return (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'

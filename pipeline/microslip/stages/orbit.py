@@ -11,10 +11,11 @@ import numpy as np
 
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
-from ..case.assemble import build, swept
+from ..case.assemble import Built, build, swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
+from ..exchange.vtu import write_motion
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.orbit import orbit_html
@@ -88,12 +89,19 @@ def _work(
     sentences = [*notes, *more, *built.messages]
     store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
     drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
+    moving = _moving(found, built, folder) if pictures else []
+    drawn += [path for path in moving if path.suffix == ".gif"]
     rows = [
         {"name": name, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for name, one in found
     ]
     page = orbit_html(f"{settings.name}: motion in time", rows, notes, [*more, *built.messages], drawn)
     store.write_text(folder / "orbit.html", page)
-    names = ["orbit.html", "orbit.csv", "orbit.h5", *(f"pictures/{p.name}" for p in drawn)]
+    names = [
+        "orbit.html",
+        "orbit.csv",
+        "orbit.h5",
+        *(str(p.relative_to(folder)) for p in dict.fromkeys(drawn + moving)),
+    ]
     diverged = [name for name, one in found if np.isfinite(one.diverged)]
     told = {"files": names, "sentences": sentences, "diverged": diverged}
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
@@ -141,15 +149,42 @@ def _pictures(found: Sequence[tuple[str, Orbit]], folder: Path, case: str) -> li
 
     folder.mkdir(exist_ok=True)
     seen, drawn = [(name, one) for name, one in found if len(one.time)], list[Path]()
-    if seen:  # one that diverges as it settles leaves nothing to draw
+    if len(seen) > 1:  # one that diverges as it settles leaves nothing to draw
         drawn.append(portraits(seen, folder / "phase_portraits.png", f"{case}: phase portraits"))
     for i, (name, one) in enumerate(seen, 1):
-        drawn.append(orbit_picture(one, folder / f"orbit_{i}.png", f"{case}: {name}, {one.said}"))
+        drawn.append(orbit_picture(one, folder / f"orbit_{i}.png", f"{case}: {name}\n{one.said}"))
         for k, contact in enumerate(one.contacts):
             if classification.chatter(one, k):
                 title = f"{case}: {name}, chatter of {contact}"
                 drawn.append(chatter_picture(one, k, folder / f"chatter_{i}_{contact}.png", title))
     return drawn
+
+
+def _moving(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path) -> list[Path]:
+    """The last period of every body that has a mesh and shapes: for ParaView, and as an animation where PyVista is."""
+    from ..pictures import can_draw
+    from ..pictures.moving import moving_gif
+
+    made, case, scenes = list[Path](), built.settings.name, can_draw() is None
+    for i, (name, one) in enumerate(found, 1):
+        if len(one.time) < one.samples:
+            continue
+        at = len(one.time) - one.samples + np.arange(0, one.samples, max(one.samples // FRAMES, 1))
+        for j, component in enumerate(one.equations.assembly.components):
+            body = built.bodies.get(component.name)
+            if body is None or not body.basis.mesh.n_cells or body.basis.sectors > 1 or not len(body.group.phi):
+                continue
+            moved = np.einsum("pxm,fm->fpx", body.group.phi, classification.of_body(one, j, at))
+            (folder / "motion").mkdir(exist_ok=True)
+            made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
+            if scenes:
+                path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
+                made.append(moving_gif(body.basis, moved, path, f"{case}: {name}, one period of the excitation"))
+    return made
+
+
+FRAMES = 32
+"""Of a period that is animated."""
 
 
 def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:

@@ -140,6 +140,14 @@ def _mean(growth: Array, period: float) -> Exponent:
     return Exponent(float(means.mean()), float(spread), n)
 
 
+def of_body(orbit: Orbit, component: int, at: Array) -> Array:
+    """(f, m) coordinates of a component at samples."""
+    e = orbit.equations
+    counts = [c.at(0).group.n_modes for c in e.assembly.components]
+    begin = sum(counts[:component])
+    return (e.shapes[begin : begin + counts[component]] @ orbit.q[:, at]).T
+
+
 def coordinates(orbit: Orbit, contact: int) -> slice:
     """Rows of `Orbit.d` and `Orbit.force` of a contact."""
     begins = np.cumsum([0, *(len(c.tangential) for c in orbit.touching)])
