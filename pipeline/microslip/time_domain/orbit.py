@@ -15,6 +15,7 @@ from ..data import Array, NotConverged, UserError
 from ..settings.mistakes import bounded
 from ..units import counted
 from .equations import Equations
+from .ground import steps_of_waves
 from .stepper import EVENTS, KINDS, Now, Seen, Stepper, static_force
 
 if TYPE_CHECKING:
@@ -51,7 +52,8 @@ class Orbit:
         time: (s,) s. y, v: (w, s) read-outs in m and their velocities in m/s. q, q_dot: (m, s) modal coordinates of
             `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
         energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads,
-            ``damped``, and ``contacts``, done on them; of that ``stored`` and ``lost``, nan where a law does not tell.
+            ``damped``, and ``contacts``, done on them; of that, and of what moving
+            ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
         error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
             read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
@@ -131,9 +133,11 @@ class Orbit:
     def drift(self) -> float:
         """Share of the energy that passed through the contacts by which what they store and lost differs from it."""
         E = self.energy
-        gone = np.abs(E["contacts"] - E["stored"] - E["lost"] - (E["contacts"] - E["stored"] - E["lost"])[0])
-        passed = np.ptp(E["contacts"]) if len(self.time) else 0.0
-        return float(gone.max() / passed) if passed else 0.0
+        if not len(self.time):
+            return 0.0
+        left = E["contacts"] + E["ground"] - E["stored"] - E["lost"]
+        passed = max(np.ptp(E["contacts"]), np.ptp(E["ground"]))
+        return float(np.abs(left - left[0]).max() / passed) if passed else 0.0
 
     @property
     def balance(self) -> float:
@@ -223,7 +227,7 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
         UserError: so few that the contacts' springs would make the motion grow.
     """
     if steps is None:
-        wanted = max(OF_PERIOD, OF_CONTACT * e.fastest / e.Omega)
+        wanted = max(OF_PERIOD, OF_CONTACT * e.fastest / e.Omega, steps_of_waves(e.contacts, 2 * np.pi / e.Omega))
         return int(2 ** max(0, math.ceil(math.log2(wanted / samples))))
     bounded("steps", steps, ge=1)
     least = math.ceil(2 * np.pi / e.Omega * e.rate / STABLE)
@@ -231,6 +235,8 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
         raise UserError(
             f"steps: {steps} a period are unstable with the springs of these contacts; take {least} or more"
         )
+    if steps < (least := steps_of_waves(e.contacts, 2 * np.pi / e.Omega)):
+        raise UserError(f"steps: {steps} a period are too few for the waviness of the ground; take {least} or more")
     return max(1, math.ceil(steps / samples))
 
 
@@ -282,7 +288,7 @@ def _orbit(
 ) -> Orbit:  # fmt: skip
     e, c = stepper.equations, len(stepper.equations.D)
     m = len(e.omega2)
-    none = Seen._make([*(np.zeros((0, n)) for n in (m, m, c, c, 5)), np.zeros(0), np.zeros(0)])
+    none = Seen._make([*(np.zeros((0, n)) for n in (m, m, c, c, 6)), np.zeros(0), np.zeros(0)])
     seen = Seen._make(np.concatenate(x) for x in zip(none, *kept, strict=True))
     listed = np.concatenate([np.zeros((0, 3)), *events])
     rates = seen.q_dot @ e.output.T + e.oscillators(seen.time) @ (e.output_given @ e.turning).T
@@ -301,7 +307,7 @@ def _read(e: Equations, seen: Seen) -> Array:
 
 def _energies(e: Equations, seen: Seen) -> dict[str, Array]:
     """See `Orbit`: preloads count as loads, and what bodies hold beside their modes as theirs."""
-    named = dict(zip(("given", "damped", "contacts", "lost", "stored"), seen.energy.T, strict=True))
+    named = dict(zip(("given", "damped", "contacts", "lost", "stored", "ground"), seen.energy.T, strict=True))
     more, preloads = seen.force - e.F_0, seen.d @ e.F_0
     beside = 0.5 * np.einsum("sc,cd,sd->s", more, e.R, more)
     named["given"] = named["given"] + preloads

@@ -24,6 +24,7 @@ from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
 from .equations import Equations
 from .flow import Flow, blocks, flow
+from .ground import moving
 
 EVENTS = 8192
 """Events that one call of the loop keeps; of more, only their number is known."""
@@ -55,6 +56,8 @@ class Bodies(NamedTuple):
         flow. tau: s. D: (c, b, 2 p) and D_o (c, n): d of the contact coordinates. kick: (b, p, c) velocities per force.
             R, yields: (c, c), see `Equations`. F_0: (c,). omega2: (b, p). steady: (b, 2 p, n) of the periodic motion
             without contacts.
+        slowing: (c, c) m/s per N that half a kick changes the contacts' velocities by; yielding: (points,) of it that
+            each point may count on, group by group.
         reach: (points,) norm of their motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`.
     """
 
@@ -70,6 +73,8 @@ class Bodies(NamedTuple):
     steady: Any
     reach: Any
     drift: Any
+    slowing: Any
+    yielding: tuple[Any, ...]
 
 
 class Now(NamedTuple):
@@ -80,8 +85,8 @@ class Now(NamedTuple):
             states: of the laws, group by group; points, places: forces and displacements (c n, 3) of their points.
             approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
             (1 or 0). slips: (contacts,) bool.
-        energy: (5,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, and
-            what contacts store now. worst: m, the largest residual of an implicit contact.
+        energy: (6,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, what
+            contacts store now, and what moving ground gave them. worst: m, the largest residual of an implicit contact.
         count: of events. events: (EVENTS, 3): time in s, contact, kind.
     """
 
@@ -101,7 +106,7 @@ class Now(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """A sample: (m,) q and q', (c,) d and force, (5,) energies (see `Now`) and the bodies' own, J; time, s."""
+    """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `Now`) and the bodies' own, J; time, s."""
 
     q: Any
     q_dot: Any
@@ -115,11 +120,12 @@ class Seen(NamedTuple):
 @dataclass(frozen=True)
 class Options:
     """What the loop is compiled for. yields: whether modes leave out compliance. leaps: over flights without contact.
-    accounts: of the energy that contacts store and lose."""
+    accounts: of the energy that contacts store and lose. brakes: whether friction follows the velocity alone."""
 
     yields: bool
     leaps: bool
     accounts: bool
+    brakes: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,15 +150,17 @@ class Stepper:
             index = np.array([np.arange(begins[i], begins[i + 1]) for i in same])
             offset = np.array([contacts[i].offset for i in same])
             law = repeated(patch.law, len(patch.points), len(same))
+            if (ground := contacts[same[0]].ground) is not None:
+                law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             found.append(Group(law, jnp.asarray(patch.kinematics), jnp.asarray(index), jnp.asarray(offset)))
         return tuple(found)
 
     @cached_property
     def same(self) -> list[list[int]]:
-        """Numbers of the contacts, those of one patch object together."""
-        found: dict[int, list[int]] = {}
+        """Numbers of the contacts, those of one patch object on the same ground together."""
+        found: dict[tuple, list[int]] = {}
         for i, c in enumerate(self.equations.contacts):
-            found.setdefault(id(c.patch), []).append(i)
+            found.setdefault((id(c.patch), c.ground), []).append(i)
         return list(found.values())
 
     @cached_property
@@ -167,7 +175,7 @@ class Stepper:
         opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
         leaps = opens and not e.F_0.any() and e.steady is not None and bool(dissipative)
-        return Options(bool(e.R.any()), leaps, self.accounts)
+        return Options(bool(e.R.any()), leaps, self.accounts, any(g.law.brakes for g in self.groups))
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -184,7 +192,8 @@ class Stepper:
         drift = np.linalg.norm(np.abs((rows @ still + given) @ e.turning).sum(axis=2), axis=1)
         return Bodies(
             flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.yields, e.F_0)),
-            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift)),
+            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift, 0.5 * self.tau * e.D @ e.D.T)),
+            self._yielding,
         )  # fmt: skip
 
     @property
@@ -200,6 +209,14 @@ class Stepper:
             given += [np.asarray(g.G) @ e.D_o[i] for i in np.asarray(g.index)]
         return np.concatenate(rows), np.concatenate(given)
 
+    @property
+    def _yielding(self) -> tuple[Any, ...]:
+        """Of every group (c n,) m/s per N: no pattern of tangential forces moves points by more."""
+        T = self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
+        rows = 0.5 * self.tau * np.abs(T @ T.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
+        ends = np.cumsum([len(g.index) * len(g.G) for g in self.groups])
+        return tuple(map(jnp.asarray, np.split(rows, ends[:-1]))) if len(ends) else ()
+
     def start(self, q: Array, v: Array, time: float = 0.0) -> Now:
         """At rest or moving, from modal coordinates (m,) and velocities; contacts come there from u = 0 on a straight
         way."""
@@ -211,7 +228,7 @@ class Stepper:
         none = jnp.zeros(len(e.contacts))
         now = Now(
             y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros(len(e.D)), states, points, points,
-            none, none.astype(bool), jnp.zeros(5), jnp.zeros(()), jnp.zeros((), dtype=int), jnp.zeros((EVENTS, 3)),
+            none, none.astype(bool), jnp.zeros(6), jnp.zeros(()), jnp.zeros((), dtype=int), jnp.zeros((EVENTS, 3)),
         )  # fmt: skip
         return _begun(self.options, self.groups, self.order, self.bodies, now)
 
@@ -242,7 +259,7 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
 
 
 class Pressed(NamedTuple):
-    """What contacts answer to a step: see `Now`; energy lost in the step and stored after it, J."""
+    """What contacts answer to a step: see `Now`; energy lost in it, given by moving ground, and stored after it, J."""
 
     d: Any
     force: Any
@@ -252,6 +269,7 @@ class Pressed(NamedTuple):
     approach: Any
     slips: Any
     lost: Any
+    given: Any
     stored: Any
     worst: Any
 
@@ -330,7 +348,7 @@ def _placed(options: Options, groups: tuple[Group, ...], B: Bodies, free: Any, v
 def _pressed(options: Options, groups: tuple, order: Any, B: Bodies, free: Any, v: Any, dt: Any, now: Now) -> Pressed:
     d, worst, (force, states, points) = _placed(options, groups, B, free, v, dt, now)
     places = tuple(_displaced(g, d) for g in groups)
-    approach, slips, lost, stored = [], [], jnp.zeros(()), jnp.zeros(())
+    approach, slips, (lost, given, stored) = [], [], jnp.zeros(3)
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
         slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(now.states[i])) > SLID * jnp.abs(u - now.places[i])[:, 1:]
         deep = g.law.overlap(u)
@@ -339,10 +357,12 @@ def _pressed(options: Options, groups: tuple, order: Any, B: Bodies, free: Any, 
         slips.append(jnp.any(slid.reshape(len(g.index), -1), axis=1))
         if options.accounts:
             moved = u - now.places[i]
-            lost += jnp.sum(g.law.lost(Step(u, moved, dt, now.points[i], points[i], now.states[i], states[i])))
+            step = Step(u, moved, dt, now.points[i], points[i], now.states[i], states[i])
+            lost, given = lost + jnp.sum(g.law.lost(step)), given + jnp.sum(g.law.given(step))
             stored += jnp.sum(g.law.stored(u, states[i]))
     by_contact = [jnp.concatenate(x)[order] if x else jnp.zeros(0) for x in (approach, slips)]
-    return Pressed(d, force, states, points, places, by_contact[0], by_contact[1].astype(bool), lost, stored, worst)
+    touched = by_contact[0], by_contact[1].astype(bool)
+    return Pressed(d, force, states, points, places, *touched, lost, given, stored, worst)
 
 
 SLID = 1e-9
@@ -405,16 +425,72 @@ def _step(options: Options, groups: tuple, order: Any, B: Bodies, left: Any, now
     free = jnp.einsum("cbi,bi->c", B.D, y) + B.D_o @ o
     half = 0.5 * B.tau * jnp.einsum("bpc,c->bp", B.kick, now.force - B.F_0)
     v = jnp.einsum("cbi,bi->c", B.D[:, :, :p], y[:, p:] + half) + B.D_o @ (_turning(B) @ o)
+    if options.brakes:
+        v, missed = slowed(groups, B, free, v + B.slowing @ (now.force - B.F_0), dt, now)
+        now = now._replace(worst=jnp.maximum(now.worst, missed * dt))
     found = _pressed(options, groups, order, B, free, v, dt, now)
     kick = B.tau * jnp.einsum("bpc,c->bp", B.kick, found.force - B.F_0)
     work = -jnp.sum(kick * (y[:, p:] + 0.5 * kick))
-    energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, found.lost])), found.stored])
+    energy = now.energy + jnp.stack([given, taken, work, found.lost, 0.0 * work, found.given])
+    energy = energy.at[4].set(found.stored)
     after = now._replace(
         y=y.at[:, p:].add(kick), o=o, time=now.time + dt, force=found.force, states=found.states, points=found.points,
         places=found.places, approach=found.approach, slips=found.slips, energy=energy,
         worst=jnp.maximum(now.worst, found.worst),
     )  # fmt: skip
     return left - 2**k, _noted(now, after, dt)
+
+
+def slowed(groups: tuple[Group, ...], B: Bodies, d: Any, v: Any, dt: Any, now: Now) -> tuple[Any, Any]:
+    """(c,) velocities of contacts after half a kick by friction that follows them alone, and what is missing, m/s.
+
+    v: before that kick. Newton's method from what the last force leaves; where that does not do, from turns in which
+    each point brakes by itself, as if all that yields were its own, from where the others leave it (forward and
+    backward steps: P. L. Lions, B. Mercier, SIAM J. Numer. Anal. 16, 1979).
+    """
+    enough = 1e-12 * jnp.abs(v).max() + 1e-18
+
+    def left(force: Any) -> Any:
+        return v - B.slowing @ (force - B.F_0)
+
+    def missing(at: Any) -> Any:
+        return at - left(_force(groups, d, at, dt, now.states, len(d))[0])
+
+    def newton(carried: tuple) -> tuple:
+        i, at, r = carried
+        at = at - jnp.linalg.solve(jax.jacfwd(missing)(at), r)
+        return i + 1, at, missing(at)
+
+    def refined(at: Any) -> tuple:
+        more = partial(_unsolved, NEWTON, enough)
+        _, at, r = jax.lax.while_loop(more, newton, (0, at, missing(at)))
+        return at, jnp.nan_to_num(jnp.abs(r).max(), nan=jnp.inf)
+
+    def turn(carried: tuple) -> tuple:
+        i, at, points, _, _ = carried
+        force, after = jnp.zeros_like(d), []
+        for g, f, state, y in zip(groups, points, now.states, B.yielding, strict=True):
+            u, w = _displaced(g, d), _moving(g, at)
+            trial = w.at[:, 1:].add(y[:, None] * f[:, 1:])
+            held = (trial - g.law.slowed(u, trial, dt, state, y))[:, 1:] / jnp.where(y > 0, y, 1.0)[:, None]
+            by_law = g.law.step(u, w, dt, state)[0]
+            f = jnp.concatenate([by_law[:, :1], held], axis=1) if g.law.brakes else by_law
+            force = force.at[g.index].set(_contracted(g, f))
+            after.append(f)
+        return i + 1, left(force), tuple(after), *refined(left(force))
+
+    at = left(now.force)
+    begin = (0, at, now.points, *refined(at))
+    *_, found, missed = jax.lax.while_loop(lambda c: (c[4] > enough) & (c[0] < TURNS), turn, begin)
+    return found, missed
+
+
+def _unsolved(most: int, enough: Any, carried: tuple) -> Any:
+    return (jnp.abs(carried[2]).max() > enough) & (carried[0] < most)
+
+
+TURNS, NEWTON = 100, 8
+"""Turns of `slowed` at most, and steps of Newton's method in each."""
 
 
 def _leap(groups: tuple[Group, ...], B: Bodies, now: Now, left: Any) -> Any:
