@@ -73,8 +73,8 @@ class Bodies(NamedTuple):
     steady: Any
     reach: Any
     drift: Any
-    slowing: Any
-    yielding: tuple[Any, ...]
+    slowing: Any = None
+    yielding: tuple[Any, ...] = ()
 
 
 class Now(NamedTuple):
@@ -192,9 +192,8 @@ class Stepper:
         drift = np.linalg.norm(np.abs((rows @ still + given) @ e.turning).sum(axis=2), axis=1)
         return Bodies(
             flow(e, self.tau), self.tau, *map(jnp.asarray, (D, e.D_o, -e.D.T.reshape(b, p, c), e.R, e.yields, e.F_0)),
-            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift, 0.5 * self.tau * e.D @ e.D.T)),
-            self._yielding,
-        )  # fmt: skip
+            *map(jnp.asarray, (e.omega2.reshape(b, p), steady, reach, drift)),
+        )._replace(slowing=jnp.asarray(0.5 * self.tau * e.D @ e.D.T), yielding=self._yielding)  # fmt: skip
 
     @property
     def _points(self) -> tuple[Array, Array]:
