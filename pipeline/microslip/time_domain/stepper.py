@@ -74,7 +74,7 @@ class Bodies(NamedTuple):
     reach: Any
     drift: Any
     slowing: Any = None
-    yielding: tuple[Any, ...] = ()
+    yielding: Any = ()
 
 
 class Now(NamedTuple):
