@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import microslip
+from microslip.case.driving import GroundOfCase
 from microslip.case.settings import CaseSettings, ContactSettings
 from microslip.contact.settings import ContactFile
 from microslip.data import (
@@ -456,6 +457,18 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.fitted_at": ("N", "at which load; if not given the force that presses it: its own, or each of the sweep"),
     "contacts.isotropic": ("", "geometric mean of both tangential stiffnesses of a curved patch, as the book's mode "
                            "needs it"),
+    "contacts.ground.velocity": ("m/s", "V of the other side, of a [motion in time](time_domain.md)"),
+    "contacts.ground.direction": ("degrees", "of the velocity, from t1 towards t2"),
+    "contacts.ground.pushes": ("", "whether the slope of a wave pushes the body along the ground; the book: false"),
+    "contacts.ground.waviness.amplitude": ("m", "y_A of a sine wave along the direction (4.3-1)"),
+    "contacts.ground.waviness.length": ("m", "lambda"),
+    "contacts.ground.waviness.phase": ("degrees", "where the contact begins"),
+    "contacts.ground.spectrum.height": ("m", "root of the mean square of waves with a power spectrum"),
+    "contacts.ground.spectrum.longest": ("m", "wave length"),
+    "contacts.ground.spectrum.shortest": ("m", "wave length"),
+    "contacts.ground.spectrum.exponent": ("", "with which the power falls over the wave number"),
+    "contacts.ground.spectrum.waves": ("", "how many"),
+    "contacts.ground.spectrum.seed": ("", "of their phases and lengths"),
     "springs.row": ("", "excitation of a body, `body:excitation` where there are several: its point and direction"),
     "springs.stiffness": ("N/m", "of the spring"),
     "springs.damping": ("N s/m", "of a damper beside it, against the ground"),
@@ -610,7 +623,7 @@ def _inner(annotation: Any, many: bool = False) -> list[tuple[Any, bool]]:
 def _told(model: Any, field: Any) -> list[tuple[Any, bool]]:
     """`_inner`, without the tables of a contact file in a contact of a case, which have a page of their own."""
     found = _inner(field.annotation)
-    return [] if model is ContactSettings else found
+    return [x for x in found if x[0] is GroundOfCase] if model is ContactSettings else found
 
 
 def _plain_keys(model: Any) -> list[str]:

@@ -340,7 +340,8 @@ def _contact(
                 patch = _in_contact(path, c, lambda: patch_of(c, whole, c.what, faces[0], load))
         more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
-        return _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance)), more
+        made = _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance))
+        return replace(made, ground=c.ground.ground if c.ground else None), more
 
     return at, said
 

@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..data import ModalGroup, UserError
-from ..settings.body import Model, NotNegative, Number, Numbers, Positive
+from ..settings.body import Model, NotNegative, Number, Numbers, Positive, _tuple
 from ..system.assembly import Load
 from ..system.component import Component, Ring
 from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
 from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
+from ..system.ground import Ground, spectrum
 from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure
 from .keys import Address, Order
 
@@ -57,6 +58,63 @@ class SpringOfCase(Model):
     stiffness: Positive
     damping: NotNegative = 0.0
     motion: NotNegative = 0.0
+
+
+class WaveOfCase(Model):
+    """A sine wave of the ground (Sextro Eq. (4.3-1)): amplitude and length in m; phase: degrees where u_r = 0."""
+
+    amplitude: NotNegative
+    length: Positive
+    phase: Number = 0.0
+
+
+class SpectrumOfCase(Model):
+    """Waves of a ground whose profile has a power spectrum over the wave number that falls with an exponent.
+
+    height: m, root of the mean square. longest, shortest: wave lengths, m. exponent: 2 of a random walk. waves: how
+    many. seed: of their phases and lengths.
+    """
+
+    height: NotNegative
+    longest: Positive
+    shortest: Positive
+    exponent: Number = 2.0
+    waves: Annotated[int, Field(ge=1, le=200)] = 32
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+
+    @model_validator(mode="after")
+    def _falling(self) -> SpectrumOfCase:
+        if self.shortest >= self.longest:
+            raise ValueError("shortest: must be below longest; exchange them")
+        return self
+
+
+class GroundOfCase(Model):
+    """Ground that moves under a contact, of a motion in time (Sextro, sections 4.1 and 4.3).
+
+    velocity: m/s, steady. direction: degrees of it, from t1 towards t2. waviness: sine waves, along the direction.
+    spectrum: more of them. pushes: whether the slope of a wave turns the normal force, so that it pushes the body along
+    the ground; false, as the book has it, leaves that out.
+    """
+
+    velocity: Number = 0.0
+    direction: Number = 0.0
+    waviness: Annotated[tuple[WaveOfCase, ...], BeforeValidator(_tuple)] = ()
+    spectrum: SpectrumOfCase | None = None
+    pushes: bool = True
+
+    @model_validator(mode="after")
+    def _moves(self) -> GroundOfCase:
+        if not self.velocity and not self.waviness and self.spectrum is None:
+            raise ValueError("velocity: is missing; ground that neither moves nor is wavy needs no table")
+        return self
+
+    @property
+    def ground(self) -> Ground:
+        waves = [(w.amplitude, w.length, float(np.radians(w.phase))) for w in self.waviness]
+        if (s := self.spectrum) is not None:
+            waves += spectrum(s.height, s.longest, s.shortest, s.exponent, s.waves, s.seed)
+        return Ground(self.velocity, float(np.radians(self.direction)), tuple(waves), self.pushes)
 
 
 class ExcitationOfCase(Model):

@@ -32,7 +32,7 @@ from ..settings.body import (
     validate,
 )
 from ..system.excitation import Turning
-from .driving import ROTATION, ExcitationOfCase, SpringOfCase, base_of
+from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
 from .questions import CurveOfCase, IdentificationOfCase, OrbitOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
@@ -121,6 +121,7 @@ class ContactSettings(ContactLaw):
     their ``approach`` or ``width`` (fit), at the load `fitted_at` (N; if not given the force that presses it: its own,
     or each of the sweep); or fit = ``exact``: a line of contact in pieces, or one round contact, with Hertz' own law.
     isotropic: of both tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
+    ground: how the other side moves, of a motion in time.
     """
 
     interface: Address
@@ -140,6 +141,7 @@ class ContactSettings(ContactLaw):
     fit: Literal["approach", "width", "exact"] = "approach"
     fitted_at: Positive | None = None
     isotropic: bool = False
+    ground: GroundOfCase | None = None
 
     @property
     def is_pressed(self) -> bool:
@@ -178,6 +180,8 @@ class ContactSettings(ContactLaw):
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
         if self.temperature is not None and not self.heated:
             raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
+        if self.ground is not None and self.against != GROUND:
+            raise ValueError(f"ground: the contact is against {self.against}; leave ground or against out")
         self.fits_here()
         return self._curved()
 
@@ -400,6 +404,11 @@ class CaseSettings(Model):
         return self
 
     def _pressed(self) -> CaseSettings:
+        moves = [c.interface for c in self.contacts if c.ground is not None]
+        if moves and not self.is_only_in_time:
+            raise ValueError(
+                f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] and no sweep"
+            )
         open_ = [c.interface for c in self.contacts if c.normal_force is None and c.interference is None]
         if open_ and self.sweep.normal_forces is None:
             raise ValueError(

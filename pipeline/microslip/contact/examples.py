@@ -19,6 +19,7 @@ from .point import PointContact
 from .point_laws import hertz_point, round_point
 from .portion import Portion
 from .profiles import Profile, RoundContact
+from .rate import RateContact
 from .regularised import MassContact
 from .sliders import Iwan, mindlin, rough_strips, segalman
 from .solids import Solid
@@ -79,6 +80,9 @@ EXAMPLES: dict[str, Example] = {
     "point, scattered": _point(scattered(_COULOMB, 0.1, 2e-3)),
     "point with mass": Example(
         MassContact(_ROUGH, _COULOMB, _C, None, _value(1e-6), _value(1e-5), _value(1e6)), 1.2e-5, 8e-6, inertia=0.02
+    ),
+    "point by its velocity": Example(
+        RateContact(_ROUGH, Rising(_value(0.2), _value(0.3), _value(50.0)), _value(1e4), _value(1e-6)), 1.2e-5, 8e-6
     ),
     "rough strips": Example(rough_strips(2.4e8, 12e-6, Polynomial(), 0.9e8, 0.3, 6), 1.2e-5, 8e-6),
     "Mindlin": Example(mindlin(Hertz(_STEEL, _STEEL, 20.0, 20.0), 0.3, 3e-5, 6), 1.2e-5, 8e-6),

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, dataclass_transform
+from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 
 import jax
 import jax.numpy as jnp
@@ -165,7 +165,12 @@ class Law:
     the gap at which the highest asperities just touch; ``v`` (n, 3) its velocity in m/s. The force (n, 3) in N is
     what has to act on the contact to move it so: the normal entry is compressive and not negative, and the work of a
     closed cycle, the integral of force . du, is the energy the contact dissipates.
+
+    Attributes:
+        brakes: whether its friction changes so fast with the velocity that a motion in time needs `slowed`.
     """
+
+    brakes: ClassVar[bool] = False
 
     def init(self, n: int) -> State:
         """State of n points that were never loaded, at u = 0."""
@@ -196,6 +201,16 @@ class Law:
             (n, 3) force in N and (k, n) the time derivative of x.
         """
         raise NotImplementedError
+
+    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
+        """(n, 3) velocities in m/s that are left of v when friction brakes points which yield by (n,) m/s per N:
+        v_t = left_t + yielding F_t(left), with the normal velocity as it is. The default leaves v: friction follows the
+        displacement."""
+        return v
+
+    def given(self, step: Step) -> Array:
+        """(n,) J that what the contact touches gives it in a step, where that moves; the default: it does not."""
+        return jnp.zeros(step.u.shape[0])
 
     def memory(self, force: Array, state: State) -> Array:
         """(..., n) forces in N that come back with the cycle once it is periodic, and that the next one depends on.

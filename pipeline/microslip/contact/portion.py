@@ -40,6 +40,13 @@ class Portion(Law):
         force, rate = self.whole.rates(u, v, x, time, lag)
         return (self.share * force.T).T, rate
 
+    @property
+    def brakes(self) -> bool:  # type: ignore[override]
+        return self.whole.brakes
+
+    def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
+        return self.whole.slowed(u, v, dt, state, self.share * yielding)
+
     def memory(self, force: Array, state: State) -> Array:
         return self.share * self.whole.memory((force.T / self.share).T, state)
 

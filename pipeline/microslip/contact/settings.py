@@ -42,6 +42,7 @@ from .jenkins import OfJenkins
 from .keys import Boundary, Lengths, PositiveLengths
 from .kinds import LawKind, kinds
 from .point import OfPoint
+from .rate import OfRate
 from .regularised import WithMass
 from .roughness import ExponentialHeights, GaussianHeights, ProfileHeights, Roughness, Shape, TableHeights
 from .sliders import OfIwan, OfMindlin, OfStrips
@@ -58,7 +59,7 @@ else:
     AnyFriction = kinds(
         "friction", OfCoulomb, OfStaticSliding, OfFalling, OfExponential, OfHeated, OfTable, OfLubricated
     )  # fmt: skip
-    AnyLaw = kinds("law", OfPoint, OfJenkins, WithMass, OfStrips, OfIwan, OfMindlin)
+    AnyLaw = kinds("law", OfPoint, OfJenkins, WithMass, OfRate, OfStrips, OfIwan, OfMindlin)
 
 
 class Motion(Model):

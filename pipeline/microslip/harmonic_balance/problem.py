@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from ..data import Array, ComplexArray, Indices
+from ..data import Array, ComplexArray, Indices, UserError
 from ..settings.mistakes import bounded
 from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
@@ -435,6 +435,8 @@ def of(
         UserError: no harmonic or cycle, a length or a share that is none, a name that no component has.
     """
     assembly.check_names()
+    if moves := [c.name for c in assembly.contacts if c.ground is not None]:
+        raise UserError(f"contacts.{moves[0]}.ground: moves, which harmonic balance cannot take; use microslip orbit")
     for name, value, bounds in (
         ("harmonics", harmonics, {"ge": 1}),
         ("cycles", cycles, {"ge": 1}),

@@ -25,6 +25,7 @@ from ..data import INTERFACE_ROWS, Array, ComplexArray, UserError
 from ..settings.mistakes import bounded
 from .component import Component, InWave, Ring
 from .disc import spread, whole
+from .ground import Ground
 
 if TYPE_CHECKING:
     from ..contact.patch import Patch
@@ -85,6 +86,7 @@ class Contact:
         phase: radians by which the wave leads here in the first harmonic. Laws are marched from where the wave is at
             zero phase: what a contact remembers of its beginning is then the same in every sector of a ring.
         compliance: (k, k) of the bodies along the coordinates, by which a patch that deforms yields to its preload.
+        ground: how the other side moves, of a motion in time; None: it stands still.
         length: m, about what it has to move by to slide, close or bend; None: what preload and offset say.
     """
 
@@ -97,6 +99,7 @@ class Contact:
     phase: float = 0.0
     compliance: Array | None = None
     length: float | None = None
+    ground: Ground | None = None
 
     @cached_property
     def stiffness(self) -> Array:
@@ -121,7 +124,7 @@ class Contact:
         found = preloaded_contact(
             self.name, self.patch, self.first, self.second, normal=normal, compliance=self.compliance
         )
-        return replace(found, phase=self.phase)
+        return replace(found, phase=self.phase, ground=self.ground)
 
 
 def preloaded_contact(

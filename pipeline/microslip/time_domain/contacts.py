@@ -60,7 +60,8 @@ class Held(NamedTuple):
             their points.
         approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
             (1 or 0). slips: (contacts,) bool.
-        lost, stored: J, in the last step and after it. missed: m, the largest residual of implicit contacts.
+        lost, given, stored: J, lost in the last step, given by moving ground in it, and stored after it. missed: m, the
+            largest residual of implicit contacts.
     """
 
     d: Any
@@ -71,6 +72,7 @@ class Held(NamedTuple):
     approach: Any
     slips: Any
     lost: Any
+    given: Any
     stored: Any
     missed: Any
 
@@ -86,7 +88,7 @@ def untouched(groups: tuple[Group, ...]) -> Held:
     states = tuple(g.law.init(_count(g)) for g in groups)
     points = tuple(jnp.zeros((_count(g), 3)) for g in groups)
     none, zero = jnp.zeros(sum(len(g.G) for g in groups)), jnp.zeros(())
-    return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero)
+    return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero)
 
 
 def _count(g: Group) -> int:
@@ -193,6 +195,7 @@ def _told(
     """What contacts hold, with events and energies; by_law: whether set-valued laws say what they lose."""
     places = tuple(moved(g, at + g.offset) for g, at in zip(groups, parts(groups, d), strict=True))
     approach, slips, lost, stored = [jnp.zeros(0)], [jnp.zeros(0, bool)], jnp.zeros(()), jnp.zeros(())
+    given = jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
         way = u - held.places[i]
         slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(way)[:, 1:]
@@ -200,12 +203,13 @@ def _told(
         deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
         approach.append(jnp.max(deep.reshape(len(g.G), -1), axis=1))
         slips.append(jnp.any(slid.reshape(len(g.G), -1), axis=1))
-        if accounts and (by_law or not g.rigid):
-            lost += jnp.sum(g.law.lost(Step(u, way, dt, held.forces[i], points[i], held.states[i], states[i])))
         if accounts:
+            step = Step(u, way, dt, held.forces[i], points[i], held.states[i], states[i])
+            lost += jnp.sum(g.law.lost(step)) if by_law or not g.rigid else 0.0
+            given += jnp.sum(g.law.given(step))
             stored += jnp.sum(g.law.stored(u, states[i]))
     return Held(
-        d, force, states, points, places, jnp.concatenate(approach), jnp.concatenate(slips), lost, stored, missed
+        d, force, states, points, places, jnp.concatenate(approach), jnp.concatenate(slips), lost, given, stored, missed
     )
 
 

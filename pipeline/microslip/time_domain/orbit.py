@@ -21,6 +21,7 @@ from . import classification
 from . import samples as kept_samples
 from .classification import Exponent
 from .equations import Equations
+from .ground import steps_of_waves
 from .samples import ROWS, UNITS, InMemory, Kept
 from .starts import Periodic
 from .starts import begun as on_its_way
@@ -63,7 +64,8 @@ class Orbit:
         time: (s,) s. y, v: (w, s) read-outs in m and their velocities in m/s. q, q_dot: (m, s) modal coordinates of
             `Equations.shapes`. d, force: (c, s) of the contact coordinates, m and N.
         energy: name -> (s,) J: ``mechanical`` of the bodies; since the start ``given`` by loads and preloads,
-            ``damped``, and ``contacts``, done on them; of that ``stored`` and ``lost``, nan where a law does not tell.
+            ``damped``, and ``contacts``, done on them; of that, and of what moving
+            ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
         error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
             read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
@@ -198,11 +200,15 @@ class Orbit:
     def drift(self) -> float:
         """Share of the energy that passed through the contacts by which what they store and lost differs from it."""
         gone, passed, first = 0.0, Range(), None
-        for contacts, stored, lost in self._energies("contacts", "stored", "lost"):
-            first = (contacts - stored - lost)[0] if first is None else first
-            gone = np.maximum(gone, np.abs(contacts - stored - lost - first).max())
+        ground = Range()
+        for contacts, moved, stored, lost in self._energies("contacts", "ground", "stored", "lost"):
+            left = contacts + moved - stored - lost
+            first = left[0] if first is None else first
+            gone = np.maximum(gone, np.abs(left - first).max())
             passed.see(contacts)
-        return float(gone / passed.width) if passed.width else 0.0
+            ground.see(moved)
+        most = max(passed.width, ground.width)
+        return float(gone / most) if most else 0.0
 
     @property
     def balance(self) -> float:
@@ -463,7 +469,7 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
         UserError: so few that the contacts' springs would make the motion grow.
     """
     if steps is None:
-        wanted = max(OF_PERIOD, OF_CONTACT * e.fastest / e.Omega)
+        wanted = max(OF_PERIOD, OF_CONTACT * e.fastest / e.Omega, steps_of_waves(e.contacts, 2 * np.pi / e.Omega))
         return int(2 ** max(0, math.ceil(math.log2(wanted / samples))))
     bounded("steps", steps, ge=1)
     least = math.ceil(2 * np.pi / e.Omega * e.rate / STABLE)
@@ -471,6 +477,8 @@ def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:
         raise UserError(
             f"steps: {steps} a period are unstable with the springs of these contacts; take {least} or more"
         )
+    if steps < (least := steps_of_waves(e.contacts, 2 * np.pi / e.Omega)):
+        raise UserError(f"steps: {steps} a period are too few for the waviness of the ground; take {least} or more")
     return max(1, math.ceil(steps / samples))
 
 

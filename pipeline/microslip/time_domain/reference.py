@@ -235,7 +235,7 @@ def _orbit(rates: Rates, found: Any, samples: int, steps: int, begin: float) -> 
     return Orbit(
         e, tuple(f"{w.monitor} {w.label}" for w in e.assembly.outputs), samples, steps, t,
         (q @ e.output.T + o @ e.output_given.T).T, (v @ e.output.T + o @ (e.output_given @ e.turning).T).T, q.T, v.T, d,
-        force, energy | {"stored": nothing, "lost": nothing}, _events(found, begin),
+        force, energy | {"stored": nothing, "lost": nothing, "ground": nothing}, _events(found, begin),
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from .stepper import KINDS, Now, Seen
 FORMAT = "microslip-orbit"
 FORMAT_VERSION = "0.1"
 
-ENERGIES = ("mechanical", "given", "damped", "contacts", "lost", "stored")
+ENERGIES = ("mechanical", "given", "damped", "contacts", "lost", "stored", "ground")
 
 UNITS = {
     "time": "s", "angular_frequency": "rad/s", "displacement": "m", "velocity": "m/s", "modal_displacement": "m kg^1/2",
@@ -74,7 +74,7 @@ def read(e: Equations, seen: Seen) -> Array:
 
 def energies(e: Equations, seen: Seen) -> dict[str, Array]:
     """`ENERGIES`, see `Orbit`: preloads count as loads, and what bodies hold beside their modes as theirs."""
-    named = dict(zip(("given", "damped", "contacts", "lost", "stored"), seen.energy.T, strict=True))
+    named = dict(zip(("given", "damped", "contacts", "lost", "stored", "ground"), seen.energy.T, strict=True))
     more, preloads = seen.force - e.F_0, seen.d @ e.F_0
     beside = 0.5 * np.einsum("sc,cd,sd->s", more, e.R, more)
     named["given"] = named["given"] + preloads

@@ -20,11 +20,14 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
+from ..contact.set_valued import SetValued
 from ..data import Array, UserError
 from ..harmonic_balance.forces import repeated
+from .braking import Braking, slowed
 from .contacts import Group, Held, Yielding, answer, force_at, rigid_answer, slope_at, times, untouched
 from .equations import Equations
 from .flow import DOUBLINGS, Flow, blocks, flow
+from .ground import moving
 from .inclusion import Meets, meets
 from .ramp import Ramp
 
@@ -38,7 +41,8 @@ class Bodies(NamedTuple):
     """What the loop reads of the equations, as jax arrays in blocks of modes.
 
     Attributes:
-        flow. yielding: see `contacts`. meets: of set-valued points, None: there are none. F_0: (c,). D: (c, m) and
+        flow. yielding: see `contacts`. meets: of set-valued points, None: there are none.
+            braking: of friction that follows the velocity alone, None: there is none. F_0: (c,). D: (c, m) and
             D_o (c, n): d of the contact coordinates. rate: (n, n) o' over o. kick: (m, c) velocities per force.
         omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
             motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`. loads: (b, p, n) modal
@@ -48,6 +52,7 @@ class Bodies(NamedTuple):
     flow: Flow
     yielding: Yielding | None
     meets: Meets | None
+    braking: Braking | None
     F_0: Any
     D: Any
     D_o: Any
@@ -66,8 +71,8 @@ class Now(NamedTuple):
     Attributes:
         y: (b, 2 p) modal displacements and velocities. o: (n,). push: (b, p) accelerations by contacts. held: by
             them.
-        energy: (5,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, and
-            what contacts store now. worst: m, the largest residual of an implicit contact.
+        energy: (6,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, what
+            contacts store now, and what moving ground gave them. worst: m, the largest residual of an implicit contact.
         met: (4, contacts) the events of the last step, at: when, s.
     """
 
@@ -90,7 +95,7 @@ class Listed(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """A sample: (m,) q and q', (c,) d and force, (5,) energies (see `Now`) and the bodies' own, J; time, s."""
+    """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `Now`) and the bodies' own, J; time, s."""
 
     q: Any
     q_dot: Any
@@ -130,16 +135,20 @@ class Stepper:
             patch = contacts[same[0]].patch
             offset = np.array([contacts[i].offset for i in same])
             law = repeated(patch.law, len(patch.points), len(same))
+            if (ground := contacts[same[0]].ground) is not None:
+                if isinstance(law, SetValued):
+                    raise UserError(f"{contacts[same[0]].name}: ground: set-valued contacts stand on ground at rest")
+                law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
             found.append(Group(law, jnp.asarray(G), jnp.asarray(offset)))
         return tuple(found)
 
     @cached_property
     def same(self) -> list[list[int]]:
-        """Numbers of the contacts, those of one patch object together."""
-        found: dict[int, list[int]] = {}
+        """Numbers of the contacts, those of one patch object on the same ground together."""
+        found: dict[tuple, list[int]] = {}
         for i, c in enumerate(self.equations.contacts):
-            found.setdefault(id(c.patch), []).append(i)
+            found.setdefault((id(c.patch), c.ground), []).append(i)
         return list(found.values())
 
     @cached_property
@@ -179,7 +188,18 @@ class Stepper:
         loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
         arrays = map(jnp.asarray, (D, D_o, e.turning, -D.T, e.omega2.reshape(b, p), steady, reach, drift, loads))
         flows = flow(e, self.tau, DOUBLINGS if self.options.leaps else 0)
-        return Bodies(flows, Yielding(R, share, F_0) if e.R.any() else None, self._meets(flows), F_0, *arrays)
+        return Bodies(
+            flows, Yielding(R, share, F_0) if e.R.any() else None, self._meets(flows), self._braking, F_0, *arrays
+        )
+
+    @property
+    def _braking(self) -> Braking | None:
+        if not any(g.law.brakes for g in self.groups):
+            return None
+        D, moved = self.equations.D[self.rows], self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
+        most = 0.5 * self.tau * np.abs(moved @ moved.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
+        ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
+        return Braking(jnp.asarray(0.5 * self.tau * D @ D.T), tuple(map(jnp.asarray, np.split(most, ends))))
 
     def _meets(self, flows: Flow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
@@ -238,7 +258,7 @@ class Stepper:
         none = jnp.zeros((4, len(e.contacts)))
         now = Now(
             y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros((b, p)),
-            held or untouched(self.groups), jnp.zeros(5), jnp.zeros(()), none.astype(bool), none,
+            held or untouched(self.groups), jnp.zeros(6), jnp.zeros(()), none.astype(bool), none,
         )  # fmt: skip
         return _begun(self.options, self.groups, self.bodies, now)
 
@@ -291,9 +311,13 @@ def _pushed(
     free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
     given = times(B.D_o, moves)
     v = times(B.D, (v_free + half).reshape(-1)) + given
+    unbraked = jnp.zeros(())
+    if B.braking is not None and share == 1.0:
+        before = times(B.D, v_free.reshape(-1)) + given
+        v, unbraked = slowed(groups, B.braking, B.F_0, free, before, dt, held)
     if B.meets is None:
         held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
-        return held, _by_force(B, held.force)
+        return held._replace(missed=held.missed + dt * unbraked), _by_force(B, held.force)
     force, *others = force_at(groups, free, v, dt, held.states)
     ahead = free
     if B.yielding is None:
@@ -374,7 +398,8 @@ def _step(options: Options, groups: tuple[Group, ...], B: Bodies, left: Any, now
         work -= jnp.sum(contacts * mean)
         given += jnp.sum(loads * mean)
     y = y.at[:, p:].add(sum(after))
-    energy = jnp.stack([*(now.energy[:4] + jnp.stack([given, taken, work, held.lost])), held.stored])
+    energy = now.energy + jnp.stack([given, taken, work, held.lost, jnp.zeros(()), held.given])
+    energy = energy.at[4].set(held.stored)
     met, at = _met(now, held, dt)
     return left - 2**k, Now(
         y, o, now.time + dt, push, held, energy, jnp.maximum(now.worst, held.missed), met, at

@@ -1,0 +1,126 @@
+"""Friction that the velocity alone decides, smoothed by an arctan (Sextro Eqs. (4.1-16) to (4.1-23)).
+
+No tangential spring stands between the body and its neighbour: what the contact yields tangentially is part of the
+body. Where a sticking contact would stand still it creeps, the slower the larger the slope.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from ..reduced.compliance import BULK_AND_SURFACE
+from ..settings.body import NotNegative, Positive
+from .friction import Friction, creep
+from .law import Array, Law, Step, norm, number, settings, static, value
+from .normal import Normal
+from .point import OwnNormal
+
+if TYPE_CHECKING:
+    from .composed import ContactModel
+
+SLIDES = 0.9
+"""Share of its largest value at which the smoothing counts as sliding, and not as the creep of a contact that sticks:
+from 6.3 / k_S on."""
+
+
+class RateState(NamedTuple):
+    """State of n points: u_t (2, n) m, path slid (2, n) m, time (n,) s."""
+
+    tangential: Array
+    slipped: Array
+    time: Array
+
+
+@settings
+class RateContact(Law):
+    """Point contact whose friction is mu(|v|) F_N 2/pi arctan(k_S |v|) along -v.
+
+    Attributes:
+        normal: normal law. friction: characteristic. slope: k_S, s/m. damping: beta of the normal spring (4.1-16), s;
+            the normal force is cut at zero. includes: whose compliance the stiffness counts, one of `series.INCLUDES`.
+    """
+
+    normal: Normal
+    friction: Friction
+    slope: Array = number(gt=0)
+    damping: Array = number(ge=0)
+    includes: str = static(default=BULK_AND_SURFACE)
+    brakes: ClassVar[bool] = True
+
+    def init(self, n: int) -> RateState:
+        return RateState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n))
+
+    def step(self, u: Array, v: Array, dt: Array | float, state: RateState) -> tuple[Array, RateState]:
+        time, tangential, speed = state.time + dt, u.T[1:], norm(v.T[1:])
+        pressed = self._pressed(u[:, 0], v[:, 0])
+        force = self._drag(speed, pressed, time) * v.T[1:]
+        slides = (pressed > 0) & (self.slope * speed > jnp.tan(0.5 * jnp.pi * SLIDES))
+        slipped = state.slipped + jnp.where(slides, tangential - state.tangential, 0.0)
+        return jnp.concatenate([pressed[None], force]).T, RateState(tangential, slipped, time)
+
+    def slowed(self, u: Array, v: Array, dt: Array | float, state: RateState, yielding: Array) -> Array:
+        pressed, trial, time = self._pressed(u[:, 0], v[:, 0]), v.T[1:], state.time + dt
+        fastest = norm(trial)
+
+        def excess(speed: Array) -> Array:
+            return speed * (1 + yielding * self._drag(speed, pressed, time)) - fastest
+
+        speed = _root(excess, fastest)
+        share = 1 / (1 + yielding * self._drag(speed, pressed, time))
+        return jnp.concatenate([v.T[:1], share * trial]).T
+
+    def limit(self, force: Array, state: RateState) -> Array:
+        return self.friction.highest(force[:, 0], state.time) * force[:, 0]
+
+    def slip(self, state: RateState) -> Array:
+        return state.slipped.T
+
+    def stored(self, u: Array, state: RateState) -> Array:
+        return self.normal.stored(u[:, 0])
+
+    def overlap(self, u: Array) -> Array:
+        return u[:, 0] - self.normal.touches()
+
+    def lost(self, step: Step) -> Array:
+        rubbed = 0.5 * jnp.sum((step.force_before + step.force)[:, 1:] * step.moved[:, 1:], axis=1)
+        return rubbed + (step.force[:, 0] - self.normal.force(step.u[:, 0])) * step.moved[:, 0]
+
+    def _pressed(self, u: Array, v: Array) -> Array:
+        return jnp.maximum(self.normal.force(u) + self.damping * self.normal.stiffness(u) * v, 0.0)
+
+    def _drag(self, speed: Array, pressed: Array, time: Array) -> Array:
+        """(n,) friction over the speed, N s/m."""
+        return pressed * self.friction.coefficient(speed, pressed, time) * creep(speed, self.slope)
+
+
+_HALVINGS = 50  # of a logarithm over forty powers of e, to 1e-13 of the speed
+
+
+def _root(excess: Callable[[Array], Array], fastest: Array) -> Array:
+    """(n,) speed where a function is zero that is negative at rest and not negative at ``fastest``."""
+    safe = jnp.where(fastest > 0, fastest, 1.0)
+
+    def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        above = excess(safe * jnp.exp(middle)) > 0
+        return jnp.where(above, low, middle), jnp.where(above, middle, high)
+
+    ends = jnp.full_like(safe, -40.0), jnp.zeros_like(safe)
+    low, high = jax.lax.fori_loop(0, _HALVINGS, halve, ends)
+    return jnp.where(fastest > 0, safe * jnp.exp(0.5 * (low + high)), 0.0)
+
+
+class OfRate(OwnNormal):
+    """Friction by the velocity alone, smoothed (4.1-16 to 4.1-23): no tangential spring, creep where it sticks."""
+
+    kind: Literal["rate"]
+    slope: Positive
+    damping: NotNegative = 0.0
+
+    def law(self, contact: ContactModel) -> Law:
+        return RateContact(contact.normal, contact.sliding, value(self.slope), value(self.damping))
