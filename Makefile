@@ -43,6 +43,7 @@ $(CASES): %: $(READY)
 	@$(RUN) run pipeline/cases/$*.toml
 
 $(BODIES): %: build/%/report.html
+pendulum: pendulum-friction
 $(BODIES:%=%-mesh): %-mesh: meshes/%.msh
 $(BODIES:%=%-modes): %-modes: build/%/basis.h5
 

@@ -65,7 +65,7 @@ def test_coulomb_friction_takes_as_much_from_every_half_swing(law: str) -> None:
     """Let go from a, the turning points are a - 2 n mu F_N / k, and it sticks where the spring cannot overcome it."""
     mu, a = 0.1, 2.2e-3
     friction = Coulomb(value(mu))
-    laws = {"rate": rate(friction, 1e9), "point": PointContact(Penalty(value(1e6)), friction, value(1e8))}
+    laws = {"rate": rate(friction, 1e8), "point": PointContact(Penalty(value(1e6)), friction, value(1e8))}
     _, y, _ = let_go(rubbing(laws[law]), a, OMEGA, 4, 8192)
     lost = 2 * mu * NORMAL / STIFFNESS
     for n in range(1, 5):
@@ -77,20 +77,20 @@ def test_coulomb_friction_takes_as_much_from_every_half_swing(law: str) -> None:
 def test_stick_slip_on_a_belt_is_its_closed_form() -> None:
     """Static 0.8 over sliding 0.55, by a characteristic that falls at once: stuck, the spring's force rises by k V;
     from mu_0 F_N it slips by half a swing of the oscillator about mu_inf F_N."""
-    friction = Exponential(value(0.8), value(0.55), value(1e5))
+    friction = Exponential(value(0.8), value(0.55), value(1e4))
     Omega = OMEGA / 8
-    t, y, v = let_go(rubbing(rate(friction, 1e12), Ground(V)), 0.5e-3, Omega, 8, 16384, 512)
+    t, y, v = let_go(rubbing(rate(friction, 1e10), Ground(V)), 0.5e-3, Omega, 4, 16384, 512)
     stuck = np.abs(v - V) < 1e-6
     np.testing.assert_allclose(y[t < 1.0], 0.5e-3 + V * t[t < 1.0], atol=1e-6)
     top, middle = 0.8 * NORMAL / STIFFNESS, 0.55 * NORMAL / STIFFNESS
     size = np.hypot(top - middle, V / OMEGA)
     assert y.max() == pytest.approx(top, rel=2e-3) and v.min() == pytest.approx(-OMEGA * size, rel=2e-3)
-    late = t > 2.0
+    late = t > 1.6
     assert y[late].min() == pytest.approx(middle - (top - middle), rel=2e-3)
     slips = t[1:][stuck[:-1] & ~stuck[1:]]
-    slipping = 2 * (np.pi - np.arctan2(V / OMEGA, top - middle)) / OMEGA
+    slipping = (np.pi + 2 * np.arctan2(V / OMEGA, top - middle)) / OMEGA
     period = 2 * (top - middle) / V + slipping
-    assert np.diff(slips[1:]).mean() == pytest.approx(period, rel=5e-3)
+    assert np.diff(slips).mean() == pytest.approx(period, rel=5e-3)
 
 
 def test_steady_sliding_holds_the_spring_by_the_friction_at_the_belts_speed() -> None:

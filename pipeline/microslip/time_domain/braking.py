@@ -34,7 +34,7 @@ def slowed(
     each point brakes by itself, as if all that yields were its own, from where the others leave it (forward and
     backward steps: P. L. Lions, B. Mercier, SIAM J. Numer. Anal. 16, 1979).
     """
-    enough = 1e-12 * jnp.abs(v).max() + 1e-18
+    enough = 1e-10 * jnp.abs(v).max() + 1e-18
 
     def left(force: Any) -> Any:
         return v - B.slowing @ (force - F_0)
