@@ -21,6 +21,7 @@ from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.harmonic_balance import checkpoint, refinement, response
 from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.accuracy import judged
 from microslip.harmonic_balance.checkpoint import labels, record, restored, resumed_response
 from microslip.harmonic_balance.checks import forces_on
 from microslip.harmonic_balance.solver import Point, solve
@@ -59,6 +60,10 @@ def free(*resonances: float) -> Assembly:
     return replace(held(body, Cubic(jnp.asarray(0.0)), [1], np.zeros(1), np.zeros(1), 0.3), contacts=())
 
 
+def pairs(peaks: list[response.Resonance]) -> list[tuple[float, float]]:
+    return [(one.frequency, one.amplitude) for one in peaks]
+
+
 @pytest.mark.slow
 def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp_path: Path) -> None:
     """Stopped three times, each point is computed once; the response is that of one go, to the solver's 1e-10."""
@@ -82,7 +87,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(problem: balance.Problem, tmp
     for name in ("harmonics", "contact", "slip", "dissipated", "supplied", "slipping", "open"):
         a, b = getattr(found, name), getattr(whole, name)
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max(), err_msg=name)
-    np.testing.assert_allclose(peaks, response.refined_peaks(problem, whole), rtol=1e-6)
+    np.testing.assert_allclose(pairs(peaks), pairs(response.refined_peaks(problem, whole)), rtol=1e-6)
     assert found.converged.all() and len(peaks) == 1 and found.slipping.max() > 0.2
 
 
@@ -119,22 +124,27 @@ def test_a_resonance_beside_the_end_of_a_sweep_is_found(frequency: np.ndarray, t
     for _ in range(2):
         with open_journal(tmp_path / "points", "abc", HEAD) as journal:
             found, peaks = resumed_response(problem, frequency, np.ones(0), journal, SERIES, told.append)
-        np.testing.assert_allclose(peaks, [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
+        np.testing.assert_allclose(pairs(peaks), [(2.2, 50 / (2 * np.pi * 2.2) ** 2 * 0.3)], rtol=1e-3)
     assert len([t for t in told if "peak near" in t]) == 1
     alone = response.harmonic_response(problem, frequency, np.ones(0))
-    assert rising({1.0: found}, {1.0: peaks}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
+    assert rising({1.0: found}, {1.0: pairs(peaks)}) == [] and len(rising({1.0: alone}, {1.0: []})) == 1
 
 
-def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:
-    """q'' + 0.05 q' + q - 0.004 q^3 = 0.3 cos t leans to lower frequencies: a fine sweep upwards comes along the lower
-    motion past the peak and jumps, a coarse one happens to come near it. Both climb to the same peak: 1e-6."""
+def softening(harmonics: int) -> balance.Problem:
+    """q'' + 0.05 q' + q - 0.004 q^3 = 0.3 cos t, which leans to lower frequencies."""
     one = np.ones(1)
     rows = {"face": np.outer([0, 1, 0, 0, 0, 0], one), "push": one, "tip": one}
     soft = held(group(one, rows, 0.025), Cubic(jnp.asarray(-0.004)), [1], np.zeros(1), np.zeros(1), 0.3)
-    problem, peaks = balance.of(soft, 3, 64, length=1.0), []
+    return balance.of(soft, harmonics, 64, length=1.0)
+
+
+def test_a_coarse_sweep_and_a_fine_one_have_the_same_overhanging_peak() -> None:
+    """A fine sweep upwards comes along the lower motion past the peak and jumps, a coarse one happens to come near it.
+    Both climb to the same peak: 1e-6."""
+    problem, peaks = softening(3), []
     for points, past in ((7, False), (97, True)):
         found = response.harmonic_response(problem, np.linspace(0.6, 1.1, points) / (2 * np.pi), np.ones(1))
-        peaks += response.refined_peaks(problem, found)
+        peaks += pairs(response.refined_peaks(problem, found))
         assert bool(overhanging(found, peaks[-1:])) == past
     np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-6)
 
@@ -236,3 +246,16 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
     row = {name: watched[list(rows.values())] for name, rows in checkpoint._outputs(problem).items()}
     np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
     np.testing.assert_array_equal(checkpoint._outputs_of(problem, row), watched)
+
+
+def test_the_error_of_an_overhanging_resonance_is_that_of_its_own_motion() -> None:
+    """Beside the peak the sweep came along a lower motion; one harmonic leaves out as much of the peak as more show."""
+    problem = softening(1)
+    found = response.harmonic_response(problem, np.linspace(0.6, 1.1, 97) / (2 * np.pi), np.ones(1))
+    (peak,) = response.refined_peaks(problem, found)
+    assert overhanging(found, [(peak.frequency, peak.amplitude)])
+    errors = {point.Omega: (e, share) for point, e, share in judged(problem, found, [peak])}
+    e, share = errors[2 * np.pi * peak.frequency]
+    assert e.amplitude == pytest.approx(peak.amplitude, rel=1e-6) and 0 < share < 0.1
+    another = peak._replace(amplitude=0.5 * peak.amplitude)
+    assert 2 * np.pi * peak.frequency not in {p.Omega for p, *_ in judged(problem, found, [another])}

@@ -20,7 +20,7 @@ from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.readout import measured
 from ..harmonic_balance.reduced import stuck, stuck_damping, untouched
 from ..harmonic_balance.refinement import filled_response
-from ..harmonic_balance.response import HarmonicResponse, refined_peaks
+from ..harmonic_balance.response import HarmonicResponse, Resonance, refined_peaks
 from ..harmonic_balance.solver import Point
 from ..harmonic_balance.sweeps import overhanging
 from ..results import Journal
@@ -192,11 +192,11 @@ def _answered(
         key = pressed_by(built, problem) if normal is None else normal
         report(f"friction response at a normal force of {key:g} N")
         limits = np.array([c.coefficient * (key if swept(c) else c.normal_force or 0.0) for c in built.contacts])
-        found, resonances[key] = _swept(problem, frequency, limits, report, journal, key)
-        responses[key] = found
+        found, peaks = _swept(problem, frequency, limits, report, journal, key)
+        responses[key], resonances[key] = found, [(one.frequency, one.amplitude) for one in peaks]
         messages += _not_periodic(key, found.unsteady, built.settings)
         messages += _lifting(built, problem, found, key) + _pulling(built, found, key)
-        messages += [] if _still(found) else left.out(problem, found, resonances[key], key)
+        messages += [] if _still(found) else left.out(problem, found, peaks, key)
         if key == max(responses):
             stiff = _stuck(problem.assembly)
     return responses, resonances, stiff, messages
@@ -220,7 +220,7 @@ def _stuck(assembly: Assembly) -> tuple[Array, Array]:
 def _swept(
     problem: Problem, frequency: Array, limits: Array, report: Callable[[str], None], journal: Journal | None,
     normal: float,
-) -> tuple[HarmonicResponse, list[tuple[float, float]]]:  # fmt: skip
+) -> tuple[HarmonicResponse, list[Resonance]]:  # fmt: skip
     """One sweep and its peaks, from what a journal holds of it and what is computed now."""
     if journal is None:
         found = filled_response(problem, frequency, limits, report)
@@ -334,9 +334,7 @@ class _Left:
 
     most: float | None
 
-    def out(
-        self, problem: Problem, found: HarmonicResponse, peaks: list[tuple[float, float]], normal: float
-    ) -> list[str]:
+    def out(self, problem: Problem, found: HarmonicResponse, peaks: list[Resonance], normal: float) -> list[str]:
         """A message where harmonics or samples are too few at a place that is judged (`accuracy.judged`).
 
         The book's mode is one harmonic by what it is, and of a whole ring its sector says the same: neither is judged.
@@ -349,15 +347,14 @@ class _Left:
         whole = settings.ring is not None and settings.ring.model == "full"
         if not problem.groups or settings.mode == "book" or (whole and self.tolerance is None):
             return []
-        looked_at = judged(problem, found, [f for f, _ in peaks])
+        looked_at = judged(problem, found, peaks)
         for point, estimate, share in looked_at if self.tolerance is not None else ():
             self._enough(problem, found, point, estimate, share, normal)
-        self.errors[normal] = {  # of the resonance itself, not of another motion at its frequency
-            f: share
-            for f, height in peaks
-            for point, e, share in looked_at
-            if np.isclose(point.Omega / (2 * np.pi), f, rtol=1e-9, atol=0)
-            and np.isclose(e.amplitude, height, rtol=1e-3)
+        self.errors[normal] = {
+            peak.frequency: share
+            for peak in peaks
+            for point, _, share in looked_at
+            if np.isclose(point.Omega / (2 * np.pi), peak.frequency, rtol=1e-9, atol=0)
         }
         if not looked_at:
             return []

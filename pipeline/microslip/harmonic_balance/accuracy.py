@@ -22,7 +22,7 @@ from . import problem as balance
 from .forces import AFT
 from .problem import Problem
 from .readout import amplitude
-from .response import HarmonicResponse
+from .response import HarmonicResponse, Resonance
 from .solver import Point, newton, solve
 
 PER_HARMONIC = 8
@@ -156,11 +156,14 @@ def left_out(problem: Problem, x: Array, Omega: float) -> float:
     return float(np.abs(residual).max() / max(np.abs(x).max(), 1e-300))
 
 
-def judged(problem: Problem, response: HarmonicResponse, peaks: Sequence[float]) -> list[tuple[Point, Error, float]]:
+def judged(
+    problem: Problem, response: HarmonicResponse, peaks: Sequence[Resonance]
+) -> list[tuple[Point, Error, float]]:  # fmt: skip
     """Errors at the resonances of a sweep, at its highest point and where most is left out, see `left_out`.
 
-    Args:
-        peaks: Hz. Returns: point, error, and the error of its amplitude, at least `FLOOR` of the highest.
+    Returns:
+        Point, error, and the error of its amplitude, at least `FLOOR` of the highest. A resonance whose solution
+        cannot be found again, but another motion at its frequency, is left out.
     """
     good = np.flatnonzero(response.converged)
     if not len(good):
@@ -171,13 +174,13 @@ def judged(problem: Problem, response: HarmonicResponse, peaks: Sequence[float])
     some = asked[np.unique(np.linspace(0, len(asked) - 1, min(LOOKED_AT, len(asked))).round().astype(int))]
     left = [left_out(problem, response.x[i], 2 * np.pi * float(response.frequency[i])) for i in some]
     worst = some[np.argsort(left)[-2:]]
-    places = {float(response.frequency[i]) for i in (top, *worst)} | {float(f) for f in peaks}
+    places = {float(response.frequency[i]): (float(size[i]), response.x[i]) for i in (top, *worst)}
+    places |= {peak.frequency: (peak.amplitude, peak.x) for peak in peaks}
     found = []
-    for f in sorted(places):
-        near = good[np.argmin(np.abs(response.frequency[good] - f))]
-        point = solve(problem, 2 * np.pi * f, [response.x[near]])
-        if point.converged:
-            e = error(problem, point.x, point.Omega)
+    for f, (height, x) in sorted(places.items(), key=lambda place: place[0]):
+        point = solve(problem, 2 * np.pi * f, [x])
+        e = error(problem, point.x, point.Omega) if point.converged else None
+        if e and np.isclose(e.amplitude, height, rtol=1e-3, atol=0):
             found.append((point, e, e.over(FLOOR * float(size[top]))))
     return found
 

@@ -21,14 +21,14 @@ from .families import Family, followed
 from .point_cycles import Cycle
 from .problem import Problem
 from .refinement import Solved, filled_response
-from .response import HarmonicResponse, Operating, highest, operating
+from .response import HarmonicResponse, Operating, Resonance, highest, operating
 from .solver import CONVERGED, Point, Report
 from .sweeps import brackets, resonances
 
 
 def resumed_response(
     problem: Problem, frequency: Array, limit: Array, journal: Journal, series: str, report: Report = lambda _: None
-) -> tuple[HarmonicResponse, list[tuple[float, float]]]:
+) -> tuple[HarmonicResponse, list[Resonance]]:
     """`refinement.filled_response` and its refined peaks; what a series of the journal holds already is not computed.
 
     Points of another `frequency` have no place in the series: each one was begun at its neighbours.
@@ -38,7 +38,7 @@ def resumed_response(
             ``peak`` = the frequency, Hz, of the point that they were searched from.
 
     Returns:
-        The response and (Hz, m) of its resonances: of the maxima of one plateau the highest.
+        The response and its resonances: of the maxima of one plateau the highest.
     """
     rows = journal.of(series)  # a peak on a point of the sweep stands in its place
     held = {key: restored(problem, row) for key, row in rows.items() if row["peak"] in (0.0, key)}
@@ -54,12 +54,12 @@ def resumed_response(
 def _peak(
     problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int], journal: Journal, series: str,
     report: Report,
-) -> tuple[float, float] | None:  # fmt: skip
+) -> Resonance | None:  # fmt: skip
     """The peak beside a point of a sweep, if there is one, kept before or searched for now."""
     beside = float(response.frequency[bracket[1]])
     for key, row in journal.of(series).items():
         if row["peak"] == beside:
-            return key, float(abs(restored(problem, row)[1].outputs[0, 1]))
+            return Resonance(key, float(abs(restored(problem, row)[1].outputs[0, 1])), row["x"])
     report(f"{series}: peak near {beside:.6g} Hz")
     found = highest(problem, response, bracket)
     if found is None:
@@ -68,7 +68,7 @@ def _peak(
     f = point.Omega / (2 * np.pi)
     kept = record(problem, point, operating(problem, point))
     journal.keep(series, f, kept | {"peak": beside})
-    return f, amplitude
+    return Resonance(f, amplitude, point.x)
 
 
 # curves ------------------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.optimize
@@ -239,11 +239,18 @@ def of_body(
     return balance.of(Assembly((component,), contacts, loads, read), **settings)
 
 
-def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[tuple[float, float]]:
-    """(Hz, m) of the peaks of the first read-out beside the tops of a sweep; of those of one plateau the highest, see
-    `sweeps.prominent`."""
+class Resonance(NamedTuple):
+    """A peak of the first read-out between the points of a sweep: Hz, m, and its (size,) unknowns."""
+
+    frequency: float
+    amplitude: float
+    x: Array
+
+
+def refined_peaks(problem: Problem, response: HarmonicResponse) -> list[Resonance]:
+    """The peaks beside the tops of a sweep; of those of one plateau the highest, see `sweeps.prominent`."""
     found = [highest(problem, response, bracket) for bracket in brackets(response)]
-    return resonances(response, [(one[0].Omega / (2 * np.pi), one[1]) for one in found if one])
+    return resonances(response, [Resonance(p.Omega / (2 * np.pi), a, p.x) for p, a in filter(None, found)])
 
 
 def highest(problem: Problem, response: HarmonicResponse, bracket: tuple[int, int, int]) -> tuple[Point, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -158,15 +159,18 @@ def prominent(height: Array, candidates: Indices) -> Indices:
     return np.array(kept, dtype=int)
 
 
-def resonances(response: FrequencyResponse, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of peaks (Hz, m) found between the points of a sweep those that are one resonance each, see `prominent`."""
+P = TypeVar("P", bound=tuple[Any, ...])
+
+
+def resonances(response: FrequencyResponse, found: Sequence[P]) -> list[P]:
+    """Of peaks (Hz, m, ...) found between the points of a sweep those that are one resonance each, see `prominent`."""
     grid, ok = response.frequency, response.converged
-    f = np.concatenate([grid[ok], [f for f, _ in found]])
-    height = np.concatenate([np.abs(response.monitor)[ok], [a for _, a in found]])
+    f = np.concatenate([grid[ok], [one[0] for one in found]])
+    height = np.concatenate([np.abs(response.monitor)[ok], [one[1] for one in found]])
     order = np.argsort(f, kind="stable")
     at = np.flatnonzero(order >= np.count_nonzero(ok))
     kept = prominent(height[order], at)
-    return [(float(f[i]), float(height[i])) for i in order[kept]]
+    return [found[i] for i in order[kept] - np.count_nonzero(ok)]
 
 
 def response_table(responses: Mapping[float, FrequencyResponse]) -> str:
