@@ -125,6 +125,11 @@ def test_what_cannot_be_is_refused() -> None:
     rigid = ms.structure(1.0, 1.0, force={0: 1.0}, elements=[ms.friction(0.1)])
     with pytest.raises(UserError, match="only a motion in time"):
         ms.harmonic_response(rigid, [0.1])
+    ball = ms.structure(1.0, 0.0, steady={0: GRAVITY}, elements=[ms.stop(math.inf, HEIGHT)])
+    with pytest.raises(UserError, match='begin from "rest"'):
+        ms.integrate(ball, 1.0)
+    with pytest.raises(UserError, match="cannot be integrated"):
+        ms.integrate(ball, 1.0, start="rest", method="reference")
     with pytest.raises(UserError, match="only a rigid stop"):
         ms.stop(1e5, 0.0, restitution=0.5)
     with pytest.raises(UserError, match="one side"):

@@ -285,6 +285,8 @@ def static_force(stepper: Stepper) -> Callable[[Array], tuple[Array, Array]]:
     their slope."""
     groups, bodies = stepper.groups, stepper.bodies
     states = untouched(groups).states
+    if bodies.meets is not None:
+        raise UserError('start: set-valued contacts have no stiffness to find a rest by; begin from "rest"')
     if bodies.yielding is not None:
         raise UserError('start: where modes leave compliance out of the contacts, begin from "rest"')
 
