@@ -61,7 +61,8 @@ class Held(NamedTuple):
         approach: (contacts,) m of each contact's deepest point; where a law does not know it, whether it is pressed
             (1 or 0). slips: (contacts,) bool.
         lost, given, stored: J, lost in the last step, given by moving ground in it, and stored after it. missed: m, the
-            largest residual of implicit contacts.
+            largest residual of implicit contacts. owed: J, what set-valued laws take from masses in the second half of
+            the kick.
     """
 
     d: Any
@@ -75,6 +76,7 @@ class Held(NamedTuple):
     given: Any
     stored: Any
     missed: Any
+    owed: Any
 
 
 def times(A: Any, x: Any) -> Any:
@@ -88,7 +90,7 @@ def untouched(groups: tuple[Group, ...]) -> Held:
     states = tuple(g.law.init(_count(g)) for g in groups)
     points = tuple(jnp.zeros((_count(g), 3)) for g in groups)
     none, zero = jnp.zeros(sum(len(g.G) for g in groups)), jnp.zeros(())
-    return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero)
+    return Held(d, d, states, points, points, none, none.astype(bool), zero, zero, zero, zero, zero)
 
 
 def _count(g: Group) -> int:
@@ -209,7 +211,18 @@ def _told(
             given += jnp.sum(g.law.given(step))
             stored += jnp.sum(g.law.stored(u, states[i]))
     return Held(
-        d, force, states, points, places, jnp.concatenate(approach), jnp.concatenate(slips), lost, given, stored, missed
+        d,
+        force,
+        states,
+        points,
+        places,
+        jnp.concatenate(approach),
+        jnp.concatenate(slips),
+        lost,
+        given,
+        stored,
+        missed,
+        jnp.zeros(()),
     )
 
 

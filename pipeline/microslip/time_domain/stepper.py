@@ -327,11 +327,13 @@ def _pushed(
     else:
         free = free + times(B.yielding.R, B.F_0)
     points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
+    owed = held.owed
     held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
     push = _by_force(B, held.force)
     if B.yielding is None and options.accounts:
-        v = times(B.D, (v_free + 0.5 * dt * (push + times(B.loads, o))).reshape(-1)) + given
-        held = held._replace(lost=held.lost + dt * jnp.sum((held.force - force) * v))
+        whole, rigid = push + times(B.loads, o), 0.5 * dt * (held.force - force)
+        now, then = (times(B.D, (v_free + part * dt * whole).reshape(-1)) + given for part in (0.25, share - 0.25))
+        held = held._replace(lost=held.lost + owed + jnp.sum(rigid * now), owed=jnp.sum(rigid * then))
     return held, push
 
 
