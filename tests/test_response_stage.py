@@ -25,6 +25,7 @@ from microslip.stages import response as making
 from microslip.stages import running
 from microslip.stages.following import open_case
 from microslip.stages.surveying import survey_stage
+from microslip.units import METRES, Quantity
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -114,6 +115,60 @@ QUICK = (
     .replace("samples = 24", "samples = 8").replace("[50.0]\n", "[1e4]\n#")
 )  # fmt: skip
 """Linear, as it sticks, and without margins: it costs little."""
+
+
+def test_every_read_out_is_drawn_and_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two directions share a picture, a gauge would have its own; the table tells what the others read at resonances of
+    the first, as the file has it; lines end where the file's points are."""
+    from microslip.pictures import response as pictures
+
+    drawn: list[dict[str, np.ndarray]] = []
+
+    def curves(axes: Any, result: Any, w: Any, *more: Any) -> bool:
+        lifts: bool = own(axes, result, w, *more)
+        drawn.append({w.name: np.nanmax(axes.get_lines()[-1].get_ydata())})
+        return lifts
+
+    own = pictures._curves
+    monkeypatch.setattr(pictures, "_curves", curves)
+    text = QUICK.replace('monitor = "probe"', "").replace("[sweep]", TWO + "[sweep]")
+    (folder / "case.toml").write_text(text)
+    respond(folder)
+    build = folder / "build" / "vane"
+    summary = json.loads((build / "response.json").read_text())
+    series = read_response(build / "response.h5").series[0]
+    assert summary["read_outs"] == ["probe, x", "probe, y"] and [*map(list, drawn)] == [["probe, x"], ["probe, y"]]
+    assert summary["pictures"].keys() >= {"friction response"}
+    (row,) = summary["resonances"]
+    at = int(np.abs(series.frequency - row["frequency_Hz"]).argmin())
+    x, y = np.abs(series.monitor("probe")[at, :, 1])
+    assert (row["amplitude_m"], row["probe, y amplitude_m"]) == pytest.approx((x, y), rel=1e-12) and y != x
+    for one, (name, values) in zip(drawn, (("probe, x", x), ("probe, y", y)), strict=True):
+        assert one[name] >= 1e6 * values * (1 - 1e-9)
+    page = (build / "response.html").read_text()
+    assert "Resonances are those of probe, x" in page and "probe, y amplitude in" in page
+
+
+TWO = """
+[[monitors]]
+monitor = "probe"
+direction = "x"
+
+[[monitors]]
+monitor = "probe"
+direction = "y"
+
+"""
+
+
+def test_read_outs_share_a_picture_where_they_are_few_and_of_one_unit() -> None:
+    from microslip.case.readouts import Readout
+    from microslip.pictures.response import together
+
+    x, y, z = (Readout(i, n, "monitors/probe", i, METRES) for i, n in enumerate("xyz"))
+    gauge = Readout(3, "root", "gauges/root", 0, Quantity("1"))
+    assert together([x, y, gauge], 3) == [x, y] and together([x, y], 4) == [x]
+    assert together([gauge, x], 1) == [gauge] and together([x, y, z, z], 1) == [x]
 
 
 @pytest.mark.slow

@@ -258,8 +258,9 @@ class CaseSettings(Model):
     """A whole case.toml.
 
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
-    [[excitations]]; monitor and direction, or [[monitors]], the first of which is drawn. harmonics, ``auto`` for as
-    many as an estimated harmonics_error (a share of the amplitude, 0.5 at most) at the resonances asks for; samples (of
+    [[excitations]]; monitor and direction, or [[monitors]], all of which are drawn, and in the first of which
+    resonances are looked for. harmonics, ``auto`` for as many as an estimated harmonics_error (a share of the
+    amplitude, 0.5 at most) at the resonances asks for; samples (of
     a cycle), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
     force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
     before they begin, the machine's if not given. mode: ``aft``, their laws in time, or ``book`` (Sextro

@@ -158,7 +158,7 @@ def record(problem: Problem, point: Point, found: Operating) -> dict[str, Any]:
         "history": np.array(point.history), "supplied": found.supplied, "damped": found.damped,
         "exchanged": found.exchanged, "kinetic": found.kinetic,
     } | {f"checks/{name}": value for name, value in vars(found.checks).items()}  # fmt: skip
-    for name, rows in _outputs(problem).items():
+    for name, rows in _outputs(problem.assembly).items():
         kept[name] = found.outputs[list(rows.values())]
     for component in problem.assembly.components:
         kept[f"bodies/{component.name}/q"] = rectangle(found.q[component.name])
@@ -208,33 +208,38 @@ def restored(problem: Problem, row: dict[str, Any]) -> tuple[Point, Operating]:
     return point, found
 
 
-def _named(a: Assembly, w: Output) -> str:
+def array_of(a: Assembly, w: Output) -> str:
     """Name of the array of a read-out: the component's name stands before the monitor's where there are several."""
     group = next(iter(next(m for m in a.components if m.name == w.component).groups.values()))
     kind = "monitors" if w.monitor in group.monitors else "gauges"
     return f"{kind}/" + (f"{w.component}:{w.monitor}" if len(a.components) > 1 else w.monitor)
 
 
-def _outputs(problem: Problem) -> dict[str, dict[str, int]]:
+def _outputs(a: Assembly) -> dict[str, dict[str, int]]:
     """Name of an array -> label of each of its rows -> number of the read-out in the assembly; the first one first.
 
     A read-out that is asked for twice is one row.
     """
     out: dict[str, dict[str, int]] = {}
-    for i, w in enumerate(problem.assembly.outputs):
-        out.setdefault(_named(problem.assembly, w), {}).setdefault(w.label, i)
+    for i, w in enumerate(a.outputs):
+        out.setdefault(array_of(a, w), {}).setdefault(w.label, i)
     return out
 
 
 def labels(problem: Problem) -> dict[str, list[str]]:
     """Name of an array -> its rows, for the head of a journal; the first row of the first one is the first read-out."""
-    return {name: list(rows) for name, rows in _outputs(problem).items()}
+    return labels_of(problem.assembly)
+
+
+def labels_of(a: Assembly) -> dict[str, list[str]]:
+    """The same of an assembly."""
+    return {name: list(rows) for name, rows in _outputs(a).items()}
 
 
 def _outputs_of(problem: Problem, row: dict[str, Any]) -> ComplexArray:
     """(w, H + 1) the read-outs in the order of the assembly, from a kept point."""
-    places, a = _outputs(problem), problem.assembly
-    found = [row[name][list(places[name]).index(w.label)] for w in a.outputs for name in [_named(a, w)]]
+    places, a = _outputs(problem.assembly), problem.assembly
+    found = [row[name][list(places[name]).index(w.label)] for w in a.outputs for name in [array_of(a, w)]]
     return np.array(found, dtype=complex).reshape(-1, problem.harmonics + 1)
 
 

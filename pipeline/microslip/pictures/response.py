@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import CaseResult, CaseSettings
-from ..case.run import lifted
+from ..case.readouts import Readout, readouts
+from ..case.run import free_response, lifted
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
 from ..harmonic_balance.sweeps import overhanging
@@ -23,46 +25,87 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def response_picture(result: CaseResult, path: Path) -> None:
-    """Amplitude over frequency for every normal force, with the free body and the sticking eigenfrequencies."""
+TOGETHER = 6
+"""Curves in a picture up to which read-outs of one unit share it."""
+STYLES = ("-", "--", "-.")
+"""Lines of read-outs that share a picture; dotted ones are not valid."""
+
+
+def together(asked: Sequence[Readout], forces: int) -> list[Readout]:
+    """Read-outs drawn beside the first one: those of its unit, where all curves are few."""
+    alike = [w for w in asked if w.quantity == asked[0].quantity]
+    return alike if len(alike) <= len(STYLES) and len(alike) * forces <= TOGETHER else alike[:1]
+
+
+def response_picture(
+    result: CaseResult, path: Path, shown: Sequence[Readout] = (), rows: Sequence[Mapping[str, Any]] = ()
+) -> None:
+    """Amplitude over frequency for every normal force, with the free body and the sticking eigenfrequencies.
+
+    Args:
+        shown: read-outs of one unit, the first one of the case if not given. rows: the table of resonances, which
+            tells what the others read there.
+    """
     from matplotlib.figure import Figure
 
+    shown = shown or readouts(result.built.assembly)[:1]
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
-    axes.plot(result.free.frequency, 1e6 * np.abs(result.free.monitor), color="0.6", lw=1, label="no contact")
-    forces, colours = sorted(result.responses), shades(len(result.responses))
-    lifts = False
-    for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
-        r = result.responses[normal]
-        apart_from_it = overhanging(r, result.resonances[normal])
-        f, amplitude = _with_peaks(r, result.resonances[normal])
-        on = ~np.isin(f, [at for at, _ in apart_from_it])
-        if (off := lifted(result.built, r)).any():
-            off = np.interp(f, r.frequency, off) > 0
-            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.8, ls=":")
-            amplitude, lifts = np.where(off, np.nan, amplitude), True
-        line = "-" if np.isfinite(amplitude).any() else ":"
-        axes.plot([at for at, _ in apart_from_it], [1e6 * a for _, a in apart_from_it], "o", color=colour, ms=4)
-        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, ls=line, label=f"$F_N$ = {said} N")
+    lifts = [_curves(axes, result, w, rows, style, len(shown) > 1) for w, style in zip(shown, STYLES, strict=False)]
     if any(np.abs(line.get_ydata()).max(initial=0.0) > 0 for line in axes.get_lines()):
         axes.set_yscale("log")
         plain_numbers(axes.yaxis, (1.0,))
     low, high = result.free.frequency[[0, -1]]
     axes.set_xlim(low, high)
     _stuck_lines(axes, result.stuck[(result.stuck > low) & (result.stuck < high)], (high - low) / 26)
-    s = result.settings
+    s, first = result.settings, shown[0]
     axes.set_xlabel("excitation frequency in Hz")
-    axes.set_ylabel(f"amplitude of {_read(s, result.quantity)}, in {result.quantity.micro} (0-peak)")
+    of = f" of {_read(s, first.quantity) if first.number == 0 else first.name}" * (len(shown) == 1)
+    axes.set_ylabel(f"amplitude{of and of + ','} in {first.quantity.micro} (0-peak)")
     to = f" to {s.amplitude:g} N at {s.excitation}" if s.excitation else ""
     axes.set_title(f"{s.name}: friction response{to}")
     axes.grid(True, which="both", alpha=0.25)
-    told = "dashed: sticking contacts"
+    told = "dashed, grey: sticking contacts" if len(shown) > 1 else "dashed: sticking contacts"
     if len(result.responses) > 1:
         told += f" at $F_N$ = {max(result.responses):g} N"
-    told += "; dotted: contacts would lift off, not valid" if lifts else ""
-    handles, labels = _by_rows(*axes.get_legend_handles_labels(), LEGEND)
-    figure.legend(handles, labels, loc="outside lower center", ncols=LEGEND, fontsize=9, title=told, title_fontsize=8)
+    told += "; dotted: contacts would lift off, not valid" if any(lifts) else ""
+    columns = LEGEND if len(shown) == 1 else 3
+    handles, labels = _by_rows(*axes.get_legend_handles_labels(), columns)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
     figure.savefig(path, format="png")
+
+
+def _curves(
+    axes: Axes, result: CaseResult, w: Readout, rows: Sequence[Mapping[str, Any]], style: str, named: bool
+) -> bool:  # fmt: skip
+    """Draw a read-out without contact and for every normal force; whether contacts would lift off somewhere."""
+    of, built = f", {w.name}" * named, result.built
+    free = result.free
+    if w.number:
+        read = replace(built.assembly, outputs=built.assembly.outputs[w.number :])
+        grid = np.linspace(result.settings.sweep.start, result.settings.sweep.stop, result.settings.sweep.points)
+        free = free_response(replace(built, assembly=read), grid)
+    axes.plot(free.frequency, 1e6 * np.abs(free.monitor), color="0.6", lw=1, ls=style, label=f"no contact{of}")
+    forces, colours = sorted(result.responses), shades(len(result.responses))
+    lifts = False
+    for colour, normal, said in zip(colours, forces, apart(forces), strict=True):
+        r, peaks = result.responses[normal], result.resonances[normal]
+        apart_from_it = [f for f, _ in overhanging(r, peaks)]
+        if w.number:
+            r = replace(r, monitor=r.outputs[:, w.number, 1])
+            told = {row["frequency_Hz"]: row[w.column] for row in rows if row["normal_force_N"] == normal}
+            peaks = [(f, told[f]) for f, _ in peaks if f in told]
+        f, amplitude = _with_peaks(r, peaks)
+        on = ~np.isin(f, apart_from_it)
+        if (off := lifted(built, r)).any():
+            off = np.interp(f, r.frequency, off) > 0
+            axes.plot(*through(f[on], np.where(off, amplitude, np.nan)[on]), color=colour, lw=1.8, ls=":")
+            amplitude, lifts = np.where(off, np.nan, amplitude), True
+        line, label = style if np.isfinite(amplitude).any() else ":", f"$F_N$ = {said} N{of}"
+        single = [(f, 1e6 * a) for f, a in peaks if f in apart_from_it]
+        axes.plot(*np.reshape(single, (-1, 2)).T, "o", color=colour, ms=4)
+        axes.plot(*through(f[on], amplitude[on]), color=colour, lw=1.6, ls=line, label=label)
+    return lifts
 
 
 LEGEND = 6

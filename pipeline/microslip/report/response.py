@@ -40,8 +40,18 @@ def answer(response: Mapping[str, Any], album: Album) -> list[Piece]:
         say(*_sentences(response), tone="lead"),
         say(f"{failed} points did not converge; they are marked in the table." if failed else "", tone="bad"),
         _resonances(rows) if rows else say(""),
+        say(_of_others(response) if rows else ""),
         album.take(SHOWN[0]),
+        *album.begun(f"{SHOWN[0]} of "),
     ]
+
+
+def _of_others(response: Mapping[str, Any]) -> str:
+    """Which read-out has the resonances, where there are several."""
+    first, *others = response.get("read_outs", [""])
+    return f"Resonances are those of {first}; what is told of {', '.join(others)} is at their frequencies." * bool(
+        others
+    )
 
 
 def _sentences(response: Mapping[str, Any]) -> list[str]:
@@ -52,7 +62,9 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     doubtful = sum(bool(row.get("doubt")) for row in rows)
     lifted = {row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", "")}
     valid = [row for row in rows if row["normal_force_N"] not in lifted] or rows
-    said = [f"The highest resonance{' found' if doubtful else ''} is {_peak(max(valid, key=_size))}"]
+    first, *others = response.get("read_outs", [""])
+    of = f" of {first}" if others else ""
+    said = [f"The highest resonance{' found' if doubtful else ''}{of} is {_peak(max(valid, key=_size))}"]
     forces = {r["normal_force_N"] for r in valid}
     tops = [max((r for r in valid if r["normal_force_N"] == n), key=_size) for n in forces]
     ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}

@@ -16,6 +16,7 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
+from ..case.readouts import readouts
 from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import ModalBasis, UserError
@@ -148,9 +149,9 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     folder, summary = points.file.parent, summarise(result)
     points.begin()
     store.write_text(folder / "response.csv", response_table(result.responses))
-    drawn = _drawn(result, folder) if wanted.pictures else {}
     response = _response(points, result, summary)
     summary["resonances"] = _judged(response, result, summary["resonances"])
+    drawn = _drawn(result, summary["resonances"], folder) if wanted.pictures else {}
     response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
@@ -172,8 +173,9 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
 
 
 def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows of resonances with the effective damping there, what the contacts do, and what speaks against them."""
-    out = []
+    """Rows of resonances with the effective damping there, the other read-outs, what the contacts do, and what speaks
+    against them."""
+    out, others = [], readouts(result.built.assembly)[1:]
     for row in rows:
         normal, f = row["normal_force_N"], row["frequency_Hz"]
         series = response.one(normal_force=normal)
@@ -182,6 +184,7 @@ def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) 
         table = {name: float(columns[name][i]) for name in ("damping_ratio", "slipping", "open")}
         errors = result.errors.get(normal, {})
         share = next((e for at, e in errors.items() if np.isclose(at, f, rtol=1e-9, atol=0)), None)
+        table |= {w.column: float(abs(w.harmonics(series)[i, 1])) for w in others}
         table |= {} if share is None or not np.isfinite(share) else {"estimated_error": float(share)}
         out.append(_ordered(row | table | {"doubt": _doubt(result, normal, f, series.status[i], share or 0.0)}))
     return out
@@ -222,13 +225,20 @@ UNCERTAIN = 0.1
 """Estimated error of an amplitude by harmonics and samples that are left out, from which on it is called uncertain."""
 
 
-def _drawn(result: CaseResult, folder: Path) -> dict[str, Path]:
-    from ..pictures.response import response_picture
+def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict[str, Path]:
+    """Title -> picture of the first read-out, with others of its unit where they are few, and of each other one."""
+    from ..pictures.response import response_picture, together
 
-    picture = folder / "pictures" / "response.png"
-    with store.complete_or_absent(picture) as temporary:
-        response_picture(result, temporary)
-    return {"friction response": picture}
+    asked = readouts(result.built.assembly)
+    first = together(asked, len(result.responses))
+    groups = {"friction response": first} | {f"friction response of {w.name}": [w] for w in asked if w not in first}
+    drawn = {}
+    for title, group in groups.items():
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", title.removeprefix("friction "))
+        drawn[title] = folder / "pictures" / f"{name}.png"
+        with store.complete_or_absent(drawn[title]) as temporary:
+            response_picture(result, temporary, group, rows)
+    return drawn
 
 
 def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]) -> Response:
@@ -339,7 +349,7 @@ def convergence_table(response: Response) -> str:
 
 def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
-    rows = []
+    rows, names = [], [w.name for w in readouts(result.built.assembly)]
     name = result.quantity.column("amplitude")
     for normal, peaks in result.resonances.items():
         rows += [{"normal_force_N": normal, "frequency_Hz": f, name: a} for f, a in peaks]
@@ -356,6 +366,7 @@ def summarise(result: CaseResult) -> dict[str, Any]:
         "damping": result.settings.damping_as,
         "stuck_modes": _stuck_modes(result),
         **({"stuck_under_N": max(result.responses)} if result.responses else {}),
+        **({"read_outs": names} if len(names) > 1 else {}),
         "resonances": rows,
         "rising_at_the_edge": [
             {"normal_force_N": r.normal_force, "frequency_Hz": r.frequency, name: r.amplitude, "add": r.add}
