@@ -427,7 +427,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "excitations.magnets.pulse": ("", "cos^2, or constant over the width"),
     "excitations.magnets.place": ("degrees", "of the loaded spot of the first blade at time 0"),
     "excitations.magnets.highest": ("", "engine order"),
-    "monitors.monitor": ("", "of a body, `body:monitor` where there are several; all are drawn, resonances of the first"),
+    "monitors.monitor": ("", "of a body, `body:monitor` where there are several; all drawn, resonances of the first"),
     "monitors.direction": ("", "in body axes"),
     "contacts.interface": ("", "of a body, `body:interface` where there are several; its frame is the contact's"),
     "contacts.against": ("", "`ground`, or the other interface"),
