@@ -387,7 +387,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                   "(harmonic_balance.md#what-is-followed-instead-of-swept)"),
     "harmonics_error": ("", "of `auto`: estimated error of the resonances that is allowed, a share of the amplitude; "
                         "0.01 if not given"),
-    "samples": ("", "of a cycle; at least four a harmonic, sixteen are better"),
+    "samples": ("", "of a cycle; at least four a harmonic; sixteen a harmonic and 48 at least if not given"),
     "cycles": ("", "marched at most until the sliders are periodic"),
     "periodicity": ("", "at most 0.01: share of the largest force within which they count as periodic; 0: all cycles "
                     "are marched"),
@@ -428,7 +428,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "excitations.magnets.pulse": ("", "cos^2, or constant over the width"),
     "excitations.magnets.place": ("degrees", "of the loaded spot of the first blade at time 0"),
     "excitations.magnets.highest": ("", "engine order"),
-    "monitors.monitor": ("", "of a body, `body:monitor` where there are several; resonances are those of the first"),
+    "monitors.monitor": ("", "of a body, `body:monitor` where there are several; all drawn, resonances of the first"),
     "monitors.direction": ("", "in body axes"),
     "contacts.interface": ("", "of a body, `body:interface` where there are several; its frame is the contact's"),
     "contacts.against": ("", "`ground`, or the other interface"),

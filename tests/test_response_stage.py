@@ -19,6 +19,7 @@ import pytest
 from test_harmonic_balance_laws import sled
 
 from microslip.basis import read_basis, write_basis
+from microslip.case import load_case
 from microslip.data import UserError
 from microslip.results import read_response
 from microslip.stages import response as making
@@ -147,6 +148,18 @@ def test_every_read_out_is_drawn_and_told(folder: Path, monkeypatch: pytest.Monk
         assert one[name] >= 1e6 * values * (1 - 1e-9)
     page = (build / "response.html").read_text()
     assert "Resonances are those of probe, x" in page and "probe, y amplitude in" in page
+
+
+@pytest.mark.parametrize(("harmonics", "given", "found"), [(1, None, 48), (3, None, 48), (9, None, 144), (9, 40, 40)])
+def test_samples_follow_the_harmonics_where_none_are_given(
+    tmp_path: Path, harmonics: int, given: int | None, found: int
+) -> None:
+    """Sixteen each, 48 at least; where more harmonics are looked for, they keep as many."""
+    (tmp_path / "case.toml").write_text(CASE.replace("samples = 24", "" if given is None else f"samples = {given}"))
+    settings, _ = load_case(tmp_path / "case.toml", [f"harmonics={harmonics}"])
+    assert settings.marching["samples"] == found
+    automatic, _ = load_case(tmp_path / "case.toml", ["harmonics=auto"])
+    assert automatic.with_harmonics(7).marching["samples"] == (112 if given is None else 94)
 
 
 TWO = """
@@ -515,7 +528,7 @@ def test_as_many_harmonics_as_the_error_asks_for(folder: Path) -> None:
     assert f",{H}," in (build / "response.csv").read_text().splitlines()[1]
     assert f"<td>{H}</td>" in (build / "response.html").read_text()
     opened = open_case(folder / "case.toml", {"sled": folder / "basis.h5"}, build)
-    assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.samples >= 8 * H
+    assert opened.with_({}).settings.harmonics == H and opened.with_({}).settings.sampled >= 8 * H
 
 
 def test_a_strain_gauge_is_strain_everywhere(folder: Path) -> None:

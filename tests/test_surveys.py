@@ -20,7 +20,8 @@ from microslip.cli import main
 from microslip.data import ModalBasis, StressSet
 from microslip.harmonic_balance import envelope, identification, response
 from microslip.harmonic_balance import problem as balance
-from microslip.stages.surveying import survey_stage
+from microslip.harmonic_balance.envelope import Envelope
+from microslip.stages.surveying import _ranges_sentences, survey_stage
 from microslip.system.assembly import Load
 from microslip.system.component import Component, Ring
 
@@ -222,6 +223,19 @@ def test_respond_over_ranges(ring: Path) -> None:
     )
     np.testing.assert_allclose(table["combination_1_m"], np.abs(alone.monitor), rtol=1e-6)  # 1 % as in its modal file
     assert (table["high_m"] >= table["combination_3_m"]).all()
+
+
+def test_a_combination_that_does_not_converge_is_told_and_counted() -> None:
+    """One of three without any solution, one with a hole: neither is called the smallest, both are named."""
+    a = np.array([[1.0, 3.0], [9.0, 9.0], [2.0, 9.0]], dtype=complex)
+    ok = np.array([[True, True], [False, False], [True, False]])
+    e = Envelope(np.array([10.0, 20.0]), ("load",), np.array([[1.0], [2.0], [3.0]]), 1e-3 * a, ok, np.ones((3, 2)))
+    assert e.peaks[[0, 2]].tolist() == [3e-3, 2e-3] and np.isnan(e.peaks[1])
+    first, second, third = _ranges_sentences(e)
+    assert "between 2 mm and 3 mm" in first and second.endswith("load 1.") and third.startswith("2 of 3 combinations")
+    assert third.endswith("of 2 points did not converge 2 with load 2; 1 with load 3.")
+    none = _ranges_sentences(replace(e, converged=np.zeros((3, 2), dtype=bool)))
+    assert len(none) == 1 and none[0].startswith("3 of 3 combinations")
 
 
 SPEEDS = """

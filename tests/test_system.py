@@ -280,7 +280,7 @@ def test_from_init_to_the_response(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert main(["init", "three-masses"]) == 0
     case = tmp_path / "three-masses" / "case.toml"
     edit(case, "points = 141", "points = 9")
-    edit(case, "[0.0, 2.0, 10.0, 1000.0]", "[2.0, 1000.0]")
+    edit(case, "[2.0, 10.0, 30.0, 1000.0]", "[2.0, 1000.0]")
     assert main(["run", "three-masses", "-q"]) == 0
     summary = json.loads((tmp_path / "build" / "three-masses" / "response.json").read_text())
     assert summary["failed_points"] == 0
@@ -306,7 +306,7 @@ def test_a_folder_with_a_case_alone_is_run(tmp_path: Path, monkeypatch: pytest.M
     case = tmp_path / "mine" / "case.toml"
     case.write_text((tmp_path / "three-masses" / "case.toml").read_text())
     edit(case, "points = 141", "points = 5")
-    edit(case, "[0.0, 2.0, 10.0, 1000.0]", "[2.0]")
+    edit(case, "[2.0, 10.0, 30.0, 1000.0]", "[2.0]")
     edit(case, 'name = "three-masses"', 'name = "mine"')
     edit(case, 'body = "three-masses"\n', "")
     case.write_text(case.read_text() + '[[bodies]]\nname = "masses"\nfile = "masses.h5"\n')

@@ -351,7 +351,7 @@ def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:
     error included; none in the book's mode, which has tables."""
 
     contacts = settings.ring.blades if settings.ring and settings.ring.model == "full" else 1
-    finer = more(settings.balanced), 2 * settings.samples
+    finer = more(settings.balanced), 2 * settings.sampled
     return 0.0 if settings.mode == "book" else aft_bytes(points, coordinates, *finer, contacts)
 
 
@@ -362,7 +362,7 @@ def _refuse_too_many(settings: CaseSettings, c: ContactSettings, load: float | N
     has = of_this_machine() / GIB if given is None else given
     if needed > has:
         raise UserError(
-            f"points: {points} with {settings.balanced} harmonics and {settings.samples} samples need about "
+            f"points: {points} with {settings.balanced} harmonics and {settings.sampled} samples need about "
             f"{needed:.3g} GiB, and {'this machine has' if given is None else 'memory_limit is'} {has:.3g}; take fewer "
             f"of them, or write memory_limit = {np.ceil(needed):g} to try it all the same"
         )

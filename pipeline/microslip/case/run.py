@@ -208,7 +208,7 @@ def _report_memory(built: Built, report: Callable[[str], None]) -> None:
     needed = max((memory_of(s, len(p.points), p.count) for p in patches), default=0.0) / GIB
     if needed > 1:
         points = max(len(p.points) for p in patches)
-        report(f"up to {points} points, {s.balanced} harmonics, {s.samples} samples: about {needed:.3g} GiB of memory")
+        report(f"up to {points} points, {s.balanced} harmonics, {s.sampled} samples: about {needed:.3g} GiB of memory")
 
 
 def _stuck(assembly: Assembly) -> tuple[Array, Array]:

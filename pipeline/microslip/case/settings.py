@@ -43,6 +43,9 @@ FIRST_HARMONICS = 3
 SAMPLES_EACH = 8
 """Samples of a cycle that ``auto`` takes at least for each harmonic, as the estimate of their error does."""
 
+GOOD_SAMPLES_EACH, FEWEST_SAMPLES = 16, 48
+"""Samples of a cycle for each harmonic, and at least, where a case names none."""
+
 Radius = Annotated[float, BeforeValidator(_float), Field(gt=0)]
 
 
@@ -260,8 +263,8 @@ class CaseSettings(Model):
     body (with the speed, speed_rpm and modes of `BodyOfCase`), or [[bodies]]; excitation and amplitude, or
     [[excitations]]; monitor and direction, or [[monitors]], all of which are drawn, and in the first of which
     resonances are looked for. harmonics, ``auto`` for as many as an estimated harmonics_error (a share of the
-    amplitude, 0.5 at most) at the resonances asks for; samples (of
-    a cycle), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
+    amplitude, 0.5 at most) at the resonances asks for; samples (of a cycle, 16 a harmonic and 48 at least if not
+    given), cycles (marched at most until the sliders are periodic) and periodicity (within which share of the largest
     force they count as periodic, 0: never): of contacts with a law. memory_limit: GiB that they may take by an estimate
     before they begin, the machine's if not given. mode: ``aft``, their laws in time, or ``book`` (Sextro
     5.2): one harmonic, constant normal force, elliptic orbits, from tables; strips: into which it cuts the
@@ -292,7 +295,7 @@ class CaseSettings(Model):
     damping_ratio: Ratio | Ratios | None = None
     harmonics: Literal["auto"] | Annotated[int, Field(ge=1, le=200)] = 3
     harmonics_error: Annotated[Positive, Field(le=0.5)] | None = None
-    samples: Annotated[int, Field(ge=8, le=100000)] = 48
+    samples: Annotated[int, Field(ge=8, le=100000)] | None = None
     cycles: Annotated[int, Field(ge=1, le=1000)] = 100
     periodicity: Annotated[NotNegative, Field(le=1e-2)] = 1e-10
     memory_limit: Positive | None = None
@@ -337,10 +340,10 @@ class CaseSettings(Model):
         if said := self._met_twice():
             raise ValueError(said)
         count = self.number_of_harmonics
-        if self.samples < 4 * count:
+        if self.sampled < 4 * count:
             raise ValueError(
-                f"samples: {self.samples} are too few for {count} harmonics; take at least {4 * count}, better "
-                f"{16 * count}"
+                f"samples: {self.sampled} are too few for {count} harmonics; take at least {4 * count}, better "
+                f"{GOOD_SAMPLES_EACH * count}"
             )
         return self._automatic()._book()._pressed()._damped()
 
@@ -443,13 +446,20 @@ class CaseSettings(Model):
 
     def with_harmonics(self, count: int) -> CaseSettings:
         """The case with a number of harmonics, and of samples that grow with them: both errors fall."""
+        if self.samples is None:
+            return self.model_copy(update={"harmonics": count})
         grown = -(-self.samples * count // FIRST_HARMONICS)
         return self.model_copy(update={"harmonics": count, "samples": max(grown, SAMPLES_EACH * count)})
 
     @property
+    def sampled(self) -> int:
+        """Samples of a cycle: those given, or as many as the harmonics need."""
+        return self.samples or max(FEWEST_SAMPLES, GOOD_SAMPLES_EACH * self.number_of_harmonics)
+
+    @property
     def marching(self) -> dict[str, Any]:
         """How finely forces are marched in time, as `harmonic_balance.problem.of` asks."""
-        return {"samples": self.samples, "cycles": self.cycles, "periodicity": self.periodicity}
+        return {"samples": self.sampled, "cycles": self.cycles, "periodicity": self.periodicity}
 
     @property
     def components(self) -> tuple[BodyOfCase, ...]:

@@ -212,8 +212,8 @@ class Envelope:
 
     @property
     def peaks(self) -> Array:
-        """(c,) m, the largest amplitude of every combination on the grid."""
-        return np.where(self.converged, np.abs(self.monitor), 0.0).max(axis=1)
+        """(c,) m, the largest amplitude of every combination on the grid; NaN where no point converged."""
+        return np.fmax.reduce(np.where(self.converged, np.abs(self.monitor), np.nan), axis=1)
 
     def columns(self) -> dict[str, Array]:
         """Name -> column, for a table."""

@@ -83,7 +83,7 @@ def open_case(path: Path, files: Mapping[str, Path], folder: Path, assignments: 
     settings = checkpoint.as_found(asked, folder, path)
     if asked.looks_for_harmonics:
         raw = {k: v for k, v in raw.items() if k != "harmonics_error"}
-        raw |= {"harmonics": settings.harmonics, "samples": settings.samples}
+        raw |= {"harmonics": settings.harmonics, "samples": settings.sampled}
     return Case(path, raw, {name: read_basis(file) for name, file in files.items()}, folder)
 
 

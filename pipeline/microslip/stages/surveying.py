@@ -249,15 +249,33 @@ def _ranges(write: Write, settings: CaseSettings, bases: Bases, path: Path, repo
 
     e = surveys.over_ranges(settings, bases, path, report, lambda some: write(tables(some)))
     title = f"{settings.name}: over {', '.join(e.names).replace('_', ' ')}"
-    most = " and ".join(e.quantity.sized(float(peak)) for peak in (e.peaks.min(), e.peaks.max()))
-    said = [f"Largest amplitude between {most} on the grid of the sweep."]
-    if np.isfinite(e.peaks).any():
-        largest = {name: values[np.nanargmax(e.peaks)] for name, values in e.corners().items() if name in e.names}
-        named = ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in largest.items())
-        said.append(f"It is largest with {named}.")
     return Survey(
-        tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, said, int((~e.converged).sum())
-    )
+        tables(e), {"pictures/ranges.png": lambda p: envelope_picture(e, p, title)}, _ranges_sentences(e),
+        int((~e.converged).sum()),
+    )  # fmt: skip
+
+
+def _ranges_sentences(e: Envelope) -> list[str]:
+    """The largest amplitudes of the combinations, and which of them are not known everywhere."""
+    said, known = [], np.isfinite(e.peaks)
+    if known.any():
+        most = " and ".join(e.quantity.sized(float(pick(e.peaks))) for pick in (np.nanmin, np.nanmax))
+        said.append(f"Largest amplitude between {most} on the grid of the sweep.")
+        said.append(f"It is largest with {_combination(e, int(np.nanargmax(e.peaks)))}.")
+    failed = (~e.converged).sum(axis=1)
+    if some := np.flatnonzero(failed).tolist():
+        each = "; ".join(f"{failed[i]} with {_combination(e, i)}" for i in some)
+        are = "is" if len(some) == 1 else "are"
+        said.append(
+            f"{len(some)} of {counted(len(failed), 'combination')} {are} not known everywhere, and the envelope leaves "
+            f"out what is missing: of {len(e.frequency)} points did not converge {each}."
+        )
+    return said
+
+
+def _combination(e: Envelope, i: int) -> str:
+    """Combination number i in words."""
+    return ", ".join(f"{name.replace('_', ' ')} {v:.4g}" for name, v in zip(e.names, e.values[i], strict=True))
 
 
 def _identification(write: Write, settings: CaseSettings, bases: Bases, path: Path, report: Report) -> Survey:
