@@ -128,8 +128,14 @@ def of_summaries(a: Raw, b: Raw) -> dict[str, float]:
 
 
 def of_rows(rows: list[Any]) -> Array:
-    """Numbers of rows but the normal force, by which they are only named."""
-    return np.array([[*_told(r).values()] if isinstance(r, dict) else r for r in rows], dtype=float)
+    """Numbers of rows but the normal force, by which they are only named; of further read-outs by size, as another
+    order or other axes give them other names."""
+    return np.array([_by_size(_told(r)) if isinstance(r, dict) else r for r in rows], dtype=float)
+
+
+def _by_size(row: Raw) -> list[float]:
+    further = sorted(v for k, v in row.items() if " amplitude_" in k)
+    return [v for k, v in row.items() if " amplitude_" not in k] + further
 
 
 def _told(row: Raw) -> Raw:

@@ -243,7 +243,7 @@ def test_rows_of_several_members_with_a_monitor_of_one_name() -> None:
     assembly = Assembly(components, (), (), tuple(Output(m, "tip", label) for m, label in asked))
     problem: Any = SimpleNamespace(assembly=assembly, harmonics=1)
     watched = np.arange(8.0).reshape(4, 2) + 0j
-    row = {name: watched[list(rows.values())] for name, rows in checkpoint._outputs(problem).items()}
+    row = {name: watched[list(rows.values())] for name, rows in checkpoint._outputs(assembly).items()}
     np.testing.assert_array_equal(row["monitors/right:tip"], watched[[1, 3]])
     np.testing.assert_array_equal(checkpoint._outputs_of(problem, row), watched)
 

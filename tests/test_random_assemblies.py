@@ -35,7 +35,8 @@ EQUAL = 1e-9
 def bare(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """Neither pictures nor estimated errors, which take as long as the answer, but where a test is named whole."""
     if "whole" not in request.node.name:
-        monkeypatch.setattr("microslip.pictures.response.response_picture", lambda _, path: path.write_bytes(b"drawn"))
+        drawn = "microslip.pictures.response.response_picture"
+        monkeypatch.setattr(drawn, lambda _, path, *__: path.write_bytes(b"drawn"))
         monkeypatch.setattr("microslip.case.run._Left.out", lambda *_: [])
 
 

@@ -32,6 +32,7 @@ from .assemble import Built, build, memory_of, swept
 from .checkpoint import series_name
 from .edges import Rising
 from .problem import book_models, normal_forces, pressed_by, problem_of
+from .readouts import Readout, readouts
 from .settings import FIRST_HARMONICS, CaseSettings
 
 Keep = Callable[[Built], AbstractContextManager[Journal]]
@@ -68,6 +69,12 @@ class CaseResult:
     def quantity(self) -> Quantity:
         """What the first read-out measures."""
         return measured(self.built.assembly)
+
+    @property
+    def readouts(self) -> list[Readout]:
+        """What is read, each once; of a ring that is answered as a whole what its first sector reads."""
+        asked = readouts(self.built.assembly)
+        return readouts(self.built.pressed(None))[: len(asked)]
 
 
 class _TooFew(Exception):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case import CaseResult, CaseSettings
-from ..case.readouts import Readout, readouts
+from ..case.readouts import Readout
 from ..case.run import free_response, lifted
 from ..data import Array
 from ..harmonic_balance import FrequencyResponse
@@ -48,7 +48,7 @@ def response_picture(
     """
     from matplotlib.figure import Figure
 
-    shown = shown or readouts(result.built.assembly)[:1]
+    shown = shown or result.readouts[:1]
     figure = Figure(figsize=(9, 6), dpi=130, layout="constrained")
     axes = figure.subplots()
     lifts = [_curves(axes, result, w, rows, style, len(shown) > 1) for w, style in zip(shown, STYLES, strict=False)]

@@ -16,7 +16,6 @@ import numpy as np
 from ..basis import read_basis
 from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
-from ..case.readouts import readouts
 from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
 from ..data import ModalBasis, UserError
@@ -175,7 +174,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
 def _judged(response: Response, result: CaseResult, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Rows of resonances with the effective damping there, the other read-outs, what the contacts do, and what speaks
     against them."""
-    out, others = [], readouts(result.built.assembly)[1:]
+    out, others = [], result.readouts[1:]
     for row in rows:
         normal, f = row["normal_force_N"], row["frequency_Hz"]
         series = response.one(normal_force=normal)
@@ -229,7 +228,7 @@ def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict
     """Title -> picture of the first read-out, with others of its unit where they are few, and of each other one."""
     from ..pictures.response import response_picture, together
 
-    asked = readouts(result.built.assembly)
+    asked = result.readouts
     first = together(asked, len(result.responses))
     groups = {"friction response": first} | {f"friction response of {w.name}": [w] for w in asked if w not in first}
     drawn = {}
@@ -349,7 +348,7 @@ def convergence_table(response: Response) -> str:
 
 def summarise(result: CaseResult) -> dict[str, Any]:
     """Numbers of a case for the report and the terminal."""
-    rows, names = [], [w.name for w in readouts(result.built.assembly)]
+    rows, names = [], [w.name for w in result.readouts]
     name = result.quantity.column("amplitude")
     for normal, peaks in result.resonances.items():
         rows += [{"normal_force_N": normal, "frequency_Hz": f, name: a} for f, a in peaks]
