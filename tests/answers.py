@@ -128,20 +128,15 @@ def of_summaries(a: Raw, b: Raw) -> dict[str, float]:
 
 
 def of_rows(rows: list[Any]) -> Array:
-    """Numbers of rows but the normal force, by which they are only named; of further read-outs by size, as another
-    order or other axes give them other names."""
-    return np.array([_by_size(_told(r)) if isinstance(r, dict) else r for r in rows], dtype=float)
-
-
-def _by_size(row: Raw) -> list[float]:
-    further = sorted(v for k, v in row.items() if " amplitude_" in k)
-    return [v for k, v in row.items() if " amplitude_" not in k] + further
+    """Numbers of rows but the normal force, by which they are only named."""
+    return np.array([[*_told(r).values()] if isinstance(r, dict) else r for r in rows], dtype=float)
 
 
 def _told(row: Raw) -> Raw:
-    """Without shares of points and samples, which flip as rounding has it, and with them the estimate of error."""
+    """Without shares of points and samples, which flip as rounding has it, and with them the estimate of error; without
+    further read-outs, which other axes and another order name otherwise: the response file has them."""
     other = ("normal_force_N", "slipping", "open", "estimated_error")
-    return {k: v for k, v in row.items() if k not in other and isinstance(v, float)}
+    return {k: v for k, v in row.items() if k not in other and " amplitude_" not in k and isinstance(v, float)}
 
 
 def apart(a: dict[str, Array], b: dict[str, Array]) -> dict[str, float]:
