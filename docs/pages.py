@@ -333,6 +333,7 @@ MEANING_CONTACT: dict[str, tuple[str, str]] = {
     "law.count": ("", "of strips or sliders"),
     "law.weakest": ("", "strength of the weakest slider over that of the strongest"),
     "law.exponent": ("", "chi of Segalman's distribution"),
+    "law.restitution": ("", "e of an impact between masses"),
     "law.ratio": ("", "beta: stiffness of its last slider over that of all others"),
     "motion.frequency": ("Hz", ""),
     "motion.normal": ("*", "u_n, positive closes: mean, cos, sin, cos 2, sin 2, ..."),

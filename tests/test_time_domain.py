@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import jax.numpy as jnp
@@ -277,6 +279,67 @@ def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> Non
         assert mesh.point_data["displacement"][nearest, 0] == pytest.approx(
             read, rel=1e-6, abs=1e-6 * np.abs(moved).max()
         )
+
+
+RIGID = {key: None for key in ("normal_stiffness", "tangential_stiffness", "includes", "roughness", "interference")}
+
+
+def rigid(folder: Path, how: dict[str, Any]) -> None:
+    """The hammer's contact made rigid."""
+    kept = [line for line in CASE.splitlines() if line.split(" =")[0] not in {*RIGID, "law"}]
+    more = "\n".join(f"{key} = {value}" for key, value in how.items())
+    (folder / "case.toml").write_text("\n".join(kept).replace("friction = 0.0", f"friction = 0.0\n{more}") + "\n")
+
+
+@pytest.mark.parametrize(
+    "how, gap, pressed, share",
+    [({"interference": -1e-4}, 1e-4, 0.0, 1e-9), ({"normal_force": 0.02}, 0.0, 0.02, 1e-5)],
+)
+def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
+    hammer: Path, how: dict[str, float], gap: float, pressed: float, share: float
+) -> None:
+    """Behind a gap, and pressed by a force that the vibration overcomes: it presses as a weight would, but for the
+    second order in the step by which a force that kicks differs from one that flows."""
+    rigid(hammer, {"law": '{ kind = "set-valued", restitution = 0.6 }', **how})
+    assert main(["orbit", "case.toml", "-q", "--no-pictures"]) == 0
+    found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
+    drive = STIFFNESS * 0.00047
+    swing = ms.structure(
+        MASS, STIFFNESS, 0.02046, force={0: drive}, steady={0: pressed},
+        elements=[ms.stop(math.inf, gap, restitution=0.6)],
+    )  # fmt: skip
+    steps = int(found.steps)
+    by_hand = ms.integrate(
+        swing, 64.32, unit="rad/s", settle=200, keep=4, samples=64, steps=steps, start="rest"
+    )  # fmt: skip
+    assert found.count("closes") > 3
+    np.testing.assert_allclose(found.y[0], by_hand.y[0], atol=share * np.abs(found.y).max())
+    assert np.abs(found.y[0]).max() > 1e-4 and found.balance < 1e-10
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ("contacts.0.normal_stiffness=1e6", "is rigid; leave normal_stiffness out"),
+        ("contacts.0.interference=1e-6", "rigid bodies cannot overlap"),
+        ('contacts.0.law={kind="set-valued", restitution=1.5}', "restitution: must not be greater than 1"),
+        ('contacts.0.friction={kind="coulomb", mu=0.3, deviation=0.1}', "no heat and no chance"),
+    ],
+)
+def test_what_a_rigid_contact_has_no_use_for_is_refused(
+    hammer: Path, capsys: pytest.CaptureFixture, change: str, words: str
+) -> None:
+    rigid(hammer, {"law": '"set-valued"', "interference": 0.0})
+    assert main(["orbit", "case.toml", "-q", "--set", change]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_rigid_contact_is_refused_by_name_where_a_stiffness_is_needed(
+    hammer: Path, capsys: pytest.CaptureFixture
+) -> None:
+    rigid(hammer, {"law": '"set-valued"', "interference": 0.0})
+    assert main(["respond", "case.toml", "-q", "--set", "sweep.start=5.0", "--set", "sweep.stop=12.0"]) == 2
+    assert 'contacts.face: law "set-valued" has no stiffness' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

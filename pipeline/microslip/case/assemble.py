@@ -289,6 +289,8 @@ def _stiffness(
     own = sized(c, faces[0], path)
     if c.is_curved:
         springs, message = _in_contact(path, c, lambda: curved_springs(own, load))
+    elif c.what.rigid:
+        springs, message = (0.0, 0.0, 0.0), ""
     else:
         springs, message = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
     return own, springs, [message] if message else []
@@ -449,10 +451,10 @@ def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
     if c.is_curved:
         return c
     found = _composed(c, path)
-    if found.law is None or found.stiffness is None:
+    if found.law is None:
         told = f"file: {file} needs" if c.file is not None else "stiffness: it needs"
         raise UserError(f"{path}: {where}.{told} friction and a tangential stiffness to make a law; add them")
-    if c.includes is None and found.stiffness.includes == SURFACE:
+    if c.includes is None and found.stiffness and found.stiffness.includes == SURFACE:
         c = c.model_copy(update={"includes": SURFACE})
     return c
 
@@ -481,8 +483,9 @@ def _composed(
 
 
 def _given(found: ContactModel) -> Springs:
-    """Stiffnesses along n, t1, t2, N/m."""
-    assert found.stiffness is not None
+    """Stiffnesses along n, t1, t2, N/m; zeros of a rigid contact."""
+    if found.stiffness is None:
+        return 0.0, 0.0, 0.0
     return (found.normal_0, *found.stiffness.tangential)
 
 

@@ -176,11 +176,13 @@ class ContactSettings(ContactLaw):
             raise ValueError(f"{given[0]}: stands in the contact file already; give file or {given[0]}")
         if self.file is None and self.friction is None:
             raise ValueError("friction: is missing; give it, or a contact file (file)")
-        if not self.is_elsewhere and getattr(self.springs, "tangential", 1.0) is None:
+        if not self.is_elsewhere and not self.what.rigid and getattr(self.springs, "tangential", 1.0) is None:
             key = "stiffness.tangential" if self.stiffness is not None else "tangential_stiffness"
             raise ValueError(f"{key}: is missing; add it")
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
+        if self.what.rigid and (self.interference or 0.0) > 0:
+            raise ValueError("interference: rigid bodies cannot overlap; give a gap (negative), or a normal_force")
         if self.temperature is not None and not self.heated:
             raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
         if self.ground is not None and self.against != GROUND:

@@ -12,7 +12,7 @@ from .heights import Heights
 from .hertz import Hertz
 from .law import Array, Law, value
 from .layer import Layer
-from .normal import Normal, Rough
+from .normal import Normal, Preload, Rough
 from .series import ContactStiffness
 from .settings import ContactFile, ContactLaw
 
@@ -24,8 +24,9 @@ class ContactModel:
     Attributes:
         settings: in SI. path: of their file. normal_0: c_N0, N/m. stiffness: of the full area; None without a
             tangential one. area: nominal, m2, or None. heights, roughness: distribution and R_Z in m, or None. normal:
-            normal law. friction: characteristic, or None. pressed: by which force, N, where that is given. layer,
-            hertz: where the stiffness comes from one. law: None without friction or tangential stiffness.
+            normal law; of a rigid contact one that never presses. friction: characteristic, or None. pressed: by which
+            force, N, where that is given. layer, hertz: where the stiffness comes from one. law: None without friction,
+            or without the tangential stiffness that it needs.
     """
 
     settings: ContactLaw
@@ -99,6 +100,8 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> ContactMo
     Raises:
         UserError: a file that is missing or cannot be read, numbers that make no law; each with its key.
     """
+    if settings.what.rigid:
+        return _rigid(settings, path)
     given = settings.springs
     try:
         source = given.source(path)
@@ -120,8 +123,14 @@ def compose(settings: ContactLaw, path: Path, pressed: float = 0.0) -> ContactMo
     return replace(found, law=_law(found))
 
 
+def _rigid(settings: ContactLaw, path: Path) -> ContactModel:
+    friction = None if settings.friction is None else settings.friction.friction(path, settings.temperature, None)
+    found = ContactModel(settings, path, 0.0, None, None, None, None, Preload(value(0.0)), friction)
+    return replace(found, law=_law(found))
+
+
 def _law(c: ContactModel) -> Law | None:
-    if c.friction is None or c.stiffness is None:
+    if c.friction is None or (c.stiffness is None and not c.settings.what.rigid):
         return None
     try:
         law: Law = c.settings.what.law(c)

@@ -58,12 +58,14 @@ class LawKind(Kind):
 
     Attributes:
         partly: whether some of it may slip while the rest sticks. opens: whether it carries no pull. of_the_force:
-            whether its numbers are those of the very force that presses it, `ContactModel.pressed`.
+            whether its numbers are those of the very force that presses it, `ContactModel.pressed`. rigid: whether it
+            has no stiffness at all.
     """
 
     partly: ClassVar[bool] = False
     opens: ClassVar[bool] = True
     of_the_force: ClassVar[bool] = False
+    rigid: ClassVar[bool] = False
 
     def fits(self, contact: ContactLaw) -> None:
         """Refuse settings of the other sections that it cannot use.

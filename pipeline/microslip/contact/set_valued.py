@@ -7,12 +7,22 @@ No smoothing parameter stands for what is rigid (the limit k_S -> infinity of Se
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
 import jax.numpy as jnp
+import numpy as np
+from pydantic import Field
 
 from ..errors import UserError
+from ..settings.body import Number
 from .friction import Friction
-from .law import Array, Law, Step, number, settings
+from .kinds import LawKind
+from .law import Array, Law, Step, number, settings, value
 from .normal import Normal
+
+if TYPE_CHECKING:
+    from .composed import ContactModel
+    from .settings import ContactLaw
 
 REFUSED = 'law "set-valued" has no stiffness: only a motion in time can take it (`microslip orbit`, `ms.integrate`)'
 
@@ -31,6 +41,9 @@ class SetValued(Law):
     restitution: Array = number(ge=0, le=1)
     gap: Array = number()
     normal: Normal | None = None
+
+    def scaled(self, share: Array) -> SetValued | None:
+        return self if self.normal is None else None
 
     def init(self, n: int) -> Array:
         return jnp.zeros((2, n))
@@ -52,3 +65,31 @@ class SetValued(Law):
 
     def lost(self, step: Step) -> Array:
         return jnp.sum(step.force[:, 1:] * step.moved[:, 1:], axis=1)
+
+
+class OfSetValued(LawKind):
+    """Rigid where it touches and where it sticks, for motions in time; `restitution` of an impact between masses. Its
+    points are the corners of the patch if not given."""
+
+    kind: Literal["set-valued"]
+    restitution: Annotated[Number, Field(ge=0, le=1)] = 0.0
+
+    rigid: ClassVar[bool] = True
+
+    def fits(self, contact: ContactLaw) -> None:
+        for key in ("stiffness", "normal_stiffness", "tangential_stiffness", "roughness"):
+            if getattr(contact, key) is not None:
+                raise ValueError(f'law: "set-valued" is rigid; leave {key} out')
+        if contact.heated or (contact.friction is not None and contact.friction.deviation):
+            raise ValueError(
+                'friction: of law = "set-valued" follows the speed alone, no heat and no chance; write a number'
+            )
+
+    def law(self, contact: ContactModel) -> Law:
+        return SetValued(contact.sliding, value(self.restitution), value(0.0))
+
+    def places(self, width: float, height: float) -> tuple[np.ndarray, np.ndarray] | None:
+        if not width or not height:
+            return None
+        corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+        return 0.5 * corners * np.array([width, height]), np.full(4, 0.25 * width * height)

@@ -45,6 +45,7 @@ from .point import OfPoint
 from .rate import OfRate
 from .regularised import WithMass
 from .roughness import ExponentialHeights, GaussianHeights, ProfileHeights, Roughness, Shape, TableHeights
+from .set_valued import OfSetValued
 from .sliders import OfIwan, OfMindlin, OfStrips
 from .stiffness import Given, OfBasis, OfCurve, OfHertz, OfLayer, Stiffness
 
@@ -59,7 +60,7 @@ else:
     AnyFriction = kinds(
         "friction", OfCoulomb, OfStaticSliding, OfFalling, OfExponential, OfHeated, OfTable, OfLubricated
     )  # fmt: skip
-    AnyLaw = kinds("law", OfPoint, OfJenkins, WithMass, OfRate, OfStrips, OfIwan, OfMindlin)
+    AnyLaw = kinds("law", OfPoint, OfJenkins, WithMass, OfRate, OfStrips, OfIwan, OfMindlin, OfSetValued)
 
 
 class Motion(Model):
@@ -221,6 +222,9 @@ class ContactLaw(Model):
         if self.stiffness is not None and short:
             raise ValueError(f"{short[0]}: is short for a table of stiffness; give one of the two")
         if self.is_elsewhere:
+            return self
+        if self.what.rigid:
+            self.what.fits(self)
             return self
         if self.stiffness is None and self.normal_stiffness is None:
             raise ValueError("normal_stiffness: is missing; add it, or a table of stiffness")

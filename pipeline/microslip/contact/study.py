@@ -24,6 +24,7 @@ from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
 from .point import PointContact
 from .regularised import MassContact, integrate
+from .set_valued import REFUSED
 from .sliders import Strips
 from .solids import Solid
 from .stiffness import OfCurve
@@ -67,6 +68,8 @@ def study(path: Path | str, assignments: list[str] | None = None) -> Study:
     """
     path = Path(path)
     settings = S.load_contact(path, assignments)
+    if settings.what.rigid:
+        raise UserError(f"{path}: {REFUSED}")
     pressed = settings.motion.normal_force if settings.motion else None
     contact = compose(settings, path, pressed or 0.0)
     found, working = _Findings(), _working(contact)

@@ -106,7 +106,10 @@ class Contact:
         """(k, k) about which the analysis is made: that of the sticking contact where it is preloaded."""
         from ..contact.elements import Spring
         from ..contact.patch import stuck_stiffness
+        from ..contact.set_valued import REFUSED, SetValued
 
+        if isinstance(self.patch.law, SetValued):
+            raise UserError(f"contacts.{self.name}: {REFUSED}")
         if isinstance(self.patch.law, Spring) and self.patch.count == 1:  # at a displacement at which it bends
             slope = abs(float(self.patch.law.slope(2 * (self.length or 0.0))))
             return slope * float(self.patch.kinematics[0, 1, 0]) ** 2 * np.eye(1)
@@ -143,10 +146,13 @@ def preloaded_contact(
         UserError: a negative normal force, or one that the law does not reach.
     """
     from ..contact.patch import equilibrium, pressing
+    from ..contact.set_valued import SetValued
 
     offset, preload = np.zeros(patch.count), np.zeros(patch.count)
     if normal is None:
         offset[0] = interference
+    elif isinstance(patch.law, SetValued):  # evenly pressed; its points share it as the motion asks
+        preload = patch.kinematics[:, 0].T @ np.full(len(patch.points), normal / len(patch.points))
     else:
         offset, preload[0] = equilibrium(patch, normal, compliance=compliance), normal
         preload[6:] = pressing(patch, offset)[6:]

@@ -221,6 +221,11 @@ class Stepper:
                 f"contacts {names}: on bodies that yield beside their modes, set-valued laws stand alone and press of "
                 'themselves; give all of them law = "set-valued" and no normal stiffness'
             )
+        if any(float(np.max(g.law.restitution)) > 0 for g in self.groups):
+            raise UserError(
+                f"contacts {names}: restitution: is for bodies of modes alone; these yield beside them, and what "
+                "comes back is theirs: leave it out"
+            )
         rows = np.concatenate([G for G, _ in self._spots]).reshape(-1, len(e.D))
         yields, moves = rows @ e.R[np.ix_(self.rows, self.rows)] @ rows.T, np.abs(rows).any(axis=1)
         if np.diag(yields)[moves].min() <= 1e-9 * np.diag(yields).max():
