@@ -23,19 +23,25 @@ import jax.numpy as jnp
 
 from ..contact.law import norm, ratio
 
-PROJECTIONS = 12
+PROJECTIONS = 3
 """Tried first: one will do for a single point."""
 
-NEWTON = 30
+NEWTON = 15
+STIFFNESSES = 0.1, 10.0
+"""r over the stiffness that a point meets by itself, one after the other. Of 600 steps of four corners of a rigid patch
+on six modes, most of them sticking, Newton's method ends with 1 in 82 %, with 0.1 in 97 %, and with 10 in most others."""
+
 CAREFUL = 3000
 """Projections with a step so short that they cannot diverge where Newton's method does not end."""
 
-EXACT = 1e-12
-"""Share of the largest force to which they are found."""
+EXACT, ENOUGH = 1e-12, 1e-9
+"""Share of the largest force to which they are found, and to which they need be: points whose answers differ by many
+orders leave no more to rounding."""
 
 
 class Meets(NamedTuple):
-    """Points that answer. A: (3 p, 3 p) m/N. r: (p, 3) N/m, of the projections. slow: share of r that always ends."""
+    """Points that answer. A: (3 p, 3 p) m/N. r: (p, 3) N/m, that each meets by itself. slow: share of r that always
+    ends."""
 
     A: Any
     r: Any
@@ -79,15 +85,15 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
         coefficient = mu(norm(w[:, 1:].T))
         return meet * within(x, pressed, coefficient)
 
-    def residual(f: Any) -> Any:
+    def residual(f: Any, share: float = 1.0) -> Any:
         w = motion(f)
-        return meet * (f - project(f, f + M.r * w, w))
+        return meet * (f - project(f, f + share * M.r * w, w))
 
     def off(carried: tuple) -> Any:
-        return jnp.abs(carried[2]).max() > EXACT * jnp.maximum(jnp.abs(carried[1]).max(), jnp.abs(M.r * reach).max())
+        return jnp.abs(carried[2]).max() / jnp.maximum(jnp.abs(carried[1]).max(), jnp.abs(M.r * reach).max())
 
     def wanted(most: int, carried: tuple) -> Any:
-        return (carried[0] < most) & off(carried)
+        return (carried[0] < most) & (off(carried) > EXACT)
 
     def along(share: Any) -> Any:
         def one(carried: tuple) -> tuple:
@@ -98,19 +104,29 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
 
         return one
 
-    def newton(carried: tuple) -> tuple:
-        i, f, r = carried
-        w = motion(f)
-        x, coefficient = f + M.r * w, mu(norm(w[:, 1:].T))
-        P = jax.vmap(jax.jacfwd(lambda a, p, c: within(a[None], p[None], c[None])[0]))(x, pressed, coefficient)
-        P = meet[:, :, None] * P
-        turned = jnp.eye(w_0.size) - M.r.reshape(-1)[:, None] * M.A
-        J = jnp.eye(w_0.size) - jnp.einsum("pij,pjk->pik", P, turned.reshape(*shape, -1)).reshape(w_0.size, -1)
-        f = f - jnp.linalg.solve(J + 1e-12 * jnp.eye(w_0.size), r.reshape(-1)).reshape(shape)
-        return i + 1, f, residual(f)
+    def newton(share: float) -> Any:
+        def one(carried: tuple) -> tuple:
+            i, f, _ = carried
+            w = motion(f)
+            x, coefficient = f + share * M.r * w, mu(norm(w[:, 1:].T))
+            P = jax.vmap(jax.jacfwd(lambda a, p, c: within(a[None], p[None], c[None])[0]))(x, pressed, coefficient)
+            P = meet[:, :, None] * P
+            turned = jnp.eye(w_0.size) - share * M.r.reshape(-1)[:, None] * M.A
+            J = jnp.eye(w_0.size) - jnp.einsum("pij,pjk->pik", P, turned.reshape(*shape, -1)).reshape(w_0.size, -1)
+            way = jnp.linalg.solve(J + 1e-12 * jnp.eye(w_0.size), residual(f, share).reshape(-1))
+            f = f - way.reshape(shape)
+            return i + 1, f, residual(f)
 
-    f = meet * first
-    for most, one in ((PROJECTIONS, along(1.0)), (NEWTON, newton), (CAREFUL, along(M.slow))):
-        start = jnp.where(jnp.isfinite(f).all(), f, 0.0)
-        _, f, r = jax.lax.while_loop(partial(wanted, most), one, (0, start, residual(start)))
+        return one
+
+    def until(share: float, most: int, one: Any, f: Any) -> Any:
+        f = jnp.where(jnp.isfinite(f).all(), f, 0.0)
+        first = jnp.where(off((0, f, residual(f))) > share, 0, most)
+        return jax.lax.while_loop(partial(wanted, most), one, (first, f, residual(f)))[1]
+
+    f = until(EXACT, PROJECTIONS, along(1.0), meet * first)
+    f = until(EXACT, NEWTON, newton(STIFFNESSES[0]), f)
+    f = until(ENOUGH, NEWTON, newton(STIFFNESSES[1]), f)
+    f = until(ENOUGH, CAREFUL, along(M.slow), f)
+    r = residual(f)
     return f, motion(f), jnp.abs(ratio(r, M.r)).max(initial=0.0)
