@@ -29,7 +29,7 @@ PROJECTIONS = 3
 NEWTON = 15
 STIFFNESSES = 0.1, 10.0
 """r over the stiffness that a point meets by itself, one after the other. Of 600 steps of four corners of a rigid patch
-on six modes, most of them sticking, Newton's method ends with 1 in 82 %, with 0.1 in 97 %, and with 10 in most others."""
+on six modes, most of them sticking, Newton's method ends with 1 in 82 %, with 0.1 in 97 %, with 10 in most others."""
 
 CAREFUL = 3000
 """Projections with a step so short that they cannot diverge where Newton's method does not end."""
