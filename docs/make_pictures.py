@@ -1247,6 +1247,9 @@ def time_domain() -> None:
     fill("time_domain.md", "balanced", table(*study.against_balance()))
     path = BUILD / "phase_portraits.png"
     save(from_file(study.drawn(found, path)), "phase_portraits")
+    slides = study.sliding(made("pendulum-sliding", "pendulum/sliding.toml"))
+    fill("time_domain.md", "sliding", table(*study.slips(slides)))
+    save(from_file(study.drawn_sliding(slides, BUILD / "sliding_portraits.png")), "sliding_portraits")
 
 
 def continuation() -> None:

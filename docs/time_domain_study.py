@@ -1,4 +1,4 @@
-"""Table and picture of docs/time_domain.md: the impact oscillator of section 4.2, and balance against time."""
+"""Tables and pictures of docs/time_domain.md: the oscillators of sections 4.2 and 4.3, and balance against time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from microslip.data import ModalBasis
 from microslip.pictures.orbit import portraits
 from microslip.time_domain import equations, orbit
 from microslip.time_domain.orbit import Orbit
+from microslip.units import counted
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "pipeline" / "cases" / "pendulum.toml"
@@ -47,6 +48,55 @@ def drawn(found: Mapping[str, Mapping[float, Orbit]], path: Path) -> Path:
     """Phase portraits as the case has them."""
     named = [(f"{w:g} rad/s", one) for w, one in found["5 %"].items()]
     return portraits(named, path, "Impact oscillator of section 4.2")
+
+
+SLIDING = ROOT / "pipeline" / "cases" / "pendulum-friction.toml"
+RIGID, FLAT = "modes=2", "contacts.0.ground={velocity=0.001}"
+PUSHING = "contacts.0.ground.pushes=true"
+MODELS = {
+    "rigid (two modes)": [RIGID, FLAT],
+    "with bending, 1 %": [FLAT, "damping_ratio=0.01"],
+    "with bending, 5 %": [FLAT],
+    "with bending, 10 %": [FLAT, "damping_ratio=0.1"],
+    "rigid, waviness, `pushes = false`": [RIGID],
+    "with bending, 5 %, waviness, `pushes = false`": [],
+    "rigid, waviness with its push": [RIGID, PUSHING],
+}
+"""Of the friction oscillator: how it is taken -> changes of the case."""
+
+LIKE_THE_BOOK = ("rigid (two modes)", "with bending, 1 %", "rigid, waviness, `pushes = false`")
+"""Drawn side by side, as Fig. 4.3-2 b) to d) are."""
+
+KEPT, SAMPLES = 40, 512
+
+
+def sliding(basis: ModalBasis) -> dict[str, Orbit]:
+    """How it is taken -> motion."""
+    found = {}
+    for name, changes in MODELS.items():
+        settings, _ = load_case(SLIDING, changes)
+        built, asked = build(settings, {"pendulum-sliding": basis}, SLIDING), settings.orbit
+        assert asked is not None and asked.Omega is not None
+        e = equations.of(built.pressed(asked.normal_force), asked.Omega[0])
+        found[name] = orbit.run(e, asked.settle, KEPT, SAMPLES)
+    return found
+
+
+def slips(found: Mapping[str, Orbit]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows: what the motions of the friction oscillator are."""
+    head = ["model", "comes back after", f"slips in {KEPT} periods", "lift-offs a period", "x, peak to peak, mm"]
+    table = []
+    for name, one in found.items():
+        back = counted(one.repeats, "period") if one.repeats else f"not within {KEPT // 2} periods"
+        x = f"{1e3 * np.ptp(one.y[0]):.2f}"
+        table.append([name, back, f"{one.count('slips')}", f"{one.count('opens') / KEPT:.2g}", x])
+    return head, table
+
+
+def drawn_sliding(found: Mapping[str, Orbit], path: Path) -> Path:
+    """Phase portraits of the models of the book."""
+    named = [(name.replace("`", ""), found[name]) for name in LIKE_THE_BOOK]
+    return portraits(named, path, "Friction oscillator of section 4.3: the arm at the disc")
 
 
 def against_balance() -> tuple[list[str], list[list[str]]]:

@@ -257,3 +257,34 @@ def test_ground_that_cannot_be_is_refused(rub: Path, capsys: pytest.CaptureFixtu
 def test_harmonic_balance_refuses_ground_that_moves() -> None:
     with pytest.raises(UserError, match="microslip orbit"):
         ms.harmonic_response(rubbing(rate(Coulomb(jnp.asarray(0.3))), Ground(V), 1.0), [2.0])
+
+
+BOOK = Exponential(value(0.8), value(0.55), value(1000.0))
+"""mu_0, mu_inf and lambda_e (s/m) of section 4.3."""
+
+
+@pytest.mark.slow
+def test_the_friction_oscillator_of_the_book_slips_in_one_size_and_on_waves_in_several() -> None:
+    """Section 4.3 with what is printed, two modes: every slip is the half swing from mu_0 F_N about mu_inf F_N, within
+    what the foot moves, and x ranges over that; with the printed waviness slips of several sizes follow one another,
+    up to twice as fast."""
+    Omega, foot = 13.8, STIFFNESS * 0.0005
+    wave = Ground(V, 0.0, ((200e-6, 2.5e-3, 0.0),), pushes=False)
+
+    def moved(ground: Ground) -> tuple[orbit.Orbit, list[float]]:
+        assembly = rubbing(rate(BOOK, 1e6, 4e-6), ground, force=foot)
+        found = orbit.run(equations.of(assembly, Omega), 20, 20, 512)
+        v = found.v[0]
+        begins = np.flatnonzero((v[:-1] > -0.25 * V) & (v[1:] <= -0.25 * V))
+        ends = [b + int(np.argmax(v[b + 1 :] > 0)) for b in begins[:-1]]
+        return found, [-float(v[b : e + 2].min()) for b, e in zip(begins, ends, strict=False)]
+
+    flat, speeds = moved(Ground(V))
+    drop, reach = (0.8 - 0.55) * NORMAL / STIFFNESS, foot / STIFFNESS
+    assert len(speeds) >= 5 and np.ptp(speeds) < 0.3 * np.mean(speeds)
+    assert np.abs(np.mean(speeds) / OMEGA - drop) < reach
+    assert 2 * drop < np.ptp(flat.y[0]) < 2 * (drop + reach) + 2 * np.pi * V / Omega
+    wavy, on_waves = moved(wave)
+    assert np.ptp(on_waves) > 0.4 * np.mean(on_waves) and max(on_waves) > 1.3 * max(speeds)
+    assert len(on_waves) > len(speeds) and np.ptp(wavy.y[0]) > np.ptp(flat.y[0])
+    assert flat.balance < 1e-9 and wavy.balance < 1e-9
