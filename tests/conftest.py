@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and MKL are loaded
-os.environ.setdefault("NPROC", "1")  # and before jax is
 
 import pytest
 from hypothesis import HealthCheck, settings

@@ -868,7 +868,6 @@ def _fail(text: str, code: int) -> int:
 
 def entry() -> None:
     """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
-    os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of a contact law are too short to be shared
     asked = []
 
     def end(number: int, _: object) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..settings.mistakes import bounded
 
+os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of contact laws are too short to be shared
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
 
 
