@@ -257,8 +257,8 @@ def test_contact_laws_run_on_one_thread_unless_more_are_asked_for():
     """Their steps are too short to be shared: on two threads a motion in time takes three times the CPU time."""
     code = "import os, microslip as ms; ms.jenkins(1.0, 1.0); print(os.environ['NPROC'])"
     for asked, told in (({}, "1"), ({"NPROC": "3"}, "3")):
-        environment = {k: v for k, v in os.environ.items() if k != "NPROC"} | asked
-        found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+        known = {k: v for k, v in os.environ.items() if k != "NPROC"} | asked
+        found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=known)
         assert found.stdout.strip() == told
 
 
