@@ -12,8 +12,6 @@ SOURCES  := $(shell find pipeline/microslip -type f -not -path '*/__pycache__/*'
 
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= $(OMP_NUM_THREADS)
-# threads of jax, between which the steps of a contact law are too short to be shared
-export NPROC ?= 1
 unexport DISPLAY PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE # without byte code the start takes twice as long
 
 # The environment knows the folder it was made for: a checkout that was moved or copied is set up again.

@@ -10,6 +10,7 @@ import numpy as np
 import microslip as ms
 from microslip.case import load_case
 from microslip.case.assemble import build
+from microslip.case.questions import OrbitOfCase
 from microslip.data import ModalBasis
 from microslip.pictures.orbit import portraits
 from microslip.time_domain import equations, orbit
@@ -26,11 +27,17 @@ def motions(basis: ModalBasis) -> dict[str, dict[float, Orbit]]:
     """How the bending is taken -> rad/s -> motion."""
     found: dict[str, dict[float, Orbit]] = {}
     for name, changes in WAYS.items():
-        settings, _ = load_case(CASE, changes)
-        assembly, asked = build(settings, {"pendulum": basis}, CASE).assembly, settings.orbit
-        assert asked is not None and asked.Omega is not None
-        found[name] = {w: orbit.run(equations.of(assembly, w), asked.settle, asked.keep) for w in asked.Omega}
+        driven, asked = assembled(CASE, changes, basis)
+        found[name] = {e.Omega: orbit.run(e, asked.settle, asked.keep) for e in driven}
     return found
+
+
+def assembled(case: Path, changes: list[str], basis: ModalBasis) -> tuple[list[equations.Equations], OrbitOfCase]:
+    """The equations of a case of one body with changes, at each of its frequencies, and what it asks."""
+    settings, _ = load_case(case, changes)
+    built, asked = build(settings, {basis.name: basis}, case), settings.orbit
+    assert asked is not None and asked.Omega is not None
+    return [equations.of(built.pressed(asked.normal_force), w) for w in asked.Omega], asked
 
 
 def rows(found: Mapping[str, Mapping[float, Orbit]]) -> tuple[list[str], list[list[str]]]:
@@ -74,10 +81,7 @@ def sliding(basis: ModalBasis) -> dict[str, Orbit]:
     """How it is taken -> motion."""
     found = {}
     for name, changes in MODELS.items():
-        settings, _ = load_case(SLIDING, changes)
-        built, asked = build(settings, {"pendulum-sliding": basis}, SLIDING), settings.orbit
-        assert asked is not None and asked.Omega is not None
-        e = equations.of(built.pressed(asked.normal_force), asked.Omega[0])
+        (e,), asked = assembled(SLIDING, changes, basis)
         found[name] = orbit.run(e, asked.settle, KEPT, SAMPLES)
     return found
 

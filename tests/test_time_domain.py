@@ -281,12 +281,10 @@ def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> Non
         )
 
 
-RIGID = {key: None for key in ("normal_stiffness", "tangential_stiffness", "includes", "roughness", "interference")}
-
-
 def rigid(folder: Path, how: dict[str, Any]) -> None:
     """The hammer's contact made rigid."""
-    kept = [line for line in CASE.splitlines() if line.split(" =")[0] not in {*RIGID, "law"}]
+    other = {"normal_stiffness", "tangential_stiffness", "includes", "roughness", "interference", "law"}
+    kept = [line for line in CASE.splitlines() if line.split(" =")[0] not in other]
     more = "\n".join(f"{key} = {value}" for key, value in how.items())
     (folder / "case.toml").write_text("\n".join(kept).replace("friction = 0.0", f"friction = 0.0\n{more}") + "\n")
 
@@ -308,10 +306,8 @@ def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
         MASS, STIFFNESS, 0.02046, force={0: drive}, steady={0: pressed},
         elements=[ms.stop(math.inf, gap, restitution=0.6)],
     )  # fmt: skip
-    steps = int(found.steps)
-    by_hand = ms.integrate(
-        swing, 64.32, unit="rad/s", settle=200, keep=4, samples=64, steps=steps, start="rest"
-    )  # fmt: skip
+    how_long = {"settle": 200, "keep": 4, "samples": 64, "steps": int(found.steps)}
+    by_hand = ms.integrate(swing, 64.32, unit="rad/s", start="rest", **how_long)
     assert found.count("closes") > 3
     np.testing.assert_allclose(found.y[0], by_hand.y[0], atol=share * np.abs(found.y).max())
     assert np.abs(found.y[0]).max() > 1e-4 and found.balance < 1e-10
@@ -322,6 +318,8 @@ def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
     [
         ("contacts.0.normal_stiffness=1e6", "is rigid; leave normal_stiffness out"),
         ("contacts.0.interference=1e-6", "rigid bodies cannot overlap"),
+        ("contacts.0.curvature=[0.1, 0.1]", "belongs to flat patches"),
+        ("contacts.0.ground.velocity=0.1", "stand on ground at rest"),
         ('contacts.0.law={kind="set-valued", restitution=1.5}', "restitution: must not be greater than 1"),
         ('contacts.0.friction={kind="coulomb", mu=0.3, deviation=0.1}', "no heat and no chance"),
     ],

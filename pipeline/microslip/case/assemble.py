@@ -453,7 +453,8 @@ def _described(c: ContactSettings, path: Path | str) -> ContactSettings:
     found = _composed(c, path)
     if found.law is None:
         told = f"file: {file} needs" if c.file is not None else "stiffness: it needs"
-        raise UserError(f"{path}: {where}.{told} friction and a tangential stiffness to make a law; add them")
+        needed = "friction" if said.what.rigid else "friction and a tangential stiffness"
+        raise UserError(f"{path}: {where}.{told} {needed} to make a law; add what is missing")
     if c.includes is None and found.stiffness and found.stiffness.includes == SURFACE:
         c = c.model_copy(update={"includes": SURFACE})
     return c

@@ -181,8 +181,6 @@ class ContactSettings(ContactLaw):
             raise ValueError(f"{key}: is missing; add it")
         if self.normal_force is not None and self.interference is not None:
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
-        if self.what.rigid and (self.interference or 0.0) > 0:
-            raise ValueError("interference: rigid bodies cannot overlap; give a gap (negative), or a normal_force")
         if self.temperature is not None and not self.heated:
             raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
         if self.ground is not None and self.against != GROUND:
@@ -199,6 +197,10 @@ class ContactSettings(ContactLaw):
         if not self.what.opens and (self.patch == "nodal" or self.curvature is not None):
             key = "curvature" if self.curvature is not None else "patch"
             raise ValueError(f'{key}: law = "{self.what.kind}" belongs to flat, rigid patches; write law = "smooth"')
+        if self.what.rigid and (self.interference or 0.0) > 0:
+            raise ValueError("interference: rigid bodies cannot overlap; give a gap (negative), or a normal_force")
+        if self.what.rigid and self.curvature is not None:
+            raise ValueError('curvature: law = "set-valued" belongs to flat patches; leave curvature out')
 
     def _curved(self) -> ContactSettings:
         springs = self.stiffness or self.normal_stiffness or self.tangential_stiffness

@@ -89,11 +89,12 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
         w = motion(f)
         return meet * (f - project(f, f + share * M.r * w, w))
 
-    def off(carried: tuple) -> Any:
-        return jnp.abs(carried[2]).max() / jnp.maximum(jnp.abs(carried[1]).max(), jnp.abs(M.r * reach).max())
+    def off(f: Any, r: Any) -> Any:
+        return jnp.abs(r).max() / jnp.maximum(jnp.abs(f).max(), jnp.abs(M.r * reach).max())
 
     def wanted(most: int, carried: tuple) -> Any:
-        return (carried[0] < most) & (off(carried) > EXACT)
+        i, f, r = carried
+        return (i < most) & (off(f, r) > EXACT)
 
     def along(share: Any) -> Any:
         def one(carried: tuple) -> tuple:
@@ -121,12 +122,12 @@ def solve(M: Meets, w_0: Any, mu: Any, pressed: Any, first: Any) -> tuple[Any, A
 
     def until(share: float, most: int, one: Any, f: Any) -> Any:
         f = jnp.where(jnp.isfinite(f).all(), f, 0.0)
-        first = jnp.where(off((0, f, residual(f))) > share, 0, most)
-        return jax.lax.while_loop(partial(wanted, most), one, (first, f, residual(f)))[1]
+        r = residual(f)
+        tried = jnp.where(off(f, r) > share, 0, most)
+        return jax.lax.while_loop(partial(wanted, most), one, (tried, f, r))[1]
 
     f = until(EXACT, PROJECTIONS, along(1.0), meet * first)
     f = until(EXACT, NEWTON, newton(STIFFNESSES[0]), f)
     f = until(ENOUGH, NEWTON, newton(STIFFNESSES[1]), f)
     f = until(ENOUGH, CAREFUL, along(M.slow), f)
-    r = residual(f)
-    return f, motion(f), jnp.abs(ratio(r, M.r)).max(initial=0.0)
+    return f, motion(f), jnp.abs(ratio(residual(f), M.r)).max(initial=0.0)
