@@ -89,14 +89,14 @@ def test_jacobian_against_differences(form: str) -> None:
 
 
 def test_both_forms_are_the_same_equations() -> None:
-    """A chain of three that rubs on a wall: relative motions or both sides as unknowns, 1e-9."""
+    """A chain of three between two walls: relative motions or both sides as unknowns, 1e-9."""
     ring = sector(3, 1, normal=50.0, push=2.0).unrolled()
-    places, areas = grid(0.02, 0.01, (2, 2))
-    law = PointContact(Penalty(jnp.asarray(2e6 / 4)), Coulomb(jnp.asarray(0.3)), jnp.asarray(1e6 / 4))
-    wall = preloaded_contact(
-        "wall", Patch("left", places, areas, law), ContactFace("blade_0", "left"), None, normal=30.0
-    )
-    chain = Assembly(ring.components, (*ring.contacts[:2], wall), ring.loads, ring.outputs)
+    between = ring.contacts[:2]
+    patch, rough = between[0].patch, Coulomb(jnp.asarray(0.3))  # as many points as between the blades: one program
+    rubs = replace(patch, law=replace(patch.law, friction=rough))
+    ends = ContactFace("blade_0", "left"), ContactFace("blade_2", "right")
+    walls = [preloaded_contact(f"wall_{i}", rubs, end, None, normal=30.0) for i, end in enumerate(ends)]
+    chain = Assembly(ring.components, (*between, *walls), ring.loads, ring.outputs)
     found = []
     for form in ("relative", "sides"):
         problem = balance.of(chain, form=form, **FINE)

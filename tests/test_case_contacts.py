@@ -32,7 +32,7 @@ from microslip.harmonic_balance.cost import aft_bytes
 from microslip.settings.body import validate
 from microslip.stages import checkpoint
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 PATH = Path("case.toml")
 HEIGHT, DEPTH = small.SIZE[2], small.SIZE[1]

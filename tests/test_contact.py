@@ -13,7 +13,9 @@ from meshes import STEEL, body, brick, graded, rotation_matrix
 from touching import SECTORS, shrouded, together
 
 from microslip.basis import check_basis, read_basis, write_basis
-from microslip.case import CaseSettings, run_case
+from microslip.case import CaseSettings
+from microslip.case.assemble import build
+from microslip.case.problem import normal_forces
 from microslip.data import Mesh, NotConverged, UserError
 from microslip.fem.contact import (
     ContactPair,
@@ -454,10 +456,11 @@ def test_case_takes_the_normal_force_of_the_static_state():
         "sweep": {"start": 50.0, "stop": 60.0, "points": 3, "normal_forces": "static"},
     })  # fmt: skip
     basis = modal_basis(shrouded(), settings_of([6000.0], closures=[closure(interference=2e-5)], **more))
-    (force,) = run_case(case, basis, "case.toml").responses
+    (force,) = normal_forces(build(case, {"test": basis}, "case.toml"), "case.toml")
     assert force == basis.groups[0, 0].contacts["shroud"].normal_force > 0
+    open_one = modal_basis(shrouded(), settings_of([6000.0], closures=[], **more))
     with pytest.raises(UserError, match="the modal file has no closure on interface 'right'"):
-        run_case(case, modal_basis(shrouded(), settings_of([6000.0], closures=[], **more)), "case.toml")
+        normal_forces(build(case, {"test": open_one}, "case.toml"), "case.toml")
 
 
 def test_closed_modes_are_those_of_a_roller():

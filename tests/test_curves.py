@@ -25,7 +25,7 @@ from microslip.results import read_response
 from microslip.stages import surveying
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 CASE = """
 name = "lifting"

@@ -16,7 +16,7 @@ from microslip.operating.motion import motion_of
 from microslip.reduced.coordinates import first_modes
 from microslip.stages.running import respond
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
 

@@ -28,7 +28,7 @@ from microslip.modal.compute import modal_basis
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 SIZE = (0.01, 0.014, 0.04)
 ROWS = """

@@ -57,6 +57,7 @@ def test_a_curved_patch_is_one_and_has_no_normal():
     assert patch.area == pytest.approx(2 * 16 * np.sin(np.pi / 16) * 0.01 * 0.03, rel=1e-9)  # chords
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_two_decks_that_touch_are_an_assembly_that_runs(decks_of_plates, capsys):
     assert main(["import", "lower.inp", "upper.inp", "joint"]) == 0
     assert "lower touches upper over 600 mm2: lower:upper against upper:lower" in capsys.readouterr().out

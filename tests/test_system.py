@@ -20,7 +20,7 @@ from microslip.data import UserError
 from microslip.reference.one_harmonic import JenkinsContact, frequency_response, stuck_frequencies
 from microslip.system import Body, Contact, Damper, Force, Monitor, Spring, System, load_system, system_basis
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 ROOT = Path(__file__).resolve().parents[1]
 THREE = (ROOT / "pipeline/microslip/templates/three-masses/system.toml").read_text(encoding="utf-8")

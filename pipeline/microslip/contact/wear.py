@@ -29,6 +29,7 @@ import numpy as np
 from ..errors import NotConverged, UserError
 from .friction import Friction
 from .heights import Heights, Tabulated, as_table, summed
+from .law import program
 from .normal import Rough
 
 
@@ -84,10 +85,19 @@ def approach_under(heights: Heights, force: np.ndarray | float) -> np.ndarray:
     return 0.5 * (low + high)
 
 
+_volume = program(lambda heights, u: heights.volume(u))
+
+
 def _volume_of(heights: Heights) -> Callable[[np.ndarray], np.ndarray]:
-    """`Heights.volume` on arrays of numpy; of a table without jax, which would compile anew for every size."""
+    """`Heights.volume` on arrays of numpy: filled up to a power of two, because jax compiles anew for every size."""
     if not isinstance(heights, Tabulated):
-        return lambda u: np.asarray(heights.volume(jnp.asarray(u)))
+
+        def of_any(u: np.ndarray) -> np.ndarray:
+            size = max(np.size(u), 64)
+            filled = np.resize(u, 1 << (size - 1).bit_length())
+            return np.asarray(_volume(heights, filled))[: np.size(u)].reshape(np.shape(u))
+
+        return of_any
     x, area, volume = (np.asarray(v) for v in (heights.x, heights.area_at, heights.volume_at))
     width, slope = np.diff(x), np.diff(area) / np.where(np.diff(x) > 0, np.diff(x), 1.0)
 
