@@ -17,8 +17,10 @@ from test_reduction import block
 from test_truncation import chain
 
 from microslip.basis import read_basis
-from microslip.case import CaseSettings, run_case
-from microslip.data import Compliance, ModalBasis, ModalGroup, UserError
+from microslip.case import CaseSettings
+from microslip.case.assemble import build
+from microslip.data import Array, Compliance, ModalBasis, ModalGroup, UserError
+from microslip.harmonic_balance import reduced
 from microslip.modal.compute import modal_basis
 from microslip.reduced.compliance import contact_share, facing, law_stiffness, sentence, shares, without_bulk
 from microslip.reduced.truncation import closing, verdict
@@ -238,6 +240,13 @@ def case(includes: str | None, normal: float, interface: str = "tip") -> CaseSet
     )  # fmt: skip
 
 
+def stuck(includes: str | None, normal: float, basis: ModalBasis) -> tuple[Array, tuple[str, ...]]:
+    """(m,) frequencies in Hz with sticking contacts, and what is told of the case."""
+    made = build(case(includes, normal), {"bar": basis}, "case.toml")
+    assembly = made.pressed(10.0)
+    return reduced.stuck(assembly.joined(1), assembly.stiffness), tuple(made.messages)
+
+
 @pytest.fixture(scope="module")
 def blocks() -> dict[str, ModalBasis]:
     return {method: block(method)[2] for method in METHODS}
@@ -245,9 +254,9 @@ def blocks() -> dict[str, ModalBasis]:
 
 def test_counting_twice_is_told_for_every_basis_that_holds_the_bulk(blocks: dict[str, ModalBasis]) -> None:
     for method, basis in blocks.items():
-        messages = " ".join(run_case(case(None, 1e9), basis, "case.toml").messages)
-        assert ("counted twice" in messages) == (method != "eigenmodes"), method
-        assert "counted twice" not in " ".join(run_case(case("surface", 1e9), basis, "case.toml").messages)
+        told = [" ".join(stuck(counted, 1e9, basis)[1]) for counted in (None, "surface")]
+        assert ("counted twice" in told[0]) == (method != "eigenmodes"), method
+        assert "counted twice" not in told[1]
 
 
 def test_bulk_is_taken_out_of_the_law_or_refused(blocks: dict[str, ModalBasis]) -> None:
@@ -255,31 +264,29 @@ def test_bulk_is_taken_out_of_the_law_or_refused(blocks: dict[str, ModalBasis]) 
 
     Craig-Bampton's own modes differ more from the eigenmodes than the contact moves them, so there it only rises.
     """
-    target = run_case(case("bulk+surface", 5e8), blocks["eigenmodes"], "case.toml").stuck[0]
-    assert target == pytest.approx(run_case(case(None, 5e8), blocks["eigenmodes"], "case.toml").stuck[0], rel=1e-12)
+    target = stuck("bulk+surface", 5e8, blocks["eigenmodes"])[0][0]
+    assert target == pytest.approx(stuck(None, 5e8, blocks["eigenmodes"])[0][0], rel=1e-12)
     for method in HELD:
         basis = blocks[method]
-        twice = run_case(case(None, 5e8), basis, "case.toml").stuck[0]
-        result = run_case(case("bulk+surface", 5e8), basis, "case.toml")
-        assert result.stuck[0] > twice, method
+        (twice, *_), (freed, *_) = (stuck(counted, 5e8, basis)[0] for counted in (None, "bulk+surface"))
+        assert freed > twice, method
         if method in ("macneal", "rubin"):
-            assert abs(result.stuck[0] - target) < 0.5 * abs(twice - target), method
-        assert any("become" in r for r in result.messages)
+            assert abs(freed - target) < 0.5 * abs(twice - target), method
+        assert any("become" in r for r in stuck("bulk+surface", 5e8, basis)[1])
         bulk = contact_share(basis.groups[0, 0], method, "u_n", "tip").beyond
         with pytest.raises(UserError, match=r"contacts\.tip\.normal_stiffness.*bulk alone.*surface"):
-            run_case(case("bulk+surface", 1.01 / bulk), basis, "case.toml")
+            stuck("bulk+surface", 1.01 / bulk, basis)
 
 
 def test_a_law_of_the_surface_gets_the_bulk_from_the_file(blocks: dict[str, ModalBasis]) -> None:
     """On eigenmodes it is MacNeal's method; on a basis that holds all nothing is added, not even rounding."""
-    added = run_case(case("surface", 1e9), blocks["eigenmodes"], "case.toml")
-    macneal = run_case(case("surface", 1e9), blocks["macneal"], "case.toml")
-    np.testing.assert_allclose(added.stuck, macneal.stuck, rtol=1e-12)
-    assert any("added to it from the file" in r for r in added.messages) and not macneal.messages
-    plain = run_case(case(None, 1e9), blocks["rubin"], "case.toml").stuck
-    assert (run_case(case("surface", 1e9), blocks["rubin"], "case.toml").stuck == plain).all()
-    without = run_case(case(None, 1e9), blocks["eigenmodes"], "case.toml").stuck[0]
-    assert abs(added.stuck[0] - plain[0]) < 0.05 * abs(without - plain[0])
+    added, told = stuck("surface", 1e9, blocks["eigenmodes"])
+    macneal, silent = stuck("surface", 1e9, blocks["macneal"])
+    np.testing.assert_allclose(added, macneal, rtol=1e-12)
+    assert any("added to it from the file" in r for r in told) and not silent
+    plain, without = stuck(None, 1e9, blocks["rubin"])[0], stuck(None, 1e9, blocks["eigenmodes"])[0]
+    assert (stuck("surface", 1e9, blocks["rubin"])[0] == plain).all()
+    assert abs(added[0] - plain[0]) < 0.05 * abs(without[0] - plain[0])
 
 
 def test_report_and_summary_say_it(blocks: dict[str, ModalBasis]) -> None:

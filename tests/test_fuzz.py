@@ -34,7 +34,7 @@ from microslip.modal.compute import modal_basis
 from microslip.settings.body import BodySettings, load_body, override, validate
 from microslip.system import system_basis
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -489,8 +489,8 @@ def settings_of(kind: str, folder: Path) -> tuple[Path, list[str]]:
 
 
 FACES = ("clamp", "tip", "contact_left", "contact_right")
-SEEDS = [("case", 0, 15), ("system", 0, 40), ("body", 0, 20)]
-MORE = [("case", 15, 150), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 150)]
+SEEDS = [("case", 0, 6), ("system", 0, 40), ("body", 0, 20)]
+MORE = [("case", 6, 150), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 150)]
 """Kind of a settings file, and which ones are drawn."""
 
 
