@@ -159,7 +159,8 @@ def test_why_a_point_fails(monkeypatch: pytest.MonkeyPatch) -> None:
         assert status == f"{why}: 60 steps"
 
 
-@pytest.mark.parametrize("law", ["smooth", "jenkins"])
+@pytest.mark.usefixtures("unjudged")
+@pytest.mark.parametrize("law", [pytest.param("smooth", marks=pytest.mark.slow), "jenkins"])
 def test_a_coarse_sweep_and_a_fine_one_print_the_same_resonances(
     law: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -171,7 +171,9 @@ def test_sliders_are_solved_for_in_few_cycles_whatever_their_motion() -> None:
     assert found.cycles.max() <= 25
 
 
-@pytest.mark.parametrize("name", ["smooth point", "rough strips", "Iwan"])
+@pytest.mark.parametrize(
+    "name", ["smooth point", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rough strips", "Iwan"))]
+)
 def test_derivatives_are_those_of_the_periodic_state(name: str) -> None:
     """Also where one cycle changes little of it: by differences of the periodic force."""
     example, u = swinging(name)

@@ -28,11 +28,15 @@ SISTERS = {  # laws that differ from a quick one in their characteristic or heig
     "point, scattered", "Mindlin, two stiffnesses", "portion of a rough contact",
 }  # fmt: skip
 assert SISTERS <= set(EXAMPLES)
-LAWS = pytest.mark.parametrize(
-    "example",
-    [pytest.param(e, marks=pytest.mark.slow if name in SISTERS else ()) for name, e in EXAMPLES.items()],
-    ids=EXAMPLES.keys(),
-)
+
+
+def laws(slow):
+    """Every law, those named here in the slow tests."""
+    each = [pytest.param(e, marks=pytest.mark.slow if name in slow else ()) for name, e in EXAMPLES.items()]
+    return pytest.mark.parametrize("example", each, ids=EXAMPLES.keys())
+
+
+LAWS = laws(SISTERS)
 FORCES = jax.jit(periodic, static_argnums=3)
 
 
@@ -245,7 +249,11 @@ def solved_for(example) -> bool:
     return example.law.recalled(state, example.law.memory(jnp.zeros((1, 3)), state)) is not None
 
 
-@LAWS
+ALIKE = SISTERS | {"rough point", "Hertz point", "rough strips"}
+"""Laws whose memory is that of a point with two stiffnesses, of a smooth point, of Iwan's sliders."""
+
+
+@laws(ALIKE)
 def test_the_derivative_of_a_periodic_cycle_matches_differences(example) -> None:
     """Of laws whose sliders are solved for: what `Law.recalled` promises of their state is used for it."""
     if not solved_for(example):

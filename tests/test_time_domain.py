@@ -291,7 +291,10 @@ def rigid(folder: Path, how: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(
     "how, gap, pressed, share",
-    [({"interference": -1e-4}, 1e-4, 0.0, 1e-9), ({"normal_force": 0.02}, 0.0, 0.02, 1e-5)],
+    [
+        ({"interference": -1e-4}, 1e-4, 0.0, 1e-9),
+        pytest.param({"normal_force": 0.02}, 0.0, 0.02, 1e-5, marks=pytest.mark.slow),
+    ],
 )
 def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
     hammer: Path, how: dict[str, float], gap: float, pressed: float, share: float
@@ -299,14 +302,14 @@ def test_a_rigid_contact_of_a_case_is_that_of_the_same_system_by_hand(
     """Behind a gap, and pressed by a force that the vibration overcomes: it presses as a weight would, but for the
     second order in the step by which a force that kicks differs from one that flows."""
     rigid(hammer, {"law": '{ kind = "set-valued", restitution = 0.6 }', **how})
-    assert main(["orbit", "case.toml", "-q", "--no-pictures"]) == 0
+    assert main(["orbit", "case.toml", "-q", "--no-pictures", "--set", "orbit.settle=20"]) == 0
     found = ms.load(hammer / "build" / "hammer" / "orbit.h5")
     drive = STIFFNESS * 0.00047
     swing = ms.structure(
         MASS, STIFFNESS, 0.02046, force={0: drive}, steady={0: pressed},
         elements=[ms.stop(math.inf, gap, restitution=0.6)],
     )  # fmt: skip
-    how_long = {"settle": 200, "keep": 4, "samples": 64, "steps": int(found.steps)}
+    how_long = {"settle": 20, "keep": 4, "samples": 64, "steps": int(found.steps)}
     by_hand = ms.integrate(swing, 64.32, unit="rad/s", start="rest", **how_long)
     assert found.count("closes") > 3
     np.testing.assert_allclose(found.y[0], by_hand.y[0], atol=share * np.abs(found.y).max())
@@ -393,7 +396,7 @@ def systems() -> dict[str, tuple[object, float]]:
     }
 
 
-@pytest.mark.parametrize("name", ["slider", "spring", "stop", "two", "vane"])
+@pytest.mark.parametrize("name", ["slider", "spring", "stop", "two", pytest.param("vane", marks=pytest.mark.slow)])
 def test_a_motion_begun_on_a_balance_is_periodic_from_its_first_period(name: str) -> None:
     """Begun at rest the second period differs from the first by half of the amplitude or more."""
     system, frequency = systems()[name]
@@ -558,7 +561,7 @@ class Killed(Exception):
     pass
 
 
-@pytest.mark.parametrize("at", [16, 48, 70])
+@pytest.mark.parametrize("at", [pytest.param(16, marks=pytest.mark.slow), 48, 70])
 def test_a_run_that_is_ended_goes_on_with_the_same_bits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
 ) -> None:
