@@ -22,7 +22,7 @@ from microslip.results import read_response
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
 from microslip.system.assembly import stuck_modes
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 N, STIFF, RATIO = 4, 1e6, 1e-3
 CASE = """

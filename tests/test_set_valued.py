@@ -81,6 +81,7 @@ def test_an_elastic_rod_leaves_a_wall_as_fast_as_it_came() -> None:
     assert drift[1] < 0.7 * drift[0] < 0.02
 
 
+@pytest.mark.slow
 def test_a_stiffer_and_stiffer_jenkins_element_becomes_set_valued() -> None:
     """The difference of both motions falls as one over the stiffness of the spring."""
 
