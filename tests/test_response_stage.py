@@ -29,7 +29,7 @@ from microslip.stages.surveying import survey_stage
 from microslip.units import METRES, Quantity
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 SAMPLES = Path(running.__file__).parents[1] / "samples"
 
 CASE = """

@@ -19,7 +19,7 @@ from microslip.stages import meshing, modal, places, response, running
 from microslip.stages.job import Job, open_job
 from microslip.stages.stage import PACKAGE, _imported, hash_of_code
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
 
 MESH, BASIS, RESPONSE = "meshes/box.msh", "build/box/basis.h5", "build/box/response.json"
 
