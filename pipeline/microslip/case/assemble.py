@@ -417,7 +417,7 @@ def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> 
 
 def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Pairing:
     """How the two faces of a contact meet."""
-    names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
+    names, (one, two) = (c.interface, c.against), (place_of(b) for b in loaded)
     seen = two.seen_from(one)
     if not settings.ring or not c.against_sector:
         return facing(faces[0], faces[1], seen, names)
@@ -426,7 +426,7 @@ def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces
     return in_ring(faces[0], faces[1], axis, point, settings.ring.blades, names, c.against_sector, seen)
 
 
-def _place(b: Loaded) -> Place:
+def place_of(b: Loaded) -> Place:
     """Where a body stands in the axes of the case."""
 
     R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))

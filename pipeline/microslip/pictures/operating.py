@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import Array
-from ..operating.cycle import at_time, longest
+from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
@@ -311,10 +311,7 @@ def farthest(motion: Motion, points: int) -> tuple[Array, float, float]:
     """
     a = displacement(motion.at(0), np.arange(points))[0].copy()
     a[0] = 0.0
-    node = int((longest(a[1]) if len(a) == 2 else np.abs(a).sum(axis=(0, 2))).argmax())
-    angles = 2 * np.pi * np.arange(100) / 100
-    far = np.linalg.norm(at_time(a[:, node], angles, axis=0), axis=1)
-    best = float(angles[far.argmax()])
+    best = farthest_at(a)
     shape = at_time(a, best, axis=0)
     return shape, float(np.linalg.norm(shape, axis=1).max()), float(np.degrees(best))
 

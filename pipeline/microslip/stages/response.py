@@ -22,13 +22,14 @@ from ..data import ModalBasis, UserError
 from ..files import store
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
-from ..report.response import JUMPS, response_html
+from ..report.response import JUMPS, highest, response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
 from ..results.series import CONVERGED
 from ..units import counted, percent, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, hashes_of
+from .ring import draw_ring
 from .stage import Made, Report, Stage
 
 if TYPE_CHECKING:
@@ -154,6 +155,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
+    drawn |= _ring(result, response, folder, report) if wanted.pictures else {}
     more = _assessed(result, response, folder, wanted, report)
     if more is not None:
         known = {(row["normal_force_N"], row["frequency_Hz"]): row for row in summary["resonances"]}
@@ -238,6 +240,17 @@ def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict
         with store.complete_or_absent(drawn[title]) as temporary:
             response_picture(result, temporary, group, rows)
     return drawn
+
+
+def _ring(result: CaseResult, response: Response, folder: Path, report: Report) -> dict[str, Path]:
+    """Title -> picture of the whole ring at its highest resonance; nothing without a ring, a resonance or PyVista."""
+    row = highest(response.resonances)
+    if result.settings.ring is None or row is None or _can_draw() is not None:
+        return {}
+    report("picture of the ring")
+    series, path = response.one(normal_force=row["normal_force_N"]), folder / "pictures" / "ring.png"
+    drawn = draw_ring(result.built, series, row, path)
+    return {} if drawn is None else {"ring at resonance": drawn}
 
 
 def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]) -> Response:
