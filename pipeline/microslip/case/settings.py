@@ -420,9 +420,8 @@ class CaseSettings(Model):
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] and no sweep"
             )
-        thrown = {b.name for b in self.bodies if b.pressed_at_rpm is not None}
         bare = [c for c in self.contacts if c.normal_force is None and c.interference is None]
-        open_ = [c.interface for c in bare if not thrown & {body for body, _ in self.ends(c)}]
+        open_ = [c.interface for c in bare if not self.is_thrown(c)]
         if open_ and self.sweep.normal_forces is None:
             raise ValueError(
                 f"contacts.{open_[0]}: nothing presses it; give sweep.normal_forces, or its normal_force or "
@@ -516,6 +515,11 @@ class CaseSettings(Model):
     def ends(self, c: ContactSettings) -> list[tuple[str, str]]:
         """(body, interface) of the one or two faces of a contact."""
         return [self.address(end) for end in (c.interface, c.against) if end != GROUND]
+
+    def is_thrown(self, c: ContactSettings) -> bool:
+        """Whether the centrifugal load of one of its bodies presses a contact."""
+        thrown = {b.name for b in self.bodies if b.pressed_at_rpm is not None}
+        return any(body in thrown for body, _ in self.ends(c))
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:
