@@ -60,7 +60,7 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if not rows:
         return ["No resonance was found in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
-    lifted, valid = _lifted(rows), _valid(rows)
+    lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])
     of = f" of {first}" if others else ""
     said = [f"The highest resonance{' found' if doubtful else ''}{of} is {_peak(highest(rows) or {})}"]
@@ -73,7 +73,7 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if lifted:
         named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
         said.append(f"Under F_N = {named} N contacts would lift off: what was found there is not valid.")
-    if stressed := [row for row in rows if "stress_amplitude_Pa" in row]:
+    if stressed := [row for row in valid if "stress_amplitude_Pa" in row]:
         worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
         margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
         force = number(worst["normal_force_N"])
@@ -104,14 +104,14 @@ JUMPS = "another motion"
 """In what speaks against a resonance beside which there is another motion, higher perhaps."""
 
 
-def _lifted(rows: Sequence[Mapping[str, Any]]) -> set[float]:
+def lifted_forces(rows: Sequence[Mapping[str, Any]]) -> frozenset[float]:
     """Normal forces under which contacts would lift off at some resonance."""
-    return {row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", "")}
+    return frozenset(row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", ""))
 
 
 def _valid(rows: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
     """Those under the other normal forces; all, where there are none."""
-    lifted = _lifted(rows)
+    lifted = lifted_forces(rows)
     return [row for row in rows if row["normal_force_N"] not in lifted] or rows
 
 

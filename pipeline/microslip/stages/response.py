@@ -18,11 +18,11 @@ from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
-from ..data import ModalBasis, UserError
+from ..data import Array, ModalBasis, UserError
 from ..files import store
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
-from ..report.response import JUMPS, highest, response_html
+from ..report.response import JUMPS, highest, lifted_forces, response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
 from ..results.series import CONVERGED
@@ -285,6 +285,7 @@ def _assessed(
     limits = result.settings.material_limits
     everywhere = wanted.stresses == "all"
     found = assessment.assess(response, basis, monitor, component, limits, report=report, everywhere=everywhere)
+    found = replace(found, lifted=_lifted_off(result, found), not_valid=lifted_forces(response.resonances))
     maps, messages = ({}, []) if found.highest is None else _maps(result, found, report)
     drawn = {}
     if wanted.pictures:
@@ -294,6 +295,15 @@ def _assessed(
         contacts = sum(n.startswith("contacts/") and n.endswith("/dissipated") for n in arrays)
         drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
+
+
+def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:
+    """Normal force (N) -> at which of the points whose stress is drawn contacts would lift off."""
+    off = {}
+    for normal, (series, _, chosen, _) in found.sweeps.items():
+        r = result.responses[normal]
+        off[normal] = np.interp(series.frequency[chosen], r.frequency, lifted(result.built, r)) > 0
+    return off
 
 
 def _maps(
