@@ -7,6 +7,8 @@ Products go to build/docs; a study whose inputs have not changed takes its modal
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import sys
 import time
 from collections.abc import Sequence
@@ -32,11 +34,12 @@ from microslip.basis import read_basis
 from microslip.case import CaseSettings, load_case, run_case
 from microslip.case.assemble import sized
 from microslip.case.settings import ContactSettings
-from microslip.data import ModalBasis, ModalGroup, SpeedRange
+from microslip.cli import main as typed
+from microslip.data import Array, ModalBasis, ModalGroup, SpeedRange
 from microslip.modal.campbell import track_basis
 from microslip.modal.compute import modal_basis
 from microslip.modal.speed_range import frequencies_over
-from microslip.pictures import lettering, plots, views
+from microslip.pictures import lettering, operating, plots, views
 from microslip.pictures.points import points_sheet
 from microslip.pictures.response import response_picture
 from microslip.pictures.scene import quiet_vtk
@@ -361,34 +364,51 @@ def damping_wire() -> None:
 
 
 def spin_pit() -> None:
-    """30 blades with underplatform dampers: strain over frequency, largest strain over mass for three shapes."""
+    """30 blades with underplatform dampers: strain over frequency, and over mass for three shapes (`optimum`)."""
     frequency = np.linspace(104, 160, 57)
-    shapes, masses = damper_study.SHAPES, damper_study.MASSES
-    all_of = {s: {m: damper_study.under_platforms(s, m, companion, frequency) for m in masses} for s in shapes}
+    all_of = {
+        (s, m): damper_study.under_platforms(s, m, companion, frequency)
+        for s in damper_study.SHAPES
+        for m in damper_study.PRINTED
+    }
     fig = figure(8.6, 3.6)
     left, right = fig.subplots(1, 2)
     plain(left)
     for mass, colour in zip(damper_study.PRINTED, plots.COLOURS, strict=False):
-        x = all_of["cottage-roof"][mass]
+        _, x = all_of["cottage-roof", mass]
         left.semilogy(x.frequency, 1e6 * np.abs(x.outputs[:, 0]), color=colour, label=f"{1e3 * mass:g} g")
     left.set(xlabel="frequency in Hz", ylabel="strain amplitude in µm/m", title="cottage roof")
     left.legend(fontsize=8)
+    over_mass = {shape: strain_over_mass(shape) for shape in damper_study.SHAPES}
     plain(right)
-    for shape, colour in zip(shapes, plots.COLOURS, strict=False):
-        largest = [1e6 * x.largest(damper_study.bending)[1] for x in all_of[shape].values()]
-        right.loglog([1e3 * m for m in masses], largest, "o-", color=colour, label=shape, markersize=3)
-    right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in µm/m")
+    for (shape, (mass, strain, best)), colour in zip(over_mass.items(), plots.COLOURS, strict=False):
+        right.loglog(1e3 * mass, 1e6 * strain, "o-", color=colour, label=shape, markersize=3)
+        right.plot(1e3 * mass[best], 1e6 * strain[best], "o", color=colour, mfc="none", markersize=9)
+    right.set(xlabel="damper mass in g", ylabel="largest strain amplitude in µm/m", title="rings: lowest")
     right.set_xticks([16, 26, 42, 75, 117], labels=["16", "26", "42", "75", "117"], minor=False)
     right.set_xticks([], minor=True)
     right.legend(fontsize=8)
+    for axes in (left, right):
+        operating.numbers_within(axes.yaxis)
     save(drawn(fig), "spin_pit")
     rows = []
-    for shape in shapes:
-        for mass in damper_study.PRINTED:
-            f, strain = all_of[shape][mass].largest(damper_study.bending)
-            normal = damper_study.wedged(damper_study.of_mass(companion(shapes[shape]), mass), damper_study.RPM)
-            rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}"])
+    for (shape, mass), (normal, x) in all_of.items():
+        f, strain = x.largest(damper_study.bending)
+        rows.append([shape, f"{1e3 * mass:g}", f"{normal:.0f}", f"{f:.1f}", f"{1e6 * strain:.0f}"])
     fill("dampers.md", "pit", table(["damper", "mass, g", "normal force, N", "resonance, Hz", "strain, µm/m"], rows))
+    best = [[s, f"{1e3 * m[i]:.1f}", f"{1e6 * strain[i]:.0f}"] for s, (m, strain, i) in over_mass.items()]
+    fill("dampers.md", "mass", table(["damper", "best mass, g", "largest strain there, µm/m"], best))
+
+
+def strain_over_mass(shape: str) -> tuple[Array, Array, int]:
+    """Masses (kg) of a damper's shape, the largest strains that `microslip optimum` finds, and which is the lowest."""
+    asked = f"optimum {damper_study.CASES}/spin-pit-{shape}.toml --over bodies.damper.mass --low 0.0165 --high 0.16"
+    with contextlib.chdir(BUILD):  # where `companion` has left the bodies
+        typed([*asked.split(), "--points", "9"])
+    text = (BUILD / f"build/spin-pit-{shape}/optimum.csv").read_text(encoding="utf-8")
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["what"] == "highest resonance"]
+    mass, strain = (np.array([float(row[k]) for row in rows]) for k in ("bodies.damper.mass", "amplitude_strain"))
+    return mass, strain, int(strain.argmin())
 
 
 # static contact ----------------------------------------------------------------------------------------------------

@@ -403,6 +403,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "bodies.aerodynamics": ("", "a table (.csv) of [what the flow adds](excitation.md#damping) to every wave"),
     "bodies.modes": ("", "how many of those that the modal file stores"),
     "bodies.mass": ("kg", "of the same shape and stiffness at rest, made of another density"),
+    "bodies.pressed_at_rpm": ("rpm", "whose centrifugal load presses a loose body into its contacts, as normal forces"),
     "bodies.turn": ("degrees", "about the body's rotation axis, from where its file has it"),
     "bodies.weak_springs": ("Hz", "that hold a body which nothing else does: frequency of its rigid motions"),
     "bodies.shift": ("m", "from where its file has it, after the turn"),

@@ -77,6 +77,23 @@ def test_resonances_and_their_stresses(response: Response) -> None:
     assert with_limits["reserve_factor"] == pytest.approx(300e6 / a[1.0].worst.amplitude, rel=1e-6)
 
 
+def test_what_is_not_valid_is_no_worst_resonance_and_is_drawn_as_such(response: Response, tmp_path: Path) -> None:
+    """The most stressed resonance is one of another normal force, unless all would lift off."""
+    from microslip.pictures.operating import over_normal_force_plot
+
+    found = assess(response, small_basis(), "tip-probe")
+    worst = found.highest
+    assert worst is not None
+    others = replace(found, not_valid=frozenset({worst.normal_force})).highest
+    assert others is not None
+    assert others.normal_force != worst.normal_force and others.worst.amplitude < worst.worst.amplitude
+    every = frozenset(r.normal_force for r in found.resonances)
+    assert replace(found, not_valid=every).highest == worst
+    lines = {"one": [(1.0, 5.0), (2.0, 1.0), (4.0, 3.0)]}
+    files = [over_normal_force_plot(lines, "y", "t", tmp_path / f"{i}.png", off) for i, off in enumerate(((), (2.0,)))]
+    assert files[0].read_bytes() != files[1].read_bytes()
+
+
 def test_pictures_and_files_of_an_assessment(response: Response, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     import meshio

@@ -245,7 +245,7 @@ MISTAKES = [
     (["modes", "bad.toml"], "bad.toml: is not valid TOML"),
     (["run", "bad.toml"], "bad.toml: is not valid TOML"),
     (["modes", "build/box/basis.h5"], "build/box/basis.h5: is not UTF-8 text"),
-    (["run", "build/box/basis.h5"], "build/box/basis.h5: is not UTF-8 text"),
+    (["run", "build/lost/basis.h5"], "build/lost/basis.h5: is not UTF-8 text"),
     (["modes", "box", "--set", "nonsense"], "write --set key.subkey=value"),
     (["modes", "box", "--set", "modes.cuont=3"], "modes.cuont: unknown key; did you mean 'count'?"),
     (["modes", "box", "--set", "modes.count=0"], "modes.count"),
@@ -279,6 +279,8 @@ MISTAKES = [
 def mistakes(folder: Path) -> Path:
     basis = (folder / "build/box/basis.h5").read_bytes()
     (folder / "empty").mkdir()
+    (folder / "build/lost").mkdir(exist_ok=True)
+    (folder / "build/lost/basis.h5").write_bytes(basis)
     (folder / "zero.h5").write_bytes(b"")
     (folder / "cut.h5").write_bytes(basis[: len(basis) // 2])
     with h5py.File(folder / "other.h5", "w") as file:

@@ -9,16 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import beam, table
+from small import basis, beam, table
 
 from microslip.basis import read_basis
 from microslip.case import load_case, run_case
 from microslip.case.assemble import load_bodies
+from microslip.case.settings import BodyOfCase
+from microslip.case.thrown import normal_forces
 from microslip.cli import main
-from microslip.data import CENTRIFUGAL, ModalBasis, UserError
+from microslip.data import CENTRIFUGAL, Array, ModalBasis, UserError
 from microslip.modal.compute import modal_basis
+from microslip.operating.motion import read_out
 from microslip.reduced.coordinates import of_density
+from microslip.results import read_response
 from microslip.settings.body import BodySettings
+from microslip.stages.response import Wanted
 from microslip.stages.running import respond
 
 SAMPLES = Path(__file__).parents[1] / "pipeline/microslip/samples"
@@ -131,3 +136,51 @@ def test_resonances_are_followed_over_the_mass(sample: ModalBasis, folder: Path)
     mass, frequency = np.array(rows).T
     assert len(mass) == 4  # three followed, and the lowest of them once more
     np.testing.assert_allclose(frequency * np.sqrt(mass), (frequency * np.sqrt(mass))[0], rtol=0.02)
+
+
+def test_coordinates_of_a_heavier_body_are_those_of_its_file(folder: Path) -> None:
+    """The motion that a response file tells of a body with another mass is what its read-out says, to the compliance
+    that the modes leave out at the read-out (3e-3): shapes and stresses of the file belong to it."""
+    respond(case(folder, "mass = 0.05"), None, [], wanted=Wanted("none", False))
+    found, basis = read_response("build/vane/response.h5"), read_basis("basis.h5")
+    (series,) = found.series
+    told, read = series.monitor("probe")[:, 0, 1], read_out(found.motion(series, basis), "probe")[:, 1, 0]
+    np.testing.assert_allclose(read, told, rtol=3e-3)
+
+
+def damper(pressed: float, mass: float, centre: Array) -> list[float]:
+    """Normal forces of two flanks under a roof of 90 degrees, which a modal file of a beam stands for."""
+    body = basis()
+    flanks = {"left": [-1.0, 0.0, 1.0], "right": [1.0, 0.0, 1.0]}
+    group = body.groups[0, 0]
+    faces = {}
+    for name, normal in flanks.items():
+        n = np.array(normal) / np.sqrt(2)
+        faces[name] = replace(group.interfaces[name], rotation=np.array([n, np.cross(Y, n), Y]))
+    body = replace(
+        body, groups={(0, 0): replace(group, interfaces=faces)}, centre=centre, rotation_point=np.zeros(3),
+        rotation_axis=Y,
+    )  # fmt: skip
+    settings = BodyOfCase(name="damper", pressed_at_rpm=pressed, mass=mass)
+    return normal_forces(settings, body, ["left", "right"], "case.toml: bodies.damper.pressed_at_rpm")
+
+
+Y = np.array([0.0, 1.0, 0.0])
+
+
+def test_a_damper_under_a_roof_presses_both_flanks() -> None:
+    """m r Omega^2 / (2 sin 45 degrees) each, whatever the place along the axis; leaning by 10 degrees one takes more:
+    F sin(45 +- 10 degrees) by the parallelogram of forces."""
+    load = 0.04 * 0.25 * (2700 * np.pi / 30) ** 2
+    for along in (0.0, 0.03):
+        found = damper(2700.0, 0.04, np.array([0.0, along, 0.25]))
+        np.testing.assert_allclose(found, load / (2 * np.sin(np.pi / 4)), rtol=1e-12)
+    lean, right = np.radians(10.0), np.radians([35.0, 55.0])
+    found = damper(2700.0, 0.04, 0.25 * np.array([np.sin(lean), 0.0, np.cos(lean)]))
+    np.testing.assert_allclose(found, load * np.sin(right), rtol=1e-12)
+
+
+def test_a_body_that_its_contacts_do_not_hold_is_refused() -> None:
+    """Thrown sideways out of the roof."""
+    with pytest.raises(UserError, match="pressed_at_rpm.*do not hold"):
+        damper(2700.0, 0.04, np.array([0.25, 0.0, 0.0]))

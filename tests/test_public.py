@@ -185,7 +185,7 @@ def test_a_point_without_a_solution_says_why():
     assert len(bad) == 0 or "not converged" in repr(found)
 
 
-def test_a_backbone_goes_from_stuck_to_free():
+def test_a_backbone_goes_from_stuck_to_free(tmp_path):
     system = ms.structure(1.0, 1.0, 0.01, force={0: 1.0}, elements=[ms.jenkins(3.0, 0.3)])
     mode = ms.backbone(system, 1e-3, 1e2, harmonics=3)
     assert (
@@ -196,6 +196,11 @@ def test_a_backbone_goes_from_stuck_to_free():
     assert "damping ratio" in repr(mode) and len(mode.to_dataframe()) == len(mode.Omega)
     assert mode.to_xarray()["frequency"].attrs["units"] == "Hz"
     np.testing.assert_array_equal(mode.plot().lines[0].get_ydata(), mode.frequency)
+    again = ms.load(mode.save(tmp_path / "mode.h5"))
+    assert repr(again) == repr(mode) and again.complete and again.checks == mode.checks
+    np.testing.assert_allclose(again.Omega, mode.Omega, rtol=1e-15)
+    for name in ("amplitude", "damping", "x"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(mode, name))
 
 
 # bodies ---------------------------------------------------------------------------------------------------------------

@@ -292,9 +292,12 @@ def test_the_answer_is_a_resonance_that_is_valid() -> None:
     """Contacts that would lift off make no highest resonance; numbers stand without powers of ten."""
     rows = [peak(20.0, 23.4, 0.032, "contacts would lift off: not valid"), peak(80.0, 123.0, 12.74e-6)]
     rows += [peak(1e4, 171.1, 80.65e-6)]
+    for row, stress in zip(rows, (900e6, 3e6, 41.5e6), strict=True):
+        row |= {"stress_amplitude_Pa": stress, "frequency_of_stress_Hz": row["frequency_Hz"]}
     words = said(response_html({"resonances": rows, "estimated_error_of_harmonics": 1.3e-13}, {}))
     assert "highest resonance found is 80.65 µm at 171.1 Hz" in words and "lowest with 12.74 µm" in words
     assert "Under FN = 20 N contacts would lift off" in words
+    assert "largest stress amplitude is 41.5 MPa" in words
     assert "uncertain by less than 0.01" in words and "32000" in words and "10000" in words and "·10" not in words
 
 

@@ -377,6 +377,9 @@ def test_what_a_path_means(tmp_path, monkeypatch):
         == places.meant(Path("build/rig"))
         == Path("pipeline/cases/rig.toml")
     )
+    (tmp_path / "build" / "own").mkdir()
+    assert places.meant(Path("own/system.toml"), case=True) == Path("own/case.toml")
+    assert places.meant(Path("build/own"), case=True) == Path("own/case.toml")
     assert places.meant(Path("own")) == Path("own") and places.meant(Path("away.toml")) == Path("away.toml")
     with pytest.raises(UserError, match="is 'blade' meant"):
         places.meant(Path("blad"))

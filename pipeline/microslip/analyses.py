@@ -188,8 +188,18 @@ def backbone(
             contacts hardly slide. mode: number of the mode with sticking contacts, 0 the lowest. output: number of the
             read-out. harmonics, samples: see `harmonic_response`. report: is told what is under way.
 
+    Returns:
+        The curve, which tabulates, draws and saves itself; `complete` if it reached the high amplitude.
+
     Raises:
         UserError: a mode that does not move the read-out, or that there is not.
+
+    Examples:
+        >>> import microslip as ms
+        >>> rubbing = ms.structure(1.0, 1.0, 0.01, force={0: 1.0}, elements=[ms.jenkins(3.0, 0.3)])
+        >>> mode = ms.backbone(rubbing, 1e-3, 1e2, harmonics=3)
+        >>> print(f"{mode.Omega[0]:.3f} rad/s stuck, {mode.Omega[-1]:.2f} sliding")
+        2.000 rad/s stuck, 1.00 sliding
     """
     problem = balanced(system, harmonics, samples)
     count = len(problem.assembly.outputs)

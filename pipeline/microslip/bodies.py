@@ -103,6 +103,8 @@ def assemble(
         found |= {b.name: read_basis(files[b.name]) for b in missing}
     if normal_force is not None:
         bounded("normal_force", normal_force, ge=0)
-        own = [c.model_copy(update={"normal_force": normal_force}) if swept(c) else c for c in settings.contacts]
+        bare = [swept(c) and not settings.is_thrown(c) for c in settings.contacts]
+        pressed = {"normal_force": normal_force}
+        own = [c.model_copy(update=pressed) if b else c for c, b in zip(settings.contacts, bare, strict=True)]
         settings = settings.model_copy(update={"contacts": tuple(own)})
     return build(settings, found, path)

@@ -40,6 +40,7 @@ from .points import (
     waves,
 )
 from .settings import GROUND, BodyOfCase, CaseSettings, ContactSettings
+from .thrown import thrown
 
 T = TypeVar("T")
 
@@ -226,6 +227,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     """
     settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
+    settings = thrown(settings, {name: b.basis for name, b in bodies.items()}, path)
     components = {name: _component(settings, b) for name, b in bodies.items()}
     contacts, springs, made, messages = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
@@ -263,16 +265,11 @@ def _residual_share(settings: CaseSettings, name: str, b: Loaded) -> Array | Non
     faces = {
         i: SURFACE if c.is_curved else c.includes
         for c in settings.contacts
-        for body, i in _ends(settings, c)
+        for body, i in settings.ends(c)
         if body == name
     }
     first = min(b.groups)
     return residual_share(b.groups[first], b.basis.reduction, b.has_residual, faces)
-
-
-def _ends(settings: CaseSettings, c: ContactSettings) -> list[tuple[str, str]]:
-    """(body, interface) of the one or two faces of a contact."""
-    return [settings.address(end) for end in (c.interface, c.against) if end != GROUND]
 
 
 def _body(bodies: Mapping[str, Loaded], name: str, path: Path | str, key: str) -> Loaded:
@@ -300,7 +297,7 @@ def _sides(
     settings: CaseSettings, bodies: Mapping[str, Loaded], c: ContactSettings, path: Path | str
 ) -> tuple[list[Loaded], list[Interface]]:
     """The one or two bodies of a contact and their interfaces."""
-    ends = _ends(settings, c)
+    ends = settings.ends(c)
     loaded = [_body(bodies, body, path, f"contacts.{c.interface}") for body, _ in ends]
     return loaded, [b.face(name, path, "contacts") for b, (_, name) in zip(loaded, ends, strict=True)]
 
@@ -314,7 +311,7 @@ def _contact(
     springs: Springs, path: Path | str,
 ) -> tuple[At, list[str]]:  # fmt: skip
     """A contact for any load, and messages. springs: of one that is not curved."""
-    ends = _ends(settings, c)
+    ends = settings.ends(c)
     loaded, faces = _sides(settings, bodies, c, path)
     first, second, met = ContactFace(*ends[0]), None, None
     if len(ends) == 2:
@@ -402,7 +399,7 @@ def _in_contact(path: Path | str, c: ContactSettings, make: Callable[[], T]) -> 
 
 def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> list[Face]:
     """The sides of a contact, for the compliance that the bodies hold."""
-    ends = _ends(settings, c)
+    ends = settings.ends(c)
     if len(ends) == 2 and ends[0][0] == ends[1][0] and loaded[0].basis.sectors > 1:  # the gap to the next sector
         b = loaded[0]
         k = min(b.stored)
@@ -410,14 +407,14 @@ def _faces(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded]) -> 
     found = []
     for b, (body, name) in zip(loaded, ends, strict=True):
         among = tuple(i for other in settings.contacts if other.against == GROUND
-                      for own, i in _ends(settings, other) if own == body)  # fmt: skip
+                      for own, i in settings.ends(other) if own == body)  # fmt: skip
         found.append(Face(b.stored[min(b.stored)], b.basis.reduction, name, among if len(ends) == 1 else ()))
     return found
 
 
 def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces: list[Interface]) -> Pairing:
     """How the two faces of a contact meet."""
-    names, (one, two) = (c.interface, c.against), (_place(b) for b in loaded)
+    names, (one, two) = (c.interface, c.against), (place_of(b) for b in loaded)
     seen = two.seen_from(one)
     if not settings.ring or not c.against_sector:
         return facing(faces[0], faces[1], seen, names)
@@ -426,7 +423,7 @@ def _met(settings: CaseSettings, c: ContactSettings, loaded: list[Loaded], faces
     return in_ring(faces[0], faces[1], axis, point, settings.ring.blades, names, c.against_sector, seen)
 
 
-def _place(b: Loaded) -> Place:
+def place_of(b: Loaded) -> Place:
     """Where a body stands in the axes of the case."""
 
     R = rotation(b.basis.rotation_axis, np.radians(b.settings.turn))

@@ -73,6 +73,8 @@ class BodyOfCase(Model):
     direction ``forward``, ``backward`` or ``both``) of what the flow adds to the modes in each wave of the ring.
     modes: how many of the stored eigenmodes are used, all if not given.
     mass: kg, of a body at rest made of another density, instead of the file's; its shape and stiffness stay.
+    pressed_at_rpm: the speed whose centrifugal load presses a loose body into its contacts, which share it as normal
+    forces without friction; they need no other.
     weak_springs: Hz, of a free body on springs so soft that it has this frequency in each of its rigid motions. A body
     that slides in all of its contacts has no place of its own; without them it slides away where mean forces do not
     balance.
@@ -87,6 +89,7 @@ class BodyOfCase(Model):
     aerodynamics: str | None = None
     modes: Annotated[int, Field(ge=1, le=2000)] | None = None
     mass: Positive | None = None
+    pressed_at_rpm: Positive | None = None
     turn: Number = 0.0
     weak_springs: Positive | None = None
     shift: Annotated[Vector, BeforeValidator(_finite_vector)] = (0.0, 0.0, 0.0)
@@ -417,7 +420,8 @@ class CaseSettings(Model):
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] and no sweep"
             )
-        open_ = [c.interface for c in self.contacts if c.normal_force is None and c.interference is None]
+        bare = [c for c in self.contacts if c.normal_force is None and c.interference is None]
+        open_ = [c.interface for c in bare if not self.is_thrown(c)]
         if open_ and self.sweep.normal_forces is None:
             raise ValueError(
                 f"contacts.{open_[0]}: nothing presses it; give sweep.normal_forces, or its normal_force or "
@@ -507,6 +511,15 @@ class CaseSettings(Model):
         """Body and row of ``body:row``; the only body of the case where none is named."""
         body, _, row = text.rpartition(":")
         return body or self.components[0].name, row
+
+    def ends(self, c: ContactSettings) -> list[tuple[str, str]]:
+        """(body, interface) of the one or two faces of a contact."""
+        return [self.address(end) for end in (c.interface, c.against) if end != GROUND]
+
+    def is_thrown(self, c: ContactSettings) -> bool:
+        """Whether the centrifugal load of one of its bodies presses a contact."""
+        thrown = {b.name for b in self.bodies if b.pressed_at_rpm is not None}
+        return any(body in thrown for body, _ in self.ends(c))
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:

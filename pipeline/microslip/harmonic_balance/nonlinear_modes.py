@@ -16,7 +16,8 @@ that `continuation` changes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,8 @@ import numpy as np
 from ..continuation import Point, Settings, follow, start
 from ..data import Array, UserError
 from ..results.checks import Checks
+from ..results.files import Response, write_response
+from ..results.series import Series
 from ..system import assembly
 from ..system.assembly import Linear
 from .problem import AtFrequency, Problem
@@ -34,6 +37,9 @@ from .solver import Point as Solved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+OVER_AMPLITUDE = "amplitude"
+"""What the series of a nonlinear mode runs over in its file."""
 
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
@@ -96,8 +102,27 @@ class Backbone:
         if not len(self.amplitude):
             return f"<Backbone: no points; {self.status}>"
         f, a, d = (f"{v[0]:.5g} to {v[-1]:.5g}" for v in (self.frequency, self.amplitude, self.damping))
-        most = f"at most {self.damping.max():.3g}"
-        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {self.status}>"
+        most, ended = f"at most {self.damping.max():.3g}", "complete" if self.complete else self.status
+        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {ended}>"
+
+    def save(self, path: Path | str) -> Path:
+        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it."""
+        known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
+        known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
+        status = tuple(c.failure or CONVERGED for c in self.checks)
+        series = Series("nonlinear mode", {"stuck": self.stuck}, self.amplitude, status, known, over=OVER_AMPLITUDE)
+        write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status))
+        return Path(path)
+
+    @classmethod
+    def of(cls, response: Response) -> Backbone:
+        """What `save` wrote."""
+        (s,) = response.series
+        rows = zip(*(s.arrays[f"checks/{n.name}"].tolist() for n in fields(Checks)), strict=True)
+        Omega, damping, x = 2 * np.pi * s.frequency, s.arrays["damping_ratio"], s.arrays["x"]
+        return cls(
+            s.parameter, Omega, damping, x, s.parameters["stuck"], response.description, tuple(Checks(*r) for r in rows)
+        )
 
     @property
     def complete(self) -> bool:

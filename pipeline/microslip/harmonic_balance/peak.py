@@ -15,7 +15,7 @@ from ..continuation import SEARCH, Lowest, Peak, lowest, rated
 from ..continuation import peak as climbed
 from ..data import Array
 from .problem import Problem
-from .readout import WithOutput
+from .readout import WithOutput, measured
 from .response import operating
 from .solver import CONVERGED, Point, Report, sweep
 from .sweeps import prominent
@@ -125,7 +125,8 @@ def optimum(
         if end is not None:
             rising[value] = end
         one = found[value] = resonance(top)
-        said = f"{one.Omega / (2 * np.pi):.6g} Hz, {one.amplitude:.4g} m" if top.converged else top.status
+        size = measured(make(value).assembly, output).sized(one.amplitude)
+        said = f"{one.Omega / (2 * np.pi):.6g} Hz, {size}" if top.converged else top.status
         report(f"highest resonance at {value:.5g}: {said}")
         keep(dict(sorted(found.items())))
         return rated(family, value, top)

@@ -15,6 +15,7 @@ from ..results.series import Series
 from ..units import Quantity
 from . import accuracy
 from .checkpoint import labels, record
+from .nonlinear_modes import OVER_AMPLITUDE, Backbone
 from .problem import Problem
 from .readout import measured
 from .response import Operating, operating
@@ -116,14 +117,16 @@ class Motions(Series):
         return Path(path)
 
 
-def load(path: Path | str) -> Series:
-    """The only series of a response file, as `Motions.save` writes it; `read_response` reads files of several.
+def load(path: Path | str) -> Series | Backbone:
+    """The only series of a response file, as `Motions.save` writes it, or a nonlinear mode; `read_response` reads files
+    of several.
 
     Raises:
         UserError: no such file, or one of several series.
     """
-    found = read_response(path).series
+    response = read_response(path)
+    found = response.series
     if len(found) != 1:
         names = ", ".join(s.name for s in found)
         raise UserError(f"{path}: holds {len(found)} series ({names}); take one of read_response(path).series")
-    return found[0]
+    return Backbone.of(response) if found[0].over == OVER_AMPLITUDE else found[0]

@@ -305,7 +305,7 @@ def sweep(
         keep(done[-1])
         solved += 1
         left = sum(float(f) not in known for f in frequency[i + 1 :])
-        if solved == 2 and (said := _long(time.perf_counter() - began, left)):
+        if solved == TIMED and (said := _long(time.perf_counter() - began, left)):
             report(said)
     for i in range(len(done) - 2, -1, -1):  # from the other side, along which there may be a way
         if not done[i].converged and not done[i].away and done[i + 1].converged:
@@ -315,8 +315,8 @@ def sweep(
     return done
 
 
-LONG = 600.0
-"""s that a sweep may take before it is told how long it will: from its second point, as the first one compiles."""
+LONG, TIMED = 600.0, 3
+"""s that a sweep may take before it is told how long it will, and the point that tells it: those before it compile."""
 
 
 def _long(each: float, left: int) -> str:

@@ -26,6 +26,15 @@ def at_time(harmonics: ComplexArray, angle: float | Array, axis: int = 1) -> Arr
     return np.tensordot(turn, a, axes=1).real
 
 
+def farthest_at(harmonics: ComplexArray) -> float:
+    """Omega t, rad, to a hundredth of the cycle, when one of the points (H + 1, n, d) is farthest from its mean."""
+    a = harmonics.copy()
+    a[0] = 0.0
+    node = int((longest(a[1]) if len(a) == 2 else np.abs(a).sum(axis=(0, 2))).argmax())
+    angles = 2 * np.pi * np.arange(100) / 100
+    return float(angles[np.linalg.norm(at_time(a[:, node], angles, axis=0), axis=1).argmax()])
+
+
 def phase(harmonics: ComplexArray, harmonic: int = 1, axis: int = 1) -> Array:
     """Phase of one harmonic against cos(h Omega t), rad between -pi and pi; a quantity that lags has a negative one."""
     return np.angle(np.take(harmonics, harmonic, axis=axis))

@@ -10,8 +10,10 @@ import numpy as np
 from ..data import Array, ModalBasis, UserError
 from ..exchange import vtu
 from ..files.store import write_text
+from ..frames import rotation
 from ..modal.stress import von_mises
-from ..ring.expansion import replicate, sector_rotation
+from ..ring.expansion import replicate
+from ..system.component import Ring
 from .cycle import at_time, longest
 from .fatigue import MaterialLimits, vibration_margin
 from .motion import Motion, displacement
@@ -88,20 +90,26 @@ def write_instants(motion: Motion, basis: ModalBasis, path: Path | str, count: i
     write_text(path, vtu.collection(files))
 
 
-def on_sector(motion: Motion, basis: ModalBasis, sector: int) -> Array:
+def on_sector(motion: Motion, basis: ModalBasis, sector: int, ring: Ring | None = None) -> Array:
     """(H + 1, n, 3) harmonics of the displacement of sector j of a ring, m, in space: R^j a_h exp(i j k_h 2 pi / N).
 
     All sectors have the same amplitude. Where the rows are conjugate the wave runs the other way.
 
+    Args:
+        ring: that a body stands in which is not cyclic itself; k_h are its indices.
+
     Raises:
         UserError: not a cyclic body, no shapes.
     """
-    if basis.sectors == 1:
+    if basis.sectors == 1 and ring is None:
         raise UserError(f"{basis.name}: the body is not cyclic, it has no other sectors")
     a = displacement(motion.at(0), np.arange(basis.mesh.n_points))[0]
-    k = np.array([-p.group.harmonic if p.conjugate else p.group.harmonic for p in motion.parts])
-    turn = np.exp(2j * np.pi * ((k * sector) % basis.sectors) / basis.sectors)
-    return turn[:, None, None] * (a @ sector_rotation(basis, sector).T)
+    if ring is None:
+        N, k = basis.sectors, [-p.group.harmonic if p.conjugate else p.group.harmonic for p in motion.parts]
+    else:
+        N, k = ring.blades, [ring.index(h) for h in range(len(motion.parts))]
+    turn = np.exp(2j * np.pi * ((np.array(k) * sector) % N) / N)
+    return turn[:, None, None] * (a @ rotation(basis.rotation_axis, 2 * np.pi * sector / N).T)
 
 
 def write_ring_vtu(motion: Motion, basis: ModalBasis, path: Path | str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Array
 from ..units import METRES, Quantity
-from .operating import shades
+from .operating import numbers_within, shades
 from .plots import (
     COLOURS,
     empty_figure,
@@ -126,8 +126,9 @@ def optimum_plot(found: Optimum, label: str, title: str, path: Path, of: Quantit
             axes.minorticks_off()
         if axes is left:
             said_beside(axes, f"{found.parameter:.4g}", at, (0, -18), ha="center", fontsize=9, color="#c8382c")
-    if height.max() > 20 * height.min():
+    if height.max() > 5 * height.min():
         left.set_yscale("log")
+        numbers_within(left.yaxis)
     left.set_ylabel(f"height of the highest resonance in {unit} (0-peak)")
     left.margins(y=0.15)
     right.set_ylabel("its frequency in Hz")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..data import Array
-from ..operating.cycle import at_time, longest
+from ..operating.cycle import at_time, farthest_at
 from ..operating.fatigue import Endurance, MaterialLimits, allowed_amplitude, vibration_margin
 from ..operating.motion import Motion, displacement
 from ..operating.stress import CycleStress, StressPeaks
@@ -46,47 +46,64 @@ def shades(count: int) -> list[tuple[float, ...]]:
 # over frequency, over normal force ---------------------------------------------------------------------------------
 
 
-def over_frequency_plot(curves: Curves, quantity: str, title: str, path: Path) -> Path:
+def over_frequency_plot(
+    curves: Curves, quantity: str, title: str, path: Path, lifted: Mapping[float, Array] | None = None
+) -> Path:
     """A quantity over the frequency (Hz) for every normal force, on a logarithmic scale.
 
     Args:
-        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit.
+        curves: NaN where a point did not converge. quantity: label of the ordinate with its unit. lifted: normal force,
+            N -> which points are not valid, because contacts would lift off; they are dotted.
     """
     figure, axes = single_panel(9.0, 6.0)
     pairs = list(zip(shades(len(curves)), sorted(curves.items()), strict=True))
+    told = ""
     for colour, (normal, (x, y)) in reversed(pairs):  # the light ones on top
-        axes.semilogy(*through(x, y), color=colour, linewidth=1.6, label=f"$F_N$ = {normal:g} N")
+        off = (lifted or {}).get(normal, np.zeros(len(x), dtype=bool))
+        if off.any():
+            axes.semilogy(*through(x, np.where(off, y, np.nan)), color=colour, linewidth=1.8, linestyle=":")
+            told = "dotted: contacts would lift off, not valid"
+        line = {"linestyle": ":" if off.all() else "-", "label": f"$F_N$ = {normal:g} N"}
+        axes.semilogy(*through(x, np.where(off, np.nan, y)), color=colour, linewidth=1.6, **line)
     low, high = (f(float(f(x)) for x, _ in curves.values()) for f in (min, max))
     axes.set(xlabel="excitation frequency in Hz", ylabel=quantity, title=title, xlim=(low, high))
     numbers_within(axes.yaxis)
-    figure.legend(loc="outside lower center", ncols=6, fontsize=9)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=9, title=told or None, title_fontsize=8)
     return save_figure(figure, path)
 
 
 def over_normal_force_plot(
-    peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path
-) -> Path:
+    peaks: Mapping[str, Sequence[tuple[float, float]]], quantity: str, title: str, path: Path,
+    lifted: Collection[float] = (),
+) -> Path:  # fmt: skip
     """The largest value of each resonance over the normal force (N), both logarithmic; the lowest is marked.
 
     Args:
         peaks: name of a resonance -> (normal force, value) pairs. A normal force of 0 has no place on the axis.
+            lifted: normal forces under which contacts would lift off, so that values are not valid: hollow.
     """
     figure, axes = single_panel(8.0, 5.2)
     for i, (name, pairs) in enumerate(peaks.items()):
         x, y = np.array(sorted(p for p in pairs if p[0] > 0)).reshape(-1, 2).T
         if not len(x):
             continue
-        colour, best = COLOURS[i % len(COLOURS)], int(np.argmin(y))
-        axes.loglog(x, y, "o-", color=colour, linewidth=1.6, markersize=4, label=name)
+        off = np.isin(x, list(lifted))
+        colour, best = COLOURS[i % len(COLOURS)], int(np.argmin(np.where(off & ~off.all(), np.inf, y)))
+        axes.loglog(x, y, "-", color=colour, linewidth=1.6, label=name)
+        axes.plot(x[~off], y[~off], "o", color=colour, markersize=4)
+        axes.plot(x[off], y[off], "o", color=colour, markersize=4, mfc="white")
         if 0 < best < len(x) - 1:
             axes.plot(x[best], y[best], "o", markersize=9, mfc="none", mec=colour, mew=1.6)
             how = {"ha": "center", "va": "top", "fontsize": 8.5, "color": colour}
             said_beside(axes, f"{x[best]:.3g} N", (x[best], y[best]), (0, -9), **how)
+    hollow = any(normal in lifted for pairs in peaks.values() for normal, _ in pairs)
     axes.set(xlabel="normal force in N", ylabel=quantity, title=title)
+    if hollow:
+        axes.plot([], [], "o", color="0.3", markersize=4, mfc="white", label="contacts would lift off: not valid")
     axes.margins(y=0.15)
     for axis in (axes.xaxis, axes.yaxis):
         numbers_within(axis)
-    if len(peaks) > 1:
+    if len(peaks) > 1 or hollow:
         axes.legend(fontsize=9)
     return save_figure(figure, path)
 
@@ -311,10 +328,7 @@ def farthest(motion: Motion, points: int) -> tuple[Array, float, float]:
     """
     a = displacement(motion.at(0), np.arange(points))[0].copy()
     a[0] = 0.0
-    node = int((longest(a[1]) if len(a) == 2 else np.abs(a).sum(axis=(0, 2))).argmax())
-    angles = 2 * np.pi * np.arange(100) / 100
-    far = np.linalg.norm(at_time(a[:, node], angles, axis=0), axis=1)
-    best = float(angles[far.argmax()])
+    best = farthest_at(a)
     shape = at_time(a, best, axis=0)
     return shape, float(np.linalg.norm(shape, axis=1).max()), float(np.degrees(best))
 

@@ -11,7 +11,8 @@ import numpy as np
 from ..data import Array, Indices, ModalBasis, ModalGroup
 from ..ring.expansion import expand, multiplicity, sector_rotation
 from ..ring.resonances import eigenmodes
-from .lettering import captioned, colour_bar, sheet, stacked
+from .lettering import captioned, colour_bar, nice, sheet, stacked
+from .plots import length_unit
 from .scene import Camera, Stage, Surface, axes_towards, face_triangles, fit, surface
 from .views import AREA, _map, at_speed, hertz, mode_scale
 
@@ -58,21 +59,35 @@ class RingStudio:
 
 def open_ring(basis: ModalBasis, stage: Stage) -> RingStudio:
     """Extract the surface of one sector and choose the view: mostly along the axis, a little from above."""
+    outside, triangles = _outside(basis, basis.sectors)
+    arm = basis.mesh.points - basis.rotation_point
+    axes, extent = _view(basis.rotation_axis), _diameter(arm, basis.rotation_axis)
+    return RingStudio(basis, stage, outside, triangles, axes, extent)
+
+
+def _outside(basis: ModalBasis, sectors: int) -> tuple[Surface, Indices]:
+    """The surface of a body that is drawn so many times, and its triangles without those of cyclic faces."""
     outside = surface(basis.mesh)
-    if basis.sectors * len(outside.triangles) > MOST_TRIANGLES:
+    if sectors * len(outside.triangles) > MOST_TRIANGLES:
         outside = surface(basis.mesh, coarse=True)
     inside = np.zeros(len(outside.triangles), dtype=bool)
-    for name in basis.cyclic_faces:
+    for name in basis.cyclic_faces if basis.sectors > 1 else ():
         if name in basis.mesh.faces:
             inside |= face_triangles(outside, basis.mesh, name)
-    axis = basis.rotation_axis
+    return outside, outside.triangles[~inside]
+
+
+def _view(axis: Array) -> Array:
+    """(3, 3) axes of the camera that looks mostly along the axis of a ring, a little from above."""
     up = np.eye(3)[2 if abs(axis[2]) < 0.7 else 0]
     up = up - (up @ axis) * axis
     up /= np.linalg.norm(up)
-    axes = axes_towards(-0.84 * axis + 0.40 * up + 0.26 * np.cross(up, axis), up)
-    arm = basis.mesh.points - basis.rotation_point
-    reach = float(np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1).max())
-    return RingStudio(basis, stage, outside, outside.triangles[~inside], axes, 2 * reach)
+    return axes_towards(-0.84 * axis + 0.40 * up + 0.26 * np.cross(up, axis), up)
+
+
+def _diameter(arm: Array, axis: Array) -> float:
+    """m, of a ring whose points lie at arm (n, 3) from a point of its axis."""
+    return 2 * float(np.linalg.norm(arm - np.outer(arm @ axis, axis), axis=1).max())
 
 
 def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
@@ -82,10 +97,8 @@ def wave(ring: RingStudio, group: ModalGroup, mode: int) -> Array:
     return np.concatenate([expand(one, ring.basis, j)[source, :, 0] for j in range(ring.basis.sectors)])
 
 
-def _directions(ring: RingStudio) -> Array:
-    """(N v, 3, 3) unit vectors along the axis, the circumference and the radius at each vertex (rows)."""
-    arm = ring.points() - ring.basis.rotation_point
-    axis = ring.basis.rotation_axis
+def _directions(arm: Array, axis: Array) -> Array:
+    """(v, 3, 3) unit vectors along the axis, the circumference and the radius (rows) at arm (v, 3) from the axis."""
     radial = arm - np.outer(arm @ axis, axis)
     radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-300)
     return np.stack([np.broadcast_to(axis, radial.shape), np.cross(axis, radial), radial], axis=1)
@@ -102,7 +115,8 @@ class _Shown:
 
 def _prepare(ring: RingStudio, group: ModalGroup, mode: int) -> _Shown:
     moved = mode_scale(ring, group.phi[:, :, mode], SWING) * wave(ring, group, mode)
-    parts = np.einsum("vdi,vi->dv", _directions(ring), moved)
+    directions = _directions(ring.points() - ring.basis.rotation_point, ring.basis.rotation_axis)
+    parts = np.einsum("vdi,vi->dv", directions, moved)
     strongest = int((np.abs(parts) ** 2).sum(axis=1).argmax())
     value = parts[strongest]
     return _Shown(moved, value / max(float(np.abs(value).max()), 1e-300), DIRECTIONS[strongest])
@@ -160,3 +174,52 @@ def ring_wave(ring: RingStudio, group: ModalGroup, mode: int, camera: Camera, st
         ring.stage.reshape(data, triangles, still + moved, value)  # type: ignore[arg-type]
         frames.append(captioned(ring.stage.shoot(camera), title, size=13))
     return frames
+
+
+@dataclass(frozen=True)
+class Round:
+    """A body in every sector of a ring. Attributes: basis. still: (N, n, 3) its mesh at rest, m, in common axes.
+    moved: (N, n, 3) displacement, m, in them."""
+
+    basis: ModalBasis
+    still: Array
+    moved: Array
+
+
+def operating_ring(bodies: Sequence[Round], axis: Array, point: Array, title: str, note: str) -> Picture:
+    """All bodies of a ring at an instant, deformed, coloured by the displacement along one direction.
+
+    Args:
+        axis, point: (3,) of the rotation. note: what is shown, without a full stop.
+    """
+    skins = [_round_skin(b) for b in bodies]
+    still, moved = (np.concatenate([s[i] for s in skins]) for i in (0, 1))
+    begins = np.cumsum([0, *(len(s[0]) for s in skins)])
+    triangles = np.concatenate([s[2] + start for s, start in zip(skins, begins, strict=False)])
+    parts = np.einsum("vdi,vi->dv", _directions(still - point, axis), moved)
+    strongest = int((parts**2).sum(axis=1).argmax())
+    size = np.linalg.norm(moved, axis=1).max()
+    grown = nice(SWING * _diameter(still - point, axis) / max(float(size), 1e-300))
+    amount, unit = length_unit(np.array([size, np.abs(parts[strongest]).max()]))
+    value = parts[strongest] / max(float(np.abs(parts[strongest]).max()), 1e-300)
+    stage = Stage()
+    try:
+        drawn = still + grown * moved
+        stage.skin(drawn, triangles, value, cmap=COLOURS, clim=(-1.0, 1.0))
+        image = stage.shoot(fit(np.vstack([still, drawn]), _view(axis), AREA))
+    finally:
+        stage.close()
+    bar = colour_bar(
+        _map(COLOURS), f"{-amount[1]:.3g}", f"{amount[1]:.3g}", f"{DIRECTIONS[strongest]} displacement in {unit}",
+        image.width,
+    )  # fmt: skip
+    told = f"{note}, {grown:g} times as large; largest displacement {amount[0]:.3g} {unit}."
+    return captioned(stacked([image, bar], 4), title, told, 20)
+
+
+def _round_skin(body: Round) -> tuple[Array, Array, Indices]:
+    """Vertices (N v, 3) at rest, their displacement (N v, 3), and the triangles of a body all round."""
+    outside, triangles = _outside(body.basis, len(body.still))
+    still, moved = (x[:, outside.source].reshape(-1, 3) for x in (body.still, body.moved))
+    shift = len(outside.source) * np.arange(len(body.still))[:, None, None]
+    return still, moved, (triangles[None] + shift).reshape(-1, 3)

@@ -100,7 +100,7 @@ def first_modes(g: ModalGroup, count: int) -> ModalGroup:
 
 
 def of_density(g: ModalGroup, share: float) -> ModalGroup:
-    """The same body at rest, of a material `share` times as dense: shape, stiffness and damping ratios stay.
+    """The same body at rest, of a material `share` times as dense; shape, stiffness, damping ratios, coordinates stay.
 
     Inertia and centrifugal excitations grow with the density; integrals for large rigid motion are left out.
 
@@ -114,9 +114,8 @@ def of_density(g: ModalGroup, share: float) -> ModalGroup:
         g, M_r=share * g.M_r, C_r=np.sqrt(share) * g.C_r, omega=g.omega / np.sqrt(share), excitations=heavy,
         run_up=None, invariants=None, gyroscopic=None,
     )  # fmt: skip
-    if g.to_diagonal is None:
-        return in_coordinates(dense, np.eye(g.n_modes) / np.sqrt(share))
-    return replace(dense, to_diagonal=g.to_diagonal / np.sqrt(share))
+    own = np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal
+    return replace(dense, to_diagonal=own / np.sqrt(share))
 
 
 def own_kind(g: ModalGroup) -> tuple[str, ...]:

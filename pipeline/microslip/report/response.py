@@ -15,8 +15,8 @@ MOST_ROWS = 60
 """Rows of a table that a page shows at once; the others unfold."""
 
 SHOWN = (
-    "friction response", "stress over frequency", "stress over normal force", "stress at resonance", "Haigh diagram",
-    "contacts at resonance",
+    "friction response", "ring at resonance", "stress over frequency", "stress over normal force",
+    "stress at resonance", "Haigh diagram", "contacts at resonance",
 )  # fmt: skip
 """Pictures of a response in their order."""
 
@@ -60,11 +60,10 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if not rows:
         return ["No resonance was found in the band." if "resonances" in response else ""]
     doubtful = sum(bool(row.get("doubt")) for row in rows)
-    lifted = {row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", "")}
-    valid = [row for row in rows if row["normal_force_N"] not in lifted] or rows
+    lifted, valid = lifted_forces(rows), _valid(rows)
     first, *others = response.get("read_outs", [""])
     of = f" of {first}" if others else ""
-    said = [f"The highest resonance{' found' if doubtful else ''}{of} is {_peak(max(valid, key=_size))}"]
+    said = [f"The highest resonance{' found' if doubtful else ''}{of} is {_peak(highest(rows) or {})}"]
     forces = {r["normal_force_N"] for r in valid}
     tops = [max((r for r in valid if r["normal_force_N"] == n), key=_size) for n in forces]
     ends = {r["normal_force_N"] for r in response.get("rising_at_the_edge", [])}
@@ -74,7 +73,7 @@ def _sentences(response: Mapping[str, Any]) -> list[str]:
     if lifted:
         named = " and ".join(filter(None, [", ".join(map(number, sorted(lifted)[:-1])), number(max(lifted))]))
         said.append(f"Under F_N = {named} N contacts would lift off: what was found there is not valid.")
-    if stressed := [row for row in rows if "stress_amplitude_Pa" in row]:
+    if stressed := [row for row in valid if "stress_amplitude_Pa" in row]:
         worst = max(stressed, key=lambda row: row["stress_amplitude_Pa"])
         margin = f", reserve factor {number(worst['reserve_factor'], 3)}" if "reserve_factor" in worst else ""
         force = number(worst["normal_force_N"])
@@ -103,6 +102,22 @@ NOT_VALID = "not valid"
 """In what speaks against a resonance of contacts that would lift off."""
 JUMPS = "another motion"
 """In what speaks against a resonance beside which there is another motion, higher perhaps."""
+
+
+def lifted_forces(rows: Sequence[Mapping[str, Any]]) -> frozenset[float]:
+    """Normal forces under which contacts would lift off at some resonance."""
+    return frozenset(row["normal_force_N"] for row in rows if NOT_VALID in row.get("doubt", ""))
+
+
+def _valid(rows: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
+    """Those under the other normal forces; all, where there are none."""
+    lifted = lifted_forces(rows)
+    return [row for row in rows if row["normal_force_N"] not in lifted] or rows
+
+
+def highest(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The resonance that a page begins with: the highest of those that are valid."""
+    return max(_valid(rows), key=_size, default=None)
 
 
 def _size(row: Mapping[str, Any]) -> float:

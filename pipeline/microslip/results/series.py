@@ -32,6 +32,7 @@ OVER = {
     "Omega": ("angular frequency", "rad/s"),
     "load": ("share of the load", ""),
     "normal_force": ("share of the normal force", ""),
+    "amplitude": ("amplitude", "m"),
 }
 """What a series may run over: in words, and its unit."""
 

@@ -6,7 +6,7 @@ From a response file and the body's modal file alone, whoever computed them and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +62,8 @@ class Assessment:
         component: its name. sweeps: normal force (N) -> its series, the motion of that, and numbers and most stressed
             places of the points to draw (see `drawn_points`). resonances: of all series. limits: of the material, or
             None. quantity: what the read-out measures. everywhere: whether
-            the points are enough for a curve over the frequency.
+            the points are enough for a curve over the frequency. lifted: normal force (N) -> which of the points to
+            draw are not valid, because contacts would lift off; not_valid: those under which a resonance is not.
     """
 
     component: str
@@ -71,12 +72,15 @@ class Assessment:
     limits: MaterialLimits | None
     quantity: Quantity = METRES
     everywhere: bool = True
+    lifted: Mapping[float, Array] = field(default_factory=dict)
+    not_valid: frozenset[float] = frozenset()
 
     @property
     def highest(self) -> StressedResonance | None:
-        """The resonance with the least margin (without limits, the most stressed one)."""
+        """The resonance with the least margin (without limits, the most stressed one) of those that are valid."""
         key = (lambda r: r.worst.vibration) if self.limits else (lambda r: -r.worst.amplitude)
-        return min(self.resonances, key=key, default=None)
+        valid = [r for r in self.resonances if r.normal_force not in self.not_valid]
+        return min(valid or self.resonances, key=key, default=None)
 
     def at(self, r: StressedResonance) -> tuple[Motion, CycleStress]:
         """Motion and stress where a resonance stresses the body most."""
@@ -261,7 +265,7 @@ def draw(
     if curves and found.everywhere:
         label, title = "largest stress amplitude of the body in MPa", f"{case}: largest stress of the body"
         drawn["stress over frequency"] = operating.over_frequency_plot(
-            curves, label, title, folder / "stress_over_frequency.png"
+            curves, label, title, folder / "stress_over_frequency.png", found.lifted
         )
     if lines := over_force(found):
         drawn["stress over normal force"] = operating.over_normal_force_plot(
@@ -269,6 +273,7 @@ def draw(
             "largest stress amplitude of the body in MPa",
             f"{case}: resonances over the normal force",
             folder / "stress_over_normal_force.png",
+            found.not_valid,
         )
     top = found.highest
     if top is not None:

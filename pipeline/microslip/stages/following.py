@@ -40,6 +40,11 @@ OF_CONTACTS = ("normal_stiffness", "tangential_stiffness", "friction", "roughnes
 """Keys of a contact that `optimum` may change in all of them at once."""
 
 NORMAL_FORCE = "normal_force"
+_UNITS = {
+    NORMAL_FORCE: "N", "normal_stiffness": "N/m", "tangential_stiffness": "N/m", "roughness": "m", "mass": "kg",
+    "pressed_at_rpm": "rpm", "speed_rpm": "rpm", "weak_springs": "Hz", "turn": "degrees", "phase": "degrees",
+}  # fmt: skip
+"""Of settings, by the last part of their names; other ones are told without."""
 _SIGNED = ("turn", "phase", "place")
 """Keys of angles, which may pass through 0; all others are followed in equal ratios."""
 
@@ -242,7 +247,7 @@ def write_optimum(found: Optimum, over: str, case: Case) -> list[Path]:
 
     files = [_optimum_table(found.found, over, case, found)]
     if any(one.status == "converged" for one in found.found.values()):
-        label = "normal force in N" if over == NORMAL_FORCE else over.replace("_", " ")
+        label = over.replace("_", " ") + (unit_of(over) and f" in{unit_of(over)}")
         picture = case.folder / "pictures" / "optimum.png"
         files.append(optimum_plot(found, label, _title(case, "highest resonance and optimum"), picture, case.quantity))
     said = [
@@ -261,9 +266,15 @@ def _optimum_table(found: Mapping[float, HighestPeak], over: str, case: Case, be
     return case.table("optimum.csv", (over, "frequency_Hz", case.quantity.column("amplitude"), "what"), rows)
 
 
+def unit_of(over: str) -> str:
+    """`` kg``: of a setting, behind a number; nothing where it is not known."""
+    unit = _UNITS.get(over.rpartition(".")[2], "")
+    return unit and f" {unit}"
+
+
 def optimum_message(found: Optimum, over: str, of: Quantity = METRES) -> str:
     """The optimum of what is read in a sentence."""
-    best, unit = found.resonance, " N" if over == NORMAL_FORCE else ""
+    best, unit = found.resonance, unit_of(over)
     if best.status != "converged":
         return f"{over}: no resonance was found at any value"
     name = "normal force" if over == NORMAL_FORCE else over
@@ -311,7 +322,7 @@ def is_optimum(found: Optimum) -> bool:
 
 def missed(found: Optimum, over: str) -> str:
     """Why there is no optimum, and where to look for it."""
-    low, high, unit = min(found.found), max(found.found), " N" if over == NORMAL_FORCE else ""
+    low, high, unit = min(found.found), max(found.found), unit_of(over)
     if found.status != NO_OPTIMUM or found.parameter not in (low, high):
         return f"no optimum was found: {found.status}"
     end = f"--low below {low:g}" if found.parameter == low else f"--high above {high:g}"

@@ -21,7 +21,8 @@ from .stage import Report
 
 def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     """What a person means by a path: a file or folder that can be run as it is; where it is a name or a folder of
-    products, the case of that name (``pipeline/cases/NAME.toml``) or the body (``geometry/NAME``).
+    products, the case of that name (``pipeline/cases/NAME.toml``) or the body (``geometry/NAME``), or what stands in
+    the folder ``NAME``. Of a body or system the case beside it, where it has to be one.
 
     Args:
         case: whether it has to be a case; else a body comes first.
@@ -29,6 +30,9 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     Raises:
         UserError: nothing of that name, with those that there are.
     """
+    beside = path.with_name("case.toml")
+    if case and path.name in ("body.toml", "system.toml") and beside.is_file():
+        return beside
     kinds = ("case",) if case else ("body", "system", "case")
     runs = path.is_file() if path.suffix == ".toml" else any((path / f"{kind}.toml").is_file() for kind in kinds)
     named = path.is_dir() or path.name in PRODUCTS or path.parent == Path() and not path.suffix
@@ -37,6 +41,7 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     name = path.parent.name if path.name in PRODUCTS else path.resolve().name
     places = [root / "pipeline" / "cases" / f"{name}.toml", root / "geometry" / name / "case.toml"]
     places = places if case else [root / "geometry" / name / "body.toml", *places]
+    places += [root / name / f"{kind}.toml" for kind in kinds]
     found = next((p for p in places if p.is_file()), None)
     if found is not None or path.is_file():
         return found or path

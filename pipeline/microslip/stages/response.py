@@ -18,17 +18,18 @@ from ..case import CaseResult, CaseSettings, checkpoint, load_case, run_case
 from ..case.assemble import build
 from ..case.run import lifted
 from ..case.settings import FIRST_HARMONICS
-from ..data import ModalBasis, UserError
+from ..data import Array, ModalBasis, UserError
 from ..files import store
 from ..harmonic_balance.response import HarmonicResponse
 from ..harmonic_balance.sweeps import overhanging
-from ..report.response import JUMPS, response_html
+from ..report.response import JUMPS, highest, lifted_forces, response_html
 from ..results import Response, read_journal, read_response, response_of, write_response
 from ..results.checks import sentence
 from ..results.series import CONVERGED
 from ..units import counted, percent, to_rpm
 from . import assessment
 from .checkpoint import Checkpoint, hashes_of
+from .ring import draw_ring
 from .stage import Made, Report, Stage
 
 if TYPE_CHECKING:
@@ -154,6 +155,7 @@ def _finished(points: Checkpoint, result: CaseResult, wanted: Wanted, report: Re
     response = replace(response, resonances=tuple(summary["resonances"]))
     write_response(folder / "response.h5", response)
     files = [folder / "response.h5", folder / "response.csv"]
+    drawn |= _ring(result, response, folder, report) if wanted.pictures else {}
     more = _assessed(result, response, folder, wanted, report)
     if more is not None:
         known = {(row["normal_force_N"], row["frequency_Hz"]): row for row in summary["resonances"]}
@@ -240,6 +242,17 @@ def _drawn(result: CaseResult, rows: list[dict[str, Any]], folder: Path) -> dict
     return drawn
 
 
+def _ring(result: CaseResult, response: Response, folder: Path, report: Report) -> dict[str, Path]:
+    """Title -> picture of the whole ring at its highest resonance; nothing without a ring, a resonance or PyVista."""
+    row = highest(response.resonances)
+    if result.settings.ring is None or row is None or _can_draw() is not None:
+        return {}
+    report("picture of the ring")
+    series, path = response.one(normal_force=row["normal_force_N"]), folder / "pictures" / "ring.png"
+    drawn = draw_ring(result.built, series, row, path)
+    return {} if drawn is None else {"ring at resonance": drawn}
+
+
 def _response(points: Checkpoint, result: CaseResult, summary: Mapping[str, Any]) -> Response:
     """What goes into ``response.h5``: the journal's points of this case's sweep."""
     names = {checkpoint.series_name(n): n for n in result.responses}
@@ -272,6 +285,7 @@ def _assessed(
     limits = result.settings.material_limits
     everywhere = wanted.stresses == "all"
     found = assessment.assess(response, basis, monitor, component, limits, report=report, everywhere=everywhere)
+    found = replace(found, lifted=_lifted_off(result, found), not_valid=lifted_forces(response.resonances))
     maps, messages = ({}, []) if found.highest is None else _maps(result, found, report)
     drawn = {}
     if wanted.pictures:
@@ -281,6 +295,15 @@ def _assessed(
         contacts = sum(n.startswith("contacts/") and n.endswith("/dissipated") for n in arrays)
         drawn = assessment.draw(found, basis, name, folder / "pictures", scenes, maps, contacts)
     return _Assessed(found.table(), drawn, _for_paraview(found, basis, maps, folder), messages)
+
+
+def _lifted_off(result: CaseResult, found: assessment.Assessment) -> dict[float, Array]:
+    """Normal force (N) -> at which of the points whose stress is drawn contacts would lift off."""
+    off = {}
+    for normal, (series, _, chosen, _) in found.sweeps.items():
+        r = result.responses[normal]
+        off[normal] = np.interp(series.frequency[chosen], r.frequency, lifted(result.built, r)) > 0
+    return off
 
 
 def _maps(

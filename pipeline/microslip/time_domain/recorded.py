@@ -14,6 +14,7 @@ import numpy as np
 from ..data import Array, UserError
 from ..files.store import fingerprint
 from ..harmonic_balance import solved
+from ..harmonic_balance.nonlinear_modes import Backbone
 from ..results.series import Series
 from . import orbit, samples
 from .equations import Equations
@@ -161,8 +162,8 @@ def read_orbits(path: Path | str) -> tuple[Recorded, ...]:
         return tuple(Recorded(path, i, file[f"motion_{i}"]) for i in range(1, count + 1))
 
 
-def load(path: Path | str) -> Series | Recorded:
-    """What a result's `save` wrote: the only series of a response file, or the only motion in time of another.
+def load(path: Path | str) -> Series | Backbone | Recorded:
+    """What a result's `save` wrote: the only series of a response file, a nonlinear mode, or the only motion in time.
 
     Files of several are read by `read_response` and `read_orbits`.
 
