@@ -270,7 +270,7 @@ def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> Non
     found = orbit.run(equations.of(Assembly((vane,), (), (load,), (Output("vane", "tip", "u_x"),)), 900.0), 2, 2, 64)
     at = np.arange(64, 128, 8)
     moved = np.einsum("pxm,fm->fpx", group.phi, classification.of_body(found, 0, at))
-    first, *files = write_motion(basis, found.time[at], moved, tmp_path / "vane.pvd")
+    first, *files = write_motion(basis, found.time[at], moved[:, None], tmp_path / "vane.pvd")
     times = [float(x) for x in re.findall(r'timestep="([^"]+)"', first.read_text())]
     np.testing.assert_array_equal(times, found.time[at])
     for file, read in zip(files, found.y[0][at], strict=True):
