@@ -85,10 +85,10 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
 def _section(orbit: Orbit, axes: Axes, read_out: int) -> None:
     """Velocity over displacement after every period: the Poincare section."""
     last = slice(orbit.samples - 1, None, orbit.samples)
-    (y, unit), (v, per_second) = (_sized(x[read_out][last]) for x in (orbit.y, orbit.v))
-    axes.plot(y, v, ".", color=COLOURS[1], markersize=5)
+    (y, unit), (v, per_second) = (_sized(x[read_out]) for x in (orbit.y, orbit.v))
+    axes.plot(y[last], v[last], ".", color=COLOURS[1], markersize=5)
     axes.set(xlabel=f"{orbit.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
-    axes.set_title(f"Poincaré section, {len(y)} periods", fontsize=9)
+    axes.set_title(f"Poincaré section, {len(y[last])} periods", fontsize=9)
 
 
 def _over_frequency(orbit: Orbit, axes: Axes, read_out: int) -> None:

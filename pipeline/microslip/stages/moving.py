@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..case.assemble import Built, Loaded
-from ..data import Array, ModalBasis
+from ..data import Array, ModalBasis, ModalGroup
 from ..exchange.vtu import write_motion
 from ..ring.expansion import sector_rotation
 from ..system.disc import spread
@@ -49,14 +49,20 @@ def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path
 
 def _moved(body: Loaded, q: Array) -> Array:
     """(f, sectors, points, 3) m of a body, by its coordinates (f, m), those of all sectors of a cyclic one."""
-    basis = body.basis
-    if basis.sectors == 1:
+    if body.basis.sectors == 1:
         return np.einsum("pxm,fm->fpx", body.group.phi, q)[:, None]
-    waves = [body.groups[k].phi for k in sorted(body.groups)]
-    return np.stack([_on_sector(basis, waves, j, q) for j in range(basis.sectors)], axis=1)
+    return whole_ring(body.basis, body.groups, q)
 
 
-def _on_sector(basis: ModalBasis, waves: list[Array], sector: int, q: Array) -> Array:
-    """(f, points, 3) in the axes of the whole ring, as `system.disc` puts its coordinates together."""
-    shapes = spread(waves, sector, basis.sectors)
-    return np.einsum("yx,pxm,fm->fpy", sector_rotation(basis, sector), shapes, q, optimize=True).astype(np.float32)
+def whole_ring(basis: ModalBasis, groups: Mapping[int, ModalGroup], q: Array) -> Array:
+    """(f, N, points, 3) m of all sectors in the axes of the ring, by its coordinates (f, m) of `system.disc`.
+
+    Args:
+        groups: of every nodal diameter.
+    """
+    waves = [groups[k].phi for k in sorted(groups)]
+    found = np.empty((len(q), basis.sectors, *waves[0].shape[:2]), np.float32)
+    for j in range(basis.sectors):
+        shapes = spread(waves, j, basis.sectors)
+        found[:, j] = np.einsum("yx,pxm,fm->fpy", sector_rotation(basis, j), shapes, q, optimize=True)
+    return found
