@@ -24,7 +24,7 @@ from microslip.analyses import balanced
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
-from microslip.contact.law import value
+from microslip.contact.law import Law, settings, value
 from microslip.contact.normal import Normal, Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
@@ -383,6 +383,19 @@ def test_what_an_orbit_cannot_do_is_refused(
 ) -> None:
     assert main(["orbit", "case.toml", "-q", "--set", change]) == 2
     assert words in capsys.readouterr().err and not (hammer / "build" / "hammer" / "orbit.csv").exists()
+
+
+def test_a_law_without_history_is_refused_by_name() -> None:
+    """One of another package that says what force it has and not what it remembers."""
+
+    @settings
+    class Forgetful(Law):
+        def step(self, u: Any, v: Any, dt: Any, state: Any) -> tuple[Any, Any]:
+            return 3.0 * u, state
+
+    mass = ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[ms.Element(Forgetful(), 0, along="n")])
+    with pytest.raises(UserError, match=r"Forgetful has no init, slip, stored"):
+        ms.integrate(mass, 1.2, unit="rad/s", settle=0, keep=1)
 
 
 def test_too_few_steps_are_refused_with_how_many_are_needed() -> None:
