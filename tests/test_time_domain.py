@@ -444,6 +444,19 @@ def test_a_motion_begun_on_a_balance_is_periodic_from_its_first_period(name: str
     assert found.repeats == 1
 
 
+SLOWER = [pytest.param(name, marks=pytest.mark.slow) for name in ("slider", "spring", "two", "vane")]
+
+
+@pytest.mark.parametrize("name", ["stop", *SLOWER])
+def test_first_harmonics_from_rest_are_those_of_harmonic_balance(name: str) -> None:
+    """To 1e-4, where 400 periods have let the start die away."""
+    system, frequency = systems()[name]
+    found = ms.integrate(system, frequency, unit="rad/s", settle=400, keep=1, steps=4096)
+    many = {} if name == "vane" else {"harmonics": 25, "samples": 1024}  # the vane has 15 of its own
+    amplitude = ms.harmonic_response(system, [frequency], unit="rad/s", **many).amplitude[0]
+    assert 2 / 256 * abs(np.fft.rfft(found.y[0])[1]) == pytest.approx(amplitude, rel=1e-4)
+
+
 def test_contacts_remember_the_balance_that_a_motion_begins_on() -> None:
     """A slider that has not been dragged along the balance's motion stands elsewhere, and the motion is another."""
     slider, frequency = systems()["slider"][0], 1.2
