@@ -41,7 +41,7 @@ $(CASES): %: $(READY)
 	@$(RUN) run pipeline/cases/$*.toml
 
 $(BODIES): %: build/%/report.html
-pendulum: pendulum-friction
+pendulum: pendulum-friction-two-modes pendulum-friction-three-modes pendulum-friction
 $(BODIES:%=%-mesh): %-mesh: meshes/%.msh
 $(BODIES:%=%-modes): %-modes: build/%/basis.h5
 

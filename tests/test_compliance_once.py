@@ -289,6 +289,30 @@ def test_a_law_of_the_surface_gets_the_bulk_from_the_file(blocks: dict[str, Moda
     assert abs(added[0] - plain[0]) < 0.05 * abs(without[0] - plain[0])
 
 
+def test_an_impact_on_modes_without_a_static_answer_is_warned_of(blocks: dict[str, ModalBasis]) -> None:
+    """A rigid contact, and one whose stiffness says nothing of the bulk: on eigenmodes alone, as much as the residual
+    compliance is; where the contact's stiffness counts the bulk, or it is added from the file, nothing is missing."""
+
+    def told(method: str, contact: dict[str, object]) -> list[str]:
+        raw = case(None, 1e9).model_dump(exclude_unset=True)
+        raw |= {"contacts": [{"interface": "tip", "friction": 0.3, **contact}], "orbit": {"frequency": 500.0}}
+        messages = build(CaseSettings.model_validate(raw), {"bar": blocks[method]}, "case.toml").messages
+        return [words for words in messages if "no static answer" in words]
+
+    soft = {"normal_stiffness": 1e10, "tangential_stiffness": 1e6, "law": "jenkins"}
+    rigid = {"interference": -1e-5, "law": "set-valued"}
+    for method in METHODS:
+        for contact in (soft, rigid):
+            assert len(told(method, contact)) == (method == "eigenmodes"), method
+    (words,) = told("eigenmodes", rigid)
+    c = blocks["eigenmodes"].groups[0, 0].compliance
+    i = c.labels.index("interface:tip:u_n")
+    assert f"{c.residual[i, i]:.3g} of {c.static[i, i]:.3g} m/N are missing" in words
+    for includes in ("surface", "bulk+surface"):
+        assert not told("eigenmodes", {**soft, "includes": includes})
+    assert not told("eigenmodes", {**soft, "normal_stiffness": 0.05 / c.residual[i, i]})
+
+
 def test_report_and_summary_say_it(blocks: dict[str, ModalBasis]) -> None:
     for method, basis in blocks.items():
         said = sentence(basis, basis.groups[0, 0])

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import meshio
 import numpy as np
 import pytest
+import sector
 from scipy.integrate import solve_ivp
 
 import microslip as ms
@@ -23,15 +24,16 @@ from microslip.analyses import balanced
 from microslip.cli import main
 from microslip.contact.friction import Coulomb
 from microslip.contact.heights import Polynomial
-from microslip.contact.law import value
+from microslip.contact.law import Law, settings, value
 from microslip.contact.normal import Normal, Penalty, Rough
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.data import CENTRIFUGAL, Rows, RunUp, UserError
 from microslip.exchange.vtu import write_motion
 from microslip.report.page import number, text
+from microslip.stages.moving import whole_ring
 from microslip.system import Body, Contact, Force, Monitor, Spring, System
-from microslip.system.assembly import Assembly, ContactFace, Load, Output, preloaded_contact
+from microslip.system.assembly import Assembly, ContactFace, Load, Output, Ring, preloaded_contact
 from microslip.system.component import Component
 from microslip.time_domain import classification, equations, orbit, recorded, samples, starts
 from microslip.time_domain.stepper import Options, Stepper
@@ -270,7 +272,7 @@ def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> Non
     found = orbit.run(equations.of(Assembly((vane,), (), (load,), (Output("vane", "tip", "u_x"),)), 900.0), 2, 2, 64)
     at = np.arange(64, 128, 8)
     moved = np.einsum("pxm,fm->fpx", group.phi, classification.of_body(found, 0, at))
-    first, *files = write_motion(basis, found.time[at], moved, tmp_path / "vane.pvd")
+    first, *files = write_motion(basis, found.time[at], moved[:, None], tmp_path / "vane.pvd")
     times = [float(x) for x in re.findall(r'timestep="([^"]+)"', first.read_text())]
     np.testing.assert_array_equal(times, found.time[at])
     for file, read in zip(files, found.y[0][at], strict=True):
@@ -279,6 +281,31 @@ def test_a_moving_body_for_paraview_moves_as_its_modes_do(tmp_path: Path) -> Non
         assert mesh.point_data["displacement"][nearest, 0] == pytest.approx(
             read, rel=1e-6, abs=1e-6 * np.abs(moved).max()
         )
+
+
+def test_all_sectors_of_a_cyclic_body_move_as_their_own_read_outs_say(tmp_path: Path) -> None:
+    """Six sectors in a travelling wave: shapes turned into the ring's axes and put together meet the ties between
+    neighbours, and their tips move as the monitors of the sectors do; the file for ParaView has all of them."""
+    N, basis = 6, sector.basis()
+    groups = {k: g for (_, k), g in basis.groups.items()}
+    ring = Assembly(
+        (Component("sector", groups, N),), (), (Load("sector", "gas", 1.0),), (Output("sector", "tip", "u_y"),),
+        Ring(N, 1),
+    )  # fmt: skip
+    frequency = 0.4 * min(g.omega[0] for g in groups.values())
+    found = orbit.run(equations.of(ring, float(frequency)), 2, 1, 16)
+    moved = whole_ring(basis, groups, classification.of_body(found, 0, np.arange(16)))
+    place = groups[0].monitors["tip"].point
+    tip = int(np.argmin(np.linalg.norm(basis.mesh.points - place, axis=1)))
+    size = np.abs(found.y).max()
+    assert np.ptp(found.y, axis=1).min() > 0.1 * size
+    np.testing.assert_allclose(moved[:, :, tip, 1].T, found.y, atol=1e-4 * size)
+    for left, right in sector.partners(basis.mesh, N):
+        np.testing.assert_allclose(moved[:, :, right], np.roll(moved[:, :, left], -1, axis=1), atol=1e-5 * size)
+    first, *files = write_motion(basis, found.time[:2], moved[:2], tmp_path / "sector.pvd")
+    written = meshio.read(files[1]).point_data["displacement"]
+    assert len(files) == 2 and len(written) % N == 0
+    assert np.abs(written).max() == pytest.approx(np.abs(moved[1]).max(), rel=1e-5)
 
 
 def rigid(folder: Path, how: dict[str, Any]) -> None:
@@ -361,6 +388,19 @@ def test_what_an_orbit_cannot_do_is_refused(
     assert words in capsys.readouterr().err and not (hammer / "build" / "hammer" / "orbit.csv").exists()
 
 
+def test_a_law_without_history_is_refused_by_name() -> None:
+    """One of another package that says what force it has and not what it remembers."""
+
+    @settings
+    class Forgetful(Law):
+        def step(self, u: Any, v: Any, dt: Any, state: Any) -> tuple[Any, Any]:
+            return 3.0 * u, state
+
+    mass = ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[ms.Element(Forgetful(), 0, along="n")])
+    with pytest.raises(UserError, match=r"Forgetful has no init, slip, stored"):
+        ms.integrate(mass, 1.2, unit="rad/s", settle=0, keep=1)
+
+
 def test_too_few_steps_are_refused_with_how_many_are_needed() -> None:
     with pytest.raises(UserError, match="take 158 or more"):
         orbit.run(equations.of(hitting(BOOK), 40.0), 0, 1, steps=20)
@@ -405,6 +445,19 @@ def test_a_motion_begun_on_a_balance_is_periodic_from_its_first_period(name: str
     size = np.abs(found.y).max(axis=1, keepdims=True)
     np.testing.assert_allclose(second / size, first / size, atol=2e-4)
     assert found.repeats == 1
+
+
+SLOWER = [pytest.param(name, marks=pytest.mark.slow) for name in ("slider", "spring", "two", "vane")]
+
+
+@pytest.mark.parametrize("name", ["stop", *SLOWER])
+def test_first_harmonics_from_rest_are_those_of_harmonic_balance(name: str) -> None:
+    """To 1e-4, where 400 periods have let the start die away."""
+    system, frequency = systems()[name]
+    found = ms.integrate(system, frequency, unit="rad/s", settle=400, keep=1, steps=4096)
+    many = {} if name == "vane" else {"harmonics": 25, "samples": 1024}  # the vane has 15 of its own
+    amplitude = ms.harmonic_response(system, [frequency], unit="rad/s", **many).amplitude[0]
+    assert 2 / 256 * abs(np.fft.rfft(found.y[0])[1]) == pytest.approx(amplitude, rel=1e-4)
 
 
 def test_contacts_remember_the_balance_that_a_motion_begins_on() -> None:
@@ -540,6 +593,14 @@ def test_a_motion_is_saved_and_read_with_all_that_it_says(tmp_path: Path) -> Non
     assert (data["event_kind"].values == "slips").sum() == found.count("slips") > 0
     assert data["contact_force"].attrs["units"] == "N, N m" and set(data["event_contact"].values) == {"stop"}
     np.testing.assert_allclose(loaded.plot().lines[0].get_xdata(), 1e6 * found.y[0])
+
+
+def test_what_sticks_begins_no_slip_by_rounding() -> None:
+    """Pressed by 0.5 N and driven so little that nothing slides: where the way turns along one of its axes, the step
+    along it is smaller than what rounding leaves of the path slid."""
+    found = orbit.run(equations.of(hitting(SLIPS, normal=0.5, push=0.05), 300.0), 0, 30, 16, 4096)
+    assert found.energy["lost"][-1] < 1e-9 * np.ptp(found.energy["stored"])
+    assert found.count("slips") == 0 and found.count("sticks") == 0
 
 
 def test_what_is_no_whole_file_of_one_motion_is_refused(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -26,7 +27,7 @@ from ..system.assembly import Assembly, Contact, ContactFace, Load, Output, prel
 from ..system.component import Component, Ring
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
-from .compliance import Face, Springs, counted_once, residual_share
+from .compliance import Face, Springs, counted_once, residual_share, static_answer
 from .driving import as_asked, damped, flow_of, loads_of, messages_of, on_springs, with_field
 from .points import (
     curved_springs,
@@ -290,7 +291,11 @@ def _stiffness(
         springs, message = (0.0, 0.0, 0.0), ""
     else:
         springs, message = counted_once(c, _given(_composed(c, path)), _faces(settings, c, loaded), path)
-    return own, springs, [message] if message else []
+    said = [message]
+    if settings.orbit or c.what.rigid:
+        stiffness = math.inf if c.what.rigid else springs[0]
+        said.append(static_answer(c, stiffness, _faces(settings, c, loaded)))
+    return own, springs, [words for words in said if words]
 
 
 def _sides(

@@ -101,6 +101,31 @@ def _what_is_counted(
     return ""
 
 
+FELT = 0.1
+"""Part of what a contact yields itself from which on a reader is told what the body does not yield."""
+
+
+def static_answer(c: ContactSettings, normal: float, faces: Sequence[Face]) -> str:
+    """A sentence where nothing holds what the bodies yield at once under an impact; else nothing.
+
+    Neither their modes, nor the residual compliance beside them, nor the contact's stiffness: the impact meets the
+    masses of the modes alone.
+
+    Args:
+        normal: stiffness of the contact, N/m; inf of a rigid one.
+    """
+    s = _sum([f.share("u_n") for f in faces])
+    if c.is_curved or c.includes is not None or not s.left or normal * s.left / s.contacts < FELT:
+        return ""
+    reduction = ", ".join(dict.fromkeys(f.reduction for f in faces))
+    other = "" if c.what.rigid else f', or includes = "{SURFACE}" where the stiffness counts no bulk'
+    return (
+        f"Contact {c.interface}: the modes ({reduction}) contain no static answer for an impact, {s.left:.3g} of "
+        f"{s.static:.3g} m/N are missing ({s.label}), so that it meets their masses alone; take a basis with static "
+        f'modes (reduction = "craig-bampton" or "rubin"){other}.'
+    )
+
+
 def residual_share(
     group: ModalGroup, reduction: str, has_residual: bool, faces: Mapping[str, str | None]
 ) -> Array | None:

@@ -80,7 +80,8 @@ def write_motion(basis: ModalBasis, times: Array, moved: Array, path: Path | str
     Point data: ``displacement`` (n, 3) m, about the mesh at rest; ParaView's filter Warp By Vector moves it.
 
     Args:
-        times: (f,) s. moved: (f, points, 3) m. path: of the PVD file; the others stand beside it.
+        times: (f,) s. moved: (f, sectors, points, 3) m, of all sectors in the axes of the ring. path: of the PVD file;
+            the others stand beside it.
 
     Returns:
         All files, the PVD file first.
@@ -91,9 +92,11 @@ def write_motion(basis: ModalBasis, times: Array, moved: Array, path: Path | str
     import meshio
 
     path, files, (outside, used) = Path(path), dict[float, Path](), _outside(basis)
+    if basis.sectors > 1:
+        outside = replicate(outside, basis.rotation_axis, basis.rotation_point, basis.sectors).mesh
     for i, (time, shape) in enumerate(zip(times, moved, strict=True)):
         files[float(time)] = path.with_name(f"{path.stem}_{i:03d}.vtu")
-        data = {"displacement": single(shape[used])}
+        data = {"displacement": single(shape[:, used].reshape(-1, 3))}
         save(meshio.Mesh(outside.points, dict(outside.cells), point_data=data), files[float(time)])
     write_text(path, collection(files))
     return [path, *files.values()]

@@ -9,20 +9,20 @@ import numpy as np
 from ..data import Array, ModalBasis
 from ..files.store import complete_or_absent
 from ..units import METRES
-from . import lettering, views
-from .scene import fit, quiet_vtk
+from . import lettering, ring_views, views
+from .scene import Stage, fit, quiet_vtk
 
 MILLISECONDS = 60
 """Of a frame."""
 
 
 def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:
-    """Frames of displacements (f, points, 3) in m, amplified alike, over the outline of the body at rest.
+    """Frames of displacements (f, sectors, points, 3) in m, amplified alike; of one body over its outline at rest.
 
     The colour is the size of the displacement; the largest one and the amplification stand below.
     """
     quiet_vtk()
-    studio = views.open_studio(basis)
+    studio = views.open_studio(basis) if basis.sectors == 1 else ring_views.open_ring(basis, Stage())
     try:
         frames = _frames(studio, moved, title)
     finally:
@@ -32,20 +32,24 @@ def moving_gif(basis: ModalBasis, moved: Array, path: Path, title: str) -> Path:
     return path
 
 
-def _frames(studio: views.Studio, moved: Array, title: str) -> list[lettering.Picture]:
-    sizes = np.linalg.norm(moved, axis=2)
-    largest = float(sizes.max())
-    factor = views.mode_scale(studio, moved[np.argmax(sizes.max(axis=1))])
-    outside, source = studio.outside, studio.outside.source
-    shown = studio.points + factor * moved[:, source]
+def _frames(studio: views.Studio | ring_views.RingStudio, moved: Array, title: str) -> list[lettering.Picture]:
+    sizes = np.linalg.norm(moved, axis=3)
+    largest, (frame, sector) = float(sizes.max()), np.unravel_index(sizes.max(axis=2).argmax(), sizes.shape[:2])
+    source, count = studio.outside.source, len(moved)
+    swing = views.AMPLITUDE if isinstance(studio, views.Studio) else ring_views.SWING
+    factor = views.mode_scale(studio, moved[frame, sector], swing)
+    note = f"amplified {factor:.3g} times; largest displacement {METRES.sized(largest)}"
+    if isinstance(studio, views.Studio):
+        still, triangles, note = studio.points, studio.outside.triangles, f"{note}; grey lines: at rest"
+        studio.stage.lines(studio.basis.mesh.points, studio.outside.outline, (150, 154, 164), 1.5)
+    else:
+        still, triangles = studio.points(), studio.every(studio.triangles, len(source))
+    shown = still + factor * moved[:, :, source].reshape(count, -1, 3)
     camera = fit(shown.reshape(-1, 3), studio.axes, 0.45 * views.AREA)
-    note = f"amplified {factor:.3g} times; largest displacement {METRES.sized(largest)}; grey lines: at rest"
-    studio.stage.lines(studio.basis.mesh.points, outside.outline, (150, 154, 164), 1.5)
-    data = studio.stage.skin(
-        studio.points, outside.triangles, np.zeros(len(source)), cmap=views.DISPLACEMENT_MAP, clim=(0.0, 1.0)
-    )
+    colours = {"cmap": views.DISPLACEMENT_MAP, "clim": (0.0, 1.0)}
+    data = studio.stage.skin(still, triangles, np.zeros(len(still)), **colours)
     frames = []
-    for points, size in zip(shown, sizes[:, source] / max(largest, 1e-300), strict=True):
-        studio.stage.reshape(data, outside.triangles, points, size)
+    for points, size in zip(shown, sizes[:, :, source].reshape(count, -1) / max(largest, 1e-300), strict=True):
+        studio.stage.reshape(data, triangles, points, size)
         frames.append(lettering.captioned(studio.stage.shoot(camera), title, note, 16))
     return frames

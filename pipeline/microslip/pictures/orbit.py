@@ -35,15 +35,19 @@ EVENT_MARKS = (("closes", "v", 4, "meets"), ("slips", "|", 9, "begins to slip"))
 
 
 def orbit_picture(orbit: Orbit, path: Path, title: str, read_out: int = 0) -> Path:
-    """Phase portrait of a read-out, its last periods with events, its spectrum; how that changes, where the motion does
-    not repeat; where there is friction, the ways of contacts in their plane and their loops."""
-    panels: list[Panel] = [
-        partial(orbit.plot, read_out=read_out),
-        partial(_history, orbit, read_out=read_out),
-        partial(_spectrum, orbit, read_out=read_out),
-    ]
+    """What its read-out does, and where there is friction, the ways of contacts in their plane and their loops.
+
+    Phase portrait, the last periods with events, the spectrum; where the motion does not repeat, its Poincare section
+    and how the spectrum changes. Of a run-up, its size over the frequency, and the spectrum that changes with that.
+    """
+    drawn: list[Callable[..., object]] = [orbit.plot, partial(_history, orbit), partial(_spectrum, orbit)]
+    if orbit.run_up:
+        drawn = [partial(_over_frequency, orbit), partial(_history, orbit)]
+    elif not orbit.repeats:
+        drawn.insert(1, partial(_section, orbit))
     if not orbit.repeats and len(orbit.time) >= 2 * WINDOW * orbit.samples:
-        panels.append(partial(_spectrogram, orbit, read_out=read_out))
+        drawn.append(partial(_orders if orbit.run_up else _spectrogram, orbit))
+    panels: list[Panel] = [partial(draw, read_out=read_out) for draw in drawn]
     areas = loops(orbit)
     rubbing = [i for i in range(len(orbit.touching)) if rubs(orbit, i)]
     for i in sorted(rubbing, key=lambda i: -np.nansum(areas[coordinates(orbit, i)]))[:OF_CONTACTS]:
@@ -76,6 +80,51 @@ def portraits(orbits: Sequence[tuple[str, Orbit]], path: Path, title: str) -> Pa
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", fontsize=9)
     figure.suptitle(title, fontweight="bold")
     return save_figure(figure, path)
+
+
+def _section(orbit: Orbit, axes: Axes, read_out: int) -> None:
+    """Velocity over displacement after every period: the Poincare section."""
+    last = slice(orbit.samples - 1, None, orbit.samples)
+    (y, unit), (v, per_second) = (_sized(x[read_out]) for x in (orbit.y, orbit.v))
+    axes.plot(y[last], v[last], ".", color=COLOURS[1], markersize=5)
+    axes.set(xlabel=f"{orbit.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
+    axes.set_title(f"Poincaré section, {len(y[last])} periods", fontsize=9)
+
+
+def _over_frequency(orbit: Orbit, axes: Axes, read_out: int) -> None:
+    """Displacement over the frequency of the excitation, and its largest size in every period of that."""
+    f, (y, unit) = orbit.frequency, _sized(orbit.y[read_out])
+    moves = np.flatnonzero(f != f[-1])
+    period = np.floor(np.cumsum(f[moves]) * (orbit.time[1] - orbit.time[0])).astype(int)
+    begins = np.searchsorted(period, np.unique(period))
+    largest = np.maximum.reduceat(np.abs(y[moves]), begins)
+    axes.plot(f[moves], y[moves], color=COLOURS[0], linewidth=0.4)
+    axes.plot(f[begins], largest, color=COLOURS[1], linewidth=1.4, label="largest in each period")
+    axes.set(xlabel="frequency of the excitation in Hz", ylabel=f"{orbit.labels[read_out]} in {unit}")
+
+
+def _orders(orbit: Orbit, axes: Axes, read_out: int) -> None:
+    """Spectra as in `_spectrogram`, in Hz over time, and the frequencies of the loads."""
+    middle, multiples, decibels = _spectra(orbit, read_out)
+    last, f = orbit.Omega / (2 * np.pi), orbit.frequency
+    drawn = axes.pcolormesh(
+        middle * orbit.period, multiples * last, decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest"
+    )
+    axes.figure.colorbar(drawn, ax=axes, label="amplitude in dB")  # type: ignore[union-attr]
+    for h in orbit.equations.harmonics:
+        axes.plot(orbit.time, h * f, color="white", linewidth=1.0, linestyle="--", label=_order(orbit, h))
+    axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, labelcolor="black")
+    for line in axes.get_legend().get_lines():  # type: ignore[union-attr]
+        line.set_color("black")
+    axes.set(xlabel="time in s", ylabel="frequency in Hz", ylim=(0, min(multiples[-1], 4.0) * last))
+    axes.grid(False)
+
+
+def _order(orbit: Orbit, harmonic: int) -> str:
+    """Of a load: its engine order where bodies turn slower than it, else which harmonic it is."""
+    ramp = orbit.equations.ramp
+    turns = ramp is not None and ramp.order > 1
+    return f"engine order {harmonic * ramp.order}" if turns and ramp else f"excitation, harmonic {harmonic}"
 
 
 def _history(orbit: Orbit, axes: Axes, read_out: int) -> None:
@@ -122,16 +171,21 @@ def _spectrum(orbit: Orbit, axes: Axes, read_out: int) -> None:
     plain_numbers(axes.yaxis, (1.0,))
 
 
-def _spectrogram(orbit: Orbit, axes: Axes, read_out: int) -> None:
-    """Spectra of windows of `WINDOW` periods that overlap, in dB of the largest amplitude."""
+def _spectra(orbit: Orbit, read_out: int) -> tuple[Array, Array, Array]:
+    """Middles of windows of `WINDOW` periods that overlap; multiples of the excitation; (w, m) dB of the largest."""
     y, n = orbit.y[read_out] - orbit.y[read_out].mean(), WINDOW * orbit.samples
     begins = np.arange(0, len(y) - n + 1, orbit.samples)
     sizes = np.abs(np.fft.rfft(np.hanning(n) * y[begins[:, None] + np.arange(n)], axis=1))
     multiples = np.arange(sizes.shape[1]) / WINDOW
     seen = multiples <= min(HIGHEST, orbit.samples / 2)
     decibels = 20 * np.log10(np.maximum(sizes[:, seen] / sizes.max(), 1e-300))
-    middle = begins / orbit.samples + 0.5 * WINDOW
-    drawn = axes.pcolormesh(middle, multiples[seen], decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest")
+    return begins / orbit.samples + 0.5 * WINDOW, multiples[seen], decibels
+
+
+def _spectrogram(orbit: Orbit, axes: Axes, read_out: int) -> None:
+    """Spectra of windows in time, in dB of the largest amplitude."""
+    middle, multiples, decibels = _spectra(orbit, read_out)
+    drawn = axes.pcolormesh(middle, multiples, decibels.T, vmin=-80, vmax=0, cmap="viridis", shading="nearest")
     axes.figure.colorbar(drawn, ax=axes, label="amplitude in dB")  # type: ignore[union-attr]
     axes.set(xlabel="time in periods of the excitation", ylabel="multiples of its frequency")
     axes.grid(False)

@@ -15,7 +15,6 @@ from ..case.assemble import Built, build, swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
 from ..data import UserError
-from ..exchange.vtu import write_motion
 from ..files import store
 from ..files.tables import columns_csv
 from ..report.orbit import orbit_html
@@ -26,6 +25,7 @@ from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
 from ..units import METRES, counted, percent
 from .checkpoint import hashes_of
+from .moving import moving_bodies
 from .stage import Made, Report, Stage, hash_of_code
 
 
@@ -63,12 +63,43 @@ def orbit_stage(
 def _work(
     stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], pictures: bool, inputs: str
 ) -> Made:  # fmt: skip
-    folder, asked = stage.product.parent, settings.orbit
-    assert asked is not None
+    folder = stage.product.parent
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
+    motions = _asked(settings, built, case_path)
+    stage.begin()
+    found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
+    notes, messages = _notes(found), _messages(found, built)
+    store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
+    drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
+    moving = moving_bodies(found, built, folder) if pictures else []
+    drawn += [path for path in moving if path.suffix == ".gif"]
+    rows = [
+        {"name": name, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for name, one in found
+    ]
+    page = orbit_html(f"{settings.name}: motion in time", rows, notes, messages, drawn)
+    store.write_text(folder / "orbit.html", page)
+    made = [folder / name for name in ("orbit.html", "orbit.csv", "orbit.h5")]
+    made += dict.fromkeys(drawn + moving)
+    told = {
+        "files": [str(path.relative_to(folder)) for path in made],
+        "sentences": [*notes, *messages],
+        "diverged": [name for name, one in found if np.isfinite(one.diverged)],
+    }
+    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    return Made(made)
+
+
+def _asked(settings: CaseSettings, built: Built, case_path: Path) -> list[recorded.Asked]:
+    """The motions that a case asks for.
+
+    Raises:
+        UserError: nothing presses a contact that waits for it.
+    """
+    asked, motions = settings.orbit, list[recorded.Asked]()
+    assert asked is not None
     if asked.normal_force is None and (waiting := [c.interface for c in built.contacts if swept(c)]):
         raise UserError(f"{case_path}: contacts.{waiting[0]}: nothing presses it; give orbit.normal_force, N")
-    assembly, motions = built.pressed(asked.normal_force), list[recorded.Asked]()
+    assembly = built.pressed(asked.normal_force)
     if asked.run_up is not None:
         motions.append(_run_up(assembly, asked, asked.run_up))
     for f in asked.hertz:
@@ -80,32 +111,7 @@ def _work(
         else:
             start = asked.start
         motions.append(recorded.Asked(name, driven, asked.settle, asked.keep, asked.samples, asked.steps, start))
-    stage.begin()
-    found = [(m.name, m) for m in recorded.run(folder / "orbit.h5", motions, inputs, stage.force, stage.report)]
-    more = [f"{name}: {words}" for name, one in found for words in one.messages]
-    turning = [m.name for m in assembly.components if asked.run_up and m.at(0).group.speed]
-    more += [f"{name}: its matrices stay those of one speed." for name in turning]
-    notes = [words for one in found for words in (_sentence(*one), *_chatter(*one))]
-    sentences = [*notes, *more, *built.messages]
-    store.write_text(folder / "orbit.csv", columns_csv(_table(found), 8))
-    drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
-    moving = _moving(found, built, folder) if pictures else []
-    drawn += [path for path in moving if path.suffix == ".gif"]
-    rows = [
-        {"name": name, "kind": KIND.get(kind := classification.kind(one), kind), **_row(one)} for name, one in found
-    ]
-    page = orbit_html(f"{settings.name}: motion in time", rows, notes, [*more, *built.messages], drawn)
-    store.write_text(folder / "orbit.html", page)
-    names = [
-        "orbit.html",
-        "orbit.csv",
-        "orbit.h5",
-        *(str(p.relative_to(folder)) for p in dict.fromkeys(drawn + moving)),
-    ]
-    diverged = [name for name, one in found if np.isfinite(one.diverged)]
-    told = {"files": names, "sentences": sentences, "diverged": diverged}
-    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made([folder / name for name in names])
+    return motions
 
 
 def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorded.Asked:
@@ -114,6 +120,20 @@ def _run_up(assembly: Assembly, asked: OrbitOfCase, how: RunUpOfCase) -> recorde
     assert asked.start != "balance"
     driven = equations.of_ramp(assembly, ramp)
     return recorded.Asked(name, driven, 0, ramp.periods, asked.samples, asked.steps, asked.start)
+
+
+def _notes(found: Sequence[tuple[str, Orbit]]) -> list[str]:
+    """What motions they are, in sentences."""
+    return [words for name, one in found for words in (_sentence(name, one), *_chatter(name, one))]
+
+
+def _messages(found: Sequence[tuple[str, Orbit]], built: Built) -> list[str]:
+    """What a reader must know of them."""
+    own = [f"{name}: {words}" for name, one in found for words in one.messages]
+    for name, one in found:
+        if one.equations.ramp and any(c.at(0).group.speed for c in one.equations.assembly.components):
+            own.append(f"{name}: the matrices stay those of one speed.")
+    return [*own, *built.messages]
 
 
 def _sentence(name: str, one: Orbit) -> str:
@@ -158,33 +178,6 @@ def _pictures(found: Sequence[tuple[str, Orbit]], folder: Path, case: str) -> li
                 title = f"{case}: {name}, chatter of {contact}"
                 drawn.append(chatter_picture(one, k, folder / f"chatter_{i}_{contact}.png", title))
     return drawn
-
-
-def _moving(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path) -> list[Path]:
-    """The last period of every body that has a mesh and shapes: for ParaView, and as an animation where PyVista is."""
-    from ..pictures import can_draw
-    from ..pictures.moving import moving_gif
-
-    made, case, scenes = list[Path](), built.settings.name, can_draw() is None
-    for i, (name, one) in enumerate(found, 1):
-        if len(one.time) < one.samples:
-            continue
-        at = len(one.time) - one.samples + np.arange(0, one.samples, max(one.samples // FRAMES, 1))
-        for j, component in enumerate(one.equations.assembly.components):
-            body = built.bodies.get(component.name)
-            if body is None or not body.basis.mesh.n_cells or body.basis.sectors > 1 or not len(body.group.phi):
-                continue
-            moved = np.einsum("pxm,fm->fpx", body.group.phi, classification.of_body(one, j, at))
-            (folder / "motion").mkdir(exist_ok=True)
-            made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
-            if scenes:
-                path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
-                made.append(moving_gif(body.basis, moved, path, f"{case}: {name}, one period of the excitation"))
-    return made
-
-
-FRAMES = 32
-"""Of a period that is animated."""
 
 
 def _table(found: Sequence[tuple[str, Orbit]]) -> dict[str, Any]:

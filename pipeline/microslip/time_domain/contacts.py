@@ -23,6 +23,9 @@ ITERATIONS = 30
 SLID = 1e-9
 """Share of a way beyond which a slider has slid and not only rounding."""
 
+ROUNDING = 1e-14
+"""Share of where points are, and of the path slid so far, that their difference in a step may be off by."""
+
 SLIDES = 1e-9
 """Share of the largest way of points that is found by iteration, beyond which one slides."""
 
@@ -200,7 +203,9 @@ def _told(
     given = jnp.zeros(())
     for i, (g, u) in enumerate(zip(groups, places, strict=True)):
         way = u - held.places[i]
-        slid = jnp.abs(g.law.slip(states[i]) - g.law.slip(held.states[i])) > SLID * jnp.abs(way)[:, 1:]
+        slip, before = g.law.slip(states[i]), g.law.slip(held.states[i])
+        rounding = ROUNDING * (norm(u.T[1:]) + norm(slip.T))
+        slid = norm((slip - before).T) > SLID * norm(way.T[1:]) + rounding
         deep = jnp.full(len(u), jnp.nan) if g.rigid else g.law.overlap(u)
         deep = jnp.where(jnp.isnan(deep), points[i][:, 0] > 0, deep)
         approach.append(jnp.max(deep.reshape(len(g.G), -1), axis=1))

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
+from ..contact.law import Law
 from ..contact.patch import stuck_stiffness
 from ..contact.set_valued import SetValued
 from ..data import Array, UserError
@@ -172,11 +173,13 @@ def of(assembly: Assembly, Omega: float) -> Equations:
     Loss factors of bodies count as dampers that take as much at that frequency.
 
     Raises:
-        UserError: a frequency that is not positive; modes that are not real.
+        UserError: a frequency that is not positive; modes that are not real; a law that does not say what it remembers.
     """
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     assembly = assembly.unrolled()
     assembly.check_names()
+    for contact in assembly.contacts:
+        _remembers(contact)
     harmonics = tuple(sorted({x.harmonic for x in assembly.loads if x.harmonic}))
     parts = {h: assembly.joined(h) for h in (0, 1, *harmonics)}
     mean, first = parts[0], parts[1]
@@ -194,6 +197,20 @@ def of(assembly: Assembly, Omega: float) -> Equations:
         _real(mean.output, assembly) @ V, _of_harmonics(parts, harmonics, lambda p: p.output_given),
         _real(mean.output_residual, assembly),
     )  # fmt: skip
+
+
+def _remembers(contact: Contact) -> None:
+    """Refuse a law of another package that lacks what a motion in time marches and reads of its history."""
+    law = getattr(contact.patch.law, "whole", contact.patch.law)
+    if lacks := [name for name in MARCHED if getattr(type(law), name, None) is getattr(Law, name)]:
+        raise UserError(
+            f"contacts.{contact.name}: {type(law).__name__} has no {', '.join(lacks)}; a motion in time follows what a "
+            "law remembers: write them (docs/own_law.md)"
+        )
+
+
+MARCHED = ("init", "step", "slip", "stored")
+"""What every law has to say of its state."""
 
 
 def _real(values: Array, assembly: Assembly) -> Array:

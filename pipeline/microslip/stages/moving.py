@@ -1,0 +1,68 @@
+"""Bodies that move in time, over their last period: for ParaView, and as animations where PyVista is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..case.assemble import Built, Loaded
+from ..data import Array, ModalBasis, ModalGroup
+from ..exchange.vtu import write_motion
+from ..ring.expansion import sector_rotation
+from ..system.disc import spread
+from ..time_domain import classification
+from ..time_domain.orbit import Orbit
+
+FRAMES = 32
+"""Of a period that is animated."""
+
+
+def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path) -> list[Path]:
+    """Files of every body that has a mesh and shapes; of a cyclic one all sectors, of lone blades in a ring the first.
+
+    Returns:
+        Those in ``motion/`` for ParaView, and animations in ``pictures/``.
+    """
+    from ..pictures import can_draw
+    from ..pictures.moving import moving_gif
+
+    made, scenes = list[Path](), can_draw() is None
+    for i, (name, one) in enumerate(found, 1):
+        if len(one.time) < one.samples:
+            continue
+        at = len(one.time) - one.samples + np.arange(0, one.samples, max(one.samples // FRAMES, 1))
+        for j, component in enumerate(one.equations.assembly.components):
+            body = built.bodies.get(component.name.removesuffix("_0" if built.settings.ring else ""))
+            if body is None or not body.basis.mesh.n_cells or not all(len(g.phi) for g in body.groups.values()):
+                continue
+            moved = _moved(body, classification.of_body(one, j, at))
+            (folder / "motion").mkdir(exist_ok=True)
+            made += write_motion(body.basis, one.time[at], moved, folder / "motion" / f"{component.name}_{i}.pvd")
+            if scenes:
+                path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
+                title = f"{built.settings.name}: {name}, one period of the excitation"
+                made.append(moving_gif(body.basis, moved, path, title))
+    return made
+
+
+def _moved(body: Loaded, q: Array) -> Array:
+    """(f, sectors, points, 3) m of a body, by its coordinates (f, m), those of all sectors of a cyclic one."""
+    if body.basis.sectors == 1:
+        return np.einsum("pxm,fm->fpx", body.group.phi, q)[:, None]
+    return whole_ring(body.basis, body.groups, q)
+
+
+def whole_ring(basis: ModalBasis, groups: Mapping[int, ModalGroup], q: Array) -> Array:
+    """(f, N, points, 3) m of all sectors in the axes of the ring, by its coordinates (f, m) of `system.disc`.
+
+    Args:
+        groups: of every nodal diameter.
+    """
+    waves = [groups[k].phi for k in sorted(groups)]
+    found = np.empty((len(q), basis.sectors, *waves[0].shape[:2]), np.float32)
+    for j in range(basis.sectors):
+        shapes = spread(waves, j, basis.sectors)
+        found[:, j] = np.einsum("yx,pxm,fm->fpy", sector_rotation(basis, j), shapes, q, optimize=True)
+    return found
