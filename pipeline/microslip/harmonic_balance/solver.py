@@ -64,7 +64,7 @@ AT_MOST = 1e-5
 """Share of x that rounding may be."""
 
 CONTRACTION = 0.1
-"""Share of |R| that a step may leave for the derivative to be used again: it costs two or three residuals."""
+"""Share of |R| that a step may leave for the derivative to be used again: a new one costs three or four residuals."""
 
 RISES = 5
 """How often a step is taken whole although |R| rises: the derivatives of the pieces that it leads to find the solution
