@@ -24,7 +24,7 @@ from microslip.contact.normal import Normal, Penalty, Preload, Rough
 from microslip.contact.patch import Patch, equilibrium, grid, stuck_stiffness
 from microslip.contact.point import PointContact
 from microslip.data import Compliance, Interface, ModalBasis, ModalGroup, NotConverged, UserError
-from microslip.harmonic_balance import response_table
+from microslip.harmonic_balance import response_table, solver
 from microslip.harmonic_balance.problem import Problem
 from microslip.harmonic_balance.reduced import stuck
 from microslip.harmonic_balance.response import HarmonicResponse, harmonic_response, newton, of_body
@@ -209,6 +209,30 @@ def test_derivatives_against_differences(rates: bool) -> None:
     along = (problem.evaluate(x, Omega + h)[0] - problem.evaluate(x, Omega - h)[0]) / (2 * h)
     np.testing.assert_allclose(R_Omega, along, rtol=0, atol=1e-6 * np.abs(along).max())
     np.testing.assert_allclose(R, problem.at(Omega).residual(x), rtol=0, atol=1e-12 * np.abs(R).max())
+
+
+def test_old_derivatives_tell_what_was_shown_and_nothing_else() -> None:
+    """Broyden's update: the change of force from one motion to another, and no change across that way."""
+    g, force, watched = modes_with_rows()
+    problem = of_body(g, (rough_patch((3, 2), 8e6),), np.array([20.0]), 8 * force, watched, harmonics=1, samples=16)
+    at, rng = problem.at(2 * np.pi * 47.0), np.random.default_rng(1)
+    x, way, other = rng.normal(size=(3, problem.size))
+    before, after, old = at.tried(x)[1], at.tried(x + 0.1 * way)[1], at.forces(x)[1]
+    ((u_0, F_0),), ((u_1, F_1),), (new,) = before, after, at.secant(old, before, after)
+    np.testing.assert_allclose(np.einsum("nkwlz,nlz->nkw", new, u_1 - u_0), F_1 - F_0, atol=1e-12 * np.abs(F_1).max())
+    across = other - way * (other @ way) / (way @ way)
+    (moved,) = [group.relative(problem.displacement(across)) for group in problem.groups]
+    moved[:, :, 0] -= problem.groups[0].offset
+    kept, was = (np.einsum("nkwlz,nlz->nkw", S, moved) for S in (new, old[0]))
+    np.testing.assert_allclose(kept, was, atol=1e-9 * np.abs(was).max())
+
+
+def test_a_start_is_told_by_the_polynomial_that_told_the_last_point() -> None:
+    """Exact for a parabola and for a line; after a kink the line is taken, which forgets what lies before it."""
+    Omega = np.array([1.0, 1.1, 1.3, 1.4, 1.45])
+    for told, ahead in ((lambda w: w**2 - w, 1.6**2 - 1.6), (lambda w: 2 * w, 3.2), (lambda w: max(w, 1.3), 1.6)):
+        points = [solver.Point(w, np.array([told(w)]), solver.CONVERGED, 0.0, 0) for w in Omega]
+        np.testing.assert_allclose(solver._ahead(points, 1.6), ahead, rtol=1e-12)
 
 
 # time integration --------------------------------------------------------------------------------------------------

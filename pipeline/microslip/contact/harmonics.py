@@ -19,6 +19,9 @@ from .periodic import periodic, with_slopes
 CHUNK = 120
 """Points treated at a time: their tangents stay in the cache, and memory does not grow with the number of points."""
 
+CHUNK_ALONE = 480
+"""The same of forces without tangents: the fewer parts, the less often each operation begins."""
+
 
 def fourier(harmonics: int, samples: int) -> tuple[Array, Array]:
     """(s, 2 H + 1) values of 1, cos, sin, cos 2, ... at the samples, and (2 H + 1, s) its inverse, the transform.
@@ -65,10 +68,10 @@ def force_harmonics(
 
 @partial(jax.jit, static_argnames=("samples", "count", "chunk"))
 def force_alone(
-    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK,
+    law: Law, u: Array, period: Array | float, samples: int = 64, count: int = 2, chunk: int = CHUNK_ALONE,
     periodicity: Array | float = 0.0,
 ) -> Array:  # fmt: skip
-    """The force of `force_harmonics` without its derivative, after the same number of cycles of every chunk."""
+    """The force of `force_harmonics` without its derivative; in chunks of one size after the same number of cycles."""
     values, transform = fourier(u.shape[2] // 2, samples)
 
     def one(law: Law, u: Array) -> tuple[Array]:
@@ -78,12 +81,13 @@ def force_alone(
     return _chunked(one, law, u, chunk)[0]
 
 
-def _chunked(one: Callable[[Law, Array], tuple[Array, ...]], law: Law, u: Array, chunk: int) -> tuple[Array, ...]:
-    """What ``one`` finds for a law and displacements (n, ...), ``chunk`` points at a time."""
+def _chunked(one: Callable[[Law, Array], tuple[Array, ...]], law: Law, u: Array, most: int) -> tuple[Array, ...]:
+    """What ``one`` finds for a law and displacements (n, ...), so many points at a time at most."""
     n = u.shape[0]
-    if n <= chunk:
+    if n <= most:
         return one(law, u)
-    parts = -(-n // chunk)
+    parts = -(-n // most)
+    chunk = -(-n // parts)
     filled = jnp.concatenate([u, jnp.zeros((parts * chunk - n, *u.shape[1:]))]).reshape(parts, chunk, *u.shape[1:])
     leaves, tree = jax.tree_util.tree_flatten(law)
     axes = point_axes(law, n)

@@ -29,8 +29,9 @@ from .cycle import blank, march, push, rates, recall
 from .law import Array, Law, State
 from .linearised import Linearised, linearised
 
-PLAIN = 2
-"""Cycles that are marched before slow sliders are solved for."""
+PLAIN = 1
+"""Cycles that are marched before slow sliders are solved for: the second one costs a third more with the derivative of
+its memory, and where it is needed, saves one."""
 
 FEWEST = 4
 """Cycles that have to be allowed if sliders are to be solved for; fewer are marched."""

@@ -35,6 +35,10 @@ RELATIVE_AT_MOST = 8
 """Members up to which all are eliminated together."""
 
 
+Tried = list[tuple[Array, Array]]
+"""Of every group of contacts the displacements (n, k, W) that were tried, and the forces."""
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """Equal contacts, evaluated together.
@@ -258,7 +262,28 @@ class AtFrequency:
 
     def residual(self, x: Array) -> Array:
         """(size,) R alone."""
-        return self.residual_of(x, self.force(x))
+        return self.tried(x)[0]
+
+    def tried(self, x: Array) -> tuple[Array, Tried]:
+        """`residual`, and the displacements and forces it is of."""
+        moved = self._moved(self.problem.displacement(x))
+        forces = [g.force(u, self.period) for g, u in zip(self.problem.groups, moved, strict=True)]
+        return self.residual_of(x, self.along(forces)), list(zip(moved, forces, strict=True))
+
+    def secant(self, slopes: list[Array], before: Tried, after: Tried) -> list[Array]:
+        """Derivatives of the contact forces that tell the change of each contact's force from one motion to another.
+
+        Broyden's update: of all derivatives that do, the nearest, coordinates counted in units of x. Contacts know of
+        no frequency, so what a contact shows here serves at the next one too.
+        """
+        out = []
+        for g, S, (u_0, F_0), (u_1, F_1) in zip(self.problem.groups, slopes, before, after, strict=True):
+            way = (u_1 - u_0) / (unit := self.problem.scale[g.first][..., None])
+            size = np.sum(way**2, axis=(1, 2), keepdims=True)
+            along = np.divide(way, size * unit, out=np.zeros_like(way), where=size > 0)
+            missed = F_1 - F_0 - np.einsum("nkwlz,nlz->nkw", S, u_1 - u_0)
+            out.append(S + missed[..., None, None] * along[:, None, None])
+        return out
 
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """See `Problem.evaluate`."""

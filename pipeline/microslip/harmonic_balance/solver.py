@@ -14,7 +14,7 @@ from .. import continuation
 from ..data import Array, UserError
 from ..settings.mistakes import bounded
 from . import pseudo_transient
-from .problem import NO_NUMBER, AtFrequency, Problem
+from .problem import NO_NUMBER, AtFrequency, Problem, Tried
 
 Report = Callable[[str], None]
 CONVERGED = "converged"
@@ -63,8 +63,8 @@ press a contact a million times more than anything moves it leave no more of R t
 AT_MOST = 1e-5
 """Share of x that rounding may be."""
 
-CONTRACTION = 0.03
-"""Share of |R| that a step may leave for the derivative to be used again: it costs two or three residuals."""
+CONTRACTION = 0.1
+"""Share of |R| that a step may leave for the derivative to be used again: a new one costs three or four residuals."""
 
 RISES = 5
 """How often a step is taken whole although |R| rises: the derivatives of the pieces that it leads to find the solution
@@ -89,7 +89,8 @@ def newton(
             reference's; no less than what `ROUNDING` leaves.
         slope: derivative of the forces somewhere near, to begin with. rises: how often |R| may rise.
     """
-    start, R, fresh, history, left_over = x, at.residual(x), False, list[float](), rises
+    start, fresh, history, left_over = x, False, list[float](), rises
+    R, seen = at.tried(x)
     reference, error = float(np.abs(at.reference).max(initial=0.0)) or 1.0, np.inf  # where nothing drives, the length
     for count in range(most):
         size = np.clip(np.abs(x).max(initial=0.0), 1e-3 * reference, 1e3 * reference)
@@ -104,18 +105,21 @@ def newton(
             if not all(np.isfinite(S).all() for S in slope):
                 return Point(at.Omega, x, at.undefined(x), error, count, history=tuple(history))
         step = at.jacobian(slope).solve(-R)
-        trial, left = x + step, at.residual(x + step)
+        left, shown = at.tried(x + step)
         before, after = np.linalg.norm(R), np.linalg.norm(left)
         if after <= CONTRACTION * before:
-            x, R, fresh = trial, left, False
+            slope, fresh = at.secant(slope, seen, shown), False
+            x, R, seen = x + step, left, shown
             continue
         if fresh and not rises:
-            x, R = _shortened(at, x, R, step, left)
+            x, R, seen = _shortened(at, x, R, step, left, shown)
         elif fresh and (after < before or left_over and np.isfinite(after)):
             left_over -= not after < before
-            x, R = trial, left
+            x, R, seen = x + step, left, shown
         elif fresh:
             break
+        elif after < before:  # of an old derivative: it is of a place no nearer than this one
+            x, R, seen = x + step, left, shown
         slope, fresh = None, False
     if rises:
         again = newton(at, start, tolerance, most, rises=0)
@@ -125,13 +129,15 @@ def newton(
     return Point(at.Omega, x, words, error, most, history=tuple(history))
 
 
-def _shortened(at: AtFrequency, x: Array, R: Array, step: Array, left: Array) -> tuple[Array, Array]:
-    """x and R after the longest of 1, 1/2, ... of a step that lowers |R|, or the last of them."""
+def _shortened(
+    at: AtFrequency, x: Array, R: Array, step: Array, left: Array, shown: Tried
+) -> tuple[Array, Array, Tried]:  # fmt: skip
+    """x, R and what it is of after the longest of 1, 1/2, ... of a step that lowers |R|, or the last of them."""
     share = 1.0
     while not np.linalg.norm(left) < np.linalg.norm(R) and share > SHORTEST:
         share *= 0.5
-        left = at.residual(x + share * step)
-    return x + share * step, left
+        left, shown = at.tried(x + share * step)
+    return x + share * step, left, shown
 
 
 def solve(problem: Problem, Omega: float, starts: list[Array], slope: Any = None) -> Point:
@@ -294,10 +300,10 @@ def sweep(
             continue
         failed = sum(not p.converged for p in done)
         report(f"{i + 1} of {len(frequency)} frequencies: {f:.6g} Hz" + (f", {failed} not converged" if failed else ""))
-        good = [p for p in done[-2:] if p.converged]
+        good = _behind(done)
         starts = [] if start is None or done else [start]
         if good:
-            starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) == 2 else [good[-1].x]
+            starts = [_ahead(good, 2 * np.pi * f), good[-1].x] if len(good) > 1 else [good[-1].x]
         began = time.perf_counter()
         point = solve(problem, 2 * np.pi * float(f), starts, slope)
         slope = point.slope
@@ -346,8 +352,29 @@ def _walked(problem: Problem, known: Point, failed: Point) -> Point:
     return replace(failed, iterations=spent)
 
 
+MOST = 5
+"""Solved points before one that its start is told by."""
+
+
+def _behind(done: list[Point]) -> list[Point]:
+    """The last points of a sweep, as far as they are solved and of different frequencies."""
+    good: list[Point] = []
+    for p in done[: -MOST - 1 : -1]:
+        if not p.converged or any(p.Omega == q.Omega for q in good):
+            break
+        good.insert(0, p)
+    return good
+
+
 def _ahead(points: list[Point], Omega: float) -> Array:
-    """The line through two solutions, at another frequency."""
-    a, b = points
-    share = (Omega - b.Omega) / (b.Omega - a.Omega) if b.Omega != a.Omega else 0.0
-    return b.x + share * (b.x - a.x)
+    """Solutions carried on to another frequency by the polynomial, of first order or more, that tells the last best."""
+    *known, last = points
+    orders = range(2, len(points))
+    missed = [np.abs(_carried(known[-n:], last.Omega) - last.x).max(initial=0.0) for n in orders]
+    return _carried(points[-orders[int(np.argmin(missed))] :] if missed else points, Omega)
+
+
+def _carried(points: list[Point], Omega: float) -> Array:
+    """Lagrange's polynomial through all of them."""
+    at = np.array([p.Omega for p in points])
+    return sum(p.x * np.prod((Omega - np.delete(at, i)) / (at[i] - np.delete(at, i))) for i, p in enumerate(points))
