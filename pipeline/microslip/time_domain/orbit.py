@@ -140,8 +140,8 @@ class Orbit:
 
     @cached_property
     def repeats(self) -> int:
-        """After how many periods of the excitation the motion comes back within `REPEATS`; 0: it does not within half
-        of the periods that are kept."""
+        """After how many periods of the excitation the motion comes back within `REPEATS` in the last half of the periods
+        that are kept; 0: it does not within half of them."""
         return comes_back(*self.stroboscopic)
 
     @cached_property
@@ -284,7 +284,12 @@ class Orbit:
         return Path(path)
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:
-        """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period."""
+        """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period.
+
+        Args:
+            axes: of matplotlib, new ones with a legend if not given. read_out: its number.
+        """
+        own = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
 
@@ -294,6 +299,8 @@ class Orbit:
         axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
         axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
         axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
+        if own:
+            axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
         return axes
 
 
@@ -337,9 +344,12 @@ def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> 
 
 
 def comes_back(after: Array, size: float) -> int:
-    """See `Orbit.repeats`."""
-    for p in range(1, after.shape[1] // 2 + 1):
-        if np.abs(after[:, p:] - after[:, :-p]).max(initial=0.0) <= REPEATS * size:
+    """See `Orbit.repeats`. The last half, where a start is forgotten best, is held against what was p periods before, so
+    that a multiple of p is not found first because what is left of the start shows less in it."""
+    count = after.shape[1]
+    half = count // 2
+    for p in range(1, half + 1):
+        if np.abs(after[:, half:] - after[:, half - p : count - p]).max(initial=0.0) <= REPEATS * size:
             return p
     return 0
 
