@@ -170,6 +170,22 @@ def test_a_saved_result_is_the_same(curve, tmp_path):
     assert ms.read_response(path).series[0].readouts == curve.readouts == ("q",)
 
 
+def test_saving_takes_the_place_of_a_response_and_of_no_other_file(curve, tmp_path):
+    path = curve.save(tmp_path / "curve.h5")
+    assert curve.save(path) == path
+    empty = tmp_path / "empty.h5"
+    empty.touch()
+    curve.save(empty)
+    motion = ms.integrate(duffing(), 0.5, unit="rad/s", settle=0, keep=1)
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine")
+    for found, place in ((curve, precious), (motion, precious), (motion, path)):
+        before = place.read_bytes()
+        with pytest.raises(UserError, match=f"{place.name}: is there already and no microslip-.* file"):
+            found.save(place)
+        assert place.read_bytes() == before
+
+
 def test_the_error_estimate_is_what_more_harmonics_change():
     coarse = ms.harmonic_response(duffing(), [1.2], unit="rad/s", harmonics=1)
     fine = ms.harmonic_response(duffing(), [1.2], unit="rad/s", harmonics=9)
@@ -350,3 +366,25 @@ def test_what_a_newcomer_typed(make, said):
     with pytest.raises(UserError) as caught:
         make()
     assert said in str(caught.value)
+
+
+def test_results_and_systems_of_both_kinds_have_the_same_names(curve):
+    """rad/s whatever a result runs over; messages of a structure, which needs none."""
+    np.testing.assert_allclose(curve.Omega, curve.parameter, rtol=1e-12)
+    in_hertz = ms.harmonic_response(duffing(), [0.1, 0.2])
+    np.testing.assert_allclose(in_hertz.Omega, 2 * np.pi * in_hertz.frequency, rtol=0)
+    assert duffing().messages == ()
+
+
+def test_a_backbone_says_in_words_why_it_ends():
+    found = ms.backbone(duffing(), 0.1, 0.2)
+    assert found.complete and repr(found).endswith("; all amplitudes were reached>")
+
+
+@pytest.mark.parametrize(
+    ("element", "name"),
+    [(ms.friction(2.0), "friction 1"), (ms.stop(np.inf, 0.1), "stop 1"), (ms.friction(2.0, name="pad"), "pad")],
+)
+def test_an_element_that_a_balance_cannot_take_is_refused_by_its_name(element, name):
+    with pytest.raises(UserError, match=f"^element {name}: "):
+        ms.harmonic_response(ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[element]), [1.0])

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, NotConverged, UserError
-from ..files.hdf5 import create, put, seal
+from ..files.hdf5 import create, put, refuse_foreign, seal
 from ..files.store import complete_or_absent
 from ..settings.mistakes import bounded
 from ..units import METRES, counted
@@ -140,8 +140,8 @@ class Orbit:
 
     @cached_property
     def repeats(self) -> int:
-        """After how many periods of the excitation the motion comes back within `REPEATS` in the last half of the periods
-        that are kept; 0: it does not within half of them."""
+        """After how many periods of the excitation the motion comes back within `REPEATS`, in the last half of the
+        periods that are kept; 0: it does not within half of them."""
         return comes_back(*self.stroboscopic)
 
     @cached_property
@@ -267,8 +267,9 @@ class Orbit:
         """Write a file of this motion (``docs/time_domain.md``), complete or absent; `load` reads it.
 
         Raises:
-            UserError: no permission, no space.
+            UserError: no permission, no space; a file that is none of motions stands there.
         """
+        refuse_foreign(path, kept_samples.FORMAT)
         with complete_or_absent(path) as temporary:
             with create(temporary) as file:
                 kept_samples.head(file)
@@ -344,8 +345,8 @@ def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> 
 
 
 def comes_back(after: Array, size: float) -> int:
-    """See `Orbit.repeats`. The last half, where a start is forgotten best, is held against what was p periods before, so
-    that a multiple of p is not found first because what is left of the start shows less in it."""
+    """See `Orbit.repeats`. The last half, where the start is forgotten best, is held against what was p periods before:
+    in a multiple of p less of a start may show, and it would be found first."""
     count = after.shape[1]
     half = count // 2
     for p in range(1, half + 1):
