@@ -35,6 +35,9 @@ from .solver import Point as Solved
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+REACHED = "all amplitudes were reached"
+"""Why a nonlinear mode ends that is complete."""
+
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
 is never in resonance by itself, which it would be with that of the sticking contact in small motions."""
@@ -102,7 +105,15 @@ class Backbone:
     @property
     def complete(self) -> bool:
         """All amplitudes asked for were reached, by motions that pass their checks."""
-        return self.status.startswith("bound")
+        return self.status == REACHED
+
+
+def _in_words(status: str, points: Sequence[Point], low: float, high: float) -> str:
+    """Why a curve between two amplitudes (m) ended, without the logarithm that it runs over."""
+    if not status.startswith("bound"):
+        return status
+    back = f"it came back to {low:.4g} m without reaching {high:.4g} m; take another low"
+    return REACHED if points[-1].lam > np.log(low) else back
 
 
 def stuck_modes(problem: Problem) -> tuple[Array, Array]:
@@ -150,7 +161,7 @@ def backbone(
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    status = next((one.failure for one in found if one.failure), state.status)
+    status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)
 
 
