@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -388,3 +389,14 @@ def test_a_backbone_says_in_words_why_it_ends():
 def test_an_element_that_a_balance_cannot_take_is_refused_by_its_name(element, name):
     with pytest.raises(UserError, match=f"^element {name}: "):
         ms.harmonic_response(ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[element]), [1.0])
+
+
+@pytest.mark.parametrize("normal", [20.0, 2e4])
+def test_where_nothing_vibrates_no_energy_is_missing(normal):
+    """What damping takes of rounding, 1e-34 of F_0 u_0, is no failure of the balance."""
+    rub = {"interface": "right", "normal_force": normal, "normal_stiffness": 2e5, "tangential_stiffness": 4e5}
+    rub |= {"friction": 0.2, "points": [2, 2]}
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": [rub]}
+    a = ms.assemble(case, vane=ms.sample()).assembly
+    still = ms.harmonic_response(replace(a, loads=tuple(replace(x, amplitude=0.0) for x in a.loads)), [870.0])
+    assert still.arrays["damped"][0] > 0 and still.amplitude[0] < 1e-15 and still.converged.all()
