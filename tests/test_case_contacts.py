@@ -29,7 +29,8 @@ from microslip.data import UserError
 from microslip.files import store
 from microslip.harmonic_balance.accuracy import more
 from microslip.harmonic_balance.cost import aft_bytes
-from microslip.settings.body import validate
+from microslip.modal.compute import modal_basis
+from microslip.settings.body import BodySettings, validate
 from microslip.stages import checkpoint
 
 pytestmark = pytest.mark.usefixtures("undrawn", "unjudged")
@@ -63,6 +64,23 @@ def two(second: dict[str, Any] | None = None, **contact: Any) -> dict[str, Any]:
     return raw | {
         "bodies": [{"name": "a", "body": "small"}, other], "excitation": "a:shaker", "monitor": "a:tip-probe"
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("reduction", ["eigenmodes", "rubin"])
+def test_what_drives_a_held_place_is_refused_and_what_reads_there_is_told(reduction: str) -> None:
+    """At the clamp a force moves nothing and a monitor reads nothing."""
+    foot = [small.SIZE[0] / 2, small.SIZE[1] / 2, 0.0]
+    held = {"name": "held", "point": foot, "direction": [1.0, 2.0, 0.0]}
+    own = small.table(reduction=reduction, monitors=[{"name": "tip-probe", "point": foot}])
+    own["excitations"].append(held)
+    basis = modal_basis(small.beam(), BodySettings.model_validate(own))
+    raw = table(**STIFF, includes="surface")
+    with pytest.raises(UserError, match="excitation: 'held' moves nothing: it acts where 'small' is held"):
+        build(made(raw | {"excitation": "held"}), {"small": basis}, PATH)
+    found = build(made(raw), {"small": basis}, PATH)
+    assert [m for m in found.messages if "Monitor 'tip-probe' reads no u_x: 'small' is held there" in m]
+    sound = build(made(raw), {"small": small.basis()}, PATH)
+    assert not [m for m in sound.messages if "Monitor" in m]
 
 
 TWICE = table(**STIFF) | {"contacts": [{"interface": "right", "friction": 0.3} | STIFF] * 2}

@@ -15,7 +15,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -25,6 +25,8 @@ import test_contact_laws as contract
 
 from microslip.cli import main
 from microslip.contact import composed
+from microslip.contact.kinds import LawKind, sources_of_others
+from microslip.contact.settings import ContactLaw
 from microslip.results import read_response
 
 PAGE = (Path(__file__).parents[1] / "docs" / "own_law.md").read_text(encoding="utf-8")
@@ -113,6 +115,20 @@ def test_a_law_of_another_package_is_named_in_a_case(
     monkeypatch.chdir(tmp_path)
     assert main(["respond", "case.toml"]) == 2  # without the package
     assert 'law.kind: "pad" is unknown; choose one of' in capsys.readouterr().err
+
+
+class Elsewhere(LawKind):
+    """A kind of another package, this file."""
+
+    kind: Literal["elsewhere"]
+
+
+def test_a_case_depends_on_other_packages_kinds_that_it_names_alone() -> None:
+    own = {"normal_stiffness": 1e4, "tangential_stiffness": 5e3, "friction": 0.3}
+    plain = ContactLaw.model_validate({**own, "law": "smooth"})
+    other = plain.model_copy(update={"law": Elsewhere(kind="elsewhere")})
+    assert sources_of_others([plain]) == {}
+    assert sources_of_others([plain, other]) == {__name__: Path(__file__)}
 
 
 @pytest.mark.slow

@@ -60,7 +60,9 @@ def test_a_curved_patch_is_one_and_has_no_normal():
 @pytest.mark.usefixtures("unjudged")
 def test_two_decks_that_touch_are_an_assembly_that_runs(decks_of_plates, capsys):
     assert main(["import", "lower.inp", "upper.inp", "joint"]) == 0
-    assert "lower touches upper over 600 mm2: lower:upper against upper:lower" in capsys.readouterr().out
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2] == "lower touches upper over 600 mm2: lower:upper against upper:lower"
+    assert "move it, and the probe, when you clamp" in (decks_of_plates / "joint" / "lower" / "body.toml").read_text()
     case, _ = load_case("joint/case.toml")
     assert [(c.interface, c.against) for c in case.contacts] == [("lower:upper", "upper:lower")]
     quick = ["--no-stress", "--no-pictures", "--set", "sweep.points=3", "--set", "harmonics=1"]
@@ -154,6 +156,7 @@ def test_solids_of_one_file_are_set_apart_and_run(drawn, capsys):
     assert main(["import", "all.step", "three", "--apart"]) == 0
     said = capsys.readouterr().out
     assert "part-1 touches part-2 over 600 mm2" in said and "part-1 touches part-3 over 78.54 mm2" in said
+    assert "surface kind" not in said and "surface kind" in (drawn / "three" / "part-1" / "body.toml").read_text()
     assert main(["run", "three", "-q", "--no-stress", "--no-pictures", "--set", "sweep.points=2"]) == 0
     areas = [p.areas.sum() for p in read_basis("build/part-1/basis.h5").groups[0, 0].interfaces.values()]
     assert areas == pytest.approx([6e-4, 25e-6 * np.pi], rel=0.03)  # chords

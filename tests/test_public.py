@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -168,6 +169,22 @@ def test_a_saved_result_is_the_same(curve, tmp_path):
         np.testing.assert_array_equal(again.arrays[name], values)
     np.testing.assert_array_equal(again.folds, curve.folds)
     assert ms.read_response(path).series[0].readouts == curve.readouts == ("q",)
+
+
+def test_saving_takes_the_place_of_a_response_and_of_no_other_file(curve, tmp_path):
+    path = curve.save(tmp_path / "curve.h5")
+    assert curve.save(path) == path
+    empty = tmp_path / "empty.h5"
+    empty.touch()
+    curve.save(empty)
+    motion = ms.integrate(duffing(), 0.5, unit="rad/s", settle=0, keep=1)
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine")
+    for found, place in ((curve, precious), (motion, precious), (motion, path)):
+        before = place.read_bytes()
+        with pytest.raises(UserError, match=f"{place.name}: is there already and no microslip-.* file"):
+            found.save(place)
+        assert place.read_bytes() == before
 
 
 def test_the_error_estimate_is_what_more_harmonics_change():
@@ -355,3 +372,36 @@ def test_what_a_newcomer_typed(make, said):
     with pytest.raises(UserError) as caught:
         make()
     assert said in str(caught.value)
+
+
+def test_results_and_systems_of_both_kinds_have_the_same_names(curve):
+    """rad/s whatever a result runs over; messages of a structure, which needs none."""
+    np.testing.assert_allclose(curve.Omega, curve.parameter, rtol=1e-12)
+    in_hertz = ms.harmonic_response(duffing(), [0.1, 0.2])
+    np.testing.assert_allclose(in_hertz.Omega, 2 * np.pi * in_hertz.frequency, rtol=0)
+    assert duffing().messages == ()
+
+
+def test_a_backbone_says_in_words_why_it_ends():
+    found = ms.backbone(duffing(), 0.1, 0.2)
+    assert found.complete and repr(found).endswith("; all amplitudes were reached>")
+
+
+@pytest.mark.parametrize(
+    ("element", "name"),
+    [(ms.friction(2.0), "friction 1"), (ms.stop(np.inf, 0.1), "stop 1"), (ms.friction(2.0, name="pad"), "pad")],
+)
+def test_an_element_that_a_balance_cannot_take_is_refused_by_its_name(element, name):
+    with pytest.raises(UserError, match=f"^element {name}: "):
+        ms.harmonic_response(ms.structure(1.0, 1.0, 0.1, force={0: 1.0}, elements=[element]), [1.0])
+
+
+@pytest.mark.parametrize("normal", [20.0, 2e4])
+def test_where_nothing_vibrates_no_energy_is_missing(normal):
+    """What damping takes of rounding, 1e-34 of F_0 u_0, is no failure of the balance."""
+    rub = {"interface": "right", "normal_force": normal, "normal_stiffness": 2e5, "tangential_stiffness": 4e5}
+    rub |= {"friction": 0.2, "points": [2, 2]}
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "contacts": [rub]}
+    a = ms.assemble(case, vane=ms.sample()).assembly
+    still = ms.harmonic_response(replace(a, loads=tuple(replace(x, amplitude=0.0) for x in a.loads)), [870.0])
+    assert still.arrays["damped"][0] > 0 and still.amplitude[0] < 1e-15 and still.converged.all()

@@ -118,6 +118,27 @@ QUICK = (
 """Linear, as it sticks, and without margins: it costs little."""
 
 
+def test_a_run_that_cannot_go_on_says_what_has_changed(folder: Path) -> None:
+    """Stopped at the third point; with another load the two that are kept are of another case."""
+    (folder / "case.toml").write_text(QUICK)
+
+    def stop_at(begin: str, *changes: str) -> list[str]:
+        told: list[str] = []
+
+        def tell(text: str) -> None:
+            told.append(text)
+            if text.startswith(begin):
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            running.respond(folder / "case.toml", None, list(changes), report=tell)
+        return [text for text in told if "anew" in text]
+
+    assert stop_at("3 of 4") == stop_at("4 of 4") == []
+    said = "warning: begins anew, without 3 points of a run that did not end; changed since: the case"
+    assert stop_at("2 of 4", "amplitude=2.5") == [said]
+
+
 def test_every_read_out_is_drawn_and_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two directions share a picture, a gauge would have its own; the table tells what the others read at resonances of
     the first, as the file has it; lines end where the file's points are."""

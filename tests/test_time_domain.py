@@ -173,6 +173,20 @@ def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
         assert (found.repeats, found.impacts * found.repeats) == (periods, impacts) and found.error < 1e-4
 
 
+def test_a_motion_that_settles_from_side_to_side_comes_back_after_its_own_period() -> None:
+    """With the multiplier m < 0 of two periods, after four less of the start is seen, |m^2 - 1|, than after two,
+    |m - 1|."""
+    k = np.arange(30)
+    after = np.where(k % 2, 1.0, -1.0) + 1e-3 * (-0.85) ** (k // 2)
+    assert orbit.comes_back(after[None], 1.0) == 2
+
+
+def test_the_legend_of_a_phase_portrait_says_what_its_dots_are() -> None:
+    slider = ms.structure(1.0, 1.0, 0.02, force={0: 0.3}, elements=[ms.jenkins(1.0, 0.2)])
+    legend = ms.integrate(slider, 1.0, unit="rad/s", settle=0, keep=2).plot().get_legend()
+    assert legend is not None and [text.get_text() for text in legend.get_texts()] == ["after every period"]
+
+
 CASE = """
 name = "hammer"
 body = "hammer"

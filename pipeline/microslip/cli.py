@@ -4,6 +4,7 @@ interrupted, 143 ended by SIGTERM."""
 from __future__ import annotations
 
 import codecs
+import contextlib
 import io
 import logging
 import os
@@ -12,6 +13,7 @@ import shlex
 import shutil
 import signal
 import sys
+import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -868,15 +870,42 @@ def _fail(text: str, code: int) -> int:
 
 def entry() -> None:
     """Console script. A request to end (SIGTERM) is Ctrl-C but for the exit code: what is finished is kept."""
-    asked = []
+    asked: list[int] = [signal.SIGINT]
 
     def end(number: int, _: object) -> None:
         asked.append(number)
         raise KeyboardInterrupt
 
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        """A request that came while the interpreter ran what takes no exception, such as a callback of its garbage
+        collector, is made again a little later."""
+        if isinstance(what.exc_value, KeyboardInterrupt):
+            again = threading.Timer(0.05, _ask_again, asked[-1:])
+            again.daemon = True
+            again.start()
+        else:
+            sys.__unraisablehook__(what)
+
+    sys.unraisablehook = lost
     signal.signal(signal.SIGTERM, end)
-    code = main()
-    sys.exit(128 + asked[0] if asked and code == 130 else code)
+    if (code := main()) == 130:
+        _leave(128 + asked[-1])
+    sys.exit(code)
+
+
+def _ask_again(number: int) -> None:
+    if hasattr(signal, "pthread_kill"):  # which wakes a main thread that waits; Windows has none
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
+
+
+def _leave(code: int) -> None:
+    """End at once: threads of libraries that were interrupted may crash while the interpreter is taken down."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -250,7 +250,9 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     flowing, loads, said = _loads(settings, bodies, flowing, path)
     messages += [*said, *messages_of(flowing, loads, settings.balanced, _blades(settings), settings.turning)]
     ring = Ring(settings.ring.blades, settings.base_order) if settings.ring else None
-    assembly = Assembly(flowing, tuple(made), loads, _outputs(settings, bodies, path), ring, settings.stuck_ratios)
+    outputs = _outputs(settings, bodies, path)
+    messages += [_held(w) for w in outputs if _is_still(bodies[w.component], "monitor", w.monitor, w.label)]
+    assembly = Assembly(flowing, tuple(made), loads, outputs, ring, settings.stuck_ratios)
     said = list(dict.fromkeys(messages))
     return Built(settings, bodies, tuple(contacts), tuple(springs), assembly, tuple(said), fitted)
 
@@ -558,6 +560,9 @@ def _loads(
             if x.speed_rpm is not None and b.group.excitations[row].unit != CENTRIFUGAL:
                 raise UserError(f"{path}: excitations.{row}.speed_rpm: the excitation is no centrifugal load; write "
                                 "centrifugal = true in the body, or leave speed_rpm out")  # fmt: skip
+            if not x.is_zero and _is_still(b, "excitation", row):
+                raise UserError(f"{path}: excitation: '{x.row}' moves nothing: it acts where '{b.basis.name}' is held; "
+                                "give it another point, or direction, in the body.toml")  # fmt: skip
         try:
             found += loads_of(x, body, row, base, blades, turning)
         except UserError as error:
@@ -583,6 +588,37 @@ def _outputs(settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | 
             raise UserError(f"{path}: direction: monitor '{name}' reads {labels}, not {label}; choose one")
         found.append(Output(body, name, label))
     return tuple(found)
+
+
+STILL = 1e-12
+"""Of the largest motion of a body's rows, by which one has to move to count as free."""
+
+
+def _is_still(b: Loaded, kind: Literal["excitation", "monitor"], name: str, label: str | None = None) -> bool:
+    """Whether a body is held where one of its rows acts or reads: no coordinate moves it, and no force by itself.
+
+    label: of the row; None: of all.
+    """
+    return all(_is_still_in(g, kind, name, label) for g in b.groups.values())
+
+
+def _is_still_in(g: ModalGroup, kind: Literal["excitation", "monitor"], name: str, label: str | None) -> bool:
+    held = g.excitations if kind == "excitation" else g.monitors
+    if name not in held:  # a gauge
+        return False
+    own, statics = held[name], np.abs(np.diag(g.compliance.static))
+    at = [i for i, one in enumerate(own.labels) if label in (one, None)]
+    named = [f"{kind}:{name}:{own.labels[i]}" for i in at]
+    yields = [statics[i] for i, one in enumerate(g.compliance.labels) if one in named]
+    every = [np.abs(r.rows).max(initial=0.0) for rows in (g.interfaces, held) for r in rows.values()]
+    moves = np.abs(own.rows[at]).max(initial=0.0) > STILL * max(every)
+    return not moves and max(yields, default=0.0) <= STILL * statics.max(initial=0.0)
+
+
+def _held(w: Output) -> str:
+    return (
+        f"Monitor '{w.monitor}' reads no {w.label}: '{w.component}' is held there; give it another point in body.toml."
+    )
 
 
 def _among(rows: Mapping[str, Any], name: str, path: Path | str, key: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..contact.kinds import files_of as of_contact
 from ..contact.kinds import sources_of_others
+from ..contact.settings import ContactLaw, load_contact
 from ..data import UserError
 from ..files.store import fingerprint
 from ..harmonic_balance.checkpoint import restored
@@ -52,10 +54,12 @@ def of_points(built: Built) -> str:
 def files_of(settings: CaseSettings, path: Path) -> dict[str, Path]:
     """Name -> file of all that a case names, modal files left out, and of what is named there in turn."""
     found = {name: path.parent / name for name in settings.files}
-    found |= sources_of_others()
+    contacts: list[ContactLaw] = [*settings.contacts]
     for name in [c.file for c in settings.contacts if c.file is not None]:
         found |= {f"{name}: {own.name}": own for own in of_contact(path.parent / name)}
-    return found
+        with contextlib.suppress(UserError):  # told where the contact is made
+            contacts.append(load_contact(path.parent / name))
+    return found | sources_of_others(contacts)
 
 
 def series_name(normal: float) -> str:

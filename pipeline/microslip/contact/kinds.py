@@ -10,6 +10,7 @@ A kind is a class of settings with ``kind: Literal["its name"]`` that makes its 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -47,10 +48,11 @@ def _of_others(section: str) -> list[EntryPoint]:
     return sorted(entry_points(group=f"microslip.{section}"), key=lambda entry: entry.name)
 
 
-def sources_of_others() -> dict[str, Path]:
-    """Module -> file of the kinds of other packages: what is computed with them depends on it."""
-    modules = {entry.module for section in SECTIONS for entry in _of_others(section)}
-    return {name: Path(found.origin) for name in sorted(modules) if (found := find_spec(name)) and found.origin}
+def sources_of_others(contacts: Iterable[ContactLaw]) -> dict[str, Path]:
+    """Module -> file of the kinds of other packages that contacts name: what is computed with them depends on it."""
+    modules = {type(getattr(c, section)).__module__ for c in contacts for section in SECTIONS}
+    others = sorted(m for m in modules if m.split(".")[0] not in (__name__.split(".")[0], "builtins"))
+    return {name: Path(found.origin) for name in others if (found := find_spec(name)) and found.origin}
 
 
 class LawKind(Kind):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import ComplexArray
-from ..results.checks import Checks, shares, work
+from ..results.checks import Checks, resting, shares, work
 from ..system.component import Component
 from .problem import Problem
 from .solver import Point
@@ -27,7 +27,8 @@ def checks(problem: Problem, found: Operating) -> Checks:
     """The checks of a solution and what belongs to it."""
     taken = sum(float(work(F, found.relative[name])) for name, F in found.force.items())
     lost = sum(float(c.lost.sum()) for c in found.cycles.values())
-    missing, uncounted = shares(found.supplied, found.damped, taken, lost, found.exchanged)
+    still = sum(float(resting(F, found.relative[name])) for name, F in found.force.items())
+    missing, uncounted = shares(found.supplied, found.damped, taken, lost, found.exchanged, still)
     return Checks(float(missing), float(uncounted), _apart(problem, found))
 
 

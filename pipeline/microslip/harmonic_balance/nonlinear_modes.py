@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 OVER_AMPLITUDE = "amplitude"
 """What the series of a nonlinear mode runs over in its file."""
+REACHED = "all amplitudes were reached"
+"""Why a nonlinear mode ends that is complete."""
 
 HELD = 2.0
 """Stiffness that is taken into the bodies, over that of the sticking contact: with more than any motion has the body
@@ -127,7 +129,15 @@ class Backbone:
     @property
     def complete(self) -> bool:
         """All amplitudes asked for were reached, by motions that pass their checks."""
-        return self.status.startswith("bound")
+        return self.status == REACHED
+
+
+def _in_words(status: str, points: Sequence[Point], low: float, high: float) -> str:
+    """Why a curve between two amplitudes (m) ended, without the logarithm that it runs over."""
+    if not status.startswith("bound"):
+        return status
+    back = f"it came back to {low:.4g} m without reaching {high:.4g} m; take another low"
+    return REACHED if points[-1].lam > np.log(low) else back
 
 
 def stuck_modes(problem: Problem) -> tuple[Array, Array]:
@@ -175,7 +185,7 @@ def backbone(
     Omega, xi = (np.array([p.x[i] for p in points]) for i in (-2, -1))
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
-    status = next((one.failure for one in found if one.failure), state.status)
+    status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high))
     return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)
 
 

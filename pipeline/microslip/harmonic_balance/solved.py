@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..data import Array, UserError
-from ..results.files import Response, read_response, stacked, write_response
+from ..files.hdf5 import refuse_foreign
+from ..results.files import FORMAT, Response, read_response, stacked, write_response
 from ..results.series import Series
 from ..units import Quantity
 from . import accuracy
@@ -111,7 +112,12 @@ class Motions(Series):
         return accuracy.error(self.problem(value), point.x, point.Omega)
 
     def save(self, path: Path | str) -> Path:
-        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it."""
+        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it.
+
+        Raises:
+            UserError: no permission, no space; a file that is none of a response stands there.
+        """
+        refuse_foreign(path, FORMAT)
         plain = Series(self.name, self.parameters, self.key, self.status, {**self.arrays}, dict(self.labels), self.over)
         write_response(path, Response(self.name, "aft", (plain,), labels=dict(self.labels)))
         return Path(path)

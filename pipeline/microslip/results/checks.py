@@ -34,6 +34,10 @@ EXCHANGED = 1e-6
 """Of the energy that goes to and fro in loads and contacts without loss, this much counts as supplied: differences of
 less cannot be told from rounding."""
 
+RESTING = 1e-20
+"""Of the work that the mean forces of the contacts would do on their mean displacements: where nothing vibrates, what
+is left of these by rounding, of forces and motions alike, makes energies of less."""
+
 
 @dataclass(frozen=True)
 class Checks:
@@ -78,14 +82,20 @@ def exchanged(force: Array, displacement: Array) -> Array:
     return np.pi * (np.arange(1, F.shape[-1] + 1) * F * u).sum(axis=(-2, -1))
 
 
-def shares(supplied: Any, damped: Any, taken: Any, lost: Any, exchanged: Any) -> tuple[Any, Any]:
+def resting(force: Array, displacement: Array) -> Array:
+    """(...) J: mean forces times mean displacements, regardless of signs."""
+    return np.abs(force[..., 0] * displacement[..., 0]).sum(axis=-1)
+
+
+def shares(supplied: Any, damped: Any, taken: Any, lost: Any, exchanged: Any, resting: Any) -> tuple[Any, Any]:
     """`Checks.balance` and `Checks.counted` of energies per cycle, J, numbers or (f,).
 
     Args:
         taken: work done on the contacts. lost: what their laws count of it. exchanged: see `exchanged`, of loads and
-            contacts.
+            contacts. resting: see `resting`, of contacts.
     """
-    size = np.max([abs(supplied), abs(damped), abs(taken), EXCHANGED * exchanged, 1e-300 + 0 * exchanged], axis=0)
+    least = np.maximum(RESTING * resting, 1e-300) + 0 * exchanged
+    size = np.max([abs(supplied), abs(damped), abs(taken), EXCHANGED * exchanged, least], axis=0)
     return (supplied - damped - taken) / size, (taken - lost) / size
 
 
@@ -180,7 +190,8 @@ def _energy(s: Series) -> list[Check]:
         return []
     taken = np.sum([work(s.arrays[f"{n}/force"], s.arrays[f"{n}/displacement"]) for n in names], axis=0)
     told = np.sum([s.arrays[f"{n}/dissipated"] for n in names], axis=0)
-    both = shares(s.arrays["supplied"], s.arrays["damped"], taken, told, s.arrays["exchanged"])
+    still = np.sum([resting(s.arrays[f"{n}/force"], s.arrays[f"{n}/displacement"]) for n in names], axis=0)
+    both = shares(s.arrays["supplied"], s.arrays["damped"], taken, told, s.arrays["exchanged"], still)
     missing, apart = (float(np.abs(off[s.converged]).max(initial=0.0)) for off in both)
     return [
         _held(s, "balance, from the harmonics", missing, BALANCE),

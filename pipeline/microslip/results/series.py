@@ -82,6 +82,11 @@ class Series:
         return np.asarray(self.arrays["frequency"])
 
     @property
+    def Omega(self) -> Array:
+        """(f,) rad/s."""
+        return 2 * np.pi * self.frequency
+
+    @property
     def parameter(self) -> Array:
         """(f,) what it runs over, see `OVER`."""
         return np.asarray(self.arrays.get("parameter", self.arrays["frequency"]))

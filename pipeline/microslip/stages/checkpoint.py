@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,10 @@ from typing import Any
 from ..case import checkpoint
 from ..case.assemble import Built
 from ..contact.kinds import sources_of_others
+from ..data import UserError
 from ..files import store
-from ..results import Journal, open_journal
+from ..results import Journal, open_journal, read_journal
+from ..units import counted
 from .stage import hash_of_code
 
 
@@ -28,7 +30,8 @@ class Checkpoint:
     Attributes:
         file: the journal. raw: the case file. modal_files: body of the case -> its modal file. fresh: forget what is
             there. begin: is called before anything is written. whole_sweep: the points depend on the sweep that they
-            are points of, as where a motion may be one of several.
+            are points of, as where a motion may be one of several. report: is told why points of a run that did not
+            end are not gone on with; None: nobody is.
     """
 
     file: Path
@@ -37,21 +40,42 @@ class Checkpoint:
     fresh: bool
     begin: Callable[[], None]
     whole_sweep: bool = False
+    report: Callable[[str], None] | None = None
 
-    @contextmanager
+    @contextlib.contextmanager
     def journal(self, built: Built) -> Iterator[Journal]:
         """The journal of an assembly; see `results.open_journal`."""
         names = {body: str(file) for body, file in self.modal_files.items()}
         head = checkpoint.head_of(built, self.raw, hashes_of(self.modal_files), names) | {"finished": False}
+        parts = self._parts(built)
+        self._tell(parts)
         self.begin()
-        with open_journal(self.file, self.inputs(built), head, self.fresh) as journal:
-            self.fresh = False
+        with open_journal(self.file, store.fingerprint(parts), head | {"made_of": parts}, self.fresh) as journal:
+            self.fresh, self.report = False, None
             yield journal
 
     def inputs(self, built: Built) -> str:
         """Hash of all that the points of an assembly depend on."""
-        sweep = built.settings.sweep
-        band = (sweep.start, sweep.stop, sweep.points) if self.whole_sweep else ()
-        others = hashes_of(sources_of_others())
-        code = hash_of_code(("case.run", "case.curves"))
-        return store.fingerprint(checkpoint.of_points(built), hashes_of(self.modal_files), code, others, *band)
+        return store.fingerprint(self._parts(built))
+
+    def _parts(self, built: Built) -> dict[str, str]:
+        """What the points depend on, in words -> its hash."""
+        sweep, others = built.settings.sweep, hashes_of(sources_of_others(built.contacts))
+        band = {"the sweep": store.fingerprint(sweep.start, sweep.stop, sweep.points)} if self.whole_sweep else {}
+        return {
+            "the case": checkpoint.of_points(built), **band, "microslip": hash_of_code(("case.run", "case.curves")),
+            **{f"the modal file of {name}": own for name, own in hashes_of(self.modal_files).items()},
+            **{f"the module {name}": own for name, own in others.items()},
+        }  # fmt: skip
+
+    def _tell(self, parts: Mapping[str, str]) -> None:
+        """What has changed since a run that did not end kept points, which are forgotten."""
+        if self.report is None or self.fresh:
+            return
+        with contextlib.suppress(UserError):  # none is there
+            head, series = read_journal(self.file)
+            known, count = head.get("made_of", {}), sum(map(len, series.values()))
+            changed = [name for name in {**parts, **known} if parts.get(name) != known.get(name)]
+            if known and count and changed:
+                why = f"changed since: {', '.join(changed)}"
+                self.report(f"warning: begins anew, without {counted(count, 'point')} of a run that did not end; {why}")

@@ -91,7 +91,8 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Impor
     told: list[str] = []
     for number, part in enumerate(parts):
         if not part.there:
-            told += import_file(part.file, part.body.parent, unit).told[:-1]
+            written = import_file(part.file, part.body.parent, unit).told[:-1]
+            told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
         _add(part, _joints(parts, number, patches, unit))
     told += [_sentence(parts, patch, unit) for patch in patches]
     flat = [patch for patch in patches if patch.normal is not None]
@@ -269,7 +270,8 @@ def _drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
     n = np.zeros(3) if patch.normal is None else patch.normal
     lines = []
     if not names[0]:
-        lines += ["", "[[excitations]]           # a force of 1 N, as far from the contact as can be"]
+        lines += ["", "[[excitations]]           # a force of 1 N, as far from the contact as can be:"]
+        lines += ["                          # move it, and the probe, when you clamp the body there"]
         lines += ['name = "shaker"', f"point = [{at}]", f"direction = [{', '.join(f'{v:.6g}' for v in n + 0.0)}]"]
     if not names[1]:
         lines += ["", "[[monitors]]", 'name = "probe"', f"point = [{at}]"]
@@ -289,7 +291,7 @@ def _case(
     bodies = ",\n".join(f'    {{ name = "{part.name}"{s} }}' for part, s in zip(parts, springs, strict=True))
     lines = [
         f'name = "{body_name(home.resolve().name)}"',
-        f'excitation = "{driven}:{rows[0]}"',
+        f'excitation = "{driven}:{rows[0]}"   # move it and the monitor, in its body.toml, when you clamp there',
         "amplitude = 1.0             # N",
     ]
     lines += [f'monitor = "{driven}:{rows[1]}"', f'direction = "{axis}"']
@@ -303,7 +305,8 @@ def _case(
         lines += ["", "[[contacts]]", f'interface = "{one}"', f'against = "{other}"']
         lines += [f"normal_stiffness = {NORMAL_STIFFNESS * area:.2g}   # N/m of the whole patch: a guess by its area"]
         lines += [f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", "friction = 0.2", "points = [3, 3]"]
-    lines += ["", "[sweep]                     # a guess: about the first bending of a beam as long as all of it"]
+    lines += ["", "# A guess for free parts, about the first bending of a beam as long as all of them:"]
+    lines += ["# when you clamp one, set the band anew; microslip modes tells the frequencies.", "[sweep]"]
     return [
         *lines,
         f"start = {float(f'{low:.2g}'):g}",

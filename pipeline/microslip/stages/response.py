@@ -100,7 +100,8 @@ def _work(
 ) -> Made:
     bases = {name: read_basis(file) for name, file in files.items()}
     folder = stage.product.parent
-    points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, whole_sweep=True)
+    told = stage.report if stage.is_unfinished else None
+    points = Checkpoint(folder / "response.points", raw, files, stage.force, stage.begin, True, told)
     try:
         begin = _harmonics(points, settings, bases, case_path) if settings.looks_for_harmonics else FIRST_HARMONICS
         result = run_case(settings, bases, case_path, stage.report, points.journal, begin)

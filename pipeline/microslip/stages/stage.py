@@ -68,6 +68,11 @@ class Stage:
         """Whether the product is up to date, and not to be made all the same."""
         return not self.force and store.is_up_to_date(self.product, {**inputs, "code": hash_of_code(self.code)})
 
+    @property
+    def is_unfinished(self) -> bool:
+        """Whether nothing stands there that was made to its end."""
+        return not store.sidecar_path(self.product).is_file()
+
     def making(self) -> AbstractContextManager[None]:
         """What else belongs to the product is made under its lock, see `store.making`."""
         return store.making(self.product, self.report)

@@ -95,7 +95,8 @@ def _work(
         stage.begin()
         said.unlink(missing_ok=True)
 
-    points = Checkpoint(folder / f"over_{kind}.points", raw, files, stage.force, begin)
+    told = stage.report if stage.is_unfinished else None
+    points = Checkpoint(folder / f"over_{kind}.points", raw, files, stage.force, begin, report=told)
 
     def write(tables: Tables) -> None:
         begin()

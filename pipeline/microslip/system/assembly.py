@@ -109,7 +109,7 @@ class Contact:
         from ..contact.set_valued import REFUSED, SetValued
 
         if isinstance(self.patch.law, SetValued):
-            raise UserError(f"contacts.{self.name}: {REFUSED}")
+            raise UserError(f"{'element ' if self.patch.count == 1 else 'contacts.'}{self.name}: {REFUSED}")
         if isinstance(self.patch.law, Spring) and self.patch.count == 1:  # at a displacement at which it bends
             slope = abs(float(self.patch.law.slope(2 * (self.length or 0.0))))
             return slope * float(self.patch.kinematics[0, 1, 0]) ** 2 * np.eye(1)
@@ -260,6 +260,11 @@ class Assembly:
         said = "; ".join(f"{key} {', '.join(names)}" for key, names in named.items() if names)
         ring = f"; one of {self.ring.blades} sectors, engine order {self.ring.order}" if self.ring else ""
         return f"<Assembly: {said}{ring}>"
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What a reader must know: nothing; of an assembly that a case describes see `Built.messages`."""
+        return ()
 
     def check_names(self) -> None:
         """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no component."""

@@ -259,10 +259,17 @@ def _contacts(elements: Sequence[Element], component: str, K: Array, force: Arra
         shape[0, ALONG[e.along], 0] = 1.0
         key = f"{e.law!r} {e.along}"
         patch = patches.setdefault(key, Patch("element", np.zeros((1, 2)), np.ones(1), e.law, shape))
-        own = e.name or f"{type(e.law).__name__.lower()} {i}"
+        own = e.name or f"{_kind(e)} {i}"
         face, zero = ContactFace(component, own, rows={0: row[None]}), np.zeros(1)
         found.append(Contact(own, patch, face, None, zero, zero, length=e.length or _length(e.law, row, K, force)))
     return tuple(found)
+
+
+def _kind(e: Element) -> str:
+    """What makes such an element."""
+    if isinstance(e.law, SetValued):
+        return "stop" if e.along == "n" else "friction"
+    return type(e.law).__name__.lower()
 
 
 def _length(law: Law, row: Array, K: Array, force: Array) -> float | None:

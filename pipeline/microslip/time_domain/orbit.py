@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from ..data import Array, NotConverged, UserError
-from ..files.hdf5 import create, put, seal
+from ..files.hdf5 import create, put, refuse_foreign, seal
 from ..files.store import complete_or_absent
 from ..settings.mistakes import bounded
 from ..units import METRES, counted
@@ -140,8 +140,8 @@ class Orbit:
 
     @cached_property
     def repeats(self) -> int:
-        """After how many periods of the excitation the motion comes back within `REPEATS`; 0: it does not within half
-        of the periods that are kept."""
+        """After how many periods of the excitation the motion comes back within `REPEATS`, in the last half of the
+        periods that are kept; 0: it does not within half of them."""
         return comes_back(*self.stroboscopic)
 
     @cached_property
@@ -267,8 +267,9 @@ class Orbit:
         """Write a file of this motion (``docs/time_domain.md``), complete or absent; `load` reads it.
 
         Raises:
-            UserError: no permission, no space.
+            UserError: no permission, no space; a file that is none of motions stands there.
         """
+        refuse_foreign(path, kept_samples.FORMAT)
         with complete_or_absent(path) as temporary:
             with create(temporary) as file:
                 kept_samples.head(file)
@@ -284,7 +285,12 @@ class Orbit:
         return Path(path)
 
     def plot(self, axes: Axes | None = None, read_out: int = 0) -> Axes:
-        """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period."""
+        """Draw its phase portrait: velocity over displacement of a read-out, and a point after every period.
+
+        Args:
+            axes: of matplotlib, new ones with a legend if not given. read_out: its number.
+        """
+        own = axes is None
         if axes is None:
             import matplotlib.pyplot as plt
 
@@ -294,6 +300,8 @@ class Orbit:
         axes.plot(by * y, rate * v, color="#0b4f9c", linewidth=0.7)
         axes.plot(by * y[last], rate * v[last], "o", color="#c8382c", markersize=4, label="after every period")
         axes.set(xlabel=f"{self.labels[read_out]} in {unit}", ylabel=f"velocity in {per_second}/s")
+        if own:
+            axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
         return axes
 
 
@@ -337,9 +345,12 @@ def stroboscopic(strips: Iterable[list[Array]], omega2: Array, samples: int) -> 
 
 
 def comes_back(after: Array, size: float) -> int:
-    """See `Orbit.repeats`."""
-    for p in range(1, after.shape[1] // 2 + 1):
-        if np.abs(after[:, p:] - after[:, :-p]).max(initial=0.0) <= REPEATS * size:
+    """See `Orbit.repeats`. The last half, where the start is forgotten best, is held against what was p periods before:
+    in a multiple of p less of a start may show, and it would be found first."""
+    count = after.shape[1]
+    half = count // 2
+    for p in range(1, half + 1):
+        if np.abs(after[:, half:] - after[:, half - p : count - p]).max(initial=0.0) <= REPEATS * size:
             return p
     return 0
 
