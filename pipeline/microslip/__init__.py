@@ -21,7 +21,7 @@ PUBLIC = {
     "exchange.labelled": "to_xarray",
     "bodies": "modes assemble sample",
     "system.structure": "structure polynomial jenkins stop friction Element",
-    "analyses": "harmonic_response follow backbone integrate run_up",
+    "analyses": "harmonic_response follow backbone integrate integrate_many run_up",
 }
 """Module -> the names of it that are public."""
 

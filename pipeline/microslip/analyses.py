@@ -23,6 +23,9 @@ from .settings.mistakes import bounded
 from .system.assembly import Assembly
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
 Report = Callable[[str], None]
@@ -239,7 +242,8 @@ def integrate(
     Args:
         system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. settle: periods
             that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
-            if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least.
+            if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least. Of fourth order
+            where every law allows it, and then halved where contacts open, close or slide; else of second.
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
             are taken; a balance or a case has its own.
@@ -250,7 +254,7 @@ def integrate(
 
     Returns:
         An `Orbit`: ``said``, ``repeats``, ``count("closes")``, ``plot()``, ``to_dataframe()``, ``to_xarray()``,
-        ``save(path)``; ``error`` of its last period.
+        ``save(path)``; ``error``, estimated, of the whole run.
 
     Raises:
         UserError: steps that are too few for the springs of the contacts; contacts that the start presses deeper than
@@ -286,6 +290,38 @@ def integrate(
         return orbit.run(found, settle, keep, samples, steps, begin, report)
     asked = recorded.Asked(f"{frequency:.6g} {unit}", found, settle, keep, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
+
+
+def integrate_many(
+    system: System, frequency: float, displacements: ArrayLike, velocities: ArrayLike, *,
+    unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20, steps: int | None = None,
+) -> Reached:  # fmt: skip
+    """Which motions many starts lead to: all of them integrated by one compiled program, for basins of attraction.
+
+    Args:
+        system, unit, settle, keep, steps: see `integrate`. displacements, velocities: (n, k) of the system's
+            coordinates at t = 0, m and m/s; of bodies from modal files those of their modes.
+
+    Returns:
+        A `Reached`: ``attractor`` and ``repeats`` of each start, ``impacts``, read-outs ``y`` after every period.
+
+    Raises:
+        UserError: starts that are not (n, k); steps that are too few for the springs of the contacts.
+
+    Examples:
+        A buckled beam, let go on either side:
+
+        >>> import microslip as ms
+        >>> beam = ms.structure(1.0, -1.0, 0.3, force={0: 0.05}, elements=[ms.polynomial({3: 1.0})])
+        >>> ms.integrate_many(beam, 0.2, [[0.8], [-0.8], [0.9]], [[0.0], [0.0], [0.0]]).attractor
+        array([0, 1, 0])
+    """
+    from .time_domain import equations, many
+
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
+    found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    return many.run(found, np.asarray(displacements), np.asarray(velocities), settle, keep, steps)
 
 
 def run_up(

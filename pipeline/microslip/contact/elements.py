@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 
 from .law import Array, Law, Step, number, settings, static, table
 
@@ -35,6 +36,10 @@ class Spring(Law):
     @property
     def remembers(self) -> int | None:
         return 0
+
+    @property
+    def follows(self) -> float:
+        return np.inf
 
     def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
         return self.step(u, v, 0.0, x)[0], x

@@ -18,6 +18,9 @@ import numpy as np
 from ..settings.mistakes import bounded
 
 os.environ.setdefault("NPROC", "1")  # threads of jax: the steps of contact laws are too short to be shared
+if "xla_backend_extra_options" not in os.environ.get("XLA_FLAGS", ""):  # loops as one program, no step by step calls
+    small = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {small}".strip()
 jax.config.update("jax_enable_x64", True)  # contact forces are differences of large numbers
 
 
@@ -202,6 +205,12 @@ class Law:
             (n, 3) force in N and (k, n) the time derivative of x.
         """
         raise NotImplementedError
+
+    @property
+    def follows(self) -> float:
+        """s, in which what the differential equation remembers follows the motion; inf: it remembers nothing; 0, the
+        default: at once, with jumps of its rate, or it is known by its steps alone."""
+        return 0.0
 
     def slowed(self, u: Array, v: Array, dt: Array | float, state: State, yielding: Array) -> Array:
         """(n, 3) velocities in m/s that are left of v when friction brakes points which yield by (n,) m/s per N:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from ..reduced.compliance import BULK_AND_SURFACE
@@ -104,6 +105,15 @@ class PointContact(Law):
     def remembers(self) -> int | None:
         """Two, of contacts of one coefficient and one stiffness."""
         return 2 if self.stiffness_2 is None and self.friction.constant else None
+
+    @property
+    def follows(self) -> float:
+        if self.remembers is None:
+            return 0.0
+        zero = jnp.zeros_like(self.stiffness_1)
+        if not jnp.any(self.stiffness_1 * self.friction.coefficient(zero, zero + 1, zero)):
+            return np.inf
+        return 0.0 if self.damping is None else float(jnp.min(self.damping))
 
     def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
         """x: tangential force of the springs, N. Friction holds them and the damper beside them, one of the

@@ -36,6 +36,10 @@ class Portion(Law):
     def remembers(self) -> int | None:
         return self.whole.remembers
 
+    @property
+    def follows(self) -> float:
+        return self.whole.follows
+
     def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
         force, rate = self.whole.rates(u, v, x, time, lag)
         return (self.share * force.T).T, rate

@@ -8,7 +8,7 @@ A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
@@ -89,7 +89,8 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
     Returns:
         nan where the motion or its neighbour ceases to be finite, or where memory cannot be separated (a message).
     """
-    if told := _whole(now.held.states):
+    stepper = replace(stepper, order=2)  # whose steps are the same for neighbours
+    if told := whole(now.held.states):
         return Exponent(math.nan, math.nan, 0, told)
     e = stepper.equations
     rows = np.where(np.arange(samples) < 1, each * samples, 0)
@@ -108,11 +109,11 @@ def exponent(stepper: Stepper, now: Now, samples: int, each: int, periods: int, 
         if not 0 < size < math.inf:
             return Exponent(math.nan, math.nan, i, "No Lyapunov exponent: the separation of two motions was lost.")
         growth[i] = math.log(size / apart)
-        other = _between(now, other, apart / size)
+        other = between(now, other, apart / size)
     return _mean(growth[ALIGNED:], 2 * np.pi / e.Omega)
 
 
-def _whole(states: Any) -> str:
+def whole(states: Any) -> str:
     """A message where a contact remembers numbers that two motions cannot be a little apart in."""
     leaves = jax.tree_util.tree_leaves(states)
     if all(jnp.issubdtype(x.dtype, jnp.floating) for x in leaves):
@@ -120,14 +121,17 @@ def _whole(states: Any) -> str:
     return "No Lyapunov exponent: a law of these contacts remembers whole numbers, which cannot be varied a little."
 
 
-def _between(now: Now, other: Now, share: float) -> Now:
+def between(now: Now, other: Now, share: float) -> Now:
     """A motion apart by a share of what the other is, memory of contacts included."""
 
     def one(a: Any, b: Any) -> Any:
         return a + share * (b - a) if jnp.issubdtype(a.dtype, jnp.floating) else a
 
     return now._replace(
-        **{key: jax.tree_util.tree_map(one, getattr(now, key), getattr(other, key)) for key in ("y", "push", "held")}
+        **{
+            key: jax.tree_util.tree_map(one, getattr(now, key), getattr(other, key))
+            for key in ("y", "push", "held", "memory")
+        }
     )
 
 

@@ -190,10 +190,10 @@ def answer(
         d, missed, (force, states, points) = free, jnp.zeros(()), force_at(groups, free, v, dt, held.states)
     else:
         d, missed, (force, states, points) = _placed(groups, bodies, free, v, dt, held)
-    return _told(groups, d, dt, held, accounts, force, states, points, missed)
+    return told(groups, d, dt, held, accounts, force, states, points, missed)
 
 
-def _told(
+def told(
     groups: tuple[Group, ...], d: Any, dt: Any, held: Held, accounts: bool, force: Any, states: Any, points: Any,
     missed: Any, by_law: bool = True,
 ) -> Held:  # fmt: skip
@@ -264,10 +264,10 @@ def rigid_answer(
         points[i], states[i] = force, held.states[i] + way.T
     force = joined(groups, points)
     if bodies is not None:
-        return _told(
+        return told(
             groups, free - times(bodies.R, force), dt, held, accounts, force, tuple(states), tuple(points), missed
         )
-    return _told(groups, free, dt, held, accounts, force, tuple(states), tuple(points), missed, by_law=False)
+    return told(groups, free, dt, held, accounts, force, tuple(states), tuple(points), missed, by_law=False)
 
 
 def slid(w: Any, free: Any) -> Any:

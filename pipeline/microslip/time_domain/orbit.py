@@ -51,6 +51,15 @@ PENETRATES = 1e-6
 UNSOLVED = 1e-6
 """Share of the largest motion of the contacts that an implicit step may miss before a reader is told."""
 
+AFTER = 16
+"""Periods at most over which it is watched how errors die away or grow."""
+
+APART = 1e-4
+"""Share of its size by which two motions are apart to see how errors live on: above those of a step."""
+
+FOLLOWED = 0.1
+"""Share of the largest read-out: with a larger error a motion is not that of its start."""
+
 REPEATS = 1e-3
 """Share of the size of a motion within which it counts as having come back."""
 
@@ -67,8 +76,9 @@ class Orbit:
             ``damped``, and ``contacts``, done on them; of that, and of what moving
             ``ground`` gave them, ``stored`` and ``lost``, nan where a law does not tell.
         events: (e, 3) time in s, number of the contact, kind (an index of `KINDS`). missed: how many are not listed.
-        error: largest deviation of a read-out when the last period is done with half the step, a share of the largest
-            read-out; nan if it was not looked for. diverged: time (s) at which numbers became infinite; inf: never.
+        error: estimate of the largest deviation of a read-out that all periods together leave, a share of the largest
+            read-out, 1 at most; nan if it was not looked for. diverged: time (s) at which numbers became infinite;
+            inf: never.
         exponent: the largest Lyapunov exponent, looked for where the motion does not come back; None: it was not.
     """
 
@@ -420,9 +430,9 @@ def march(
         kept.mark(now, done)
         if done % CHUNK == 0 or done in (settle, settle + keep):
             report(f"period {done} of {settle + keep}, {float(now.time):.6g} s")
-    error = _error(stepper, now, samples, each)
+    error, told = _error(stepper, now, samples, each, settle + keep)
     exponent = _exponent(stepper, now, kept, samples, each, settle + keep)
-    more = (exponent.message,) if exponent and exponent.message else ()
+    more = tuple(text for text in (told, exponent.message if exponent else "") if text)
     return Ended(each * samples, error, messages=(*_warnings(kept, float(now.worst)), *more), exponent=exponent)
 
 
@@ -464,13 +474,49 @@ def _warnings(kept: Kept, worst: float) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _error(stepper: Stepper, now: Now, samples: int, each: int) -> float:
-    """Deviation of one more period from the same with half the step, over the largest read-out."""
-    fine = replace(stepper, tau=stepper.tau / 2)
-    both = [s.run(now, np.full(samples, k))[1] for s, k in ((stepper, each), (fine, 2 * each))]
-    y = [kept_samples.read(stepper.equations, seen) for seen in both]
-    size = np.abs(y[1]).max(initial=0.0)
-    return float(np.abs(y[0] - y[1]).max(initial=0.0) / size * 4 / 3) if size else 0.0
+def _error(stepper: Stepper, now: Now, samples: int, each: int, done: int) -> tuple[float, str]:
+    """What all periods together leave in the read-outs, a share of the largest, and what a reader must know.
+
+    One more period done with half the step tells what one leaves; how two motions that far apart, but for a factor,
+    come nearer or part in `AFTER` periods, or in an eighth of those that were done, tells what all of them leave.
+    """
+    fine, e = replace(stepper, tau=stepper.tau / 2), stepper.equations
+    found = [s.run(now, np.full(samples, k))[:2] for s, k in ((stepper, each), (fine, 2 * each))]
+    y = [kept_samples.read(e, seen) for _, seen in found]
+    size, order = np.abs(y[1]).max(initial=0.0), 4 if stepper.options.halvings else 2
+    share = float(np.abs(y[0] - y[1]).max(initial=0.0) / (size or 1.0)) * 2**order / (2**order - 1)
+    parts = _separations(stepper, found[0][0], found[1][0], samples, each, min(AFTER, done // 8))
+    half = len(parts) // 2
+    if not half or not np.isfinite(parts).all():
+        return min(1.0, share * done), ""
+    keeps = float((parts[-half:].sum() / parts[:half].sum()) ** (1 / (len(parts) - half)))
+    n = max(done - 1 - len(parts), 0)
+    more = parts[-half:].mean() * (n if abs(keeps - 1) < 1e-9 else keeps * np.expm1(n * np.log(keeps)) / (keeps - 1))
+    whole = min(1.0, share * (1 + parts.sum() + more))
+    if keeps <= 1 or whole < FOLLOWED:
+        return whole, ""
+    return whole, (
+        f"Errors grow {keeps:.3g} times in a period: after {done} this motion is one of those possible, not the "
+        "one that this start leads to; what it is on average holds all the same."
+    )
+
+
+def _separations(stepper: Stepper, a: Now, b: Now, samples: int, each: int, periods: int) -> Array:
+    """(periods,) how far two motions are apart after each, over what they are now; none where they are not apart."""
+    stiff = np.sqrt(np.abs(stepper.equations.omega2)).reshape(len(a.y), -1)
+    weights = np.concatenate([stiff, np.ones_like(stiff)], axis=1)
+
+    def far(y: Any) -> float:
+        return float(np.linalg.norm(weights * np.asarray(y)))
+
+    if not far(a.y - b.y) > 0 or classification.whole(a.held.states):
+        return np.zeros(0)
+    b = classification.between(a, b, APART * far(a.y) / far(a.y - b.y))
+    begin, rows, found = far(a.y - b.y), np.where(np.arange(samples) < 1, samples * each, 0), []
+    for _ in range(periods):
+        a, b = (stepper.run(one, rows)[0] for one in (a, b))
+        found.append(far(a.y - b.y) / begin)
+    return np.array(found)
 
 
 def steps_of_a_sample(e: Equations, samples: int, steps: int | None) -> int:

@@ -1,0 +1,103 @@
+"""What the compiled loop reads of the bodies, and what it carries from step to step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from .braking import Braking
+from .contacts import Held, Yielding, times
+from .flow import Flow
+from .inclusion import Meets
+from .ramp import Ramp
+
+
+class Bodies(NamedTuple):
+    """What the loop reads of the equations, as jax arrays in blocks of modes.
+
+    Attributes:
+        flow. yielding: see `contacts`. meets: of set-valued points, None: there are none.
+            braking: of friction that follows the velocity alone, None: there is none. F_0: (c,). D: (c, m) and
+            D_o (c, n): d of the contact coordinates. rate: (n, n) o' over o. kick: (m, c) velocities per force.
+        omega2: (b, p). steady: (b, 2 p, n) of the periodic motion without contacts. reach: (points,) norm of their
+            motion by modes, drift: (points,) m/s of the steady motion at most: see `_leap`. loads: (b, p, n) modal
+            forces of o that kick, of a run-up. enough: see `fourth`.
+    """
+
+    flow: Flow
+    yielding: Yielding | None
+    meets: Meets | None
+    braking: Braking | None
+    F_0: Any
+    D: Any
+    D_o: Any
+    rate: Any
+    omega2: Any
+    steady: Any
+    reach: Any
+    drift: Any
+    loads: Any
+    kick: Any
+    enough: Any
+
+
+class Now(NamedTuple):
+    """Where the motion is.
+
+    Attributes:
+        y: (b, 2 p) modal displacements and velocities. o: (n,). push: (b, p) accelerations by contacts. held: by
+            them.
+        energy: (6,) J since the start: given by loads, taken by dampers, done on contacts, lost there for good, what
+            contacts store now, and what moving ground gave them. worst: m, the largest residual of an implicit contact.
+        met: (4, contacts) the events of the last step, at: when, s. memory: of `fourth`, what the laws' differential
+            equations remember (k, n) and its rate, group by group, and (b, p) how the accelerations were bent, m/s4.
+            level: of `fourth`, k of the next step's 2^k.
+    """
+
+    y: Any
+    o: Any
+    time: Any
+    push: Any
+    held: Held
+    energy: Any
+    worst: Any
+    met: Any
+    at: Any
+    memory: Any
+    level: Any
+
+
+class Listed(NamedTuple):
+    """Events. count: of them. rows: (EVENTS, 3): time in s, contact, kind."""
+
+    count: Any
+    rows: Any
+
+
+class Seen(NamedTuple):
+    """A sample: (m,) q and q', (c,) d and force, (6,) energies (see `Now`) and the bodies' own, J; time, s."""
+
+    q: Any
+    q_dot: Any
+    d: Any
+    force: Any
+    energy: Any
+    mechanical: Any
+    time: Any
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the loop is compiled for. leaps: over flights without contact. accounts: of the energy that contacts store
+    and lose. ramp: o is that of a run-up, with these harmonics, whose loads kick. halvings: of the step, where it is
+    of fourth order; 0: it is of second."""
+
+    leaps: bool
+    accounts: bool
+    ramp: tuple[Ramp, tuple[int, ...]] | None = None
+    halvings: int = 0
+
+
+def by_force(B: Bodies, force: Any) -> Any:
+    """(b, p) m/s2 of the modes by forces (c,) of the contact coordinates."""
+    return times(B.kick, force - B.F_0).reshape(B.omega2.shape)

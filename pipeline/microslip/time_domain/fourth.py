@@ -1,0 +1,147 @@
+"""A step of fourth order, for contacts whose laws are differential equations: kicks at its begin, middle and end.
+
+The flow between kicks being exact, with N the accelerations by contacts,
+
+    v += h N_1 / 6,  flow h / 2,  v += h (N_2 + N_3) / 3,  flow h / 2,  v += h N_4 / 6
+
+are the weights of the classical Runge-Kutta method in the coordinates that flow (J. D. Lawson, SIAM J. Numer. Anal. 4,
+1967); N_2 to N_4 are what contacts say in its stages, and what they remember goes along with the same weights. N_5,
+where the step ends, is N_1 of the next one. What the step misses is estimated by h (N_4 - N_5) / 6, of third order, and
+by how much N is bent otherwise than in the step before: so a kink is seen wherever in the step a contact closes, opens
+or begins to slide. Where that is too much the step is done again in halves, down to a 512th, so that no more is
+lost there than in a step of the smooth motion.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from .bodies import Bodies, Now, Options, by_force
+from .contacts import Group, force_at, joined, moved, parts, times, told
+
+HALVINGS = 10
+"""Of a step, of which the shortest flow is half a step: where contacts change it is a 512th at least."""
+
+MISSED = 1e-3
+"""Of (step times the fastest frequency)^4: what a step may miss, a share of the motion."""
+
+GROWS = 40.0
+"""How many times smaller than it may be the estimate of a step is after which the next one is twice as long."""
+
+
+SLOW = 0.03
+"""Over the fastest frequency, s: laws that follow the motion more quickly would make steps too short."""
+
+
+class Answer(NamedTuple):
+    """push: (b, p) accelerations. points: (c n, 3) N and rates: (k, n) of what is remembered, group by group. d, v:
+    (c,) of the contact coordinates, m and m/s."""
+
+    push: Any
+    points: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    d: Any
+    v: Any
+
+
+def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
+    """With what the contacts remember, and their forces by that."""
+    x = tuple(
+        g.law.memory(f, s).reshape(g.law.remembers, len(f)) if g.law.remembers else jnp.zeros((0, len(f)))
+        for g, f, s in zip(groups, now.held.forces, now.held.states, strict=True)
+    )
+    first = _answer(groups, B, now.y, now.o, x, now.time)
+    held = now.held._replace(force=joined(groups, first.points), forces=first.points)
+    return now._replace(push=first.push, held=held, memory=(x, first.rates, 0 * first.push), level=jnp.full((), 1))
+
+
+def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:
+    """What contacts say where the bodies are, (b, 2 p)."""
+    q, v = jnp.split(y, 2, axis=1)
+    d = times(B.D, q.reshape(-1)) + times(B.D_o, o)
+    w = times(B.D, v.reshape(-1)) + times(B.D_o, times(B.rate, o))
+    found = [
+        g.law.rates(moved(g, at + g.offset), moved(g, rate), own, time, B.flow.length[0])
+        for g, at, rate, own in zip(groups, parts(groups, d), parts(groups, w), x, strict=True)
+    ]
+    points, rates = tuple(f for f, _ in found), tuple(r for _, r in found)
+    return Answer(by_force(B, joined(groups, points)), points, rates, d, w)
+
+
+def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> tuple[Any, Now]:
+    """Whether 2^k steps were done, and where the motion is then; where they were not, what is to be tried."""
+    p, h, half = B.omega2.shape[1], B.flow.length[k], B.flow.length[k - 1]
+    x, rates, bent_before = now.memory
+    o = times(B.flow.turn[k - 1], now.o), times(B.flow.turn[k], now.o)
+    stack = B.flow.stack[k - 1]
+    moves = stack[:, : 2 * p]
+
+    def flown(y: Any, o: Any) -> Any:
+        return times(moves, jnp.concatenate([y, jnp.broadcast_to(o, (len(y), len(o)))], axis=1))
+
+    def kick(y: Any, push: Any) -> Any:
+        return y.at[:, p:].add(push)
+
+    def pushed(push: Any) -> Any:
+        """(b, 2 p) what half a step makes of an acceleration."""
+        return times(moves[:, :, p : 2 * p], push)
+
+    def grown(share: Any, *by: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(a + share * sum(r) for a, *r in zip(x, *by, strict=True))
+
+    free, first = flown(now.y, now.o), pushed(now.push)
+    two = _answer(groups, B, free + half * first, o[0], grown(half, rates), now.time + half)
+    three = _answer(groups, B, kick(free, half * two.push), o[0], grown(half, two.rates), now.time + half)
+    end = flown(free, o[0]) + h * pushed(three.push)
+    four = _answer(groups, B, end, o[1], grown(h, three.rates), now.time + h)
+    kicks = (h / 6 * now.push, h / 3 * (two.push + three.push), h / 6 * four.push)
+    y, energy = _gone(stack, now.y, (now.o, o[0]), kicks)
+    x = grown(h / 6, rates, two.rates, two.rates, three.rates, three.rates, four.rates)
+    last = _answer(groups, B, y, o[1], x, now.time + h)
+    held = _held(options, groups, h, now, last, x)
+    bent = (now.push - two.push - three.push + last.push) / h**2
+    missed = h / 6 * jnp.sqrt(jnp.sum((four.push - last.push) ** 2) + jnp.sum((0.5 * h**2 * (bent - bent_before)) ** 2))
+    size = jnp.sqrt(jnp.sum(y[:, p:] ** 2 + B.omega2 * y[:, :p] ** 2))
+    done, level = _judged(options, k, now.level, missed, B.enough * size)
+    energy = now.energy.at[:3].add(energy).at[3].add(held.lost).at[4].set(held.stored).at[5].add(held.given)
+    after = now._replace(
+        y=y, o=o[1], time=now.time + h, push=last.push, held=held, energy=energy, memory=(x, last.rates, bent)
+    )
+    after = jax.tree_util.tree_map(lambda a, b: jnp.where(done, a, b), after, now)
+    return done, after._replace(level=level)
+
+
+def _judged(options: Options, k: Any, level: Any, missed: Any, enough: Any) -> tuple[Any, Any]:
+    """Whether a step is good, and which one is to be tried then."""
+    done = ~(missed > enough) | (k <= 1)
+    fewer = jnp.clip(jnp.floor(0.25 * jnp.log2(enough / (missed + 1e-300))), -4, -1).astype(int)
+    longer = jnp.where(GROWS * missed < enough, jnp.maximum(level, k + 1), level)
+    return done, jnp.clip(jnp.where(done, longer, k + fewer), 1, options.halvings)
+
+
+def _gone(stack: Any, y: Any, oscillators: tuple[Any, Any], kicks: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+    """(b, 2 p) after kicks with flows between them, and (3,) J given by loads, taken by dampers, done on contacts."""
+    p = y.shape[1] // 2
+    given, taken, work = (jnp.zeros(()) for _ in range(3))
+    for i, push in enumerate(kicks):
+        work -= jnp.sum(push * (y[:, p:] + 0.5 * push))
+        y = y.at[:, p:].add(push)
+        if i < 2:
+            z = jnp.concatenate([y, jnp.broadcast_to(oscillators[i], (len(y), len(oscillators[i])))], axis=1)
+            flown = times(stack, z)
+            works = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
+            y, given, taken = flown[:, : 2 * p], given + works[0], taken + works[1]
+    return y, jnp.stack([given, taken, work])
+
+
+def _held(options: Options, groups: tuple[Group, ...], h: Any, now: Now, last: Answer, x: tuple[Any, ...]) -> Any:
+    """What contacts hold: their state as their law's own step tells it, with the memory that was integrated."""
+    _, states, _ = force_at(groups, last.d, last.v, h, now.held.states)
+    recalled = tuple(
+        (g.law.recalled(s, own) if g.law.remembers else None) or s for g, s, own in zip(groups, states, x, strict=True)
+    )
+    force = joined(groups, last.points)
+    return told(groups, last.d, h, now.held, options.accounts, force, recalled, last.points, jnp.zeros(()))

@@ -1,0 +1,93 @@
+"""A step of second order: half a kick by the contacts, flow, and half a kick by what they say where the bodies came to.
+
+It takes any law: with memory, set-valued, on bodies that yield beside their modes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from .bodies import Bodies, Now, Options, by_force
+from .braking import slowed
+from .contacts import Group, Held, answer, force_at, rigid_answer, times
+
+
+def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: Now) -> Now:
+    """2^k steps, of which more than one only where no contact is met in them."""
+    p = B.omega2.shape[1]
+    dt = B.flow.length[k]
+    touched, pushed = 0.5 * dt * now.push, 0.5 * dt * times(B.loads, now.o)
+    v = now.y[:, p:] + touched + pushed
+    z = jnp.concatenate([now.y[:, :p], v, jnp.broadcast_to(now.o, (len(v), len(now.o)))], axis=1)
+    flown = times(B.flow.stack[k], z)
+    q, v_free = flown[:, :p], flown[:, p : 2 * p]
+    given, taken = jnp.sum(z * flown[:, 2 * p :].reshape(len(z), 2, -1).transpose(1, 0, 2), axis=(1, 2))
+    o, moves = _driven(options, B, now, k, dt)
+    held, push = answered(options, groups, B, q, v_free, touched + pushed, o, moves, dt, now.held)
+    y, work = jnp.concatenate([q, v_free], axis=1), jnp.zeros(())
+    after = 0.5 * dt * push, 0.5 * dt * times(B.loads, o)
+    for contacts, loads, mean in ((touched, pushed, 0.5 * (now.y[:, p:] + v)), (*after, v_free + 0.5 * sum(after))):
+        work -= jnp.sum(contacts * mean)
+        given += jnp.sum(loads * mean)
+    y = y.at[:, p:].add(sum(after))
+    energy = now.energy + jnp.stack([given, taken, work, held.lost, jnp.zeros(()), held.given])
+    energy = energy.at[4].set(held.stored)
+    return now._replace(
+        y=y, o=o, time=now.time + dt, push=push, held=held, energy=energy, worst=jnp.maximum(now.worst, held.missed)
+    )
+
+
+def _driven(options: Options, B: Bodies, now: Now, k: Any, dt: Any) -> tuple[Any, Any]:
+    """(n,) o after a step, and o' there."""
+    if options.ramp is None:
+        o = times(B.flow.turn[k], now.o)
+        return o, times(B.rate, o)
+    ramp, harmonics = options.ramp
+    o = ramp.driving(now.time + dt, harmonics, jnp)
+    return o, (o - now.o) / dt
+
+
+def answered(
+    options: Options, groups: tuple[Group, ...], B: Bodies, q: Any, v_free: Any, half: Any, o: Any, moves: Any, dt: Any,
+    held: Held, share: float = 1.0,
+) -> tuple[Held, Any]:  # fmt: skip
+    """What contacts hold where the bodies are, and (b, p) their accelerations of the modes.
+
+    Args:
+        v_free: (b, p) velocities without the kick at the step's end. half: (b, p) that kick, as far as it is known.
+            moves: (n,) o'. share: of a whole kick that is still to come before the bodies flow on.
+    """
+    free = times(B.D, q.reshape(-1)) + times(B.D_o, o)
+    given = times(B.D_o, moves)
+    v = times(B.D, (v_free + half).reshape(-1)) + given
+    unbraked = jnp.zeros(())
+    if B.braking is not None and share == 1.0:
+        before = times(B.D, v_free.reshape(-1)) + given
+        v, unbraked = slowed(groups, B.braking, B.F_0, free, before, dt, held)
+    if B.meets is None:
+        held = answer(groups, B.yielding, free, v, dt, held, options.accounts)
+        return held._replace(missed=held.missed + dt * unbraked), by_force(B, held.force)
+    force, *others = force_at(groups, free, v, dt, held.states)
+    ahead = free
+    if B.yielding is None:
+        ahead = _ahead(B, q, v_free + share * dt * (by_force(B, force) + times(B.loads, o)), o)
+    else:
+        free = free + times(B.yielding.R, B.F_0)
+    points = B.meets if B.yielding is not None else B.meets._replace(A=share * B.meets.A, r=B.meets.r / share)
+    owed = held.owed
+    held = rigid_answer(groups, points, B.yielding, free, ahead, dt, held, tuple(others), options.accounts)
+    push = by_force(B, held.force)
+    if B.yielding is None and options.accounts:
+        whole, rigid = push + times(B.loads, o), 0.5 * dt * (held.force - force)
+        now, then = (times(B.D, (v_free + part * dt * whole).reshape(-1)) + given for part in (0.25, share - 0.25))
+        held = held._replace(lost=held.lost + owed + jnp.sum(rigid * now), owed=jnp.sum(rigid * then))
+    return held, push
+
+
+def _ahead(B: Bodies, q: Any, v: Any, o: Any) -> Any:
+    """(c,) of the contact coordinates after another step."""
+    z = jnp.concatenate([q, v, jnp.broadcast_to(o, (len(q), len(o)))], axis=1)
+    then = times(B.flow.stack[0][:, : q.shape[1]], z)
+    return times(B.D, then.reshape(-1)) + times(B.D_o, times(B.flow.turn[0], o))
