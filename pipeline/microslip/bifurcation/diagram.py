@@ -1,0 +1,198 @@
+"""A diagram: equilibria over the parameter, the orbits born on them, and those born on these, branch by branch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..continuation import Lost, Settings
+from ..continuation.curve import State
+from ..data import Array, UserError
+from . import equilibria, floquet, orbits, switching
+from .branches import EQUILIBRIA, Branch, of_orbits
+from .dynamics import Dynamics
+from .equilibria import Hopf
+from .shooting import Orbit, Shooting
+
+Report = Callable[[str], None]
+Kept = Callable[[str], Branch | None]
+"""A finished branch of a name, if there is one."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a diagram is to show, see `case.questions.BifurcationOfCase`."""
+
+    start: float
+    stop: float
+    orbits: bool = True
+    doublings: int = 1
+    nodes: int = 32
+    step: float = 0.08
+    points: int = 400
+    attractors: tuple[float, ...] = ()
+    starts: int = 64
+    seed: int = 0
+
+    @property
+    def settings(self) -> Settings:
+        low, high = sorted((self.start, self.stop))
+        step = min(0.02, self.step)
+        return Settings(
+            direction=1 if self.stop > self.start else -1, low=low, high=high, points=self.points, step=step,
+            step_max=self.step,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Branches over a parameter.
+
+    Attributes:
+        system. branches. hopf: the Hopf points. messages: what a reader must know.
+    """
+
+    system: Dynamics
+    branches: tuple[Branch, ...]
+    hopf: tuple[Hopf, ...]
+    messages: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Branch:
+        return next(b for b in self.branches if b.name == name)
+
+
+@dataclass(eq=False)
+class _Work:
+    """A diagram on its way."""
+
+    system: Dynamics
+    asked: Asked
+    kept: Kept
+    keep: Callable[[Branch], None]
+    report: Report
+    found: list[Branch] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+
+    def add(self, name: str, make: Callable[[], Branch]) -> Branch:
+        """A branch, from where it is kept or made now."""
+        branch = self.kept(name)
+        if branch is None:
+            self.report(name)
+            branch = make()
+            self.keep(branch)
+        if branch.lost:
+            where = f" at {branch.parameter[-1]:.6g}" if len(branch) else ""
+            self.messages.append(f"{name}: ends{where}: {branch.ended}")
+        self.found.append(branch)
+        return branch
+
+
+def diagram(
+    system: Dynamics, x: Array, asked: Asked, kept: Kept = lambda _: None,
+    keep: Callable[[Branch], None] = lambda _: None, report: Report = lambda _: None,
+) -> Diagram:  # fmt: skip
+    """Equilibria from x (n,) at the start, orbits from every Hopf point, doubled ones from every period doubling.
+
+    A branch that cannot be followed ends where it is, and the rest goes on.
+
+    Args:
+        kept, keep: finished branches of an interrupted run. report: is told what is under way.
+
+    Raises:
+        UserError: there is no equilibrium near x.
+    """
+    work = _Work(system, asked, kept, keep, report)
+    still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
+    points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
+    if asked.orbits:
+        for i, point in enumerate(points, 1):
+            if not _is_known(work, point):
+                _born_at(work, f"orbits {i}", point)
+    return Diagram(system, tuple(work.found), points, tuple(work.messages))
+
+
+def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
+    settings = asked.settings
+    state = equilibria.first(system, x, asked.start, settings)
+    if state.status:
+        raise UserError(f"no equilibrium is found near the start: {state.status}")
+    rows = [(p.x, p.lam, p.kind) for p in state.found]
+    while not state.status:
+        before, state = state, equilibria.next_one(system, state, settings)
+        passed = [(h.x, h.p, "Hopf") for h in equilibria.hopf_between(system, before, state, settings)]
+        rows += sorted([*passed, *((p.x, p.lam, p.kind) for p in state.found)], key=lambda r: abs(r[1] - rows[-1][1]))
+    X, P = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
+    values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])
+    seen = np.array([system.seen(a, b) for a, b in zip(X, P, strict=True)])
+    return Branch(
+        EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
+        values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
+    )  # fmt: skip
+
+
+def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:
+    """The Hopf point of a branch."""
+    pairs = still.multipliers[i][still.multipliers[i].imag > 0]
+    omega = pairs[np.argmin(np.abs(pairs.real))].imag
+    return equilibria.hopf(system, still.x[i, 0], float(still.parameter[i]), float(omega))
+
+
+def _is_known(work: _Work, point: Hopf) -> bool:
+    """Whether a branch of orbits has ended at the Hopf point."""
+    ends = [b for b in work.found if not b.still and b.ended == orbits.COLLAPSED]
+    return any(abs(b.parameter[-1] - point.p) < 1e-2 * work.system.parameter_scale
+               and abs(b.period[-1] * point.omega / (2 * np.pi) - 1) < 1e-2 for b in ends)  # fmt: skip
+
+
+def _born_at(work: _Work, name: str, point: Hopf) -> None:
+    def make() -> Branch:
+        begun = switching.born_at(work.system, point, work.asked.nodes, work.asked.settings)
+        return followed(name, f"Hopf point at {point.p:.6g}", *begun, work.asked.settings, work.report)
+
+    _doublings(work, work.add(name, make), work.asked.doublings)
+
+
+def _doublings(work: _Work, parent: Branch, levels: int) -> None:
+    """The orbits of twice the period at every period doubling of a branch, and so on."""
+    for number, i in enumerate(parent.of_kind("period doubling") if levels else [], 1):
+        orbit = parent.orbit(work.system, int(i))
+        if any(is_same(orbit, b, work.system) for b in work.found if b.x.shape[1] == 2 * parent.x.shape[1]):
+            continue
+        name = f"{parent.name} doubled {number}"
+        born = f"period doubling at {orbit.p:.6g} of {parent.name}"
+
+        def make(name: str = name, born: str = born, orbit: Orbit = orbit) -> Branch:
+            begun = switching.doubled_at(orbit, work.asked.settings)
+            return followed(name, born, *begun, work.asked.settings, work.report)
+
+        _doublings(work, work.add(name, make), levels - 1)
+
+
+def is_same(orbit: Orbit, branch: Branch, system: Dynamics) -> bool:
+    """Whether a branch of orbits of twice the period ends at an orbit."""
+    if branch.ended != orbits.COLLAPSED:
+        return False
+    near = abs(branch.parameter[-1] - orbit.p) < 2e-2 * system.parameter_scale
+    return bool(near and abs(branch.period[-1] / (2 * orbit.period) - 1) < 1e-2)
+
+
+def followed(
+    name: str, born: str, problem: Shooting, state: State, settings: Settings, report: Report = lambda _: None
+) -> Branch:  # fmt: skip
+    """A branch of orbits to its end."""
+    found, ended = list[orbits.Found](), ""
+    try:
+        for more, status in orbits.follow(problem, state, settings):
+            found += more
+            ended = status
+            if found:
+                report(f"{name}: {len(found)} of {settings.points} points, {found[-1].orbit.p:.6g}")
+    except (Lost, FloatingPointError) as error:
+        ended = f"stuck: {error or 'the orbit was lost'}"
+    if not found:
+        x = problem.reference.x
+        at = orbits.Found(problem.reference, floquet.multipliers(problem.reference), "start")
+        return of_orbits(name, born, ended or f"no start from {len(x)} nodes", [at])
+    return of_orbits(name, born, ended, found)

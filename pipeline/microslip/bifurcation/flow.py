@@ -1,0 +1,157 @@
+"""The flow of a system over many short times side by side, with its derivatives by the variational equations.
+
+Each piece chooses its own steps: the pair of orders 8, 5 and 3 of J. R. Dormand and P. J. Prince (E. Hairer, S. P.
+Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and II.10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from scipy.integrate import DOP853
+
+from ..contact.law import program
+from .dynamics import Dynamics
+
+MOST = 4000
+"""Steps of a piece at most."""
+
+
+class Pieces(NamedTuple):
+    """Ends of pieces: x (m, n), dx (m, n, n + 2) their derivatives over where they began, p and the period; steps (m,);
+    fine (m,): whether the end was reached."""
+
+    x: Any
+    dx: Any
+    steps: Any
+    fine: Any
+
+
+def _stages(rate: Callable, s: Any, Z: Any, first: Any, h: Any) -> tuple[Any, list[Any]]:
+    """Z after a step and the thirteen slopes of it. Written out: a loop of such short vectors takes seven times as
+    long."""
+    K = [first]
+    for i in range(1, 12):
+        K.append(rate(s + float(DOP853.C[i]) * h, Z + h * _mix(DOP853.A[i, :i], K)))
+    new = Z + h * _mix(DOP853.B, K)
+    return new, [*K, rate(s + h, new)]
+
+
+def _mix(weights: Any, K: list[Any]) -> Any:
+    return sum(float(w) * k for w, k in zip(weights, K, strict=True) if w)
+
+
+def _error(K: list[Any], h: Any, size: Any) -> Any:
+    """Over what is allowed."""
+    five, three = (_mix(E, K) / size for E in (DOP853.E5, DOP853.E3))
+    five, three = jnp.sum(five**2), jnp.sum(three**2)
+    return jnp.abs(h) * five / jnp.sqrt((five + 0.01 * three) * size.size + 1e-300)
+
+
+def marched(
+    rate: Callable, Z: Any, begin: Any, end: Any, absolute: Any, relative: float, most: int = MOST
+) -> tuple[Any, Any, Any]:
+    """Z (n, k) from begin to end, steps, and whether it got there.
+
+    Args:
+        rate: function of s and Z. absolute: (n, 1) tolerance of the first column, which chooses the steps together with
+            the others as far as they are larger.
+    """
+
+    def size(Z: Any, new: Any) -> Any:
+        return absolute + relative * jnp.maximum(jnp.abs(Z), jnp.abs(new))[:, :1]
+
+    def step(carried: tuple) -> tuple:
+        s, Z, first, h, count = carried
+        h = jnp.minimum(h, end - s)
+        new, K = _stages(rate, s, Z, first, h)
+        error = _error([k[:, :1] for k in K], h, size(Z, new))
+        good = (error < 1.0) & jnp.isfinite(error)
+        factor = jnp.clip(0.9 * jnp.where(jnp.isfinite(error), error, 1e9) ** (-1 / 8), 0.2, 6.0)
+        last = good & (s + h >= end)
+        s, Z, first = (jnp.where(good, a, b) for a, b in ((s + h, s), (new, Z), (K[-1], first)))
+        return jnp.where(last, end, s), Z, first, h * jnp.where(good, factor, jnp.minimum(factor, 0.9)), count + 1
+
+    start = (begin, Z, rate(begin, Z), 0.02 * (end - begin), 0)
+    s, Z, _, _, count = jax.lax.while_loop(lambda c: (c[0] < end) & (c[4] < most), step, start)
+    return Z, count, s >= end
+
+
+@cache
+def pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
+    """Compiled function of x (m, n), p, the period and the number of turns of what drives: the ends of m pieces of
+    equal time, which together last one period."""
+
+    @program
+    def run(x: Any, p: Any, period: Any, turns: Any) -> Pieces:
+        m, n = x.shape
+        absolute = relative * jnp.asarray(system.scale)[:, None]
+
+        def f(x: Any, p: Any, period: Any, s: Any) -> Any:
+            return period * system.rate(x, p, 2 * jnp.pi * turns * s)
+
+        def rate(s: Any, Z: Any) -> Any:
+            def along(dx: Any, more: Any) -> Any:
+                return jax.jvp(lambda *a: f(*a, s), (Z[:, 0], p, period), (dx, more[0], more[1]))[1]
+
+            given = jnp.concatenate([jnp.zeros((n, 2)), jnp.eye(2)])
+            slopes = jax.vmap(along, (1, 0), 1)(Z[:, 1:], given)
+            return jnp.concatenate([f(Z[:, 0], p, period, s)[:, None], slopes], axis=1)
+
+        def one(x: Any, begin: Any) -> tuple:
+            Z = jnp.concatenate([x[:, None], jnp.eye(n), jnp.zeros((n, 2))], axis=1)
+            return marched(rate, Z, begin, begin + 1.0 / m, absolute, relative)
+
+        Z, steps, fine = jax.vmap(one)(x, jnp.arange(m) / m)
+        return Pieces(Z[:, :, 0], Z[:, :, 1:], steps, fine)
+
+    return run
+
+
+@cache
+def samples(system: Dynamics, count: int, relative: float = 1e-9) -> Callable[..., Any]:
+    """Compiled function of x (m, n), p, the period and the turns: (m, count, n) of every piece at equal times, its
+    beginning included and its end not."""
+
+    @program
+    def run(x: Any, p: Any, period: Any, turns: Any) -> Any:
+        m = len(x)
+        absolute = relative * jnp.asarray(system.scale)[:, None]
+
+        def rate(s: Any, Z: Any) -> Any:
+            return period * system.rate(Z[:, 0], p, 2 * jnp.pi * turns * s)[:, None]
+
+        def on(Z: Any, begin: Any) -> tuple:
+            return marched(rate, Z, begin, begin + 1.0 / (m * count), absolute, relative)[0], Z[:, 0]
+
+        def one(x: Any, begin: Any) -> Any:
+            return jax.lax.scan(on, x[:, None], begin + jnp.arange(count) / (m * count))[1]
+
+        return jax.vmap(one)(x, jnp.arange(m) / m)
+
+    return run
+
+
+@cache
+def left_alone(system: Dynamics, relative: float = 1e-8) -> Callable[..., Any]:
+    """Compiled function of many starts x (k, n), p, the time each is left and the angle of what drives at the start:
+    where they are then (k, n)."""
+
+    @program
+    def run(x: Any, p: Any, time: Any, angle: Any) -> Any:
+        absolute = relative * jnp.asarray(system.scale)[:, None]
+        driven = 0.0 if system.frequency is None else system.frequency(p)
+
+        def rate(t: Any, Z: Any) -> Any:
+            return system.rate(Z[:, 0], p, angle + driven * t)[:, None]
+
+        def one(x: Any) -> Any:
+            return marched(rate, x[:, None], 0.0, time, absolute, relative, 10_000_000)[0][:, 0]
+
+        return jax.vmap(one)(x)
+
+    return run
