@@ -58,7 +58,7 @@ class Sliding(NamedTuple):
         return [(p.law.remembers or 0, len(p.at)) for p in self.points]
 
     @property
-    def count(self) -> int:
+    def order(self) -> int:
         """Of q, v and x."""
         return 2 * int(np.shape(self.push)[0]) + sum(k * n for k, n in self.memory)
 
@@ -90,7 +90,8 @@ def of(assembly: Assembly, like: Array | None = None) -> Sliding:
     loads = np.array([p.load for p in driven], dtype=complex).reshape(len(harmonics), len(T)) @ T
     first = T.T @ _real(mean.C) @ T, T.T @ _real(mean.K) @ T, _real(mean.load) @ T + preload @ D
     rest = _real(mean.output) @ T, np.array(harmonics, dtype=float), loads.real, -loads.imag, T
-    return Sliding(*map(jnp.asarray, first), _points(assembly.contacts, D), *map(jnp.asarray, rest))
+    C, K, push = map(jnp.asarray, first)
+    return Sliding(C, K, push, _points(assembly.contacts, D), *map(jnp.asarray, rest))
 
 
 def _points(contacts: Sequence[Contact], D: Array) -> tuple[Points, ...]:
@@ -101,8 +102,8 @@ def _points(contacts: Sequence[Contact], D: Array) -> tuple[Points, ...]:
         law, n, G = c.patch.law, len(c.patch.points), c.patch.kinematics
         if not law.smooth:
             raise UserError(
-                f"contacts.{c.name}: its law, {type(getattr(law, 'whole', law)).__name__}, cannot be linearised wherever "
-                'it slides; take friction that the velocity alone decides (law = { kind = "rate", slope = ... })'
+                f"contacts.{c.name}: its law, {type(getattr(law, 'whole', law)).__name__}, cannot be "
+                'linearised where it slides; take friction by the velocity alone (law = { kind = "rate", slope = ... })'
             )
         own = G @ D[begin : begin + c.patch.count]
         leaves, tree = jax.tree_util.tree_flatten(law)
@@ -192,7 +193,7 @@ def equilibrium(s: Sliding, z: Array | None = None) -> Array:
         NotConverged: there is none that it finds.
     """
     mean = s._replace(cosine=0 * s.cosine, sine=0 * s.sine)
-    z = np.zeros(s.count) if z is None else np.asarray(z, dtype=float)
+    z = np.zeros(s.order) if z is None else np.asarray(z, dtype=float)
     for _ in range(50):
         change = np.linalg.lstsq(state_matrix(mean, z), -np.asarray(_rate(mean, z)), rcond=1e-14)[0]
         z = z + change
@@ -209,7 +210,7 @@ def linearised(s: Sliding, z: Array) -> tuple[Array, Array]:
     Raises:
         UserError: contacts that remember: take `state_matrix`.
     """
-    if s.count != 2 * len(s.push):
+    if s.order != 2 * len(s.push):
         raise UserError("sliding: contacts that remember have more than a stiffness and a damping; take state_matrix")
     A, m = state_matrix(s, z), len(s.push)
     return -A[m:, m:], -A[m:, :m]

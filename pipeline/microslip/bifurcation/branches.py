@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,10 @@ EQUILIBRIA = "equilibria"
 
 SPECIAL = ("Hopf", "fold", "period doubling", "torus", "branch point")
 """Kinds of points where something happens."""
+
+
+LOST = ("stuck", "no start", "points")
+"""Begin what is said of branches that could not be followed to their end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +70,7 @@ class Branch:
     @property
     def lost(self) -> bool:
         """Whether it could not be followed to its end."""
-        return self.ended.startswith(("stuck", "no start", "points"))
+        return self.ended.startswith(LOST)
 
     def of_kind(self, kind: str) -> Array:
         """Numbers of the points of a kind."""
@@ -106,6 +110,15 @@ def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 
     )  # fmt: skip
 
 
+def joined(back: Branch, forth: Branch) -> Branch:
+    """Two branches that begin at the same point, as one: the first one from its end to its beginning, then the second.
+    It ended as both did."""
+    both = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
+    said = [one.ended for one in (back, forth)]
+    ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
+    return replace(forth, ended=ended, **both)
+
+
 def columns(branch: Branch) -> dict[str, Any]:
     """Column -> values of a table."""
     found: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
@@ -136,8 +149,8 @@ def put(group: h5py.Group, branch: Branch) -> None:
 
 
 def get(group: h5py.Group) -> Branch:
-    texts = {key: str(group.attrs[key]) for key in TEXTS}
-    arrays = {key: group[key][()] for key in ARRAYS}
+    texts: dict[str, Any] = {key: str(group.attrs[key]) for key in TEXTS}
+    arrays: dict[str, Any] = {key: group[key][()] for key in ARRAYS}
     arrays["multipliers"] = arrays["multipliers"] + 1j * group["multipliers" + hdf5.IMAGINARY][()]
     arrays["stable"], arrays["kind"] = arrays["stable"].astype(bool), np.char.decode(arrays["kind"], "utf-8")
     outputs = tuple(str(group.attrs["outputs"]).split("\n")) if group.attrs["outputs"] else ()

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..continuation import Lost, Settings
+from ..continuation import Lost, Scaled, Settings, start
 from ..continuation.curve import State
 from ..data import Array, UserError
 from . import equilibria, floquet, orbits, switching
-from .branches import EQUILIBRIA, Branch, of_orbits
+from .basin import attractors
+from .branches import EQUILIBRIA, Branch, joined, of_orbits
 from .dynamics import Dynamics
 from .equilibria import Hopf
 from .shooting import Orbit, Shooting
@@ -110,19 +111,67 @@ def diagram(
         for i, point in enumerate(points, 1):
             if not _is_known(work, point):
                 _born_at(work, f"orbits {i}", point)
+        for p in asked.attractors:
+            _coexisting(work, still, p)
     return Diagram(system, tuple(work.found), points, tuple(work.messages))
 
 
-def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
+def _coexisting(work: _Work, still: Branch, p: float) -> None:
+    """The branches of attractors at p that are on none which is known."""
+    system, asked = work.system, work.asked
+    work.report(f"{asked.starts} motions at {p:.6g}")
+    centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
+    found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
+    for number, one in enumerate((a.orbit for a in found), 1):
+        if not any(_passes(b, one) for b in work.found):
+            name = f"attractor {number} at {p:.6g}"
+            _doublings(work, work.add(name, lambda n=name, o=one: _both_ways(n, o, asked, work.report)), asked.doublings)
+
+
+def _passes(branch: Branch, orbit: Orbit) -> bool:
+    """Whether a branch passes an orbit, by its period, or twice that, and extremes between two neighbouring points."""
+    if branch.still:
+        return False
+    y = orbit.system.seen(orbit.sampled(), orbit.p)
+    own = np.concatenate([y.max(axis=0), y.min(axis=0)])
+    size = float(np.ptp(y, axis=0).max())
+    away = branch.parameter - orbit.p
+    for i in np.flatnonzero(away[:-1] * away[1:] <= 0):
+        u = away[i] / (away[i] - away[i + 1]) if away[i] != away[i + 1] else 0.0
+        period = (1 - u) * branch.period[i] + u * branch.period[i + 1]
+        ends = np.concatenate([branch.largest, branch.smallest], axis=1)
+        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - own).max() / size
+        if abs(period / orbit.period - 1) < CLOSE and apart < CLOSE:
+            return True
+    return False
+
+
+CLOSE = 0.02
+"""Difference of periods and extremes, over their sizes, up to which an orbit is on a branch."""
+
+
+def _both_ways(name: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
+    """The branch through an orbit, to both sides."""
+    problem = Shooting(orbit.system, orbit, orbit.period)
+    parts = []
+    for way in (-1, 1):
+        settings = replace(asked.settings, direction=way)
+        state = start(problem, problem.unknowns(orbit), orbit.p, settings)
+        parts.append(followed(name, f"attractor at {orbit.p:.6g}", problem, state, settings, report))
+    return joined(*parts)
+
+
+def _equilibria(def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     settings = asked.settings
     state = equilibria.first(system, x, asked.start, settings)
     if state.status:
         raise UserError(f"no equilibrium is found near the start: {state.status}")
-    rows = [(p.x, p.lam, p.kind) for p in state.found]
+    rows: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
     while not state.status:
         before, state = state, equilibria.next_one(system, state, settings)
-        passed = [(h.x, h.p, "Hopf") for h in equilibria.hopf_between(system, before, state, settings)]
-        rows += sorted([*passed, *((p.x, p.lam, p.kind) for p in state.found)], key=lambda r: abs(r[1] - rows[-1][1]))
+        new: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
+        new += [(h.x, h.p, "Hopf") for h in equilibria.hopf_between(system, before, state, settings)]
+        rows += sorted(new, key=lambda r: _ahead(system, before, r[0], r[1]))
     X, P = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
     values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])
     seen = np.array([system.seen(a, b) for a, b in zip(X, P, strict=True)])
@@ -130,6 +179,11 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
         EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
         values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
     )  # fmt: skip
+
+
+def _ahead(system: Dynamics, state: State, x: Array, p: float) -> float:
+    """How far along the tangent of a state."""
+    return float(state.tangent @ (Scaled(equilibria.Still(system)).pack(x, p) - state.y))
 
 
 def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:

@@ -109,7 +109,7 @@ def lyapunov(system: Dynamics, x: Array, p: float, omega: float) -> float:
     size = np.asarray(system.scale)
     at = x / size
 
-    def form(*ways: ComplexArray) -> ComplexArray:
+    def form(*ways: Array) -> Array:
         total = np.zeros(len(at), dtype=complex)
         for parts in np.ndindex(*(2,) * len(ways)):
             real = [w.imag if i else w.real for w, i in zip(ways, parts, strict=True)]

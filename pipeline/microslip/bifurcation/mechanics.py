@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import sliding
-from ..data import Array, UserError
+from ..data import Array, NotConverged, UserError
 from ..system.assembly import Assembly
 from .dynamics import Dynamics
 
@@ -44,8 +44,11 @@ class Over:
         T = [x, 2 * x * x - 1]
         while len(T) + 1 < max(map(len, self.series)):
             T.append(2 * x * T[-1] - T[-2])
-        leaves = [sum(t * a for t, a in zip(T, c[1:], strict=False)) + c[0] if len(c) > 1 else c[0] for c in self.series]
-        return jax.tree_util.tree_unflatten(self.tree, leaves)
+
+        def leaf(c: Array) -> Any:
+            return c[0] + sum(t * a for t, a in zip(T, c[1:], strict=False)) if len(c) > 1 else c[0]
+
+        return jax.tree_util.tree_unflatten(self.tree, [leaf(c) for c in self.series])
 
 
 def over(make: Make, low: float, high: float) -> Over:
@@ -58,10 +61,10 @@ def over(make: Make, low: float, high: float) -> Over:
     for count in (5, 9, 17, 33, HIGHEST):
         x = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         found = [jax.tree_util.tree_flatten(sliding.of(make(_value(low, high, one)), like)) for one in x]
-        if any(tree != found[0][1] for _, tree in found):
+        if len({str(tree) for _, tree in found}) > 1:
             raise UserError("parameter: laws of contacts change in kind with it; take another one, or a shorter range")
-        columns = [np.array([np.asarray(leaf) for leaf in leaves]) for leaves in zip(*(f for f, _ in found), strict=True)]
-        series = [_series(x, values) for values in columns]
+        columns = zip(*(leaves for leaves, _ in found), strict=True)
+        series = [_series(x, np.array([np.asarray(leaf) for leaf in leaves])) for leaves in columns]
         if all(_is_short(c) for c in series):
             return Over(low, high, found[0][1], [_cut(c) for c in series])
     raise UserError("parameter: the equations do not change smoothly with it; take a shorter range")
@@ -108,7 +111,7 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
     def rate(z: Any, p: Any, angle: Any) -> Any:
         return sliding.rate(equations.at(p), z, angle)
 
-    m, n = len(middle.push), middle.count
+    m, n = len(middle.push), middle.order
     shown = make(0.5 * (low + high)).outputs
 
     def read(x: Array, p: float) -> Array:
@@ -125,11 +128,11 @@ def size(s: sliding.Sliding) -> Array:
     m = len(s.push)
     try:
         still = sliding.equilibrium(s)
-    except Exception:
-        still = np.zeros(s.count)
+    except NotConverged:
+        still = np.zeros(s.order)
     values, X = np.linalg.eigh(0.5 * np.asarray(s.K + s.K.T))
     w = np.sqrt(np.maximum(np.abs(values), 1e-6 * np.abs(values).max(initial=1e-300)))
     push = np.abs(np.asarray(s.push)) + np.abs(np.asarray(s.cosine)).sum(0) + np.abs(np.asarray(s.sine)).sum(0)
     found = np.linalg.norm(still[:m]) + np.linalg.norm(np.abs(X.T @ push) / w**2) or 1.0
     mean = float(np.exp(np.mean(np.log(w))))
-    return np.concatenate([np.full(m, found), np.full(m, found * mean), np.full(s.count - 2 * m, found)])
+    return np.concatenate([np.full(m, found), np.full(m, found * mean), np.full(s.order - 2 * m, found)])

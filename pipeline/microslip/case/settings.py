@@ -35,7 +35,15 @@ from ..system.excitation import Turning
 from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
-from .questions import BifurcationOfCase, CurveOfCase, IdentificationOfCase, OrbitOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
+from .questions import (
+    BifurcationOfCase,
+    CurveOfCase,
+    IdentificationOfCase,
+    OrbitOfCase,
+    OrdersOfCase,
+    RangesOfCase,
+    SpeedsOfCase,
+)
 
 FIRST_HARMONICS = 3
 """With which ``harmonics = "auto"`` begins."""
@@ -337,7 +345,8 @@ class CaseSettings(Model):
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        moved = (self.bifurcation or any(s.motion for s in self.springs)) and not self.excitation and not self.excitations
+        free = self.bifurcation or any(s.motion for s in self.springs)
+        moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
                 raise ValueError(f"{short}: give {short}, or one or more [[{many}]], and not both")

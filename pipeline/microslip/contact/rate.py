@@ -60,8 +60,8 @@ class RateContact(Law):
         return 0
 
     def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
-        pressed = self._pressed(u[:, 0], v[:, 0])
-        return jnp.concatenate([pressed[None], self._drag(norm(v.T[1:]), pressed, time) * v.T[1:]]).T, x
+        pressed, now = self._pressed(u[:, 0], v[:, 0]), jnp.asarray(time)
+        return jnp.concatenate([pressed[None], self._drag(norm(v.T[1:]), pressed, now) * v.T[1:]]).T, x
 
     def init(self, n: int) -> RateState:
         return RateState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n))

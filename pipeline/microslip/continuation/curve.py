@@ -161,8 +161,8 @@ def start(problem: Equations, x: Array, lam: float, settings: Settings | None = 
 def branch_off(
     problem: Equations, x: Array, lam: float, direction: tuple[Array, float], settings: Settings | None = None
 ) -> State:
-    """The first point on the plane across a direction, from a guess x (n,) on that plane: of a curve that leaves another
-    one there, which Newton's method at fixed lambda would find instead.
+    """The first point on the plane across a direction, from a guess x (n,) on that plane: of a curve that leaves
+    another one there, which Newton's method at fixed lambda would find instead.
 
     Args:
         direction: of x (n,) and of lambda, in their units, in which the curve is to be followed.

@@ -32,8 +32,8 @@ def bifurcation_html(
 
 READ_AS = (
     "Lines are stable, dashes unstable. The ordinate is half of the way from the smallest to the largest value in a "
-    "period, zero for an equilibrium. The multiplier is the largest Floquet multiplier, of an equilibrium the eigenvalue "
-    "farthest to the right, in 1/s."
+    "period, zero for an equilibrium. The multiplier is the largest Floquet multiplier, of an equilibrium the "
+    "eigenvalue farthest to the right, in 1/s."
 )
 
 
