@@ -10,8 +10,10 @@ is missing where the frequency is that of what drives. Derivatives are exact: th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import jax
 import numpy as np
@@ -108,11 +110,11 @@ class Balance:
         return E, P
 
     @cached_property
-    def _rates(self):  # type: ignore[no-untyped-def]
+    def _rates(self) -> Callable[..., tuple[Any, Any, Any]]:
         """Compiled: f (N, n), df/dx (N, n, n) and df/dp (N, n) at x (N, n), p and angles (N,)."""
         f = self.system.rate
 
-        def one(x, p, angle):  # type: ignore[no-untyped-def]
+        def one(x: Any, p: Any, angle: Any) -> tuple[Any, Any, Any]:
             return f(x, p, angle), jax.jacfwd(f)(x, p, angle), jax.jacfwd(f, 1)(x, p, angle)
 
         return jax.jit(jax.vmap(one, (0, None, 0)))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +15,15 @@ from ..data import Array, UserError
 from . import equilibria, floquet, orbits, switching
 from .basin import attractors
 from .branches import EQUILIBRIA, Branch, joined, of_orbits
+from .drawn import draw
 from .dynamics import Dynamics
 from .equilibria import Hopf
 from .shooting import Orbit, Shooting
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 Report = Callable[[str], None]
 Kept = Callable[[str], Branch | None]
@@ -62,6 +70,25 @@ class Diagram:
 
     def __getitem__(self, name: str) -> Branch:
         return next(b for b in self.branches if b.name == name)
+
+    def at(self, kind: str) -> dict[str, Array]:
+        """Branch -> values of the parameter at its points of a kind, see `branches.SPECIAL`."""
+        found = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
+        return {name: values for name, values in found.items() if len(values)}
+
+    def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
+        """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
+        draw(self.branches, axes, label, self.system.named[read_out], self.system.unit, read_out)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row a point, branch by branch."""
+        import pandas
+
+        return pandas.concat([b.to_dataframe() for b in self.branches], ignore_index=True)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same by points."""
+        return self.to_dataframe().rename_axis("point").to_xarray()
 
 
 @dataclass(eq=False)
@@ -125,7 +152,8 @@ def _coexisting(work: _Work, still: Branch, p: float) -> None:
     for number, one in enumerate((a.orbit for a in found), 1):
         if not any(_passes(b, one) for b in work.found):
             name = f"attractor {number} at {p:.6g}"
-            _doublings(work, work.add(name, lambda n=name, o=one: _both_ways(n, o, asked, work.report)), asked.doublings)
+            branch = work.add(name, partial(_both_ways, name, one, asked, work.report))
+            _doublings(work, branch, asked.doublings)
 
 
 def _passes(branch: Branch, orbit: Orbit) -> bool:
@@ -161,7 +189,7 @@ def _both_ways(name: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
     return joined(*parts)
 
 
-def _equilibria(def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
+def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     settings = asked.settings
     state = equilibria.first(system, x, asked.start, settings)
     if state.status:
@@ -209,8 +237,10 @@ def _born_at(work: _Work, name: str, point: Hopf) -> None:
 
 
 def _doublings(work: _Work, parent: Branch, levels: int) -> None:
-    """The orbits of twice the period at every period doubling of a branch, and so on."""
-    for number, i in enumerate(parent.of_kind("period doubling") if levels else [], 1):
+    """The orbits of twice the period at every period doubling by which a branch gains or loses its stability, and so
+    on: those of orbits that are unstable on both sides are left, they are many and nothing comes to them."""
+    places = [i for i in parent.of_kind("period doubling") if parent.stable[max(i - 1, 0) : i + 2 : 2].any()]
+    for number, i in enumerate(places if levels else [], 1):
         orbit = parent.orbit(work.system, int(i))
         if any(is_same(orbit, b, work.system) for b in work.found if b.x.shape[1] == 2 * parent.x.shape[1]):
             continue

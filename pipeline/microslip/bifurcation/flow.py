@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from scipy.integrate import DOP853
 
 from ..contact.law import program
@@ -81,14 +82,43 @@ def marched(
     return Z, count, s >= end
 
 
+BLOCK = 32
+"""Pieces at most that one call of a compiled program flows side by side; more of them are several calls."""
+
+
+def blocks(m: int) -> int:
+    """In how many calls of equal size m pieces are done."""
+    return next(k for k in range(-(-m // BLOCK), m + 1) if m % k == 0)
+
+
+def pieces(system: Dynamics, x: Any, p: float, period: float, turns: int) -> Pieces:
+    """The ends of m pieces of equal time, which together last one period, from x (m, n); turns: of what drives."""
+    m, run = len(x), _pieces(system)
+    parts = [run(one, begin, 1.0 / m, p, period, float(turns)) for one, begin in _parts(x)]
+    return Pieces(*(np.concatenate(found) for found in zip(*parts, strict=True)))
+
+
+def samples(system: Dynamics, x: Any, p: float, period: float, turns: int, each: int) -> Any:
+    """(m, each, n) of every one of m pieces at equal times, its beginning included and its end not."""
+    m, run = len(x), _samples(system, each)
+    parts = [run(one, begin, 1.0 / m, p, period, float(turns)) for one, begin in _parts(x)]
+    return np.concatenate([np.asarray(part) for part in parts])
+
+
+def _parts(x: Any) -> list[tuple[Any, Any]]:
+    """Blocks of nodes, and when they begin in periods."""
+    m = len(x)
+    count = blocks(m)
+    return list(zip(np.split(np.asarray(x), count), np.split(np.arange(m) / m, count), strict=True))
+
+
 @cache
-def pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
-    """Compiled function of x (m, n), p, the period and the number of turns of what drives: the ends of m pieces of
-    equal time, which together last one period."""
+def _pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
+    """Compiled function of x (b, n), when they begin and how long they last in periods, p, the period, the turns."""
 
     @program
-    def run(x: Any, p: Any, period: Any, turns: Any) -> Pieces:
-        m, n = x.shape
+    def run(x: Any, begin: Any, lasts: Any, p: Any, period: Any, turns: Any) -> Pieces:
+        n = x.shape[1]
         absolute = relative * jnp.asarray(system.scale)[:, None]
 
         def f(x: Any, p: Any, period: Any, s: Any) -> Any:
@@ -104,34 +134,33 @@ def pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
 
         def one(x: Any, begin: Any) -> tuple:
             Z = jnp.concatenate([x[:, None], jnp.eye(n), jnp.zeros((n, 2))], axis=1)
-            return marched(rate, Z, begin, begin + 1.0 / m, absolute, relative)
+            return marched(rate, Z, begin, begin + lasts, absolute, relative)
 
-        Z, steps, fine = jax.vmap(one)(x, jnp.arange(m) / m)
+        Z, steps, fine = jax.vmap(one)(x, begin)
         return Pieces(Z[:, :, 0], Z[:, :, 1:], steps, fine)
 
     return run
 
 
 @cache
-def samples(system: Dynamics, count: int, relative: float = 1e-9) -> Callable[..., Any]:
-    """Compiled function of x (m, n), p, the period and the turns: (m, count, n) of every piece at equal times, its
-    beginning included and its end not."""
+def _samples(system: Dynamics, each: int, relative: float = 1e-9) -> Callable[..., Any]:
+    """Compiled function of the same: (b, each, n)."""
 
     @program
-    def run(x: Any, p: Any, period: Any, turns: Any) -> Any:
-        m = len(x)
+    def run(x: Any, begin: Any, lasts: Any, p: Any, period: Any, turns: Any) -> Any:
         absolute = relative * jnp.asarray(system.scale)[:, None]
+        step = lasts / each
 
         def rate(s: Any, Z: Any) -> Any:
             return period * system.rate(Z[:, 0], p, 2 * jnp.pi * turns * s)[:, None]
 
         def on(Z: Any, begin: Any) -> tuple:
-            return marched(rate, Z, begin, begin + 1.0 / (m * count), absolute, relative)[0], Z[:, 0]
+            return marched(rate, Z, begin, begin + step, absolute, relative)[0], Z[:, 0]
 
         def one(x: Any, begin: Any) -> Any:
-            return jax.lax.scan(on, x[:, None], begin + jnp.arange(count) / (m * count))[1]
+            return jax.lax.scan(on, x[:, None], begin + step * jnp.arange(each))[1]
 
-        return jax.vmap(one)(x, jnp.arange(m) / m)
+        return jax.vmap(one)(x, begin)
 
     return run
 

@@ -33,14 +33,14 @@ class Orbit:
 
     def sampled(self, each: int = 8) -> Array:
         """(m each, n) at equal times of one period."""
-        found = flow.samples(self.system, each)(self.x, self.p, self.period, float(self.turns))
-        return np.asarray(found).reshape(-1, self.system.count)
+        found = flow.samples(self.system, self.x, self.p, self.period, self.turns, each)
+        return np.asarray(found.reshape(-1, self.system.count))
 
     @cached_property
     def derivatives(self) -> Array:
         """(m, n, n) of the ends of the pieces over their beginnings."""
-        found = flow.pieces(self.system)(self.x, self.p, self.period, float(self.turns))
-        return np.asarray(found.dx)[:, :, : self.system.count]
+        found = flow.pieces(self.system, self.x, self.p, self.period, self.turns)
+        return np.asarray(found.dx[:, :, : self.system.count])
 
     @cached_property
     def slope(self) -> Array:
@@ -109,7 +109,7 @@ class Shooting:
         if not (np.isfinite(x).all() and T > 0):
             bad = np.full(len(x), np.inf)
             return bad, np.full((len(x), len(x)), np.inf), bad
-        ends, dx, _, fine = map(np.asarray, flow.pieces(self.system)(nodes, lam, T, float(self.reference.turns)))
+        ends, dx, _, fine = flow.pieces(self.system, nodes, lam, T, self.reference.turns)
         R, J, slope = np.zeros(len(x)), np.zeros((len(x), len(x))), np.zeros(len(x))
         following = np.roll(np.arange(m), -1)
         R[: m * n] = (ends - nodes[following]).ravel()

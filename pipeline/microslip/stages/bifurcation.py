@@ -98,15 +98,16 @@ def bifurcation_stage(
         "pictures": pictures,
         "files": hashes_of(checkpoint.files_of(settings, case_path)),
     }
-    told = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
-    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, told))
+    own = {key: value for key, value in checkpoint.without_defaults(raw).items() if key != "bifurcation"}
+    depends = {**inputs, "case": own, "pictures": None, "code": hash_of_code(stage.code)}
+    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))
     answer = json.loads(stage.product.read_text())
     return [folder / name for name in answer["files"]], answer["sentences"], not answer["lost"]
 
 
 def _work(
     stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], case_path: Path, files: Mapping[str, Path],
-    pictures: bool, inputs: str,
+    pictures: bool, inputs: Mapping[str, Any],
 ) -> Made:  # fmt: skip
     folder = stage.product.parent
     bases = {name: read_basis(file) for name, file in files.items()}
@@ -127,8 +128,9 @@ def _work(
     return Made([folder / name for name in names])
 
 
-def _diagram(one: Changed, folder: Path, inputs: str, stage: Stage) -> Diagram:
+def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stage) -> Diagram:
     asked, name = one.asked, one.asked.name
+    inputs = store.hash_settings({**depends, "asked": asked.model_dump()})
     low, high = sorted((asked.start, asked.stop))
     Omega = None if asked.frequency is None else 2 * np.pi * asked.frequency
     stage.report(f"{name}: equations over {asked.parameter}")
