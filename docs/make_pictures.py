@@ -1428,6 +1428,16 @@ def bolted_pipes() -> None:
     save(drawn(fig), "bolted_pipes")
 
 
+def belt() -> None:
+    import bifurcation_study as study
+
+    for path in study.followed(BUILD / "belt", print):
+        if path.suffix == ".png" and path.stem in ("orbits_load", "bifurcation_load", "bifurcation_velocity",
+                                                   "bifurcation_damping"):  # fmt: skip
+            save(from_file(path), path.stem)
+    fill("bifurcation.md", "belt", table(*study.compared(BUILD / "belt")))
+
+
 STUDIES = {
     f.__name__: f
     for f in (
@@ -1460,6 +1470,7 @@ STUDIES = {
         laws,
         microslip,
         time_domain,
+        belt,
         continuation,
         followed,
         accuracy,

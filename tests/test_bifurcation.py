@@ -18,7 +18,6 @@ from microslip.bifurcation import balance, branches, floquet
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.shooting import Orbit, Shooting
-from microslip.continuation import newton
 from microslip.data import UserError
 
 
@@ -58,6 +57,7 @@ def test_hopf_normal_form_is_found_with_its_circles() -> None:
     assert (still.stable == (still.parameter <= 1e-12)).all()
 
 
+@pytest.mark.slow
 def test_subcritical_circles_repel() -> None:
     """Of the reversed flow: p -> -p, the circles are there before the Hopf point and their multiplier is above 1."""
     found = diagram(normal_form(-1.0), np.zeros(2), Asked(-1.0, 1.0, nodes=8, doublings=0, points=12))
@@ -77,6 +77,7 @@ def rotor() -> Dynamics:
     return Dynamics(rate, ("x", "y", "u", "v"), np.ones(4), 2.0)
 
 
+@pytest.mark.slow
 def test_torus_point_and_its_multipliers() -> None:
     from microslip.bifurcation import orbits
     from microslip.continuation import start
@@ -95,6 +96,7 @@ def test_torus_point_and_its_multipliers() -> None:
     assert found[0].stable and not found[-1].stable
 
 
+@pytest.mark.slow
 def test_period_of_van_der_pol() -> None:
     """6.66328685932313 at mu = 1 (e.g. A. Amore, F. Fernandez, arXiv 1401.4110), and its multiplier by the trace
     exp(integral of mu (1 - x^2)) (Liouville)."""
@@ -109,7 +111,7 @@ def test_period_of_van_der_pol() -> None:
 
 @cache
 def chemical() -> Diagram:
-    return diagram(brusselator(), np.array([1.0, 1.5]), Asked(1.5, 3.0, nodes=16, doublings=0, step=0.2))
+    return diagram(brusselator(), np.array([1.0, 1.5]), Asked(1.5, 2.3, nodes=16, doublings=0, step=0.3))
 
 
 def test_brusselator() -> None:
@@ -181,16 +183,9 @@ def duffing() -> Dynamics:
     return Dynamics(rate, ("q", "v"), np.full(2, 4.0), 2.0, frequency=lambda p: p)
 
 
+@pytest.mark.slow
 def test_folds_of_a_driven_oscillator_are_those_of_harmonic_balance() -> None:
-    from microslip.bifurcation import diagram as room
-    from microslip.continuation import start
-
-    system, asked = duffing(), Asked(0.9, 1.7, nodes=8, step=0.3)
-    x = np.zeros((8, 2))
-    problem = Shooting(system, Orbit(system, x, 2 * np.pi / 0.9, 0.9), 2 * np.pi / 0.9)
-    found = newton(problem, x.ravel(), 0.9)
-    assert found.converged
-    branch = room.followed("driven", "the start", problem, start(problem, found.x, 0.9, asked.settings), asked.settings)
+    branch = diagram(duffing(), np.zeros(2), Asked(0.9, 1.7, nodes=8, step=0.3, doublings=0))["driven"]
     folds = branch.parameter[branch.of_kind("fold")]
     q = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
     np.testing.assert_allclose(folds, ms.follow(q, 0.3, 2.5, harmonics=9, unit="rad/s").folds, rtol=1e-6)

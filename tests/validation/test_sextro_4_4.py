@@ -9,10 +9,14 @@ from __future__ import annotations
 
 from functools import cache
 
+import jax
 import numpy as np
 import pytest
 from closed_forms.oscillators import belt
+from scipy.integrate import solve_ivp
 
+from microslip.bifurcation import balance, floquet
+from microslip.bifurcation.branches import SPECIAL, Branch
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 
 pytestmark = pytest.mark.slow
@@ -80,3 +84,79 @@ def window(found: Diagram) -> tuple[float, float]:
 def test_window_of_three_attractors_of_the_velocity() -> None:
     """Printed: 3.57 to 4.09 m/s."""
     assert window(velocity()) == pytest.approx((3.57, 4.09), rel=2e-3)
+
+
+def in_time(found: Diagram, p: float, x: np.ndarray, time: float) -> np.ndarray:
+    """Where a motion from x is after a time, by SciPy's LSODA."""
+    f = jax.jit(lambda x: found.system.rate(x, p, 0.0))
+    return solve_ivp(lambda _, x: np.asarray(f(x)), (0, time), x, method="LSODA", rtol=1e-9, atol=1e-11).y[:, -1]
+
+
+def chosen(branch: Branch) -> list[int]:
+    """Three points of a branch, evenly along it, whose motions need not be looked at for long."""
+    if branch.still:
+        clear = np.abs(branch.multipliers[:, 0].real) > 0.01
+    else:
+        clear = np.abs(np.log(np.abs(branch.multipliers[:, 0]) + 1e-300)) > 0.05
+    places = np.flatnonzero(clear & ~np.isin(branch.kind, (*SPECIAL, "start")))
+    return [int(places[round(u * (len(places) - 1))]) for u in (0.1, 0.5, 0.9)]
+
+
+def away(orbit: np.ndarray, x: np.ndarray) -> float:
+    return float(np.linalg.norm(orbit - x, axis=1).min())
+
+
+def test_stability_of_every_branch_is_what_motions_do() -> None:
+    """Three points of each, both over the load and over the velocity: beside a stable orbit or equilibrium a motion
+    comes nearer, beside an unstable one, along the most unstable direction, it goes away."""
+    for found in (load(), velocity()):
+        for branch in found.branches:
+            for i in chosen(branch):
+                p, x = float(branch.parameter[i]), branch.x[i]
+                if branch.still:
+                    values, vectors = np.linalg.eig(np.asarray(found.system.still(x[0], p)[1]))
+                    k = int(np.argmax(values.real))
+                    orbit, way, lasts = x, vectors[:, k].real, 2.0 / abs(values[k].real)
+                else:
+                    one = branch.orbit(found.system, i)
+                    values, vectors = np.linalg.eig(floquet.monodromy(one))
+                    k = int(np.argmin(np.abs(values - branch.multipliers[i, 0])))
+                    periods = np.ceil(2.0 / abs(np.log(abs(values[k]) + 1e-300)))
+                    orbit, way, lasts = one.sampled(64), vectors[:, k].real, periods * one.period
+                begin = x[0] + 1e-4 * way / np.linalg.norm(way)
+                grown = away(orbit, in_time(found, p, begin, lasts)) / away(orbit, begin)
+                assert (grown < 0.5) if branch.stable[i] else (grown > 2.0), f"{branch.name}, {p}: {grown}"
+
+
+def test_shooting_is_harmonic_balance_with_many_harmonics() -> None:
+    """The stable orbit that coexists, near B = 8 m: the largest difference over the period falls below 1e-6 of the
+    amplitude with 400 harmonics; with 100 it is a hundred times as large, because the friction law is sharp."""
+    branch = load()["orbits 2"]
+    i = int(np.argmin(np.abs(branch.parameter - 7.5) + 9.0 * ~branch.stable))
+    orbit = branch.orbit(load().system, i)
+    amplitude = 0.5 * float(np.ptp(orbit.sampled(), axis=0).max()) / 4.0  # in scales, as distances are
+    apart = []
+    for H in (100, 400):
+        one, solution = balance.balanced(orbit, H)
+        assert solution.converged
+        apart.append(balance.distance(one, orbit) / amplitude)
+    assert apart[1] < 1e-6 and apart[0] > 100 * apart[1]
+
+
+def test_multipliers_are_those_of_the_variational_equation() -> None:
+    """Integrated by SciPy along the stable orbit at B = 3 m, past the sharp turns into sticking."""
+    branch = load()["orbits 1"]
+    i = int(np.argmin(np.abs(branch.parameter - 3.0) + 9.0 * ~branch.stable))
+    orbit, system = branch.orbit(load().system, i), load().system
+    both = jax.jit(lambda x: (system.rate(x, orbit.p, 0.0), jax.jacfwd(lambda y: system.rate(y, orbit.p, 0.0))(x)))
+
+    def rate(_: float, z: np.ndarray) -> np.ndarray:
+        f, J = both(z[:4])
+        return np.concatenate([f, (np.asarray(J) @ z[4:].reshape(4, 4)).ravel()])
+
+    begin = np.concatenate([orbit.x[0], np.eye(4).ravel()])
+    end = solve_ivp(rate, (0, orbit.period), begin, method="DOP853", rtol=1e-10, atol=1e-11).y[:, -1]
+    values = np.linalg.eigvals(end[4:].reshape(4, 4))
+    assert np.abs(values - 1).min() < 1e-6
+    for multiplier in branch.multipliers[i]:
+        assert np.abs(values - multiplier).min() < 1e-6

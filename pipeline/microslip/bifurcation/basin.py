@@ -27,10 +27,12 @@ ALIKE = 1e-3
 
 @dataclass(frozen=True)
 class Attractor:
-    """A stable orbit. Attributes: orbit. share: of the starts that came to it."""
+    """A stable orbit. Attributes: orbit. share: of the starts that came to it. swing: (w,) half of the way from the
+    smallest to the largest value of the read-outs in the last period of the first motion that did."""
 
     orbit: Orbit
     share: float
+    swing: Array
 
 
 def starts(system: Dynamics, centre: Array, count: int, seed: int, width: float = 3.0) -> Array:
@@ -53,15 +55,18 @@ def attractors(system: Dynamics, centre: Array, p: float, count: int, seed: int,
     ways = np.swapaxes(np.array(seen), 0, 1)
     found: list[Orbit] = []
     counts: list[int] = []
+    swings: list[Array] = []
     for way in ways:
         for orbit in _closed(system, way, p, slow / EACH, nodes, found):
             same = next((i for i, one in enumerate(found) if alike(one, orbit)), None)
             if same is None:
                 found.append(orbit)
                 counts.append(1)
+                last = way[-int(np.ceil(orbit.period * EACH / slow)) - 1 :]
+                swings.append(0.5 * np.ptp(system.seen(last, p), axis=0))
             else:
                 counts[same] += 1
-    return [Attractor(o, n / count) for o, n in zip(found, counts, strict=True)]
+    return [Attractor(o, n / count, y) for o, n, y in zip(found, counts, swings, strict=True)]
 
 
 def _slow(system: Dynamics, centre: Array, p: float) -> float:

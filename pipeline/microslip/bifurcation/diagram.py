@@ -12,8 +12,8 @@ import numpy as np
 from ..continuation import Lost, Scaled, Settings, start
 from ..continuation.curve import State
 from ..data import Array, UserError
-from . import equilibria, floquet, orbits, switching
-from .basin import attractors
+from . import equilibria, floquet, flow, orbits, switching
+from .basin import Attractor, attractors
 from .branches import EQUILIBRIA, Branch, joined, of_orbits
 from .drawn import draw
 from .dynamics import Dynamics
@@ -60,12 +60,14 @@ class Diagram:
     """Branches over a parameter.
 
     Attributes:
-        system. branches. hopf: the Hopf points. messages: what a reader must know.
+        system. branches. hopf: the Hopf points. attractors: what motions from many starts came to. messages: what a
+            reader must know.
     """
 
     system: Dynamics
     branches: tuple[Branch, ...]
     hopf: tuple[Hopf, ...]
+    attractors: tuple[Attractor, ...] = ()
     messages: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Branch:
@@ -78,7 +80,8 @@ class Diagram:
 
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
-        draw(self.branches, axes, label, self.system.named[read_out], self.system.unit, read_out)
+        dots = [(a.orbit.p, float(a.swing[read_out])) for a in self.attractors]
+        draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit, read_out)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A row a point, branch by branch."""
@@ -101,6 +104,7 @@ class _Work:
     keep: Callable[[Branch], None]
     report: Report
     found: list[Branch] = field(default_factory=list)
+    seen: list[Attractor] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
 
     def add(self, name: str, make: Callable[[], Branch]) -> Branch:
@@ -121,7 +125,8 @@ def diagram(
     system: Dynamics, x: Array, asked: Asked, kept: Kept = lambda _: None,
     keep: Callable[[Branch], None] = lambda _: None, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
-    """Equilibria from x (n,) at the start, orbits from every Hopf point, doubled ones from every period doubling.
+    """Equilibria from x (n,) at the start, orbits from every Hopf point, doubled ones from every period doubling that
+    changes stability. Of a driven system: what a motion from x comes to, and what is doubled from there.
 
     A branch that cannot be followed ends where it is, and the rest goes on.
 
@@ -129,9 +134,12 @@ def diagram(
         kept, keep: finished branches of an interrupted run. report: is told what is under way.
 
     Raises:
-        UserError: there is no equilibrium near x.
+        UserError: there is no equilibrium, or no orbit of a driven system, near x.
     """
     work = _Work(system, asked, kept, keep, report)
+    if system.frequency is not None:
+        _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
+        return Diagram(system, tuple(work.found), (), (), tuple(work.messages))
     still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
     points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
     if asked.orbits:
@@ -140,7 +148,34 @@ def diagram(
                 _born_at(work, f"orbits {i}", point)
         for p in asked.attractors:
             _coexisting(work, still, p)
-    return Diagram(system, tuple(work.found), points, tuple(work.messages))
+    return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.messages))
+
+
+DRIVEN = "driven"
+"""Name of the branch of a driven system."""
+
+LEFT = 60
+"""Periods that a driven motion is left alone before an orbit is looked for where it is."""
+
+
+def _driven(work: _Work, x: Array) -> Branch:
+    """The orbits of the period of what drives, from where a motion from x is after `LEFT` of them."""
+    system, asked = work.system, work.asked
+    assert system.frequency is not None
+    period = 2 * np.pi / float(system.frequency(asked.start))
+    left = np.asarray(flow.left_alone(system)(np.asarray(x, dtype=float)[None], asked.start, LEFT * period, 0.0))
+    nodes = [left[0]]
+    for i in range(asked.nodes - 1):
+        run, angle = flow.left_alone(system), 2 * np.pi * i / asked.nodes
+        nodes.append(np.asarray(run(nodes[-1][None], asked.start, period / asked.nodes, angle))[0])
+    problem = Shooting(system, Orbit(system, np.array(nodes), period, asked.start), period)
+    state = start(problem, np.array(nodes).ravel(), asked.start, asked.settings)
+    if state.status:
+        raise UserError(
+            f"no periodic motion is found near the start: {state.status}; begin at a value of the parameter where the "
+            "motion is small or settles, or give another x"
+        )
+    return followed(DRIVEN, "start", problem, state, asked.settings, work.report)
 
 
 def _coexisting(work: _Work, still: Branch, p: float) -> None:
@@ -149,6 +184,7 @@ def _coexisting(work: _Work, still: Branch, p: float) -> None:
     work.report(f"{asked.starts} motions at {p:.6g}")
     centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
     found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
+    work.seen += found
     for number, one in enumerate((a.orbit for a in found), 1):
         if not any(_passes(b, one) for b in work.found):
             name = f"attractor {number} at {p:.6g}"
@@ -193,7 +229,10 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     settings = asked.settings
     state = equilibria.first(system, x, asked.start, settings)
     if state.status:
-        raise UserError(f"no equilibrium is found near the start: {state.status}")
+        raise UserError(
+            f"no equilibrium is found near the start: {state.status}; begin at another value of the parameter, or give "
+            "another x"
+        )
     rows: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
     while not state.status:
         before, state = state, equilibria.next_one(system, state, settings)

@@ -18,7 +18,8 @@ MARKS = {"Hopf": ("o", "Hopf point"), "fold": ("D", "fold"), "period doubling": 
 
 
 def draw(
-    branches: Sequence[Branch], axes: Axes, axis: str, name: str, unit: str = "", read_out: int = 0
+    branches: Sequence[Branch], dots: Sequence[tuple[float, float]], axes: Axes, axis: str, name: str, unit: str = "",
+    read_out: int = 0,
 ) -> None:  # fmt: skip
     """Branches in the axes: lines where stable, dashes where not, marks where something happens."""
     top = max(float(np.abs(b.swing[:, read_out]).max(initial=0.0)) for b in branches)
@@ -35,6 +36,9 @@ def draw(
         if places:
             mark, words = MARKS[kind]
             axes.plot(*np.array(places).T, mark, color="white", mec="#30343c", ms=6, label=words, zorder=5)
+    if dots:
+        x, y = np.array(dots).T
+        axes.plot(x, factor * y, ".", color="#30343c", ms=9, label="motions come here", zorder=6)
     axes.plot([], [], "-", color="#30343c", lw=2.2, label="stable")
     axes.plot([], [], ls=(0, (4, 3)), color="#30343c", lw=1.0, label="unstable")
     axes.set(xlabel=axis, ylabel=f"{name}: amplitude in {unit}".removesuffix(" in "))

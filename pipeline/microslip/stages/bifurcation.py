@@ -18,7 +18,7 @@ from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.assemble import build
 from ..case.questions import BifurcationOfCase
-from ..data import ModalBasis, UserError
+from ..data import ModalBasis, NotConverged, UserError
 from ..files import hdf5, store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
@@ -142,8 +142,12 @@ def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stag
     folder.mkdir(parents=True, exist_ok=True)
     fields = Asked.__dataclass_fields__
     given = Asked(**{key: getattr(asked, key) for key in fields})
+    try:
+        begin = sliding.equilibrium(sliding.of(one.at(asked.start)))
+    except NotConverged as error:
+        raise UserError(f"{one.path}: bifurcation.{name}.start: {error}") from error
     return diagram(
-        system, sliding.equilibrium(sliding.of(one.at(asked.start))), given,
+        system, begin, given,
         lambda branch: None if stage.force else branches.kept(file(branch), inputs),
         lambda branch: branches.write(file(branch.name), branch, inputs), lambda text: stage.report(f"{name}: {text}"),
     )  # fmt: skip
