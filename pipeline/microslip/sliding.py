@@ -72,7 +72,7 @@ def of(assembly: Assembly, like: Array | None = None) -> Sliding:
 
     Raises:
         UserError: a contact that is not smooth, wavy ground, modes that are not real, compliance beside the modes;
-            bodies that move by other shapes than the other assembly's.
+            bodies that move by other shapes than the other assembly's, or have loss factors.
     """
     assembly = assembly.unrolled()
     assembly.check_names()
@@ -83,6 +83,8 @@ def of(assembly: Assembly, like: Array | None = None) -> Sliding:
             "sliding: the modes leave compliance out beside the contacts, which has no equation of its own; take a "
             "modal file without residual compliance"
         )
+    if (loss := assembly.joined(1).loss) is not None and np.any(loss):
+        raise UserError('damping: loss factors have no equation in time; write damping = "modal", or give dampers')
     T = _turn(points_moved(assembly), like)
     T = T @ np.linalg.inv(np.linalg.cholesky(T.T @ _real(mean.M) @ T)).T
     D = _real(mean.rows) @ T

@@ -27,6 +27,7 @@ def draw(
     for i, branch in enumerate(branches):
         y = factor * branch.swing[:, read_out]
         colour = "#30343c" if branch.still else f"C{(i - 1) % 10}"
+        axes.plot([], [], "-", color=colour, lw=2.2, label=branch.name)
         for part, stable in branch.stretches():
             style = "-" if stable else (0, (4, 3))
             axes.plot(branch.parameter[part], y[part], ls=style, color=colour, lw=2.2 if stable else 1.0)
@@ -39,7 +40,6 @@ def draw(
     if dots:
         x, y = np.array(dots).T
         axes.plot(x, factor * y, ".", color="#30343c", ms=9, label="motions come here", zorder=6)
-    axes.plot([], [], "-", color="#30343c", lw=2.2, label="stable")
     axes.plot([], [], ls=(0, (4, 3)), color="#30343c", lw=1.0, label="unstable")
     axes.set(xlabel=axis, ylabel=f"{name}: amplitude in {unit}".removesuffix(" in "))
-    axes.legend(fontsize=8, frameon=False, ncols=7, loc="lower left", bbox_to_anchor=(0.0, 1.06))
+    axes.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -126,7 +126,7 @@ def _pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
 
         def rate(s: Any, Z: Any) -> Any:
             def along(dx: Any, more: Any) -> Any:
-                return jax.jvp(lambda *a: f(*a, s), (Z[:, 0], p, period), (dx, more[0], more[1]))[1]
+                return jax.jvp(lambda x, p, T: f(x, p, T, s), (Z[:, 0], p, period), (dx, more[0], more[1]))[1]
 
             given = jnp.concatenate([jnp.zeros((n, 2)), jnp.eye(2)])
             slopes = jax.vmap(along, (1, 0), 1)(Z[:, 1:], given)

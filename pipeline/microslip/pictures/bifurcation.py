@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def diagram_picture(found: Diagram, path: Path, title: str, axis: str, read_out: int = 0) -> Path:
     """Half of the way from the smallest to the largest value of a read-out over the parameter."""
-    figure, axes = single_panel(9.5, 5.6)
+    figure, axes = single_panel(10.5, 5.4)
     found.plot(axes, axis, read_out)
     axes.set_title(title, fontweight="bold")
     return save_figure(figure, path)
@@ -49,4 +49,4 @@ def _portraits(found: Diagram, branch: Branch, axes: Axes, unit: str) -> None:
         axes.plot(y, velocity, ls=style, lw=1.3, color=COLOURS[k], label=label)
     axes.set(xlabel=found.system.named[0], ylabel="velocity")
     axes.set_title(branch.name, fontsize=9)
-    axes.legend(fontsize=7, frameon=False)
+    axes.legend(fontsize=7, frameon=False, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
