@@ -1431,7 +1431,7 @@ def bolted_pipes() -> None:
 def belt() -> None:
     import bifurcation_study as study
 
-    for path in study.followed(BUILD / "belt", print):
+    for path in study.followed(BUILD / "belt", lambda _: None):
         if path.suffix == ".png" and path.stem in ("orbits_load", "bifurcation_load", "bifurcation_velocity",
                                                    "bifurcation_damping"):  # fmt: skip
             save(from_file(path), path.stem)

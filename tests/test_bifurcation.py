@@ -208,10 +208,11 @@ def test_doubled_orbit_is_what_a_motion_comes_to() -> None:
     """Rossler's: beyond the doubling the orbit of one period is unstable, that of two stable, and SciPy's motion ends
     on it."""
     system = rossler()
-    found = diagram(system, np.array([0.0, 0.0, 0.0]), Asked(0.3, 3.2, nodes=16, doublings=1, step=0.1))
-    (one,) = found.at("period doubling")["orbits 1"][:1]
+    asked = Asked(2.3, 3.2, nodes=16, doublings=1, attractors=(2.5,), starts=12)
+    found = diagram(system, np.array([0.02, -0.09, 0.09]), asked)
+    (one,) = found.at("period doubling")["attractor 1 at 2.5"]
     assert 2.82 < one < 2.84
-    twice = found["orbits 1 doubled 1"]
+    twice = found["attractor 1 at 2.5 doubled 1"]
     i = int(np.argmin(np.abs(twice.parameter - 3.1)))
     orbit = twice.orbit(system, i)
     assert twice.stable[i] and orbit.period == pytest.approx(2 * 5.9, rel=0.03)
@@ -244,3 +245,55 @@ def test_no_equilibrium_near_the_start() -> None:
     system = Dynamics(lambda z, p, _: jnp.stack([z[0] ** 2 + 1 + p**2]), ("x",), np.ones(1))
     with pytest.raises(UserError, match="no equilibrium"):
         diagram(system, np.ones(1), Asked(0.0, 1.0))
+
+
+def test_no_driven_motion_near_the_start() -> None:
+    """A motion that grows without bounds is no start: the sentence says what to try."""
+
+    def rate(z: Any, p: Any, angle: Any) -> Any:
+        return jnp.stack([z[1], z[0] + 0.5 * z[0] ** 3 + jnp.cos(angle)])
+
+    system = Dynamics(rate, ("q", "v"), np.ones(2), 1.0, frequency=lambda p: p)
+    with pytest.raises(UserError, match="no periodic motion.*begin at"):
+        diagram(system, np.array([50.0, 10.0]), Asked(0.5, 1.0, nodes=4))
+
+
+def test_same_value_twice_is_refused() -> None:
+    with pytest.raises(UserError, match="stop"):
+        ms.bifurcate(brusselator(), 1.0, 1.0)
+
+
+def test_contacts_that_stick_are_refused() -> None:
+    with pytest.raises(UserError, match="jenkins"):
+        ms.bifurcate(lambda p: ms.structure(1.0, 1.0, 0.02, elements=[ms.jenkins(1.0, p)]), 0.5, 1.0)
+
+
+@pytest.mark.slow
+def test_what_a_structure_does_over_a_parameter() -> None:
+    """A mass on a spring of a cube under a steady force p: x + 0.5 x^3 = p, from Python."""
+    found = ms.bifurcate(
+        lambda p: ms.structure(1.0, 1.0, 0.05, steady={0: p}, output=0, elements=[ms.polynomial({3: 0.5})]), 0.0, 2.0
+    )
+    (still,) = found.branches
+    x = still.largest[:, 0]
+    np.testing.assert_allclose(x + 0.5 * x**3, still.parameter, atol=1e-10)
+    assert still.stable.all() and not found.hopf
+
+
+@pytest.mark.slow
+def test_motions_find_the_orbit_that_no_branch_leads_to() -> None:
+    """A circle that is there for all p, beside an equilibrium that is always stable: r' = -r (1 - r^2) (4 - r^2)."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        r2 = z[0] ** 2 + z[1] ** 2
+        grows = -(1 - r2) * (4 - r2)
+        return jnp.stack([grows * z[0] - z[1], grows * z[1] + z[0]])
+
+    system = Dynamics(rate, ("x", "y"), np.ones(2), 2.0)
+    found = diagram(system, np.zeros(2), Asked(0.0, 1.0, nodes=8, doublings=0, attractors=(0.5,), starts=24, seed=3))
+    (one,) = found.attractors
+    np.testing.assert_allclose(np.linalg.norm(one.orbit.x, axis=1), 2.0, atol=1e-8)
+    begun = 3.0 * np.random.default_rng(3).uniform(-1, 1, (24, 2))
+    assert one.share == np.mean(np.linalg.norm(begun, axis=1) > 1.0)  # the unstable circle of radius 1 divides them
+    branch = found["attractor 1 at 0.5"]
+    assert branch.parameter.min() == 0.0 and branch.parameter.max() == 1.0 and branch.stable.all()

@@ -113,7 +113,7 @@ def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 
 def joined(back: Branch, forth: Branch) -> Branch:
     """Two branches that begin at the same point, as one: the first one from its end to its beginning, then the second.
     It ended as both did."""
-    both = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
+    both: dict[str, Any] = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
     said = [one.ended for one in (back, forth)]
     ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
     return replace(forth, ended=ended, **both)

@@ -237,7 +237,8 @@ def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
     while not state.status:
         before, state = state, equilibria.next_one(system, state, settings)
         new: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
-        new += [(h.x, h.p, "Hopf") for h in equilibria.hopf_between(system, before, state, settings)]
+        passed = equilibria.hopf_between(system, before, state, settings)
+        new += [(h.x, h.p, "Hopf") for h in passed if settings.low <= h.p <= settings.high]
         rows += sorted(new, key=lambda r: _ahead(system, before, r[0], r[1]))
     X, P = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
     values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])

@@ -21,6 +21,9 @@ from .dynamics import Dynamics
 MOST = 4000
 """Steps of a piece at most."""
 
+SHORTEST = 1e-12
+"""Share of a piece below which a step is so short that the motion is taken to become infinite."""
+
 
 class Pieces(NamedTuple):
     """Ends of pieces: x (m, n), dx (m, n, n + 2) their derivatives over where they began, p and the period; steps (m,);
@@ -56,7 +59,7 @@ def _error(K: list[Any], h: Any, size: Any) -> Any:
 def marched(
     rate: Callable, Z: Any, begin: Any, end: Any, absolute: Any, relative: float, most: int = MOST
 ) -> tuple[Any, Any, Any]:
-    """Z (n, k) from begin to end, steps, and whether it got there.
+    """Z (n, k) from begin to end, infinite where it does not get there; steps, and whether it does.
 
     Args:
         rate: function of s and Z. absolute: (n, 1) tolerance of the first column, which chooses the steps together with
@@ -78,8 +81,9 @@ def marched(
         return jnp.where(last, end, s), Z, first, h * jnp.where(good, factor, jnp.minimum(factor, 0.9)), count + 1
 
     start = (begin, Z, rate(begin, Z), 0.02 * (end - begin), 0)
-    s, Z, _, _, count = jax.lax.while_loop(lambda c: (c[0] < end) & (c[4] < most), step, start)
-    return Z, count, s >= end
+    least = SHORTEST * (end - begin)
+    s, Z, _, _, count = jax.lax.while_loop(lambda c: (c[0] < end) & (c[4] < most) & (c[3] > least), step, start)
+    return jnp.where(s >= end, Z, jnp.inf), count, s >= end
 
 
 BLOCK = 32

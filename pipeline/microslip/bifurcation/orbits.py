@@ -49,6 +49,7 @@ def follow(problem: Shooting, state: State, settings: Settings) -> Iterator[tupl
         found = [_at(problem, p.x, p.lam, p.kind) for p in state.found]
         last = found[-1] if found else here
         passed = _passed(problem, previous, state, here, last, settings) if found else []
+        passed = [one for one in passed if settings.low <= one.orbit.p <= settings.high]
         ended = state.status or _collapsed(problem, here.orbit, last.orbit)
         if ended == COLLAPSED:
             yield [], ended
