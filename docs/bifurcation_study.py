@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import h5py
+from matplotlib.axes import Axes
+
+from microslip.bifurcation import branches
+from microslip.bifurcation.drawn import draw
 from microslip.case import load_case
 from microslip.stages.bifurcation import bifurcation_stage
 from microslip.stages.places import modal_files
 
 ROOT = Path(__file__).resolve().parents[1]
 CASE = ROOT / "pipeline" / "cases" / "belt.toml"
+
+SHOWN = {"load": "load parameter B in m", "velocity": "belt velocity in m/s", "damping": "damping D"}
+"""Diagrams of the case and what their axes say."""
 
 Row = dict[str, str]
 
@@ -21,6 +29,16 @@ def followed(folder: Path, report: Callable[[str], None]) -> list[Path]:
     settings, _ = load_case(CASE)
     files = modal_files(settings, CASE, ROOT, report)
     return bifurcation_stage(CASE, files, folder, report=report)[0]
+
+
+def panels(folder: Path, places: Iterable[Axes]) -> None:
+    """The diagrams of the case, without the names of their branches."""
+    with h5py.File(folder / "bifurcation.h5") as file:
+        for axes, (name, words) in zip(places, SHOWN.items(), strict=True):
+            found = [branches.get(file[name][f"branch_{i}"]) for i in range(len(file[name]))]
+            draw(found, [], axes, words, "amplitude of the second mass", "m")
+            axes.get_legend().remove()
+            axes.set_ylabel("amplitude in m")
 
 
 def rows(folder: Path, name: str) -> list[Row]:

@@ -1431,10 +1431,14 @@ def bolted_pipes() -> None:
 def belt() -> None:
     import bifurcation_study as study
 
-    for path in study.followed(BUILD / "belt", lambda _: None):
-        if path.suffix == ".png" and path.stem in ("orbits_load", "bifurcation_load", "bifurcation_velocity",
-                                                   "bifurcation_damping"):  # fmt: skip
-            save(from_file(path), path.stem)
+    study.followed(BUILD / "belt", lambda _: None)
+    fig = figure(10.0, 3.0)
+    fig.set_dpi(90)
+    places = fig.subplots(1, 3)
+    study.panels(BUILD / "belt", places)
+    for axes in places:
+        plain(axes)
+    save(drawn(fig), "bifurcation")
     fill("bifurcation.md", "belt", table(*study.compared(BUILD / "belt")))
 
 

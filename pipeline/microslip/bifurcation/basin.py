@@ -79,8 +79,7 @@ def _closed(system: Dynamics, way: Array, p: float, step: float, nodes: int, kno
     """The orbit that a motion (times, n) has come to, if it is one and stable; one of the known ones where it has its
     extremes."""
     size = np.asarray(system.scale)
-    moves = np.ptp(way / size, axis=0)
-    if not np.isfinite(way).all() or moves.max() < 10 * BACK:
+    if not np.isfinite(way).all() or np.ptp(way / size, axis=0).max() < 10 * BACK:
         return []
     for one in known:
         lasts = int(np.ceil(one.period / step))

@@ -169,10 +169,13 @@ def _driven(work: _Work, x: Array) -> Branch:
         run, angle = flow.left_alone(system), 2 * np.pi * i / asked.nodes
         nodes.append(np.asarray(run(nodes[-1][None], asked.start, period / asked.nodes, angle))[0])
     problem = Shooting(system, Orbit(system, np.array(nodes), period, asked.start), period)
-    state = start(problem, np.array(nodes).ravel(), asked.start, asked.settings)
-    if state.status:
+    status = "it becomes infinite"
+    if np.isfinite(nodes).all():
+        state = start(problem, np.array(nodes).ravel(), asked.start, asked.settings)
+        status = state.status
+    if status:
         raise UserError(
-            f"no periodic motion is found near the start: {state.status}; begin at a value of the parameter where the "
+            f"no periodic motion is found near the start: {status}; begin at a value of the parameter where the "
             "motion is small or settles, or give another x"
         )
     return followed(DRIVEN, "start", problem, state, asked.settings, work.report)

@@ -31,7 +31,10 @@ def portraits_picture(found: Diagram, path: Path, title: str, unit: str) -> Path
     columns = min(len(shown), 3)
     rows = -(-len(shown) // columns)
     figure = empty_figure(4.4 * columns + 0.4, 4.0 * rows)
-    for axes, branch in zip(np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel(), shown, strict=False):
+    places = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in places[len(shown) :]:
+        axes.set_visible(False)
+    for axes, branch in zip(places, shown, strict=False):
         plain_axes(axes)
         _portraits(found, branch, axes, unit)
     figure.suptitle(title, fontweight="bold")
