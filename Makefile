@@ -81,6 +81,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/structures.py
 	@$(PYTHON) benchmarks/ring_response.py
 	@$(PYTHON) benchmarks/time_domain.py
+	@$(PYTHON) benchmarks/bifurcation.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

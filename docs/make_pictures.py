@@ -1448,6 +1448,20 @@ def bolted_pipes() -> None:
     save(drawn(fig), "bolted_pipes")
 
 
+def belt() -> None:
+    import bifurcation_study as study
+
+    study.followed(BUILD / "belt", lambda _: None)
+    fig = figure(10.0, 3.0)
+    fig.set_dpi(90)
+    places = fig.subplots(1, 3)
+    study.panels(BUILD / "belt", places)
+    for axes in places:
+        plain(axes)
+    save(drawn(fig), "bifurcation")
+    fill("bifurcation.md", "belt", table(*study.compared(BUILD / "belt")))
+
+
 STUDIES = {
     f.__name__: f
     for f in (
@@ -1480,6 +1494,7 @@ STUDIES = {
         laws,
         microslip,
         time_domain,
+        belt,
         continuation,
         followed,
         accuracy,

@@ -249,6 +249,19 @@ def test_cyclic_page(tmp_path: Path) -> None:
         np.testing.assert_allclose(basis.groups[0, k].frequency[:3], [float(v) for v in told[k][2:5]], rtol=1e-4)
 
 
+def test_bifurcation_page() -> None:
+    """Deviations follow from the values beside them; all but H1 and the turning point, which hang on it, are met within
+    0.2 %; at H2 a pair of eigenvalues of the linear part is on the axis."""
+    from closed_forms.oscillators import belt
+
+    told = {r[0]: r for r in rows("bifurcation.md", "belt")}
+    for name, (_, _, printed, value, deviation) in told.items():
+        assert number(deviation) == pytest.approx(100 * (float(value) / float(printed) - 1), abs=0.01)
+        assert abs(number(deviation)) < (6.0 if name[:2] in ("H1", "T1") else 0.2)
+    J = np.asarray(belt(0.2, 9.8).still(np.zeros(4), float(told["H2, Hopf point"][3]))[1])
+    assert np.abs(np.linalg.eigvals(J).real).min() < 1e-5
+
+
 @pytest.mark.slow
 def test_contact_statics_page(tmp_path: Path) -> None:
     """Normal force of the coarse shroud at 1500 rpm without interference."""

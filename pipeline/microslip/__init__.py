@@ -21,7 +21,8 @@ PUBLIC = {
     "exchange.labelled": "to_xarray",
     "bodies": "modes assemble sample",
     "system.structure": "structure polynomial jenkins stop friction Element",
-    "analyses": "harmonic_response follow backbone integrate integrate_many run_up",
+    "bifurcation.dynamics": "Dynamics",
+    "analyses": "harmonic_response follow backbone integrate integrate_many run_up bifurcate",
 }
 """Module -> the names of it that are public."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -25,6 +25,8 @@ from .system.assembly import Assembly
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from .bifurcation.diagram import Diagram
+    from .bifurcation.dynamics import Dynamics
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -368,3 +370,55 @@ def run_up(
         return orbit.run(found, 0, ramp.periods, samples, steps, begin, report)
     asked = recorded.Asked(f"{start:.6g} to {stop:.6g} {unit}", found, 0, ramp.periods, samples, steps, begin)
     return recorded.run(file, [asked], report=report)[0]
+
+
+def bifurcate(
+    system: Dynamics | Callable[[float], Assembly], start: float, stop: float, *, x: Any = None,
+    frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
+    attractors: Sequence[float] = (), starts: int = 64, nodes: int = 32, step: float = 0.08, points: int = 400,
+    report: Report = lambda _: None,
+) -> Diagram:  # fmt: skip
+    """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
+
+    Args:
+        system: x' = f(x, p, angle), or the assembly at a value of the parameter; its contacts' friction follows the
+            velocity alone, or it has smooth springs. start, stop: of the parameter. x: (n,) a guess of the equilibrium
+            at the start; at rest if not given. frequency: of an assembly's loads, in the unit.
+        orbits: whether they are followed. doublings: how often from an orbit on to the one of twice its period.
+        attractors: values of the parameter at which `starts` motions are left alone, to find what they come to.
+        nodes: of an orbit. step: the longest, a share of start to stop. points: of a branch. report: is told what is
+            under way.
+
+    Returns:
+        A `Diagram`: ``branches``, ``hopf``, ``at("fold")``, ``plot(axes)``, ``to_dataframe()``, ``to_xarray()``. A
+        branch that could not be followed to its end says why in ``ended``.
+
+    Raises:
+        UserError: no equilibrium near the start; contacts that remember; a parameter that does not act smoothly.
+
+    Examples:
+        The chemical oscillator called Brusselator, whose Hopf point is at 2:
+
+        >>> import jax.numpy as jnp, numpy as np, microslip as ms
+        >>> def rate(x, p, _):
+        ...     return jnp.stack([1 - (p + 1) * x[0] + x[0] ** 2 * x[1], p * x[0] - x[0] ** 2 * x[1]])
+        >>> system = ms.Dynamics(rate, ("x", "y"), np.array([2.0, 2.0]))
+        >>> found = ms.bifurcate(system, 1.5, 2.5, x=[1.0, 1.5], orbits=False)
+        >>> [round(point.p, 9) for point in found.hopf]
+        [2.0]
+    """
+    from .bifurcation import diagram, mechanics
+    from .sliding import equilibrium, of
+
+    bounded("start, stop", [start, stop])
+    if start == stop:
+        raise UserError("stop: is the start; give two different values of the parameter")
+    if isinstance(system, diagram.Dynamics):
+        made = replace(system, parameter_scale=abs(stop - start))
+        begin = np.zeros(made.count) if x is None else np.asarray(x, dtype=float)
+    else:
+        Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
+        made = mechanics.dynamics(system, min(start, stop), max(start, stop), Omega)
+        begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
+    asked = diagram.Asked(start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts)
+    return diagram.diagram(made, begin, asked, report=report)

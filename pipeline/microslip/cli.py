@@ -398,6 +398,32 @@ def orbit(
 
 
 @app.command
+def bifurcate(
+    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """Does a case begin to move by itself, and what then: equilibria and periodic orbits over a parameter, stable and
+    unstable ones, as [[bifurcation]] asks.
+
+    Every finished branch is kept; interrupted, the same command goes on where it was.
+
+    Args:
+        case: a case.toml, the folder that holds it, its name, or its products.
+    """
+    from .case import load_case
+    from .stages.bifurcation import bifurcation_stage
+    from .stages.places import modal_files
+
+    case = _case_file(case)
+    with progress(f"bifurcate {case}", quiet) as report:
+        settings, _ = load_case(case, list(set_))
+        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
+        made, sentences, whole = bifurcation_stage(case, files, folder, list(set_), force, report, not no_pictures)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not whole:
+        raise NotConverged(f"some branches could not be followed to their end; {made[0]} says where and why")
+
+
+@app.command
 def backbone(
     case: Path, basis: Path | None = None, /, *, mode: int | None = None, low: float | None = None,
     high: float | None = None, set_: Set = (), quiet: Quiet = False,

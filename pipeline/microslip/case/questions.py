@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..settings.body import Coefficient, Model, NotNegative, Positive, Ratios, _finite_vector, _tuple
+from ..settings.body import Coefficient, Model, Name, NotNegative, Number, Positive, Ratios, _finite_vector, _tuple
 from .keys import Orders, Positives
 
 NotNegatives = Annotated[tuple[NotNegative, ...], BeforeValidator(_finite_vector)]
@@ -190,3 +190,41 @@ class OrbitOfCase(Model):
     @property
     def hertz(self) -> tuple[float, ...]:
         return self.frequency or tuple(w / (2 * math.pi) for w in self.Omega or ())
+
+
+class BifurcationOfCase(Model):
+    """A diagram of equilibria and periodic orbits over a parameter, by `microslip bifurcate`.
+
+    name: of its files. parameter: what its axis says, in unit. keys: of this case, dotted, which follow the parameter,
+    each with the factor that makes its value of it; those that begin with ``system.`` are keys of the system.toml.
+    fixed: other keys and their values, of this diagram alone. start, stop: of the parameter. orbits: whether those born
+    at Hopf points are followed, doublings: how often from an orbit to the one of twice its period. attractors: values
+    of the parameter at which `starts` motions, drawn from `seed`, are left to themselves, to find what they lead to.
+    nodes: of an orbit, doubled with its period. step: the longest, a share of start to stop. points: of a branch.
+    frequency: Hz of the first harmonic of the excitations, where there are any.
+    """
+
+    name: Name
+    parameter: str
+    unit: str = ""
+    keys: dict[str, Number]
+    fixed: dict[str, Number] = {}
+    start: Number
+    stop: Number
+    orbits: bool = True
+    doublings: Annotated[int, Field(ge=0, le=8)] = 1
+    attractors: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
+    starts: Annotated[int, Field(ge=1, le=10000)] = 64
+    seed: Annotated[int, Field(ge=0)] = 0
+    nodes: Annotated[int, Field(ge=4, le=1024)] = 32
+    step: Annotated[Positive, Field(le=0.5)] = 0.08
+    points: Annotated[int, Field(ge=2, le=100000)] = 400
+    frequency: Positive | None = None
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> BifurcationOfCase:
+        if self.start == self.stop:
+            raise ValueError("stop: is the start; give two different values of the parameter")
+        if not self.keys:
+            raise ValueError("keys: name one or more keys of the case that follow the parameter, with a factor each")
+        return self

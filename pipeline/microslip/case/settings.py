@@ -35,7 +35,15 @@ from ..system.excitation import Turning
 from .driving import ROTATION, ExcitationOfCase, GroundOfCase, SpringOfCase, base_of
 from .keys import GROUND as GROUND
 from .keys import Address, Count, Order
-from .questions import CurveOfCase, IdentificationOfCase, OrbitOfCase, OrdersOfCase, RangesOfCase, SpeedsOfCase
+from .questions import (
+    BifurcationOfCase,
+    CurveOfCase,
+    IdentificationOfCase,
+    OrbitOfCase,
+    OrdersOfCase,
+    RangesOfCase,
+    SpeedsOfCase,
+)
 
 FIRST_HARMONICS = 3
 """With which ``harmonics = "auto"`` begins."""
@@ -316,6 +324,7 @@ class CaseSettings(Model):
     curve: CurveOfCase | None = None
     orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
+    bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -323,7 +332,14 @@ class CaseSettings(Model):
         """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
         if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
             raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
+        if isinstance(raw, dict) and raw.get("bifurcation") and "sweep" not in raw:
+            raw = raw | {"sweep": NO_SWEEP}
         return raw
+
+    @property
+    def is_only_followed(self) -> bool:
+        """Whether it asks for bifurcations and for no sweep."""
+        return bool(self.bifurcation) and self.orbit is None and self.sweep == Sweep.model_validate(NO_SWEEP)
 
     @property
     def is_only_in_time(self) -> bool:
@@ -332,7 +348,8 @@ class CaseSettings(Model):
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        moved = any(s.motion for s in self.springs) and not self.excitation and not self.excitations
+        free = self.bifurcation or any(s.motion for s in self.springs)
+        moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
                 raise ValueError(f"{short}: give {short}, or one or more [[{many}]], and not both")
@@ -416,9 +433,10 @@ class CaseSettings(Model):
 
     def _pressed(self) -> CaseSettings:
         moves = [c.interface for c in self.contacts if c.ground is not None]
-        if moves and not self.is_only_in_time:
+        if moves and not self.is_only_in_time and not self.is_only_followed:
             raise ValueError(
-                f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] and no sweep"
+                f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] or "
+                "[[bifurcation]] and no sweep"
             )
         bare = [c for c in self.contacts if c.normal_force is None and c.interference is None]
         open_ = [c.interface for c in bare if not self.is_thrown(c)]
@@ -520,6 +538,10 @@ class CaseSettings(Model):
         """Whether the centrifugal load of one of its bodies presses a contact."""
         thrown = {b.name for b in self.bodies if b.pressed_at_rpm is not None}
         return any(body in thrown for body, _ in self.ends(c))
+
+
+NO_SWEEP = {"start": 1.0, "stop": 2.0}
+"""Stands for the sweep of a case that asks for bifurcations alone."""
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +13,8 @@ from .law import Array, Law, Step, number, settings, static, table
 class Spring(Law):
     """Base of springs along t1. The three functions of the displacement u (m, any shape) are made of operators alone,
     so that they serve arrays of numpy as well as those of jax."""
+
+    smooth: ClassVar[bool] = True
 
     def force(self, u: Any) -> Any:
         """N."""
@@ -84,6 +86,7 @@ def _horner(coefficients: list[Any], u: Any) -> Any:
 class Stop(Spring):
     """A spring that is met beyond a gap and cannot pull; both: on the other side too. stiffness: N/m. gap: m."""
 
+    smooth: ClassVar[bool] = False
     stiffness: Array = number(ge=0)
     gap: Array = number()
     both: bool = static(default=False)

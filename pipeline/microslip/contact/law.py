@@ -172,9 +172,11 @@ class Law:
 
     Attributes:
         brakes: whether its friction changes so fast with the velocity that a motion in time needs `slowed`.
+        smooth: whether `rates` has a slope everywhere, so that it can be linearised wherever it is.
     """
 
     brakes: ClassVar[bool] = False
+    smooth: ClassVar[bool] = False
 
     def init(self, n: int) -> State:
         """State of n points that were never loaded, at u = 0."""

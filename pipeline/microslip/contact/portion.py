@@ -45,6 +45,10 @@ class Portion(Law):
         return (self.share * force.T).T, rate
 
     @property
+    def smooth(self) -> bool:  # type: ignore[override]
+        return self.whole.smooth
+
+    @property
     def brakes(self) -> bool:  # type: ignore[override]
         return self.whole.brakes
 

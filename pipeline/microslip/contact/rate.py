@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from ..reduced.compliance import BULK_AND_SURFACE
 from ..settings.body import NotNegative, Positive
-from .friction import Friction, creep
+from .friction import Friction, Scattered, creep
 from .law import Array, Law, Step, norm, number, settings, static, value
 from .normal import Normal
 from .point import OwnNormal
@@ -50,6 +50,18 @@ class RateContact(Law):
     damping: Array = number(ge=0)
     includes: str = static(default=BULK_AND_SURFACE)
     brakes: ClassVar[bool] = True
+
+    @property
+    def smooth(self) -> bool:  # type: ignore[override]
+        return not isinstance(self.friction, Scattered)
+
+    @property
+    def remembers(self) -> int | None:
+        return 0
+
+    def rates(self, u: Array, v: Array, x: Array, time: Array | float, lag: float) -> tuple[Array, Array]:
+        pressed, now = self._pressed(u[:, 0], v[:, 0]), jnp.asarray(time)
+        return jnp.concatenate([pressed[None], self._drag(norm(v.T[1:]), pressed, now) * v.T[1:]]).T, x
 
     def init(self, n: int) -> RateState:
         return RateState(jnp.zeros((2, n)), jnp.zeros((2, n)), jnp.zeros(n))

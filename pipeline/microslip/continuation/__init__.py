@@ -6,11 +6,15 @@ Knows no mechanics: lambda may be a frequency, a normal force, a level of excita
 
 from .curve import Branch as Branch
 from .curve import Kind as Kind
+from .curve import Lost as Lost
 from .curve import Point as Point
+from .curve import Segment as Segment
 from .curve import Settings as Settings
 from .curve import State as State
 from .curve import advance as advance
+from .curve import branch_off as branch_off
 from .curve import follow as follow
+from .curve import root as root
 from .curve import start as start
 from .curve import trace as trace
 from .extremum import NO_OPTIMUM as NO_OPTIMUM
@@ -23,5 +27,6 @@ from .extremum import rated as rated
 from .newton import CONVERGED as CONVERGED
 from .newton import Equations as Equations
 from .newton import NewtonSettings as NewtonSettings
+from .newton import Scaled as Scaled
 from .newton import Solution as Solution
 from .newton import newton as newton

@@ -158,6 +158,29 @@ def start(problem: Equations, x: Array, lam: float, settings: Settings | None = 
     return State(y, t, orientation, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
 
 
+def branch_off(
+    problem: Equations, x: Array, lam: float, direction: tuple[Array, float], settings: Settings | None = None
+) -> State:
+    """The first point on the plane across a direction, from a guess x (n,) on that plane: of a curve that leaves
+    another one there, which Newton's method at fixed lambda would find instead.
+
+    Args:
+        direction: of x (n,) and of lambda, in their units, in which the curve is to be followed.
+    """
+    settings = settings or Settings()
+    scaled = Scaled(problem)
+    y = scaled.pack(x, lam)
+    ahead = scaled.pack(*direction)
+    ahead = ahead / norm(ahead)
+    found = correct(scaled, y, ahead, float(ahead @ y), replace(settings.newton, iterations=40, last_resort=True))
+    empty = State(y, np.zeros_like(y), 1, settings.step, None, settings.direction, y, y, 0, 0.0, ())
+    if not found.ok or found.tangent is None:
+        return replace(empty, status=f"no start: {found.status}")
+    y, t = found.y, found.tangent / norm(found.tangent)  # border . tangent = 1: it goes ahead
+    first = _point(scaled, y, t, "start", False, 0.0)
+    return State(y, t, found.sign, settings.step, None, _sign(t[-1]) or settings.direction, y, t, 1, 0.0, (first,))
+
+
 def follow(problem: Equations, state: State, settings: Settings | None = None) -> Iterator[State]:
     """The state given and all that follow, until one has a status. The points of each are in its `found`."""
     settings = settings or Settings()

@@ -82,8 +82,8 @@ def modal_files(
         body = b.body or b.name
         if b.file is not None:
             found[b.name] = _named(path, b)
-        elif (lumped := _lumped(path, body)) is not None:
-            found[b.name] = system_stage(lumped, report=report, root=root)
+        elif (system := lumped(path, body)) is not None:
+            found[b.name] = system_stage(system, report=report, root=root)
         else:
             job = open_job(find_body(path, body, root), root=root)
             modes_stage(job, report=report)
@@ -91,7 +91,7 @@ def modal_files(
     return found
 
 
-def _lumped(case_path: Path, name: str) -> Path | None:
+def lumped(case_path: Path, name: str) -> Path | None:
     """The system.toml of a small system of that name beside a case, in its folder or in one of the system's name."""
     for place in (case_path.parent / "system.toml", case_path.parent / name / "system.toml"):
         file = system_file(place) if place.is_file() else None
@@ -136,7 +136,7 @@ def _nowhere(case: CaseSettings, path: Path, b: BodyOfCase, looked: list[Path], 
     name, said = b.body or b.name, " or ".join(map(str, looked))
     begun = f"{path}: there is no modal file of '{name}': no {said} in {root.resolve()}"
     with contextlib.suppress(UserError):
-        by_hand = _lumped(path, name)
+        by_hand = lumped(path, name)
         if by_hand is None:
             find_body(path, name, root)
         return f"{begun}; microslip run {shlex.quote(str(by_hand.parent if by_hand else path))} makes it"

@@ -17,6 +17,7 @@ from ..results import read_response
 from ..results.names import apart
 from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
+from .bifurcation import bifurcation_stage
 from .job import Job, open_job
 from .modal import modes_stage, system_stage
 from .orbit import orbit_stage
@@ -56,12 +57,13 @@ def _answered(
     path: Path, case: CaseSettings, files: Mapping[str, Path], folder: Path, assignments: list[str] | None,
     force: bool, report: Report, wanted: Wanted,
 ) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
-    """The response of a case, None if it asks for motions in time alone, and those; whether all of it converged."""
+    """The response of a case, None if it asks for none, motions in time and bifurcations; whether all converged."""
     response, converged = None, True
-    if not case.is_only_in_time:
+    if not case.is_only_in_time and not case.is_only_followed:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
-    if case.orbit is not None:
-        converged = orbit_stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
+    for asked, stage in ((case.orbit, orbit_stage), (case.bifurcation, bifurcation_stage)):
+        if asked:
+            converged = stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
     return response, converged
 
 
@@ -83,7 +85,8 @@ def run_case_file(
             return report_stage(job, response, force, report, wanted.pictures), converged
     folder = Path(".") / "build" / case.name
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
-    return folder / ("orbit.html" if case.is_only_in_time else "response.csv"), converged
+    page = "bifurcation.html" if case.is_only_followed else "orbit.html" if case.is_only_in_time else "response.csv"
+    return folder / page, converged
 
 
 def run_system(

@@ -1,0 +1,71 @@
+"""Pictures and the table of docs/bifurcation.md: the two masses on a belt of section 4.4."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import h5py
+from matplotlib.axes import Axes
+
+from microslip.bifurcation import branches
+from microslip.bifurcation.drawn import draw
+from microslip.case import load_case
+from microslip.stages.bifurcation import bifurcation_stage
+from microslip.stages.places import modal_files
+
+ROOT = Path(__file__).resolve().parents[1]
+CASE = ROOT / "pipeline" / "cases" / "belt.toml"
+
+SHOWN = {"load": "load parameter B in m", "velocity": "belt velocity in m/s", "damping": "damping D"}
+"""Diagrams of the case and what their axes say."""
+
+Row = dict[str, str]
+
+
+def followed(folder: Path, report: Callable[[str], None]) -> list[Path]:
+    """The case's diagrams; their files."""
+    settings, _ = load_case(CASE)
+    files = modal_files(settings, CASE, ROOT, report)
+    return bifurcation_stage(CASE, files, folder, report=report)[0]
+
+
+def panels(folder: Path, places: Iterable[Axes]) -> None:
+    """The diagrams of the case, without the names of their branches."""
+    with h5py.File(folder / "bifurcation.h5") as file:
+        for axes, (name, words) in zip(places, SHOWN.items(), strict=True):
+            found = [branches.get(file[name][f"branch_{i}"]) for i in range(len(file[name]))]
+            draw(found, [], axes, words, "amplitude of the second mass", "m")
+            axes.get_legend().remove()
+            axes.set_ylabel("amplitude in m")
+
+
+def rows(folder: Path, name: str) -> list[Row]:
+    """Of the table of a diagram."""
+    with open(folder / f"bifurcation_{name}.csv", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def points(table: list[Row], branch: str, kind: str) -> list[float]:
+    return [float(row["parameter"]) for row in table if row["branch"] == branch and row["kind"] == kind]
+
+
+def compared(folder: Path) -> tuple[list[str], list[list[str]]]:
+    """Head and rows: printed and found values."""
+    load, velocity = rows(folder, "load"), rows(folder, "velocity")
+    one, other = "orbits 1", "orbits 2"
+    still, window = points(load, "equilibria", "Hopf"), points(velocity, "attractor 1 at 3.8", "fold")
+    found = [
+        ("H1, Hopf point, subcritical", "m", 1.12, still[0]),
+        ("T1, turning point", "m", 0.88, points(load, one, "fold")[0]),
+        ("H2, Hopf point", "m", 7.09, still[1]),
+        ("first period doubling", "m", 8.09, points(load, one, "period doubling")[0]),
+        ("second", "m", 9.26, points(load, f"{one} doubled 1", "period doubling")[0]),
+        ("third", "m", 9.36, points(load, f"{one} doubled 1 doubled 1", "period doubling")[0]),
+        ("coexisting orbit becomes stable", "m", 7.25, points(load, other, "period doubling")[-1]),
+        ("three attractors, from", "m/s", 3.57, min(window)),
+        ("three attractors, to", "m/s", 4.09, max(window)),
+    ]
+    head = ["", "unit", "printed", "found", "difference"]
+    return head, [[n, u, f"{p:g}", f"{x:.5g}", f"{100 * (x / p - 1):+.2f} %"] for n, u, p, x in found]

@@ -1,0 +1,176 @@
+"""Branches of a diagram as arrays, in memory and in files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from ..data import Array, ComplexArray
+from ..files import hdf5, store
+from .dynamics import Dynamics
+from .orbits import Found
+from .shooting import Orbit
+
+if TYPE_CHECKING:
+    import pandas
+
+EQUILIBRIA = "equilibria"
+
+SPECIAL = ("Hopf", "fold", "period doubling", "torus", "branch point")
+"""Kinds of points where something happens."""
+
+
+LOST = ("stuck", "no start", "points")
+"""Begin what is said of branches that could not be followed to their end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Equilibria, or periodic orbits, along one curve.
+
+    Attributes:
+        name. born: of what. ended: why. turns: k of what drives in a period. outputs: names of the w read-outs.
+        parameter: (k,). period: (k,) s, not a number for equilibria. x: (k, m, n) nodes, one of an equilibrium.
+        largest, smallest: (k, w) of the read-outs. multipliers: (k, e) Floquet multipliers, of an equilibrium
+            eigenvalues in 1/s. stable: (k,). kind: (k,) of `orbits.Kind`, or ``Hopf``.
+    """
+
+    name: str
+    born: str
+    ended: str
+    turns: int
+    outputs: tuple[str, ...]
+    parameter: Array
+    period: Array
+    x: Array
+    largest: Array
+    smallest: Array
+    multipliers: ComplexArray
+    stable: Array
+    kind: Array
+
+    def __len__(self) -> int:
+        return len(self.parameter)
+
+    @property
+    def still(self) -> bool:
+        """Whether it is one of equilibria."""
+        return self.x.shape[1] == 1
+
+    @property
+    def swing(self) -> Array:
+        """(k, w) half of the way from the smallest to the largest value."""
+        return 0.5 * (self.largest - self.smallest)
+
+    @property
+    def lost(self) -> bool:
+        """Whether it could not be followed to its end."""
+        return self.ended.startswith(LOST)
+
+    def of_kind(self, kind: str) -> Array:
+        """Numbers of the points of a kind."""
+        return np.flatnonzero(self.kind == kind)
+
+    def orbit(self, system: Dynamics, i: int) -> Orbit:
+        """The i-th orbit."""
+        return Orbit(system, self.x[i], float(self.period[i]), float(self.parameter[i]), self.turns)
+
+    def stretches(self) -> Iterator[tuple[slice, bool]]:
+        """Parts of one stability, each with the first point of the next one, and whether they are stable. Where
+        stability changes nothing can be said of the point itself, and its neighbour decides."""
+        sure = ~np.isin(self.kind, SPECIAL)
+        steady = (self.stable | ~sure)[:-1] & (self.stable | ~sure)[1:]
+        edges = [0, *(np.flatnonzero(np.diff(steady.astype(int))) + 1), len(steady)]
+        for a, b in zip(edges, edges[1:], strict=False):
+            if b > a:
+                yield slice(a, b + 1), bool(steady[a])
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row a point."""
+        import pandas
+
+        return pandas.DataFrame(columns(self))
+
+
+def of_orbits(name: str, born: str, ended: str, found: list[Found], each: int = 8) -> Branch:
+    """A branch of periodic orbits, read at so many times a node."""
+    orbits = [one.orbit for one in found]
+    seen = [o.system.seen(o.sampled(each), o.p) for o in orbits]
+    return Branch(
+        name, born, ended, orbits[0].turns, orbits[0].system.named,
+        np.array([o.p for o in orbits]), np.array([o.period for o in orbits]), np.array([o.x for o in orbits]),
+        np.array([y.max(axis=0) for y in seen]), np.array([y.min(axis=0) for y in seen]),
+        np.array([one.multipliers for one in found]), np.array([one.stable for one in found]),
+        np.array([one.kind for one in found]),
+    )  # fmt: skip
+
+
+def joined(back: Branch, forth: Branch) -> Branch:
+    """Two branches that begin at the same point, as one: the first one from its end to its beginning, then the second.
+    It ended as both did."""
+    both: dict[str, Any] = {key: np.concatenate([getattr(back, key)[:0:-1], getattr(forth, key)]) for key in ARRAYS}
+    said = [one.ended for one in (back, forth)]
+    ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
+    return replace(forth, ended=ended, **both)
+
+
+def columns(branch: Branch) -> dict[str, Any]:
+    """Column -> values of a table."""
+    found: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
+                             "parameter": branch.parameter, "stable": branch.stable.astype(int),
+                             "period_s": branch.period}  # fmt: skip
+    for i, name in enumerate(branch.outputs):
+        key = name.replace(" ", "_")
+        found |= {f"{key}_largest": branch.largest[:, i], f"{key}_smallest": branch.smallest[:, i]}
+    first = np.abs(branch.multipliers).max(axis=1, initial=0.0)
+    decisive = branch.multipliers[:, 0] if branch.multipliers.shape[1] else np.zeros(len(branch), complex)
+    return found | {"multiplier_real": decisive.real, "multiplier_imaginary": decisive.imag} | (
+        {} if branch.still else {"multiplier_size": first}
+    )  # fmt: skip
+
+
+TEXTS = ("name", "born", "ended")
+ARRAYS = {"parameter": "", "period": "s", "x": "", "largest": "", "smallest": "", "multipliers": "", "stable": "",
+          "kind": ""}  # fmt: skip
+
+
+def put(group: h5py.Group, branch: Branch) -> None:
+    for key in TEXTS:
+        group.attrs[key] = getattr(branch, key)
+    group.attrs["turns"], group.attrs["outputs"] = branch.turns, "\n".join(branch.outputs)
+    for key, unit in ARRAYS.items():
+        values = getattr(branch, key)
+        hdf5.put(group, key, values.astype(np.int8) if values.dtype == bool else values, unit)
+
+
+def get(group: h5py.Group) -> Branch:
+    texts: dict[str, Any] = {key: str(group.attrs[key]) for key in TEXTS}
+    arrays: dict[str, Any] = {key: group[key][()] for key in ARRAYS}
+    arrays["multipliers"] = arrays["multipliers"] + 1j * group["multipliers" + hdf5.IMAGINARY][()]
+    arrays["stable"], arrays["kind"] = arrays["stable"].astype(bool), np.char.decode(arrays["kind"], "utf-8")
+    outputs = tuple(str(group.attrs["outputs"]).split("\n")) if group.attrs["outputs"] else ()
+    return Branch(turns=int(group.attrs["turns"]), outputs=outputs, **texts, **arrays)
+
+
+def write(path: Path, branch: Branch, inputs: str) -> None:
+    """A finished branch, with the hash of what it depends on."""
+    with store.complete_or_absent(path) as temporary:
+        with hdf5.create(temporary) as file:
+            file.attrs["inputs"] = inputs
+            put(file, branch)
+        hdf5.seal(temporary)
+
+
+def kept(path: Path, inputs: str) -> Branch | None:
+    """A finished branch of the same inputs, if it is there and as it was written."""
+    if not path.is_file() or hdf5.seal_state(path) != "intact":
+        return None
+    with h5py.File(store.ordinary(path), "r") as file:
+        return get(file) if str(file.attrs.get("inputs")) == inputs else None
+
+

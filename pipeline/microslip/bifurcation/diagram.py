@@ -1,0 +1,325 @@
+"""A diagram: equilibria over the parameter, the orbits born on them, and those born on these, branch by branch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..continuation import Lost, Scaled, Settings, start
+from ..continuation.curve import State
+from ..data import Array, UserError
+from . import equilibria, floquet, flow, orbits, switching
+from .basin import Attractor, attractors
+from .branches import EQUILIBRIA, Branch, joined, of_orbits
+from .drawn import draw
+from .dynamics import Dynamics
+from .equilibria import Hopf
+from .shooting import Orbit, Shooting
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
+
+Report = Callable[[str], None]
+Kept = Callable[[str], Branch | None]
+"""A finished branch of a name, if there is one."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a diagram is to show, see `case.questions.BifurcationOfCase`."""
+
+    start: float
+    stop: float
+    orbits: bool = True
+    doublings: int = 1
+    nodes: int = 32
+    step: float = 0.08
+    points: int = 400
+    attractors: tuple[float, ...] = ()
+    starts: int = 64
+    seed: int = 0
+
+    @property
+    def settings(self) -> Settings:
+        low, high = sorted((self.start, self.stop))
+        step = min(0.02, self.step)
+        return Settings(
+            direction=1 if self.stop > self.start else -1, low=low, high=high, points=self.points, step=step,
+            step_max=self.step,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Branches over a parameter.
+
+    Attributes:
+        system. branches. hopf: the Hopf points. attractors: what motions from many starts came to. messages: what a
+            reader must know.
+    """
+
+    system: Dynamics
+    branches: tuple[Branch, ...]
+    hopf: tuple[Hopf, ...]
+    attractors: tuple[Attractor, ...] = ()
+    messages: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Branch:
+        return next(b for b in self.branches if b.name == name)
+
+    def at(self, kind: str) -> dict[str, Array]:
+        """Branch -> values of the parameter at its points of a kind, see `branches.SPECIAL`."""
+        found = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
+        return {name: values for name, values in found.items() if len(values)}
+
+    def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
+        """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
+        dots = [(a.orbit.p, float(a.swing[read_out])) for a in self.attractors]
+        draw(self.branches, dots, axes, label, self.system.named[read_out], self.system.unit, read_out)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row a point, branch by branch."""
+        import pandas
+
+        return pandas.concat([b.to_dataframe() for b in self.branches], ignore_index=True)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same by points."""
+        return self.to_dataframe().rename_axis("point").to_xarray()
+
+
+@dataclass(eq=False)
+class _Work:
+    """A diagram on its way."""
+
+    system: Dynamics
+    asked: Asked
+    kept: Kept
+    keep: Callable[[Branch], None]
+    report: Report
+    found: list[Branch] = field(default_factory=list)
+    seen: list[Attractor] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+
+    def add(self, name: str, make: Callable[[], Branch]) -> Branch:
+        """A branch, from where it is kept or made now."""
+        branch = self.kept(name)
+        if branch is None:
+            self.report(name)
+            branch = make()
+            self.keep(branch)
+        if branch.lost:
+            where = f" at {branch.parameter[-1]:.6g}" if len(branch) else ""
+            self.messages.append(f"{name}: ends{where}: {branch.ended}")
+        self.found.append(branch)
+        return branch
+
+
+def diagram(
+    system: Dynamics, x: Array, asked: Asked, kept: Kept = lambda _: None,
+    keep: Callable[[Branch], None] = lambda _: None, report: Report = lambda _: None,
+) -> Diagram:  # fmt: skip
+    """Equilibria from x (n,) at the start, orbits from every Hopf point, doubled ones from every period doubling that
+    changes stability. Of a driven system: what a motion from x comes to, and what is doubled from there.
+
+    A branch that cannot be followed ends where it is, and the rest goes on.
+
+    Args:
+        kept, keep: finished branches of an interrupted run. report: is told what is under way.
+
+    Raises:
+        UserError: there is no equilibrium, or no orbit of a driven system, near x.
+    """
+    work = _Work(system, asked, kept, keep, report)
+    if system.frequency is not None:
+        _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
+        return Diagram(system, tuple(work.found), (), (), tuple(work.messages))
+    still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
+    points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
+    if asked.orbits:
+        for i, point in enumerate(points, 1):
+            if not _is_known(work, point):
+                _born_at(work, f"orbits {i}", point)
+        for p in asked.attractors:
+            _coexisting(work, still, p)
+    return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.messages))
+
+
+DRIVEN = "driven"
+"""Name of the branch of a driven system."""
+
+LEFT = 60
+"""Periods that a driven motion is left alone before an orbit is looked for where it is."""
+
+
+def _driven(work: _Work, x: Array) -> Branch:
+    """The orbits of the period of what drives, from where a motion from x is after `LEFT` of them."""
+    system, asked = work.system, work.asked
+    assert system.frequency is not None
+    period = 2 * np.pi / float(system.frequency(asked.start))
+    left = np.asarray(flow.left_alone(system)(np.asarray(x, dtype=float)[None], asked.start, LEFT * period, 0.0))
+    nodes = [left[0]]
+    for i in range(asked.nodes - 1):
+        run, angle = flow.left_alone(system), 2 * np.pi * i / asked.nodes
+        nodes.append(np.asarray(run(nodes[-1][None], asked.start, period / asked.nodes, angle))[0])
+    problem = Shooting(system, Orbit(system, np.array(nodes), period, asked.start), period)
+    status = "it becomes infinite"
+    if np.isfinite(nodes).all():
+        state = start(problem, np.array(nodes).ravel(), asked.start, asked.settings)
+        status = state.status
+    if status:
+        raise UserError(
+            f"no periodic motion is found near the start: {status}; begin at a value of the parameter where the "
+            "motion is small or settles, or give another x"
+        )
+    return followed(DRIVEN, "start", problem, state, asked.settings, work.report)
+
+
+def _coexisting(work: _Work, still: Branch, p: float) -> None:
+    """The branches of attractors at p that are on none which is known."""
+    system, asked = work.system, work.asked
+    work.report(f"{asked.starts} motions at {p:.6g}")
+    centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
+    found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
+    work.seen += found
+    for number, one in enumerate((a.orbit for a in found), 1):
+        if not any(_passes(b, one) for b in work.found):
+            name = f"attractor {number} at {p:.6g}"
+            branch = work.add(name, partial(_both_ways, name, one, asked, work.report))
+            _doublings(work, branch, asked.doublings)
+
+
+def _passes(branch: Branch, orbit: Orbit) -> bool:
+    """Whether a branch passes an orbit, by its period, or twice that, and extremes between two neighbouring points."""
+    if branch.still:
+        return False
+    y = orbit.system.seen(orbit.sampled(), orbit.p)
+    own = np.concatenate([y.max(axis=0), y.min(axis=0)])
+    size = float(np.ptp(y, axis=0).max())
+    away = branch.parameter - orbit.p
+    for i in np.flatnonzero(away[:-1] * away[1:] <= 0):
+        u = away[i] / (away[i] - away[i + 1]) if away[i] != away[i + 1] else 0.0
+        period = (1 - u) * branch.period[i] + u * branch.period[i + 1]
+        ends = np.concatenate([branch.largest, branch.smallest], axis=1)
+        apart = np.abs((1 - u) * ends[i] + u * ends[i + 1] - own).max() / size
+        if abs(period / orbit.period - 1) < CLOSE and apart < CLOSE:
+            return True
+    return False
+
+
+CLOSE = 0.02
+"""Difference of periods and extremes, over their sizes, up to which an orbit is on a branch."""
+
+
+def _both_ways(name: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
+    """The branch through an orbit, to both sides."""
+    problem = Shooting(orbit.system, orbit, orbit.period)
+    parts = []
+    for way in (-1, 1):
+        settings = replace(asked.settings, direction=way)
+        state = start(problem, problem.unknowns(orbit), orbit.p, settings)
+        parts.append(followed(name, f"attractor at {orbit.p:.6g}", problem, state, settings, report))
+    return joined(*parts)
+
+
+def _equilibria(system: Dynamics, x: Array, asked: Asked) -> Branch:
+    settings = asked.settings
+    state = equilibria.first(system, x, asked.start, settings)
+    if state.status:
+        raise UserError(
+            f"no equilibrium is found near the start: {state.status}; begin at another value of the parameter, or give "
+            "another x"
+        )
+    rows: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
+    while not state.status:
+        before, state = state, equilibria.next_one(system, state, settings)
+        new: list[tuple[Array, float, str]] = [(p.x, p.lam, p.kind) for p in state.found]
+        passed = equilibria.hopf_between(system, before, state, settings)
+        new += [(h.x, h.p, "Hopf") for h in passed if settings.low <= h.p <= settings.high]
+        rows += sorted(new, key=lambda r: _ahead(system, before, r[0], r[1]))
+    X, P = np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
+    values = np.array([equilibria.eigenvalues(system, a, b) for a, b in zip(X, P, strict=True)])
+    seen = np.array([system.seen(a, b) for a, b in zip(X, P, strict=True)])
+    return Branch(
+        EQUILIBRIA, "the start", state.status, 1, system.named, P, np.full(len(P), np.nan), X[:, None], seen, seen,
+        values, values.real.max(axis=1) <= 0, np.array([r[2] for r in rows]),
+    )  # fmt: skip
+
+
+def _ahead(system: Dynamics, state: State, x: Array, p: float) -> float:
+    """How far along the tangent of a state."""
+    return float(state.tangent @ (Scaled(equilibria.Still(system)).pack(x, p) - state.y))
+
+
+def _hopf(system: Dynamics, still: Branch, i: int) -> Hopf:
+    """The Hopf point of a branch."""
+    pairs = still.multipliers[i][still.multipliers[i].imag > 0]
+    omega = pairs[np.argmin(np.abs(pairs.real))].imag
+    return equilibria.hopf(system, still.x[i, 0], float(still.parameter[i]), float(omega))
+
+
+def _is_known(work: _Work, point: Hopf) -> bool:
+    """Whether a branch of orbits has ended at the Hopf point."""
+    ends = [b for b in work.found if not b.still and b.ended == orbits.COLLAPSED]
+    return any(abs(b.parameter[-1] - point.p) < 1e-2 * work.system.parameter_scale
+               and abs(b.period[-1] * point.omega / (2 * np.pi) - 1) < 1e-2 for b in ends)  # fmt: skip
+
+
+def _born_at(work: _Work, name: str, point: Hopf) -> None:
+    def make() -> Branch:
+        begun = switching.born_at(work.system, point, work.asked.nodes, work.asked.settings)
+        return followed(name, f"Hopf point at {point.p:.6g}", *begun, work.asked.settings, work.report)
+
+    _doublings(work, work.add(name, make), work.asked.doublings)
+
+
+def _doublings(work: _Work, parent: Branch, levels: int) -> None:
+    """The orbits of twice the period at every period doubling by which a branch gains or loses its stability, and so
+    on: those of orbits that are unstable on both sides are left, they are many and nothing comes to them."""
+    places = [i for i in parent.of_kind("period doubling") if parent.stable[max(i - 1, 0) : i + 2 : 2].any()]
+    for number, i in enumerate(places if levels else [], 1):
+        orbit = parent.orbit(work.system, int(i))
+        if any(is_same(orbit, b, work.system) for b in work.found if b.x.shape[1] == 2 * parent.x.shape[1]):
+            continue
+        name = f"{parent.name} doubled {number}"
+        born = f"period doubling at {orbit.p:.6g} of {parent.name}"
+
+        def make(name: str = name, born: str = born, orbit: Orbit = orbit) -> Branch:
+            begun = switching.doubled_at(orbit, work.asked.settings)
+            return followed(name, born, *begun, work.asked.settings, work.report)
+
+        _doublings(work, work.add(name, make), levels - 1)
+
+
+def is_same(orbit: Orbit, branch: Branch, system: Dynamics) -> bool:
+    """Whether a branch of orbits of twice the period ends at an orbit."""
+    if branch.ended != orbits.COLLAPSED:
+        return False
+    near = abs(branch.parameter[-1] - orbit.p) < 2e-2 * system.parameter_scale
+    return bool(near and abs(branch.period[-1] / (2 * orbit.period) - 1) < 1e-2)
+
+
+def followed(
+    name: str, born: str, problem: Shooting, state: State, settings: Settings, report: Report = lambda _: None
+) -> Branch:  # fmt: skip
+    """A branch of orbits to its end."""
+    found, ended = list[orbits.Found](), ""
+    try:
+        for more, status in orbits.follow(problem, state, settings):
+            found += more
+            ended = status
+            if found:
+                report(f"{name}: {len(found)} of {settings.points} points, {found[-1].orbit.p:.6g}")
+    except (Lost, FloatingPointError) as error:
+        ended = f"stuck: {error or 'the orbit was lost'}"
+    if not found:
+        x = problem.reference.x
+        at = orbits.Found(problem.reference, floquet.multipliers(problem.reference), "start")
+        return of_orbits(name, born, ended or f"no start from {len(x)} nodes", [at])
+    return of_orbits(name, born, ended, found)

@@ -1,0 +1,101 @@
+"""What is followed: a smooth system of first order, x' = f(x, p, angle), free or driven with a known frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..data import Array
+
+jax.config.update("jax_enable_x64", True)
+
+Rate = Callable[[Any, Any, Any], Any]
+"""f of x (n,), the parameter p and the angle (rad) of what drives it, in jax: (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """A system x' = f(x, p, angle).
+
+    Attributes:
+        rate: f. labels: of the n coordinates. scale: (n,) what a large change of each is. parameter_scale: what a large
+            change of p is. frequency: rad/s of what drives it, a function of p in jax; None: nothing does, and f does
+            not depend on the angle.
+        outputs: names of what is read, and unit. read: of x (..., n) and p: (..., w); None: the coordinates.
+    """
+
+    rate: Rate
+    labels: tuple[str, ...]
+    scale: Array
+    parameter_scale: float = 1.0
+    frequency: Callable[[Any], Any] | None = None
+    outputs: tuple[str, ...] = ()
+    read: Callable[[Array, float], Array] | None = None
+    unit: str = ""
+
+    @property
+    def count(self) -> int:
+        return len(self.labels)
+
+    def seen(self, x: Array, p: float) -> Array:
+        """(..., w) of x (..., n)."""
+        return x if self.read is None else np.asarray(self.read(x, p))
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """(w,) of the read-outs."""
+        return self.outputs or self.labels
+
+    @cached_property
+    def still(self) -> Callable[[Any, Any], tuple[Any, Any, Any]]:
+        """f, df/dx and df/dp at x and p, compiled, of a system that nothing drives."""
+
+        def f(x: Any, p: Any) -> Any:
+            return self.rate(x, p, jnp.zeros(()))
+
+        return jax.jit(lambda x, p: (f(x, p), jax.jacfwd(f)(x, p), jax.jacfwd(f, 1)(x, p)))
+
+    @cached_property
+    def forms(self) -> tuple[Callable[..., Any], Callable[..., Any]]:
+        """The second and third derivatives of f along given directions over the scales, compiled: of x and p over
+        their scales, and two or three directions (n,)."""
+        size = jnp.asarray(self.scale)
+
+        def f(y: Any, p: Any) -> Any:
+            return self.rate(y * size, p, jnp.zeros(())) / size
+
+        def along(g: Any, way: Any) -> Any:
+            return lambda y, p: jax.jvp(lambda y: g(y, p), (y,), (way,))[1]
+
+        def second(y: Any, p: Any, a: Any, b: Any) -> Any:
+            return along(along(f, a), b)(y, p)
+
+        def third(y: Any, p: Any, a: Any, b: Any, c: Any) -> Any:
+            return along(along(along(f, a), b), c)(y, p)
+
+        return jax.jit(second), jax.jit(third)
+
+    @cached_property
+    def hopf(self) -> Callable[..., tuple[Any, Any]]:
+        """Of z = (x, p, Re v, Im v, omega) and a complex vector c (n,): f, J v - i omega v and c . v - 1, real and
+        imaginary parts, and their derivatives over z, compiled."""
+        n = self.count
+
+        def F(z: Any, re: Any, im: Any) -> Any:
+            x, p, a, b, w = z[:n], z[n], z[n + 1 : 2 * n + 1], z[2 * n + 1 : 3 * n + 1], z[-1]
+
+            def f(x: Any) -> Any:
+                return self.rate(x, p, jnp.zeros(()))
+
+            value, Ja = jax.jvp(f, (x,), (a,))
+            Jb = jax.jvp(f, (x,), (b,))[1]
+            one = jnp.stack([re @ a - im @ b - 1, re @ b + im @ a])
+            return jnp.concatenate([value, Ja + w * b, Jb - w * a, one])
+
+        return jax.jit(lambda z, re, im: (F(z, re, im), jax.jacfwd(F)(z, re, im)))

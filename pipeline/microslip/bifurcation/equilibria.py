@@ -1,0 +1,138 @@
+"""Equilibria f(x, p) = 0 over the parameter, and Hopf points on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
+from ..continuation.curve import State
+from ..data import Array, ComplexArray
+from .dynamics import Dynamics
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """f(x, p) = 0: `continuation.Equations`."""
+
+    system: Dynamics
+
+    @property
+    def x_scale(self) -> Array:
+        return np.asarray(self.system.scale)
+
+    @property
+    def lam_scale(self) -> float:
+        return self.system.parameter_scale
+
+    def evaluate(self, x: Array, lam: float) -> tuple[Array, Array, Array]:
+        f, J, slope = self.system.still(x, float(lam))
+        return np.asarray(f), np.asarray(J), np.asarray(slope)
+
+
+@dataclass(frozen=True)
+class Hopf:
+    """Where a pair of eigenvalues passes the imaginary axis.
+
+    Attributes:
+        x: (n,). p. omega: rad/s. shape: (n,) complex eigenvector to i omega, the largest entry over its scale 1.
+        criticality: first Lyapunov coefficient of a shape of unit length: negative, orbits born there are as stable as
+            the equilibrium was (supercritical); positive, less (subcritical).
+    """
+
+    x: Array
+    p: float
+    omega: float
+    shape: ComplexArray
+    criticality: float
+
+
+def eigenvalues(system: Dynamics, x: Array, p: float) -> ComplexArray:
+    """(n,) of the linearised system, the largest real part first."""
+    found = np.linalg.eigvals(np.asarray(system.still(x, p)[1])).astype(complex)
+    return found[np.argsort(-found.real, kind="stable")]
+
+
+def hopf_between(system: Dynamics, before: State, after: State, settings: Settings) -> list[Hopf]:
+    """The Hopf points between two neighbouring states of the curve."""
+    scaled = Scaled(Still(system))
+
+    def real(k: int) -> Callable[[Array, Array], float]:
+        return lambda y, _: float(eigenvalues(system, y[:-1] * scaled.x_scale, y[-1] * scaled.lam_scale)[k].real)
+
+    ends = [eigenvalues(system, s.y[:-1] * scaled.x_scale, s.y[-1] * scaled.lam_scale) for s in (before, after)]
+    counts = sorted(int((e.real > 0).sum()) for e in ends)
+    segment = Segment(before.y, after.y, before.tangent, after.tangent, False)
+    found = []
+    for k in range(counts[0], counts[1] - 1, 2):
+        try:
+            y, _ = root(scaled, segment, settings, real(k), 1e-6)
+        except Lost:
+            continue
+        x, p = y[:-1] * scaled.x_scale, float(y[-1] * scaled.lam_scale)
+        value = eigenvalues(system, x, p)[k]
+        if abs(value.imag) > 1e-6 * np.abs(eigenvalues(system, x, p)).max():
+            found.append(hopf(system, x, p, abs(value.imag)))
+    return found
+
+
+def hopf(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
+    """The Hopf point near a guess, by Newton's method on f = 0, J v = i omega v, c . v = 1 for all at once.
+
+    Raises:
+        Lost: it does not converge from there.
+    """
+    n, dz = system.count, np.zeros(1)
+    values, vectors = np.linalg.eig(np.asarray(system.still(x, p)[1]))
+    v = vectors[:, np.argmin(np.abs(values - 1j * omega))]
+    v = v / v[np.argmax(np.abs(v / np.asarray(system.scale)))]
+    c = np.conj(v) / (np.abs(v) ** 2).sum()
+
+    z = np.concatenate([x, [p], v.real, v.imag, [omega]])
+    for _ in range(30):
+        F, slope = map(np.asarray, system.hopf(z, c.real, c.imag))
+        dz = np.linalg.solve(slope, F)
+        z = z - dz
+        if np.abs(dz).max() <= 1e-13 * (1 + np.abs(z).max()):
+            break
+    if not np.isfinite(z).all() or np.abs(dz).max() > 1e-9 * (1 + np.abs(z).max()):
+        raise Lost
+    shape = z[n + 1 : 2 * n + 1] + 1j * z[2 * n + 1 : 3 * n + 1]
+    return Hopf(z[:n], float(z[n]), float(z[-1]), shape, lyapunov(system, z[:n], float(z[n]), float(z[-1])))
+
+
+def lyapunov(system: Dynamics, x: Array, p: float, omega: float) -> float:
+    """First Lyapunov coefficient of a Hopf point (Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, Eq. (5.34)),
+    coordinates over their scales."""
+    size = np.asarray(system.scale)
+    at = x / size
+
+    def form(*ways: Array) -> Array:
+        total = np.zeros(len(at), dtype=complex)
+        for parts in np.ndindex(*(2,) * len(ways)):
+            real = [w.imag if i else w.real for w, i in zip(ways, parts, strict=True)]
+            total += 1j ** sum(parts) * np.asarray(system.forms[len(ways) - 2](at, p, *real))
+        return total
+
+    J = np.asarray(system.still(x, p)[1]) * size / size[:, None]
+    q, left = _eigenvector(J, 1j * omega), _eigenvector(J.T, -1j * omega)
+    left = left / np.conj(np.vdot(left, q))
+    mean, second = np.linalg.solve(J, form(q, q.conj())), np.linalg.solve(2j * omega * np.eye(len(at)) - J, form(q, q))
+    total = form(q, q, q.conj()) - 2 * form(q, mean) + form(q.conj(), second)
+    return float(np.vdot(left, total).real / (2 * omega))
+
+
+def _eigenvector(J: Array, value: complex) -> ComplexArray:
+    values, vectors = np.linalg.eig(J)
+    return vectors[:, np.argmin(np.abs(values - value))]
+
+
+def first(system: Dynamics, x: Array, p: float, settings: Settings) -> State:
+    """The state from which equilibria are followed, `continuation.start`."""
+    return start(Still(system), x, p, settings)
+
+
+def next_one(system: Dynamics, state: State, settings: Settings) -> State:
+    return advance(Still(system), state, settings)

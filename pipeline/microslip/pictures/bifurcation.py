@@ -1,0 +1,55 @@
+"""Pictures of bifurcations: branches over the parameter, orbits in their phase plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..bifurcation.branches import Branch
+from ..bifurcation.diagram import Diagram
+from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+def diagram_picture(found: Diagram, path: Path, title: str, axis: str, read_out: int = 0) -> Path:
+    """Half of the way from the smallest to the largest value of a read-out over the parameter."""
+    figure, axes = single_panel(10.5, 5.4)
+    found.plot(axes, axis, read_out)
+    axes.set_title(title, fontweight="bold")
+    return save_figure(figure, path)
+
+
+SHOWN = 6
+
+
+def portraits_picture(found: Diagram, path: Path, title: str, unit: str) -> Path:
+    """Orbits of every branch in the phase plane of the first read-out, from its beginning to its end by colour."""
+    shown = [b for b in found.branches if not b.still][:9]
+    columns = min(len(shown), 3)
+    rows = -(-len(shown) // columns)
+    figure = empty_figure(4.4 * columns + 0.4, 4.0 * rows)
+    places = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in places[len(shown) :]:
+        axes.set_visible(False)
+    for axes, branch in zip(places, shown, strict=False):
+        plain_axes(axes)
+        _portraits(found, branch, axes, unit)
+    figure.suptitle(title, fontweight="bold")
+    return save_figure(figure, path)
+
+
+def _portraits(found: Diagram, branch: Branch, axes: Axes, unit: str) -> None:
+    for k, i in enumerate(dict.fromkeys(np.linspace(0, len(branch) - 1, SHOWN).round().astype(int).tolist())):
+        orbit = branch.orbit(found.system, i)
+        y = found.system.seen(orbit.sampled(16), orbit.p)[:, 0]
+        y = np.append(y, y[0])
+        velocity = np.gradient(np.concatenate([y[-3:-1], y, y[1:3]]), orbit.period / (len(y) - 1))[2:-2]
+        style = "-" if branch.stable[i] else (0, (4, 3))
+        label = f"{orbit.p:.4g} {unit}".strip()
+        axes.plot(y, velocity, ls=style, lw=1.3, color=COLOURS[k], label=label)
+    axes.set(xlabel=found.system.named[0], ylabel="velocity")
+    axes.set_title(branch.name, fontsize=9)
+    axes.legend(fontsize=7, frameon=False, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))

@@ -1,0 +1,211 @@
+"""Diagrams of equilibria and periodic orbits of a case: tables, all orbits in HDF5, pictures and a page."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import sliding
+from ..basis import read_basis
+from ..bifurcation import branches, mechanics
+from ..bifurcation.diagram import Asked, Diagram, diagram
+from ..case import CaseSettings, checkpoint, load_case
+from ..case.assemble import build
+from ..case.questions import BifurcationOfCase
+from ..data import ModalBasis, NotConverged, UserError
+from ..files import hdf5, store
+from ..files.tables import rows_csv
+from ..report.bifurcation import bifurcation_html
+from ..settings.body import override
+from ..settings.mistakes import validate
+from ..system.assembly import Assembly
+from ..system.lumped import load_system
+from .checkpoint import hashes_of
+from .places import lumped
+from .stage import Made, Report, Stage, hash_of_code
+
+OF_SYSTEM = "system."
+"""Begins keys that are those of a system.toml and not of the case."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A case whose keys follow a parameter. Attributes: path. raw: its text as a table. bases: body -> modal basis.
+    asked: the diagram."""
+
+    path: Path
+    raw: Mapping[str, Any]
+    bases: Mapping[str, ModalBasis]
+    asked: BifurcationOfCase
+
+    def at(self, p: float) -> Assembly:
+        """The assembly at a value of the parameter.
+
+        Raises:
+            UserError: a key that is none of the case or the system.
+        """
+        values = dict(self.asked.fixed) | {key: factor * p for key, factor in self.asked.keys.items()}
+        raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
+        own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
+        others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
+        where = f"{self.path}: bifurcation.{self.asked.name}.keys"
+        try:
+            settings = validate(CaseSettings, override(raw, own, self.path), self.path)
+            built = build(settings, self._systems(others, where) if others else self.bases, self.path)
+        except UserError as error:
+            raise UserError(f"{where}: {str(error).removeprefix('--set ')}") from error
+        return built.assembly
+
+    def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:
+        found = dict(self.bases)
+        made = {name: lumped(self.path, basis.name) for name, basis in self.bases.items()}
+        for name, file in made.items():
+            if file is not None:
+                found[name] = load_system(file, assignments).basis()
+        if not any(made.values()):
+            raise UserError(f"{where}: '{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one")
+        return found
+
+
+def bifurcation_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """The diagrams that a case asks for, in a folder; finished branches are kept there.
+
+    Args:
+        files: body of the case -> its modal file.
+
+    Returns:
+        The files, sentences, and whether every branch was followed to its end.
+
+    Raises:
+        UserError: the case asks for none; a key that is none; no equilibrium to begin with.
+    """
+    settings, raw = load_case(case_path, assignments)
+    if not settings.bifurcation:
+        raise UserError(f"{case_path}: bifurcation: is missing; add [[bifurcation]] with keys, start and stop")
+    stage = Stage(folder / "bifurcation.json", ("stages.bifurcation",), force, report)
+    inputs = {
+        "case": checkpoint.without_defaults(raw),
+        "basis": hashes_of(files),
+        "pictures": pictures,
+        "files": hashes_of(checkpoint.files_of(settings, case_path)),
+    }
+    own = {key: value for key, value in checkpoint.without_defaults(raw).items() if key != "bifurcation"}
+    depends = {**inputs, "case": own, "pictures": None, "code": hash_of_code(stage.code)}
+    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))
+    answer = json.loads(stage.product.read_text())
+    return [folder / name for name in answer["files"]], answer["sentences"], not answer["lost"]
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], case_path: Path, files: Mapping[str, Path],
+    pictures: bool, inputs: Mapping[str, Any],
+) -> Made:  # fmt: skip
+    folder = stage.product.parent
+    bases = {name: read_basis(file) for name, file in files.items()}
+    changed = [Changed(case_path, raw, bases, asked) for asked in settings.bifurcation]
+    for one in changed:
+        one.at(one.asked.start)  # what is wrong in a later diagram is said before the first one is made
+    stage.begin()
+    found = [_diagram(one, folder / "branches", inputs, stage) for one in changed]
+    made = [_table(folder, one.asked, drawn) for one, drawn in zip(changed, found, strict=True)]
+    made.append(_file(folder / "bifurcation.h5", settings.bifurcation, found))
+    drawn = _pictures(folder / "pictures", settings, found) if pictures else []
+    sentences = [s for asked, one in zip(settings.bifurcation, found, strict=True) for s in told(asked, one)]
+    page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
+    store.write_text(folder / "bifurcation.html", page)
+    names = [str(p.relative_to(folder)) for p in (folder / "bifurcation.html", *made, *drawn)]
+    answer = {"files": names, "sentences": sentences, "lost": any(b.lost for one in found for b in one.branches)}
+    store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
+    return Made([folder / name for name in names])
+
+
+def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stage) -> Diagram:
+    asked, name = one.asked, one.asked.name
+    inputs = store.hash_settings({**depends, "asked": asked.model_dump()})
+    low, high = sorted((asked.start, asked.stop))
+    Omega = None if asked.frequency is None else 2 * np.pi * asked.frequency
+    stage.report(f"{name}: equations over {asked.parameter}")
+    system = mechanics.dynamics(one.at, low, high, Omega)
+
+    def file(branch: str) -> Path:
+        return folder / f"{name}, {branch}.h5".replace(", ", "_").replace(" ", "_")
+
+    folder.mkdir(parents=True, exist_ok=True)
+    fields = Asked.__dataclass_fields__
+    given = Asked(**{key: getattr(asked, key) for key in fields})
+    try:
+        begin = sliding.equilibrium(sliding.of(one.at(asked.start)))
+    except NotConverged as error:
+        raise UserError(f"{one.path}: bifurcation.{name}.start: {error}") from error
+    return diagram(
+        system, begin, given,
+        lambda branch: None if stage.force else branches.kept(file(branch), inputs),
+        lambda branch: branches.write(file(branch.name), branch, inputs), lambda text: stage.report(f"{name}: {text}"),
+    )  # fmt: skip
+
+
+def _table(folder: Path, asked: BifurcationOfCase, found: Diagram) -> Path:
+    parts = [branches.columns(b) for b in found.branches]
+    keys = list(dict.fromkeys(key for part in parts for key in part))
+    empty = np.full(max(len(b) for b in found.branches), np.nan)
+    rows = [row for part in parts for row in zip(*(part.get(k, empty[: len(part["kind"])]) for k in keys), strict=True)]
+    cells = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in rows)
+    store.write_text(folder / f"bifurcation_{asked.name}.csv", rows_csv(keys, cells))
+    return folder / f"bifurcation_{asked.name}.csv"
+
+
+def _file(path: Path, asked: Sequence[BifurcationOfCase], found: Sequence[Diagram]) -> Path:
+    with store.complete_or_absent(path) as temporary:
+        with hdf5.create(temporary) as file:
+            file.attrs["format"], file.attrs["version"] = "microslip-bifurcation", "0.1"
+            for one, drawn in zip(asked, found, strict=True):
+                group = file.create_group(one.name)
+                group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
+                for i, branch in enumerate(drawn.branches):
+                    branches.put(group.create_group(f"branch_{i}"), branch)
+        hdf5.seal(temporary)
+    return path
+
+
+def _pictures(folder: Path, settings: CaseSettings, found: Sequence[Diagram]) -> list[Path]:
+    from ..pictures.bifurcation import diagram_picture, portraits_picture
+
+    folder.mkdir(exist_ok=True)
+    drawn = list[Path]()
+    for asked, one in zip(settings.bifurcation, found, strict=True):
+        title, axis = f"{settings.name}: {asked.parameter}", f"{asked.parameter} in {asked.unit}".removesuffix(" in ")
+        drawn.append(diagram_picture(one, folder / f"bifurcation_{asked.name}.png", title, axis))
+        if any(not b.still for b in one.branches):
+            drawn.append(portraits_picture(one, folder / f"orbits_{asked.name}.png", title, asked.unit))
+    return drawn
+
+
+WORDS: dict[str, Callable[[str], str]] = {
+    "fold": lambda at: f"fold at {at}",
+    "period doubling": lambda at: f"period doubling at {at}",
+    "torus": lambda at: f"torus point at {at}",
+    "branch point": lambda at: f"branch point at {at}",
+}
+
+
+def told(asked: BifurcationOfCase, found: Diagram) -> list[str]:
+    """A sentence a Hopf point and a branch."""
+    unit = f" {asked.unit}" if asked.unit else ""
+    said = []
+    for point in found.hopf:
+        kind = "subcritical" if point.criticality > 0 else "supercritical"
+        said.append(f"{asked.name}: Hopf point at {point.p:.6g}{unit}, {point.omega:.6g} rad/s, {kind}.")
+    for b in found.branches:
+        passed = [WORDS[str(k)](f"{p:.6g}{unit}") for k, p in zip(b.kind, b.parameter, strict=True) if str(k) in WORDS]
+        if not b.still or passed:
+            said.append(f"{asked.name}, {b.name}: born at the {b.born}; {', '.join(passed) or 'nothing on the way'}.")
+    return [*said, *(f"{asked.name}, {words}" for words in found.messages)]

@@ -1,0 +1,299 @@
+"""Bifurcations of systems with closed forms, and every number two ways."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from closed_forms.oscillators import brusselator
+from scipy.integrate import solve_ivp
+
+import microslip as ms
+from microslip.bifurcation import balance, branches, floquet
+from microslip.bifurcation.diagram import Asked, Diagram, diagram
+from microslip.bifurcation.dynamics import Dynamics
+from microslip.bifurcation.shooting import Orbit, Shooting
+from microslip.data import UserError
+
+
+def circling(z: Any, p: Any) -> Any:
+    """z' = (p + i) z - z |z|^2: of p > 0 the circle of the radius sqrt p, period 2 pi, multiplier exp(-4 pi p)."""
+    r2 = z[0] ** 2 + z[1] ** 2
+    return [p * z[0] - z[1] - r2 * z[0], z[0] + p * z[1] - r2 * z[1]]
+
+
+def normal_form(sign: float = 1.0) -> Dynamics:
+    """That, or with the other sign: the circle is there for p < 0 and repels."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        x, y = circling(z, sign * p)
+        return jnp.stack([sign * x, sign * y]) if sign > 0 else jnp.stack([-x, -y])
+
+    return Dynamics(rate, ("x", "y"), np.ones(2), 2.0)
+
+
+@cache
+def circles() -> Diagram:
+    return diagram(normal_form(), np.zeros(2), Asked(-1.0, 1.0, nodes=8, doublings=0))
+
+
+def test_hopf_normal_form_is_found_with_its_circles() -> None:
+    found = circles()
+    (point,) = found.hopf
+    assert abs(point.p) < 1e-12 and point.omega == pytest.approx(1.0, abs=1e-12)
+    assert point.criticality == pytest.approx(-2.0, abs=1e-9)  # |z|^2 is twice the square of a unit shape's amplitude
+    branch = found.branches[1]
+    p = branch.parameter
+    np.testing.assert_allclose(branch.period, 2 * np.pi, rtol=1e-9)
+    np.testing.assert_allclose((branch.x**2).sum(axis=2), p[:, None] * np.ones((1, 8)), atol=1e-9)
+    np.testing.assert_allclose(branch.multipliers[:, 0].real, np.exp(-4 * np.pi * p), atol=1e-8)
+    assert branch.stable[1:].all() and "bound" in branch.ended
+    still = found.branches[0]
+    assert (still.stable == (still.parameter <= 1e-12)).all()
+
+
+@pytest.mark.slow
+def test_subcritical_circles_repel() -> None:
+    """Of the reversed flow: p -> -p, the circles are there before the Hopf point and their multiplier is above 1."""
+    found = diagram(normal_form(-1.0), np.zeros(2), Asked(-1.0, 1.0, nodes=8, doublings=0, points=12))
+    assert found.hopf[0].criticality == pytest.approx(2.0, abs=1e-9)
+    branch = found.branches[1]
+    assert not branch.stable.any() and branch.parameter[-1] != 0
+
+
+def rotor() -> Dynamics:
+    """A circle of radius 1 beside another one that grows with p, of the frequency sqrt 2: a torus from p = 0 on."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        one, other = circling(z[:2], 1.0), circling(z[2:], p)
+        w = np.sqrt(2.0) - 1.0
+        return jnp.stack([*one, other[0] - w * z[3], other[1] + w * z[2]])
+
+    return Dynamics(rate, ("x", "y", "u", "v"), np.ones(4), 2.0)
+
+
+@pytest.mark.slow
+def test_torus_point_and_its_multipliers() -> None:
+    from microslip.bifurcation import orbits
+    from microslip.continuation import start
+
+    system, n = rotor(), 8
+    turn = 2 * np.pi * np.arange(n) / n
+    x = np.stack([np.cos(turn), np.sin(turn), 0 * turn, 0 * turn], axis=1)
+    problem = Shooting(system, Orbit(system, x, 2 * np.pi, -0.5), 2 * np.pi)
+    settings = Asked(-0.5, 0.5).settings
+    state = start(problem, np.append(x, 2 * np.pi), -0.5, settings)
+    found = [one for more, _ in orbits.follow(problem, state, settings) for one in more]
+    (torus,) = [one for one in found if one.kind == "torus"]
+    assert abs(torus.orbit.p) < 1e-9
+    turned = np.exp(2j * np.pi * np.sqrt(2.0))
+    np.testing.assert_allclose(sorted(torus.multipliers[:2].imag), sorted([turned.imag, -turned.imag]), atol=1e-8)
+    assert found[0].stable and not found[-1].stable
+
+
+@pytest.mark.slow
+def test_period_of_van_der_pol() -> None:
+    """6.66328685932313 at mu = 1 (e.g. A. Amore, F. Fernandez, arXiv 1401.4110), and its multiplier by the trace
+    exp(integral of mu (1 - x^2)) (Liouville)."""
+    system = Dynamics(lambda z, p, _: jnp.stack([z[1], p * (1 - z[0] ** 2) * z[1] - z[0]]), ("x", "v"), np.full(2, 2.0))
+    found = diagram(system, np.zeros(2), Asked(-0.5, 1.0, nodes=16, doublings=0, step=0.2))
+    orbit = found.branches[-1].orbit(system, -1)
+    assert orbit.p == pytest.approx(1.0, abs=1e-12) and orbit.period == pytest.approx(6.66328685932313, rel=1e-9)
+    x = orbit.sampled(64)[:, 0]
+    (multiplier,) = floquet.multipliers(orbit)
+    assert np.log(multiplier.real) == pytest.approx(orbit.period * np.mean(1 - x**2), rel=1e-6)
+
+
+@cache
+def chemical() -> Diagram:
+    return diagram(brusselator(), np.array([1.0, 1.5]), Asked(1.5, 2.3, nodes=16, doublings=0, step=0.3))
+
+
+def test_brusselator() -> None:
+    (point,) = chemical().hopf
+    assert point.p == pytest.approx(2.0, abs=1e-11) and point.omega == pytest.approx(1.0, abs=1e-11)
+    assert point.criticality < 0
+
+
+def test_shooting_is_harmonic_balance() -> None:
+    """On the same orbit of the Brusselator: 40 harmonics to 1e-9, and fewer the worse."""
+    system = chemical().system
+    orbit = chemical().branches[1].orbit(system, -1)
+    apart = []
+    for H in (10, 20, 40):
+        one, solution = balance.balanced(orbit, H)
+        assert solution.converged
+        apart.append(balance.distance(one, orbit))
+    assert apart[2] < 1e-9 and apart[0] > 10 * apart[1] > 100 * apart[2]
+    assert one.omega * orbit.period == pytest.approx(2 * np.pi, rel=1e-10)
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    """Of the equations of shooting and of the balance, over all unknowns and the parameter."""
+    system = chemical().system
+    orbit = chemical().branches[1].orbit(system, -2)
+    shoot = Shooting(system, orbit, orbit.period)
+    harmonic = balance.Balance(system, balance.of_orbit(orbit, 5))
+    for problem, x in ((shoot, shoot.unknowns(orbit)), (harmonic, harmonic.unknowns(harmonic.reference))):
+        way, h = np.random.default_rng(1).normal(size=len(x)), 1e-6
+        _, J, slope = problem.evaluate(x, orbit.p)
+        ends = [problem.evaluate(x + s * h * way, orbit.p + s * h)[0] for s in (1, -1)]
+        np.testing.assert_allclose(J @ way + slope, (ends[0] - ends[1]) / (2 * h), rtol=1e-5, atol=1e-6)
+
+
+def by_scipy(system: Dynamics, orbit: Orbit) -> np.ndarray:
+    """Multipliers of the monodromy matrix that SciPy integrates with the variational equation."""
+    n = system.count
+    J = jax.jit(jax.jacfwd(lambda x: system.rate(x, orbit.p, 0.0)))
+    f = jax.jit(lambda x: system.rate(x, orbit.p, 0.0))
+
+    def rate(_: float, z: np.ndarray) -> np.ndarray:
+        return np.concatenate([f(z[:n]), (np.asarray(J(z[:n])) @ z[n:].reshape(n, n)).ravel()])
+
+    z = np.concatenate([orbit.x[0], np.eye(n).ravel()])
+    end = solve_ivp(rate, (0, orbit.period), z, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(end[:n], orbit.x[0], atol=1e-8)
+    return np.linalg.eigvals(end[n:].reshape(n, n))
+
+
+def test_multipliers_are_those_of_the_variational_equation() -> None:
+    """And do not depend on the number of nodes."""
+    system = chemical().system
+    orbit = chemical().branches[1].orbit(system, -1)
+    own = by_scipy(system, orbit)
+    (multiplier,) = floquet.multipliers(orbit)
+    assert np.abs(own - 1).min() < 1e-7 and np.abs(own - multiplier).min() < 1e-8
+    for nodes in (4, 30):
+        x = orbit.sampled(60)[:: 960 // nodes] if nodes == 30 else orbit.x[::4]
+        again = Orbit(system, x, orbit.period, orbit.p)
+        assert abs(floquet.multipliers(again)[0] - multiplier) < 1e-8
+
+
+def duffing() -> Dynamics:
+    """q'' + 0.05 q' + q + 0.05 q^3 = 0.4 cos(p t): that of `ms.follow`'s docstring."""
+
+    def rate(z: Any, p: Any, angle: Any) -> Any:
+        return jnp.stack([z[1], 0.4 * jnp.cos(angle) - 0.05 * z[1] - z[0] - 0.05 * z[0] ** 3])
+
+    return Dynamics(rate, ("q", "v"), np.full(2, 4.0), 2.0, frequency=lambda p: p)
+
+
+@pytest.mark.slow
+def test_folds_of_a_driven_oscillator_are_those_of_harmonic_balance() -> None:
+    branch = diagram(duffing(), np.zeros(2), Asked(0.9, 1.7, nodes=8, step=0.3, doublings=0))["driven"]
+    folds = branch.parameter[branch.of_kind("fold")]
+    q = ms.structure(1.0, 1.0, 0.05, force={0: 0.4}, elements=[ms.polynomial({3: 0.05})])
+    np.testing.assert_allclose(folds, ms.follow(q, 0.3, 2.5, harmonics=9, unit="rad/s").folds, rtol=1e-6)
+    top = branch.of_kind("fold")[0]
+    assert branch.stable[: top - 1].all() and not branch.stable[top + 1 : branch.of_kind("fold")[1]].any()
+
+
+def rossler() -> Dynamics:
+    """x' = -y - z, y' = x + 0.2 y, z' = 0.2 + z (x - p), whose orbit doubles its period at p = 2.83."""
+
+    def rate(s: Any, p: Any, _: Any) -> Any:
+        x, y, z = s[0], s[1], s[2]
+        return jnp.stack([-y - z, x + 0.2 * y, 0.2 + z * (x - p)])
+
+    return Dynamics(rate, ("x", "y", "z"), np.array([4.0, 4.0, 4.0]), 3.0)
+
+
+@pytest.mark.slow
+def test_doubled_orbit_is_what_a_motion_comes_to() -> None:
+    """Rossler's: beyond the doubling the orbit of one period is unstable, that of two stable, and SciPy's motion ends
+    on it."""
+    system = rossler()
+    asked = Asked(2.3, 3.2, nodes=16, doublings=1, attractors=(2.5,), starts=12)
+    found = diagram(system, np.array([0.02, -0.09, 0.09]), asked)
+    (one,) = found.at("period doubling")["attractor 1 at 2.5"]
+    assert 2.82 < one < 2.84
+    twice = found["attractor 1 at 2.5 doubled 1"]
+    i = int(np.argmin(np.abs(twice.parameter - 3.1)))
+    orbit = twice.orbit(system, i)
+    assert twice.stable[i] and orbit.period == pytest.approx(2 * 5.9, rel=0.03)
+    f = jax.jit(lambda x: system.rate(x, orbit.p, 0.0))
+    end = solve_ivp(lambda _, x: np.asarray(f(x)), (0, 400), [1.0, 1.0, 0.0], rtol=1e-10, atol=1e-10).y[:, -1]
+    again = solve_ivp(lambda _, x: np.asarray(f(x)), (0, orbit.period), end, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(again.y[:, -1], end, atol=1e-4)
+    assert again.y[0].max() == pytest.approx(orbit.sampled(16)[:, 0].max(), abs=1e-2)
+
+
+def test_a_branch_is_kept_and_read_again(tmp_path: Path) -> None:
+    branch = circles().branches[1]
+    branches.write(tmp_path / "b.h5", branch, "inputs")
+    again = branches.kept(tmp_path / "b.h5", "inputs")
+    assert again is not None and again.name == branch.name and again.ended == branch.ended
+    np.testing.assert_array_equal(again.multipliers, branch.multipliers)
+    np.testing.assert_array_equal(again.kind, branch.kind)
+    assert branches.kept(tmp_path / "b.h5", "other inputs") is None
+    (tmp_path / "b.h5").write_bytes((tmp_path / "b.h5").read_bytes()[:-9])
+    assert branches.kept(tmp_path / "b.h5", "inputs") is None
+
+
+def test_tables_of_a_diagram() -> None:
+    table = circles().to_dataframe()
+    assert len(table) == sum(map(len, circles().branches)) and set(table["kind"]) >= {"Hopf", "start", "bound"}
+    assert circles().to_xarray()["parameter"].shape == (len(table),)
+
+
+def test_no_equilibrium_near_the_start() -> None:
+    system = Dynamics(lambda z, p, _: jnp.stack([z[0] ** 2 + 1 + p**2]), ("x",), np.ones(1))
+    with pytest.raises(UserError, match="no equilibrium"):
+        diagram(system, np.ones(1), Asked(0.0, 1.0))
+
+
+def test_no_driven_motion_near_the_start() -> None:
+    """A motion that grows without bounds is no start: the sentence says what to try."""
+
+    def rate(z: Any, p: Any, angle: Any) -> Any:
+        return jnp.stack([z[1], z[0] + 0.5 * z[0] ** 3 + jnp.cos(angle)])
+
+    system = Dynamics(rate, ("q", "v"), np.ones(2), 1.0, frequency=lambda p: p)
+    with pytest.raises(UserError, match="no periodic motion.*begin at"):
+        diagram(system, np.array([50.0, 10.0]), Asked(0.5, 1.0, nodes=4))
+
+
+def test_same_value_twice_is_refused() -> None:
+    with pytest.raises(UserError, match="stop"):
+        ms.bifurcate(brusselator(), 1.0, 1.0)
+
+
+def test_contacts_that_stick_are_refused() -> None:
+    with pytest.raises(UserError, match="jenkins"):
+        ms.bifurcate(lambda p: ms.structure(1.0, 1.0, 0.02, elements=[ms.jenkins(1.0, p)]), 0.5, 1.0)
+
+
+@pytest.mark.slow
+def test_what_a_structure_does_over_a_parameter() -> None:
+    """A mass on a spring of a cube under a steady force p: x + 0.5 x^3 = p, from Python."""
+    found = ms.bifurcate(
+        lambda p: ms.structure(1.0, 1.0, 0.05, steady={0: p}, output=0, elements=[ms.polynomial({3: 0.5})]), 0.0, 2.0
+    )
+    (still,) = found.branches
+    x = still.largest[:, 0]
+    np.testing.assert_allclose(x + 0.5 * x**3, still.parameter, atol=1e-10)
+    assert still.stable.all() and not found.hopf
+
+
+@pytest.mark.slow
+def test_motions_find_the_orbit_that_no_branch_leads_to() -> None:
+    """A circle that is there for all p, beside an equilibrium that is always stable: r' = -r (1 - r^2) (4 - r^2)."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        r2 = z[0] ** 2 + z[1] ** 2
+        grows = -(1 - r2) * (4 - r2)
+        return jnp.stack([grows * z[0] - z[1], grows * z[1] + z[0]])
+
+    system = Dynamics(rate, ("x", "y"), np.ones(2), 2.0)
+    found = diagram(system, np.zeros(2), Asked(0.0, 1.0, nodes=8, doublings=0, attractors=(0.5,), starts=24, seed=3))
+    (one,) = found.attractors
+    np.testing.assert_allclose(np.linalg.norm(one.orbit.x, axis=1), 2.0, atol=1e-8)
+    begun = 3.0 * np.random.default_rng(3).uniform(-1, 1, (24, 2))
+    assert one.share == np.mean(np.linalg.norm(begun, axis=1) > 1.0)  # the unstable circle of radius 1 divides them
+    branch = found["attractor 1 at 0.5"]
+    assert branch.parameter.min() == 0.0 and branch.parameter.max() == 1.0 and branch.stable.all()
