@@ -92,7 +92,7 @@ def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
     from ..exchange.matrices import files_of
 
     settings = {k: v for k, v in job.raw.items() if k not in ("description", "note")}
-    files = [job.folder / name for name in files_of(given)]
+    files = [job.folder / name for name in files_of(given, job.settings.parameters)]
     if missing := [f for f in files if not store.ordinary(f).is_file()]:
         raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
     return {"settings": settings, "files": [store.hash_file(f) for f in files]}
