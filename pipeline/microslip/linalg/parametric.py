@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import scipy.sparse as sp
 
-from ..data import Matrices, MatrixTerm, UserError
+from ..data import Array, Matrices, MatrixTerm, UserError
 from .quadratic import Quadratic
 
 ORDERS = {"mass": 2, "damping": 1, "gyroscopic": 1, "stiffness": 0, "circulatory": 0}
@@ -44,6 +45,20 @@ class Family:
         """Names of those that a matrix scales with."""
         return tuple(sorted({t.parameter for t in self.terms if t.power}))
 
+    def values(self, values: Mapping[str, float], over: str) -> Mapping[str, float]:
+        """The values, if every matrix is defined at them and the parameter `over` scales one.
+
+        Raises:
+            UserError: it scales none; see `weight`.
+        """
+        if over not in self.parameters:
+            known = ", ".join(self.parameters)
+            way = f"choose from {known}" if known else "add [[parameters]] with its powers"
+            raise UserError(f"stability.over: no matrix scales with the parameter '{over}'; {way}")
+        for term in self.terms:
+            weight(term, values)
+        return values
+
     def at(self, values: Mapping[str, float]) -> Quadratic:
         """The matrices at values of the parameters.
 
@@ -56,6 +71,20 @@ class Family:
             sums[ORDERS[term.role]] = sums[ORDERS[term.role]] + weight(term, values) * term.matrix
         K, C, M = (A.tocsr() if sp.issparse(A) else A for A in sums)
         return Quadratic(M, C, K)
+
+    def merged(self) -> Family:
+        """The same with one matrix for each power of s and of a parameter."""
+        sums: dict[tuple[Any, ...], Any] = {}
+        for t in self.terms:
+            key = (ORDERS[t.role], *((t.parameter, t.power, t.reference) if t.power else ("", 0.0, 1.0)))
+            sums[key] = sums[key] + t.factor * t.matrix if key in sums else t.factor * t.matrix
+        role = {2: "mass", 1: "damping", 0: "stiffness"}
+        return Family(tuple(MatrixTerm(role[k], A, name, p, 1.0, at) for (k, name, p, at), A in sums.items()))
+
+    def projected(self, V: Array, W: Array | None = None) -> Family:
+        """The same with dense W^T A V for every matrix A; W = V if not given."""
+        left = V if W is None else W
+        return Family(tuple(replace(t, matrix=np.asarray(left.T @ (t.matrix @ V))) for t in self.terms))
 
 
 def family_of(body: Matrices) -> Family:
@@ -77,16 +106,3 @@ def state(body: Matrices, values: Mapping[str, float]) -> Matrices:
         add = weight(term, values) * term.matrix
         sums[term.role] = add if held is None else held + add
     return replace(body, terms=(), **{role: A.tocsr() for role, A in sums.items()})
-
-
-def known(parameters: Sequence[str], name: str, where: str) -> None:
-    """Refuse a parameter that nothing scales with.
-
-    Raises:
-        UserError: with those that there are.
-    """
-    if name not in parameters:
-        has = (
-            f"they scale with {', '.join(parameters)}" if parameters else "nothing scales with any; add [[parameters]]"
-        )
-        raise UserError(f"{where}: no matrix scales with '{name}'; {has}")

@@ -378,15 +378,41 @@ def _judge(Q: Quadratic, s: complex, x: ComplexArray, y: ComplexArray) -> tuple[
 
 def every_root(Q: Quadratic) -> Roots:
     """All finite roots of dense matrices with frequencies not below 0, from the companion form at once."""
-    M, C, K = (A.toarray() if sp.issparse(A) else np.asarray(A, dtype=float) for A in (Q.M, Q.C, Q.K))
-    n, eye = len(M), np.eye(len(M))
-    g = np.sqrt(_norm(K) / _norm(M)) if _norm(M) and _norm(K) else 1.0  # brings s to the size of one
-    A = np.block([[np.zeros((n, n)), eye], [-K / g**2, -C / g]])
-    B = scipy.linalg.block_diag(eye, M)
+    n, g, (A, B) = Q.n, _scale(Q), _companion(Q)
     (alpha, beta), L, R = scipy.linalg.eig(A, B, left=True, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-13 * np.abs(alpha)
     s = g * alpha[finite] / beta[finite]
     up = s.imag >= 0
     s, x, y = s[up], R[:n, finite][:, up], L[n:, finite][:, up]
-    whole = Quadratic(M, C, K)
-    return judged(whole, [(complex(v), _unit(a), _unit(b)) for v, a, b in zip(s, x.T, y.T, strict=True)])
+    return judged(Q, [(complex(v), _unit(a), _unit(b)) for v, a, b in zip(s, x.T, y.T, strict=True)])
+
+
+WELL_CONDITIONED = 1e8
+"""Condition number of a mass matrix up to which it is inverted."""
+
+
+def every_value(Q: Quadratic) -> ComplexArray:
+    """All finite roots of dense matrices with frequencies not below 0, without vectors."""
+    A, B = _companion(Q)
+    n = Q.n
+    if np.linalg.cond(B[n:, n:], 1) < WELL_CONDITIONED:
+        A[n:] = np.linalg.solve(B[n:, n:], A[n:])
+        s = _scale(Q) * np.linalg.eigvals(A)
+    else:
+        alpha, beta = scipy.linalg.eig(A, B, right=False, homogeneous_eigvals=True)
+        finite = np.abs(beta) > 1e-13 * np.abs(alpha)
+        s = _scale(Q) * alpha[finite] / beta[finite]
+    return s[s.imag >= 0].astype(complex)
+
+
+def _scale(Q: Quadratic) -> float:
+    """1/s, brings s to the size of one."""
+    return float(np.sqrt(_norm(Q.K) / _norm(Q.M))) if _norm(Q.M) and _norm(Q.K) else 1.0
+
+
+def _companion(Q: Quadratic) -> tuple[Array, Array]:
+    """A z = t B z with z = (x, t x), t = s over `_scale`."""
+    M, C, K = (A.toarray() if sp.issparse(A) else np.asarray(A, dtype=float) for A in (Q.M, Q.C, Q.K))
+    n, eye, g = len(M), np.eye(len(M)), _scale(Q)
+    A = np.block([[np.zeros((n, n)), eye], [-K / g**2, -C / g]])
+    return A, scipy.linalg.block_diag(eye, M)

@@ -768,7 +768,8 @@ class BodySettings(Model):
                 raise ValueError(f"{found[0]}: without nodes there are no places; give geometry.matrices.nodes")
         known = sorted({term.name for term in self.parameters} - {"speed"})
         if unknown := sorted(set(self.values) - set(known)):
-            way = "rotation.speeds_rpm gives it" if unknown[0] == "speed" else f"choose from {', '.join(known) or 'none'}"
+            names = ", ".join(known) or "none"
+            way = "rotation.speeds_rpm gives it" if unknown[0] == "speed" else f"choose from {names}"
             raise ValueError(f"values.{unknown[0]}: no matrix scales with it here; {way}")
 
 

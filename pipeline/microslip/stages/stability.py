@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from ..data import UserError
-from ..files import store
-from ..files.tables import rows_csv
+from ..files import hdf5, store
+from ..files.tables import columns_csv, rows_csv
 from ..linalg.parametric import Family, family_of
 from ..linalg.quadratic import Window
+from ..report.roots import roots_html
+from ..roots.diagram import Diagram, diagram
+from ..roots.spectrum import Spectrum, spectrum
 from ..settings.body import StabilitySettings
-from ..stability.spectrum import Spectrum, spectrum
-from ..units import from_rpm
+from ..units import from_rpm, rpm_text
 from .job import Job, open_job
 from .modal import matrices_inputs
 from .stage import Made, Report, Stage
@@ -36,7 +41,9 @@ def stability_stage(
     if asked is None:
         raise UserError(f"{job.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
     stage = Stage(job.build_folder / "stability.json", ("stages.stability",), force, report)
-    stage.make({**matrices_inputs(job, given), "pictures": pictures}, lambda: _work(stage, job, asked, report))
+    stage.make(
+        {**matrices_inputs(job, given), "pictures": pictures}, lambda: _work(stage, job, asked, report, pictures)
+    )
     told = json.loads(stage.product.read_text())
     return [stage.product.parent / name for name in told["files"]], told["lines"], told["complete"]
 
@@ -69,22 +76,85 @@ def family(job: Job) -> Family:
         raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
 
 
-def _work(stage: Stage, job: Job, asked: StabilitySettings, report: Report) -> Made:
-    folder = stage.product.parent
+def _work(stage: Stage, job: Job, asked: StabilitySettings, report: Report, pictures: bool) -> Made:
+    folder, matrices, at = stage.product.parent, family(job), values_of(job)
+    try:
+        if asked.range is not None:
+            for value in asked.range:
+                matrices.values({**at, asked.over: value}, asked.over)
+        Q = matrices.at(at)
+    except UserError as error:
+        raise UserError(f"{job.path}: {error}") from error
+    window = window_of(asked)
     found = spectrum(
-        family(job).at(values_of(job)), window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral,
-        certify=asked.certify, report=report,
+        Q, window, accuracy=asked.accuracy, neutral=asked.neutral, certify=asked.certify, report=report
     )  # fmt: skip
+    over = None
+    if asked.range is not None:
+        values = np.linspace(*asked.range, asked.points)
+        how = {"tolerance": asked.tolerance, "neutral": asked.neutral}
+        over = diagram(matrices, asked.over, values, window, at=at, report=report, **how)
     stage.begin()
-    store.write_text(folder / "stability.csv", table_csv(found))
-    names = ["stability.csv"]
+    names = _written(folder, job, found, over, pictures)
     told = {
         "files": names,
-        "lines": [*table_lines(found), found.sentence],
+        "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else [])],
         "complete": found.complete or not asked.certify,
     }
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
     return Made([folder / name for name in names])
+
+
+def _written(folder: Path, job: Job, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:
+    """Names of the files, the page first."""
+    drawn = _pictures(found, over, folder / "pictures") if pictures else {}
+    texts = {
+        "stability.html": roots_html(f"{job.settings.name}: stability", state_words(job), found, over, drawn),
+        "stability.csv": table_csv(found),
+    }
+    if over is not None:
+        texts["stability_over.csv"] = columns_csv(over.columns, 12)
+    for name, text in texts.items():
+        store.write_text(folder / name, text)
+    write_roots(folder / "stability.h5", found, over, values_of(job))
+    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
+
+
+def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mapping[str, float]) -> None:
+    """Roots, their right and left vectors, and the roots over a range, as HDF5 with named dimensions.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    with store.complete_or_absent(path) as temporary:
+        with hdf5.create(temporary) as file:
+            file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
+            file.attrs["values"] = json.dumps(dict(values))
+            where = file.create_group("roots")
+            for name, column in found.columns.items():
+                hdf5.put(where, name, np.array(column), dims=("root",))
+            hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
+            for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
+                hdf5.put(where, name, vectors, dims=("coordinate", "root"))
+            for name, column in over.columns.items() if over else ():
+                hdf5.put(file.require_group("over"), name, column, dims=("row",))
+        hdf5.seal(temporary)
+
+
+def state_words(job: Job) -> str:
+    """Where the roots of the table are taken: "At 120 rpm"."""
+    others = [f"{name} = {value:g}" for name, value in job.settings.values.items()]
+    return "At " + ", ".join([rpm_text(values_of(job)["speed"]), *others])
+
+
+def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
+    from ..pictures.plots import save_figure
+
+    folder.mkdir(exist_ok=True)
+    drawn = {"plane": save_figure(found.plot(), folder / "roots.png")}
+    if over is not None:
+        drawn["over"] = save_figure(over.plot(), folder / "roots_over.png")
+    return drawn
 
 
 def table_csv(found: Spectrum) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from ..data import Array
 from ..linalg import quadratic, winding
 from ..linalg.quadratic import Quadratic, Roots, Window
 from ..linalg.winding import Count
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Report = Callable[[str], None]
 
@@ -22,7 +25,7 @@ BLOCKS = (2, 4, 8)
 """Vectors of a block, the next where the count misses roots: multiplicities that a search can see."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Spectrum:
     """The roots s of a window, in the order of their frequencies.
 
@@ -97,6 +100,23 @@ class Spectrum:
         import pandas
 
         return pandas.DataFrame(self.columns)
+
+    def to_xarray(self) -> Any:
+        """An `xarray.Dataset` over the number of the root, vectors over coordinates included."""
+        import xarray
+
+        told = {name: (("root",), values) for name, values in self.columns.items()}
+        vectors = {"shape": (("coordinate", "root"), self.roots.x), "left": (("coordinate", "root"), self.roots.y)}
+        return xarray.Dataset({**told, **vectors}, coords={"root": np.arange(1, len(self.roots) + 1)})
+
+    def plot(self) -> Figure:
+        """The roots in the complex plane."""
+        from ..pictures.roots import spectrum_figure
+
+        return spectrum_figure(self)
+
+    def __repr__(self) -> str:
+        return f"<Spectrum: {self.sentence}>"
 
     @property
     def columns(self) -> dict[str, Any]:
