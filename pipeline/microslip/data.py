@@ -151,7 +151,7 @@ class Matrices:
     """A body that another program has assembled: M x'' + (C + G) x' + (K + N) x = f, in SI.
 
     Attributes:
-        stiffness, mass: (m, m) symmetric. damping: (m, m), gyroscopic and circulatory: (m, m) skew, or None.
+        stiffness, mass: (m, m) symmetric. damping: (m, m), gyroscopic: (m, m) skew, circulatory: (m, m), or None.
         mesh: the nodes, and cells and sets if they are known. node: (m,) point of each row, -1 for a generalised
             coordinate of a superelement. component: (m,) 0 to 2: displacement along x, y, z; 3 to 5: rotation about
             them; -1 for a generalised coordinate.
@@ -509,6 +509,11 @@ class ModalGroup:
     invariants: Invariants | None = None
     contacts: Mapping[str, ContactState] = field(default_factory=dict)
     residual: Residual | None = None
+    N_r: Annotated[Array | None, Stored(
+        "mode mode", "s^-2", "circulatory: what the stiffness K_r + N_r holds beside the symmetric K_r, of which the "
+        "modes are; of any symmetry", at="modes/N_r", when="the stiffness is not symmetric: friction, follower forces",
+        order=1,
+    )] = None  # fmt: skip
 
     @property
     def frequency(self) -> Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..roots.diagram import Diagram
 from ..roots.spectrum import Spectrum
-from .page import Album, fold, page, say, table
+from .page import Album, Piece, fold, page, say, table
 
 CAPTIONS = {
     "plane": "Roots in the complex plane. What stands right of the line grows by itself.",
@@ -38,7 +38,7 @@ def roots_html(
     return page(title, pieces)
 
 
-def _table(found: Spectrum):
+def _table(found: Spectrum) -> Piece:
     c = found.columns
     rows: list[Sequence[object]] = [
         (f"{f:.7f}", f"{g:.7g}", f"{d:.3e}", v, f"{t:.1e}", f"{r:.1e}", f"{e:.1e}")
@@ -52,6 +52,6 @@ def _table(found: Spectrum):
 
 
 READ_AS = (
-    "An amplitude grows as exp(growth t). Neutral: the growth rate is nearer to zero than the data decide. Residual: of "
-    "the equation over the elastic force; backward error: over the norms of the matrices."
+    "An amplitude grows as exp(growth t). Neutral: the growth rate is nearer to zero than the data decide. Residual: "
+    "of the equation over the elastic force; backward error: over the norms of the matrices."
 )

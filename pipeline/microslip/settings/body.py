@@ -229,9 +229,9 @@ UnitSystem = Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"]
 class MatrixFiles(Model):
     """Stiffness and mass that another program has assembled, the node and direction of every row, and positions.
 
-    A file that holds several matrices is written FILE#NAME. circulatory: the non-symmetric part of the stiffness, any
-    square matrix: its symmetric part is added to the stiffness, its skew part is kept beside it. Without nodes every
-    row is a generalised coordinate, and the supports are in the matrices.
+    A file that holds several matrices is written FILE#NAME. circulatory: what the stiffness holds beside its
+    symmetric part (friction, follower forces), any square matrix; modes are those of the symmetric part. Without nodes
+    every row is a generalised coordinate, and the supports are in the matrices.
     """
 
     stiffness: str

@@ -76,7 +76,7 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     from ..modal.foreign import foreign_basis
 
     try:
-        body = read_matrices(given, job.folder, job.settings.length_unit)
+        body = read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters)
         basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
     except UserError as error:
         text = str(error)

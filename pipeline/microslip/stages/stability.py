@@ -13,6 +13,7 @@ from ..files import hdf5, store
 from ..files.tables import columns_csv, rows_csv
 from ..linalg.parametric import Family, family_of
 from ..linalg.quadratic import Window
+from ..modal.foreign import values_of
 from ..report.roots import roots_html
 from ..roots.diagram import Diagram, diagram
 from ..roots.spectrum import Spectrum, spectrum
@@ -48,11 +49,6 @@ def stability_stage(
     return [stage.product.parent / name for name in told["files"]], told["lines"], told["complete"]
 
 
-def values_of(job: Job) -> dict[str, float]:
-    """The state of a body: its speed of rotation (rad/s) and the values of its other parameters."""
-    return {"speed": from_rpm(job.settings.rotation.speeds_rpm[0]), **job.settings.values}
-
-
 def window_of(asked: StabilitySettings) -> Window:
     """The window in 1/s and rad/s."""
     low, high = asked.frequency
@@ -77,7 +73,7 @@ def family(job: Job) -> Family:
 
 
 def _work(stage: Stage, job: Job, asked: StabilitySettings, report: Report, pictures: bool) -> Made:
-    folder, matrices, at = stage.product.parent, family(job), values_of(job)
+    folder, matrices, at = stage.product.parent, family(job), values_of(job.settings)
     try:
         if asked.range is not None:
             for value in asked.range:
@@ -116,7 +112,7 @@ def _written(folder: Path, job: Job, found: Spectrum, over: Diagram | None, pict
         texts["stability_over.csv"] = columns_csv(over.columns, 12)
     for name, text in texts.items():
         store.write_text(folder / name, text)
-    write_roots(folder / "stability.h5", found, over, values_of(job))
+    write_roots(folder / "stability.h5", found, over, values_of(job.settings))
     return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
 
 
@@ -144,7 +140,7 @@ def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mappi
 def state_words(job: Job) -> str:
     """Where the roots of the table are taken: "At 120 rpm"."""
     others = [f"{name} = {value:g}" for name, value in job.settings.values.items()]
-    return "At " + ", ".join([rpm_text(values_of(job)["speed"]), *others])
+    return "At " + ", ".join([rpm_text(values_of(job.settings)["speed"]), *others])
 
 
 def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:

@@ -78,7 +78,7 @@ def read_matrices(
     made: dict[str, sp.csr_matrix] = {}
     messages, scaling = list[str](), list[MatrixTerm]()
 
-    def parts(item: Found, role: str, reference: str) -> dict[str, sp.csr_matrix]:
+    def checked(item: Found, role: str, reference: str) -> sp.csr_matrix:
         path = folder / split(reference)[0]
         matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
         if matrix.shape[0] != rows:
@@ -87,18 +87,17 @@ def read_matrices(
                 "give matrices of the same coordinates"
             )
         if role == "circulatory":
-            return {k: A for k, A in zip(("stiffness", role), _halves(matrix), strict=True) if _largest(A)}
+            return matrix
         matrix, message = _symmetric(matrix, role, path)
         messages.extend([message] if message else [])
-        return {role: matrix}
+        return matrix
 
     for role, item in found.items():
-        for part, matrix in parts(item, role, getattr(given, role)).items():
-            made[part] = made[part] + matrix if part in made else matrix
+        made[role] = checked(item, role, getattr(given, role))
     for term in terms:
         how = (term.name, term.power, term.factor, term.reference)
-        item = _read(folder, term.matrix, term.role)
-        scaling += [MatrixTerm(part, matrix, *how) for part, matrix in parts(item, term.role, term.matrix).items()]
+        matrix = checked(_read(folder, term.matrix, term.role), term.role, term.matrix)
+        scaling.append(MatrixTerm(term.role, matrix, *how))
     _check_mass(made["mass"], folder / split(given.mass)[0], dofs)
     system = given.units or usual_system(length_unit)
     if system is None:
@@ -151,11 +150,6 @@ def _read(folder: Path, reference: str, role: str) -> Found:
         raise UserError(f"{path}: the {role} matrix: {_told(error)}; write it again") from error
     except MemoryError as error:
         raise UserError(f"{path}: the {role} matrix needs more memory than there is; store it sparse") from error
-
-
-def _halves(matrix: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The symmetric and the skew part of a matrix, whose sum it is."""
-    return (0.5 * (matrix + matrix.T)).tocsr(), (0.5 * (matrix - matrix.T)).tocsr()
 
 
 def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
