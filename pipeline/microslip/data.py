@@ -134,12 +134,12 @@ class MatrixTerm:
     """A matrix that scales with a parameter: factor (value / reference)^power times it is added to those of its role.
 
     Attributes:
-        role: ``stiffness``, ``mass``, ``damping``, ``gyroscopic`` or ``circulatory``. matrix: (m, m), SI, as symmetric
-            as its role says. parameter: its name; ``speed`` is the speed of rotation, rad/s.
+        role: ``stiffness``, ``mass``, ``damping``, ``gyroscopic`` or ``circulatory``. matrix: (m, m), sparse or dense,
+            SI, as symmetric as its role says. parameter: its name; ``speed`` is the speed of rotation, rad/s.
     """
 
     role: str
-    matrix: csr_matrix
+    matrix: Any
     parameter: str = "speed"
     power: float = 0.0
     factor: float = 1.0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..data import Array, Matrices, MatrixTerm, UserError
+from ..data import Array, Matrices, MatrixTerm, ModalGroup, UserError
 from .quadratic import Quadratic
 
 ORDERS = {"mass": 2, "damping": 1, "gyroscopic": 1, "stiffness": 0, "circulatory": 0}
@@ -92,6 +92,21 @@ def family_of(body: Matrices) -> Family:
     roles = ("mass", "damping", "gyroscopic", "stiffness", "circulatory")
     constant = [MatrixTerm(role, A) for role in roles if (A := getattr(body, role)) is not None]
     return Family((*constant, *body.terms))
+
+
+def family_of_group(name: str, g: ModalGroup) -> Family:
+    """The reduced matrices of a body, N_r and G_r included.
+
+    Args:
+        name: of the body, for messages.
+
+    Raises:
+        UserError: complex matrices, of a cyclic sector in a wave.
+    """
+    roles = {"mass": g.M_r, "damping": g.C_r, "gyroscopic": g.G_r, "stiffness": g.K_r, "circulatory": g.N_r}
+    if any(np.iscomplexobj(A) for A in roles.values() if A is not None):
+        raise UserError(f"{name}: the roots of complex matrices, of a cyclic sector in a wave, are not computed")
+    return Family(tuple(MatrixTerm(role, A) for role, A in roles.items() if A is not None))
 
 
 def state(body: Matrices, values: Mapping[str, float]) -> Matrices:

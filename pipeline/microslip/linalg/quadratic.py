@@ -14,6 +14,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.linalg import lapack
 
 from ..data import Array, ComplexArray, Flags, NotConverged
 
@@ -142,16 +143,16 @@ class Factors:
             except RuntimeError as error:
                 raise ZeroDivisionError(str(error)) from error
             return
-        self._lu = scipy.linalg.lu_factor(A, check_finite=False)
-        if not np.diagonal(self._lu[0]).all():
-            raise ZeroDivisionError("a pivot is zero")
+        *self._lu, zero = lapack.zgetrf(A)
+        if zero:
+            raise ZeroDivisionError(f"pivot {zero} is zero")
 
     def solve(self, b: Array, adjoint: bool = False) -> Array:
         """A^-1 b, or A^-H b, of one or several right-hand sides."""
         b = np.ascontiguousarray(b, dtype=complex)
         if self._sparse:
             return self._lu.solve(b, "H" if adjoint else "N")
-        return scipy.linalg.lu_solve(self._lu, b, 2 if adjoint else 0, check_finite=False)
+        return lapack.zgetrs(*self._lu, b, trans=2 if adjoint else 0)[0]
 
     def log_determinant(self) -> complex:
         """log det A; its imaginary part, the phase, up to multiples of 2 pi."""
@@ -270,7 +271,7 @@ def _disc(Q: Quadratic, part: Window, block: int) -> tuple[Array, Array, float, 
         return np.vstack([w, (u + shift * w) / g])
 
     space = min(LARGEST_SPACE, 2 * n)
-    V = np.zeros((2 * n, space + block), dtype=complex)
+    V = np.zeros((2 * n, space + block), dtype=complex, order="F")
     H = np.zeros((space + block, space), dtype=complex)
     start = np.random.default_rng(1).standard_normal((2 * n, 2 * block)).view(complex)
     V[:, :block] = np.linalg.qr(start)[0]
@@ -296,7 +297,7 @@ def _extend(V: ComplexArray, H: ComplexArray, m: int, block: int, operator: Any)
     """One more block of the space, orthogonalised twice."""
     w = operator(V[:, m : m + block])
     for _ in range(2):
-        h = V[:, : m + block].conj().T @ w
+        h = (w.conj().T @ V[:, : m + block]).conj().T  # conjugates the smaller of the two
         w -= V[:, : m + block] @ h
         H[: m + block, m : m + block] += h
     V[:, m + block : m + 2 * block], H[m + block : m + 2 * block, m : m + block] = np.linalg.qr(w)

@@ -23,6 +23,9 @@ SKETCH = 64
 CAUTION = 5.0
 """Times the largest ratio of a true error to the residual's, seen at the values held out."""
 
+CUT = 3.0
+"""Times the tolerance: directions of the sampled vectors that are smaller, over the largest, are left out."""
+
 STRANGER = 1e-3
 """Estimated relative error beyond which a root of the projected matrices is none of the body's."""
 
@@ -79,7 +82,7 @@ class Sampled:
 
 def _wider(window: Window) -> Window:
     """A window with a margin, in which roots on its border are still known."""
-    margins = [1e-6 * max(abs(a), abs(b)) for a, b in (window.growth, window.omega)]
+    margins = [1e-2 * max(abs(a), abs(b)) for a, b in (window.growth, window.omega)]
     (a, b), (c, d) = window.growth, window.omega
     return Window((a - margins[0], b + margins[0]), (max(c - margins[1], 0.0), d + margins[1]))
 
@@ -151,7 +154,7 @@ def _basis_of(
 ) -> Sampled:  # fmt: skip
     x = np.hstack(vectors)
     U, size, _ = np.linalg.svd(np.hstack([x.real, x.imag]), full_matrices=False)
-    V = U[:, size > tolerance * size[0]]
+    V = U[:, size > CUT * tolerance * size[0]]
     n = len(V)
     rows = np.random.default_rng(2).standard_normal((n, SKETCH)) / np.sqrt(SKETCH)
     gain = max(gains, default=1.0)

@@ -48,6 +48,7 @@ def spectrum_figure(found: Spectrum) -> Figure:
             ha="right" if beyond else "left",
         )  # fmt: skip
     low, high = np.array(found.window.omega) / (2 * np.pi * kilo)
+    high = high if np.isfinite(high) else 1.1 * max(float(y.max(initial=0.0)), 1e-12)
     axes.set(xlabel="growth rate in 1/s", ylabel=f"frequency in {'kHz' if kilo > 1 else 'Hz'}", ylim=(low, high))
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure

@@ -3,56 +3,109 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ..basis import read_basis
 from ..data import UserError
 from ..files import hdf5, store
 from ..files.tables import columns_csv, rows_csv
-from ..linalg.parametric import Family, family_of
+from ..linalg.parametric import Family, family_of, family_of_group
 from ..linalg.quadratic import Window
 from ..modal.foreign import values_of
 from ..report.roots import roots_html
 from ..roots.diagram import Diagram, diagram
 from ..roots.spectrum import Spectrum, spectrum
 from ..settings.body import StabilitySettings
-from ..units import from_rpm, rpm_text
+from ..units import rpm_text
 from .job import Job, open_job
-from .modal import matrices_inputs
+from .modal import matrices_inputs, modes_stage
 from .stage import Made, Report, Stage
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of which matrices.
+
+    Attributes:
+        name: for titles. folder: of the products. where: begins a refusal. family: makes the matrices. at: values of
+            their parameters. window, asked: of [stability]. inputs: what the answer depends on.
+    """
+
+    name: str
+    folder: Path
+    where: Path
+    family: Callable[[], Family]
+    at: Mapping[str, float]
+    window: Window
+    asked: StabilitySettings
+    inputs: Mapping[str, Any]
+
+    @property
+    def state(self) -> str:
+        """Where the roots of the table are taken: "At 120 rpm"."""
+        others = [f"{name} = {value:g}" for name, value in self.at.items() if name != "speed"]
+        return "At " + ", ".join([rpm_text(self.at["speed"]), *others])
 
 
 def stability_stage(
     path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True
 ) -> tuple[list[Path], list[str], bool]:  # fmt: skip
-    """Roots of a body in the window that its [stability] asks for, in build/NAME.
+    """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it.
 
     Returns:
         The files, sentences and lines of a table, and whether the roots are proved complete.
 
     Raises:
-        UserError: no matrices, no window, a parameter that there is not.
+        UserError: no window, a parameter that there is not, a case.
     """
+    q = question(path, assignments, report)
+    stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report)
+    stage.make({**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
+    told = json.loads(stage.product.read_text())
+    return [q.folder / name for name in told["files"]], told["lines"], told["complete"]
+
+
+def question(path: Path, assignments: list[str], report: Report = lambda _: None) -> Question:
+    """What a body.toml or a modal file asks.
+
+    Raises:
+        UserError: matrices without a window, a case.
+    """
+    if path.suffix == ".h5":
+        return _of_basis(path, None)
     job = open_job(path, assignments)
     given, asked = job.settings.geometry.matrices, job.settings.stability
     if given is None:
-        raise UserError(f"{job.path}: stability is computed of geometry.matrices or of a modal file; give build/NAME")
+        return _of_basis(modes_stage(job, report=report)[0], asked)
     if asked is None:
         raise UserError(f"{job.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
-    stage = Stage(job.build_folder / "stability.json", ("stages.stability",), force, report)
-    stage.make(
-        {**matrices_inputs(job, given), "pictures": pictures}, lambda: _work(stage, job, asked, report, pictures)
-    )
-    told = json.loads(stage.product.read_text())
-    return [stage.product.parent / name for name in told["files"]], told["lines"], told["complete"]
+    return Question(
+        job.settings.name, job.build_folder, job.path, lambda: family(job), values_of(job.settings), window_of(asked),
+        asked, matrices_inputs(job, given),
+    )  # fmt: skip
+
+
+def _of_basis(file: Path, asked: StabilitySettings | None) -> Question:
+    """All roots of a modal file's first speed, or those in a window."""
+    basis = read_basis(file)
+    g = basis.groups[min(basis.groups)]
+    if asked is None:
+        highest = float(g.omega.max(initial=1.0)) / np.pi  # twice the frequency of the highest mode
+        asked = StabilitySettings(growth=(-2 * np.pi * highest, 2 * np.pi * highest), frequency=(0.0, highest))
+    inputs = {"basis": store.hash_file(file), "stability": asked.model_dump()}
+    reduced, window = family_of_group(basis.name, g), window_of(asked)
+    return Question(basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window, asked, inputs)
 
 
 def window_of(asked: StabilitySettings) -> Window:
     """The window in 1/s and rad/s."""
     low, high = asked.frequency
-    return Window(asked.growth, (from_rpm(60 * low), from_rpm(60 * high)))
+    return Window(asked.growth, (2 * np.pi * low, 2 * np.pi * high))
 
 
 def family(job: Job) -> Family:
@@ -72,47 +125,47 @@ def family(job: Job) -> Family:
         raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
 
 
-def _work(stage: Stage, job: Job, asked: StabilitySettings, report: Report, pictures: bool) -> Made:
-    folder, matrices, at = stage.product.parent, family(job), values_of(job.settings)
+def _work(stage: Stage, q: Question, pictures: bool) -> Made:
+    matrices, asked, report = q.family(), q.asked, stage.report
     try:
-        if asked.range is not None:
-            for value in asked.range:
-                matrices.values({**at, asked.over: value}, asked.over)
-        Q = matrices.at(at)
+        for value in asked.range or ():
+            matrices.values({**q.at, asked.over: value}, asked.over)
+        Q = matrices.at(q.at)
     except UserError as error:
-        raise UserError(f"{job.path}: {error}") from error
-    window = window_of(asked)
+        raise UserError(f"{q.where}: {error}") from error
     found = spectrum(
-        Q, window, accuracy=asked.accuracy, neutral=asked.neutral, certify=asked.certify, report=report
+        Q, q.window, accuracy=asked.accuracy, neutral=asked.neutral, certify=asked.certify, report=report
     )  # fmt: skip
     over = None
     if asked.range is not None:
-        values = np.linspace(*asked.range, asked.points)
-        how = {"tolerance": asked.tolerance, "neutral": asked.neutral}
-        over = diagram(matrices, asked.over, values, window, at=at, report=report, **how)
+        over = diagram(
+            matrices, asked.over, np.linspace(*asked.range, asked.points), q.window, at=q.at,
+            tolerance=asked.tolerance, neutral=asked.neutral, report=report,
+        )  # fmt: skip
     stage.begin()
-    names = _written(folder, job, found, over, pictures)
+    names = _written(q, found, over, pictures)
     told = {
         "files": names,
         "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else [])],
         "complete": found.complete or not asked.certify,
     }
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
-    return Made([folder / name for name in names])
+    return Made([q.folder / name for name in names])
 
 
-def _written(folder: Path, job: Job, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:
+def _written(q: Question, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:
     """Names of the files, the page first."""
+    folder = q.folder
     drawn = _pictures(found, over, folder / "pictures") if pictures else {}
     texts = {
-        "stability.html": roots_html(f"{job.settings.name}: stability", state_words(job), found, over, drawn),
+        "stability.html": roots_html(f"{q.name}: stability", q.state, found, over, drawn),
         "stability.csv": table_csv(found),
     }
     if over is not None:
         texts["stability_over.csv"] = columns_csv(over.columns, 12)
     for name, text in texts.items():
         store.write_text(folder / name, text)
-    write_roots(folder / "stability.h5", found, over, values_of(job.settings))
+    write_roots(folder / "stability.h5", found, over, q.at)
     return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
 
 
@@ -135,12 +188,6 @@ def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mappi
             for name, column in over.columns.items() if over else ():
                 hdf5.put(file.require_group("over"), name, column, dims=("row",))
         hdf5.seal(temporary)
-
-
-def state_words(job: Job) -> str:
-    """Where the roots of the table are taken: "At 120 rpm"."""
-    others = [f"{name} = {value:g}" for name, value in job.settings.values.items()]
-    return "At " + ", ".join([rpm_text(values_of(job.settings)["speed"]), *others])
 
 
 def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
