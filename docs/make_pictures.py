@@ -1093,6 +1093,24 @@ def python() -> None:
     save(drawn(fig), "python")
 
 
+# the stability page ------------------------------------------------------------------------------------------------
+
+
+def stability() -> None:
+    """The disc brake: roots at 120 rpm, and how many grow at which speeds."""
+    import microslip as ms
+    from microslip.pictures.roots import over_picture, plane_picture
+
+    brake = ROOT / "geometry" / "disc-brake"
+    plane_picture(ms.stability(brake, certify=False), PICTURES / "stability_roots.png")
+    over = ms.stability(brake, over="speed", values=np.linspace(2 * np.pi, 10 * np.pi, 100))
+    over_picture(over, PICTURES / "stability_speeds.png")
+    rpm, counts = over.values * 30 / np.pi, over.unstable
+    runs = np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1)
+    rows = [[f"{rpm[r[0]]:.1f} to {rpm[r[-1]]:.1f} rpm", str(counts[r[0]])] for r in runs]
+    fill("stability.md", "stability_speeds", table(["speed", "roots that grow"], rows))
+
+
 # the cyclic page ---------------------------------------------------------------------------------------------------
 
 SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
@@ -1433,6 +1451,7 @@ STUDIES = {
     for f in (
         reference,
         python,
+        stability,
         geometry,
         meeting,
         damping_element,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..linalg.quadratic import Window
 from ..linalg.sampled import Sampled, sampled
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 Report = Callable[[str], None]
 
@@ -116,11 +116,13 @@ class Diagram:
             coords={"branch": np.arange(1, len(b) + 1), self.parameter: self.values},
         )
 
-    def plot(self) -> Figure:
-        """Growth and frequency of the roots over the parameter."""
-        from ..pictures.roots import diagram_figure
+    def plot(self, axes: Axes | None = None, what: Literal["growth", "frequency"] = "growth") -> Axes:
+        """Draw growth rates or frequencies over the parameter; in colour what grows somewhere."""
+        from .drawing import new_axes, over
 
-        return diagram_figure(self)
+        axes = new_axes() if axes is None else axes
+        over(axes, self, what == "frequency")
+        return axes
 
     def __repr__(self) -> str:
         return f"<Diagram: {self.sentence}>"

@@ -14,7 +14,7 @@ from ..linalg.quadratic import Quadratic, Roots, Window
 from ..linalg.winding import Count
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 Report = Callable[[str], None]
 
@@ -109,11 +109,13 @@ class Spectrum:
         vectors = {"shape": (("coordinate", "root"), self.roots.x), "left": (("coordinate", "root"), self.roots.y)}
         return xarray.Dataset({**told, **vectors}, coords={"root": np.arange(1, len(self.roots) + 1)})
 
-    def plot(self) -> Figure:
-        """The roots in the complex plane."""
-        from ..pictures.roots import spectrum_figure
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the roots in the complex plane: growth rate to the right, frequency upwards."""
+        from .drawing import new_axes, plane
 
-        return spectrum_figure(self)
+        axes = new_axes() if axes is None else axes
+        plane(axes, self)
+        return axes
 
     def __repr__(self) -> str:
         return f"<Spectrum: {self.sentence}>"

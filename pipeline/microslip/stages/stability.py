@@ -191,12 +191,12 @@ def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mappi
 
 
 def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
-    from ..pictures.plots import save_figure
+    from ..pictures.roots import over_picture, plane_picture
 
     folder.mkdir(exist_ok=True)
-    drawn = {"plane": save_figure(found.plot(), folder / "roots.png")}
+    drawn = {"plane": plane_picture(found, folder / "roots.png")}
     if over is not None:
-        drawn["over"] = save_figure(over.plot(), folder / "roots_over.png")
+        drawn["over"] = over_picture(over, folder / "roots_over.png")
     return drawn
 
 
