@@ -1098,13 +1098,16 @@ def python() -> None:
 
 def stability() -> None:
     """The disc brake: roots at 120 rpm, and how many grow at which speeds."""
+    from PIL import Image
+
     import microslip as ms
     from microslip.pictures.roots import over_picture, plane_picture
 
     brake = ROOT / "geometry" / "disc-brake"
-    plane_picture(ms.stability(brake, certify=False), PICTURES / "stability_roots.png")
+    drawn_to = BUILD / "stability.png"
+    save(Image.open(plane_picture(ms.stability(brake, certify=False), drawn_to)), "stability_roots")
     over = ms.stability(brake, over="speed", values=np.linspace(2 * np.pi, 10 * np.pi, 100))
-    over_picture(over, PICTURES / "stability_speeds.png")
+    save(Image.open(over_picture(over, drawn_to)), "stability_speeds")
     rpm, counts = over.values * 30 / np.pi, over.unstable
     runs = np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1)
     rows = [[f"{rpm[r[0]]:.1f} to {rpm[r[-1]]:.1f} rpm", str(counts[r[0]])] for r in runs]

@@ -106,8 +106,14 @@ def _growth_scale(axes: Axes, growing: list[ComplexArray]) -> None:
     """Linear about 0 and logarithmic beyond, where growth rates differ by more than a factor of 20."""
     tops = [float(np.nanmax(b.real)) for b in growing]
     if tops and max(tops) > 20 * min(tops):
-        axes.set_yscale("asinh", linear_width=max(min(tops), 1e-3 * max(tops)))
-        axes.yaxis.set_major_formatter(lambda x, _: f"{x:g}")
+        width = max(min(tops), 1e-3 * max(tops))
+        low, high = axes.get_ylim()
+        axes.set_yscale("asinh", linear_width=width)
+        decades = 10.0 ** np.arange(np.round(np.log10(width)), np.log10(max(abs(low), high)) + 1)
+        ticks = [t for t in (*-decades[::-1], 0.0, *decades) if low <= t <= high]
+        axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
+        axes.set_yticks([], minor=True)
+        axes.set_ylim(low, high)
 
 
 def _abscissa(found: Diagram) -> tuple[Array, str]:
