@@ -2,7 +2,7 @@
 # and pipeline/cases/<case>.toml + the modal files it names -> build/<case>/response.csv.
 # Each stage decides by the hash of its inputs whether there is work to do; make only calls it.
 
-BODIES   := $(sort $(patsubst geometry/%/body.toml,%,$(wildcard geometry/*/body.toml)))
+BODIES   := $(sort $(patsubst geometry/%/build.py,%,$(wildcard geometry/*/build.py)))
 CASES    := $(filter-out $(BODIES),$(sort $(basename $(notdir $(wildcard pipeline/cases/*.toml)))))
 PYTHON   := .venv/bin/python
 RUN      := $(PYTHON) -m microslip
@@ -20,7 +20,7 @@ MOVED := $(shell [ "$$(cat $(READY) 2>/dev/null)" = "$$(pwd -P)" ] || echo moved
 .DELETE_ON_ERROR:
 .SECONDARY:
 .SECONDEXPANSION:
-.PHONY: moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
+.PHONY: disc-brake moved help setup all cases $(CASES) $(BODIES) $(BODIES:%=%-mesh) $(BODIES:%=%-modes) test test-slow test-all peers lint docs bench clean distclean
 
 help: ## list the verbs
 	@grep -hE '^[a-z%-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -39,6 +39,9 @@ cases: $(CASES) ## every case that is not named like its body
 # Which bodies a case needs stands in its file: run reads it, and works only where a hash has changed.
 $(CASES): %: $(READY)
 	@$(RUN) run pipeline/cases/$*.toml
+
+disc-brake: $(READY) ## does the published disc brake squeal: roots, and how many grow at which speeds
+	@$(RUN) stability geometry/disc-brake
 
 $(BODIES): %: build/%/report.html
 pendulum: pendulum-friction-two-modes pendulum-friction-three-modes pendulum-friction
@@ -82,6 +85,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/ring_response.py
 	@$(PYTHON) benchmarks/time_domain.py
 	@$(PYTHON) benchmarks/bifurcation.py
+	@$(PYTHON) benchmarks/stability.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

@@ -8,10 +8,12 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
-from microslip.data import Array, Mesh, ModalBasis
+from microslip.data import Array, Matrices, Mesh, ModalBasis
 from microslip.mesh import boundary_facets
 from microslip.modal.compute import modal_basis
+from microslip.modal.foreign import foreign_basis
 from microslip.settings.body import BodySettings
 from microslip.system import Body, Damper, Force, Monitor, Spring, System, system_basis
 
@@ -146,6 +148,28 @@ def three_masses() -> ModalBasis:
     return system_basis(ROOT / "pipeline/microslip/templates/three-masses/system.toml")
 
 
+def sliding_masses() -> ModalBasis:
+    """Three masses whose stiffness is not symmetric, as that of sliding contacts: N_r and G_r beside the modes."""
+    K = 1e4 * np.array([[3.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
+    N = 2e3 * np.array([[0.1, 1.0, 0.0], [-0.8, 0.0, 0.5], [0.0, -0.5, 0.0]])  # neither symmetric nor skew
+    G = np.array([[0.0, 3.0, 0.0], [-3.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    mesh = Mesh(np.array([[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]), {}, {}, {}, np.arange(1, 4))
+    M, C = np.diag([1.0, 2.0, 1.5]), 2e-5 * K
+    M_, C_, K_, G_, N_ = (csr_matrix(A) for A in (M, C, K, G, N))
+    body = Matrices(K_, M_, C_, G_, mesh, np.arange(3), np.zeros(3, dtype=np.int64), True, circulatory=N_)
+    settings = BodySettings.model_validate(
+        {
+            "name": "sliding-masses",
+            "length_unit": "m",
+            "geometry": {"matrices": {"stiffness": "K.mtx", "mass": "M.mtx", "nodes": "nodes.csv", "grounded": True}},
+            "excitations": [{"name": "shaker", "node": 1, "direction": [1.0, 0.0, 0.0]}],
+            "monitors": [{"name": "end", "node": 3, "directions": "x"}],
+            "modes": {"count": 3, "solver": "superlu"},
+        }
+    )
+    return foreign_basis(body, settings, provenance=_told(settings))[0]
+
+
 def vane_eigenmodes() -> ModalBasis:
     """Eigenmodes with stress at the nodes."""
     settings = vane_settings("vane-eigenmodes")
@@ -194,6 +218,7 @@ def vane_range() -> ModalBasis:
 SAMPLES: dict[str, Callable[[], ModalBasis]] = {
     "two-masses": two_masses,
     "three-masses": three_masses,
+    "sliding-masses": sliding_masses,
     "vane-eigenmodes": vane_eigenmodes,
     "vane-craig-bampton": vane_craig_bampton,
     "sector-cyclic": sector_cyclic,

@@ -53,9 +53,10 @@ def response(g: ModalGroup, read: Array, load: Array, frequency: Array, springs:
     V = np.eye(g.n_modes) if g.to_diagonal is None else g.to_diagonal
     T = np.concatenate([[read], [load], *(g.interfaces[n].rows for n in springs)]) @ V
     k = np.concatenate([np.zeros(0), *(np.array(s) for s in springs.values())])
+    N = 0.0 if own.N_r is None else own.N_r
     out = []
     for w in 2 * np.pi * frequency:
-        Z = np.diag(own.omega**2 - w**2) + 1j * w * (own.C_r + own.G_r)
+        Z = np.diag(own.omega**2 - w**2) + N + 1j * w * (own.C_r + own.G_r)
         H = T @ np.linalg.solve(Z, T.conj().T)
         free = H[0, 1]
         if len(k):

@@ -448,11 +448,11 @@ def row_of(g, name):
 
 
 def answer(file, asked):
-    """What the reduced body answers, straight from M_r, C_r, G_r, K_r and the rows. A static answer of a free body is
-    its elastic part.
+    """What the reduced body answers, straight from M_r, C_r, G_r, K_r, N_r and the rows. A static answer of a free body
+    is its elastic part, and knows nothing of N_r, as the compliances do.
 
-    Response: read @ (K - w^2 M + i w (C + G))^-1 load^H for a unit amplitude, with springs (N/m, N m/rad) from the six
-    rows of the interfaces in `springs` to the ground.
+    Response: read @ (K + N - w^2 M + i w (C + G))^-1 load^H for a unit amplitude, with springs (N/m, N m/rad) from the
+    six rows of the interfaces in `springs` to the ground.
     """
     g = file[f"speed_{asked['speed']}/nd_{asked['nodal_diameter']}"]
     M, K, C, G = (get(g["modes"], n) for n in ("M_r", "K_r", "C_r", "G_r"))
@@ -462,6 +462,7 @@ def answer(file, asked):
     load, read = row_of(g, asked["load"]).conj(), row_of(g, asked["read"])
     if asked["kind"] == "static":
         return np.array([read @ np.linalg.solve(K, load)])
+    K = K + get(g["modes"], "N_r") if "N_r" in g["modes"] else K
     w = 2 * np.pi * np.array(asked["frequency_Hz"])
     return np.array([read @ np.linalg.solve(K - v**2 * M + 1j * v * (C + G), load) for v in w])
 

@@ -1113,6 +1113,27 @@ def python() -> None:
     save(drawn(fig), "python")
 
 
+# the stability page ------------------------------------------------------------------------------------------------
+
+
+def stability() -> None:
+    """The disc brake: roots at 120 rpm, and how many grow at which speeds."""
+    from PIL import Image
+
+    import microslip as ms
+    from microslip.pictures.roots import over_picture, plane_picture
+
+    brake = ROOT / "geometry" / "disc-brake"
+    drawn_to = BUILD / "stability.png"
+    save(Image.open(plane_picture(ms.stability(brake, certify=False), drawn_to)), "stability_roots")
+    over = ms.stability(brake, over="speed", values=np.linspace(2 * np.pi, 10 * np.pi, 100))
+    save(Image.open(over_picture(over, drawn_to)), "stability_speeds")
+    rpm, counts = over.values * 30 / np.pi, over.unstable
+    runs = np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1)
+    rows = [[f"{rpm[r[0]]:.1f} to {rpm[r[-1]]:.1f} rpm", str(counts[r[0]])] for r in runs]
+    fill("stability.md", "stability_speeds", table(["speed", "roots that grow"], rows))
+
+
 # the cyclic page ---------------------------------------------------------------------------------------------------
 
 SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
@@ -1467,6 +1488,7 @@ STUDIES = {
     for f in (
         reference,
         python,
+        stability,
         geometry,
         meeting,
         damping_element,

@@ -19,7 +19,7 @@ PUBLIC = {
     "results.files": "read_response",
     "time_domain.recorded": "load read_orbits",
     "exchange.labelled": "to_xarray",
-    "bodies": "modes assemble sample",
+    "bodies": "modes assemble sample stability",
     "system.structure": "structure polynomial jenkins stop friction Element",
     "bifurcation.dynamics": "Dynamics",
     "analyses": "harmonic_response follow backbone integrate integrate_many run_up bifurcate",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .basis import read_basis
 from .case.assemble import Built, build, swept
@@ -14,6 +15,10 @@ from .settings.body import load_toml
 from .settings.mistakes import bounded, validate
 from .stages.job import job_of, open_job
 from .stages.places import modal_files
+
+if TYPE_CHECKING:
+    from .roots.diagram import Diagram
+    from .roots.spectrum import Spectrum
 
 Report = Callable[[str], None]
 
@@ -60,6 +65,47 @@ def modes(
             raise UserError("geometry.mesh: is missing: a body given as a dict has a mesh; or write a body.toml")
         return modal.basis_of(job, job.mesh_file, report)[0]
     return read_basis(modal.modes_stage(open_job(body, root=folder), report=report)[0])
+
+
+def stability(
+    body: Any, *, frequency: tuple[float, float] | None = None, growth: tuple[float, float] = (-math.inf, math.inf),
+    over: str | None = None, values: Any = None, at: Mapping[str, float] | None = None, accuracy: float = 1e-8,
+    neutral: float = 0.0, certify: bool = True, report: Report = lambda _: None,
+) -> Spectrum | Diagram:  # fmt: skip
+    """Roots s of (s^2 M + s C + K) x = 0 in a window, none missed: what grows by itself, and how fast.
+
+    Args:
+        body: a body.toml of matrices or its folder, a modal file or basis, matrices (M, C, K), none of which need be
+            symmetric, sparse or not, or a `linalg.parametric.Family`.
+        frequency: Hz, from, to; of a body.toml, what its [stability] says if not given. growth: 1/s, from, to. Both may
+            be left out where there are no more than 300 coordinates.
+        over: parameter that matrices scale with, and values: of it, rising; then the roots at each of them come from
+            one basis. at: values of the other parameters.
+        accuracy: relative, of the matrices' entries. neutral: 1/s, growth rates below it are not decided.
+        certify: count the roots by the argument principle too.
+
+    Raises:
+        UserError: matrices of different sizes or with numbers that are not finite, a window without area, an unknown
+            parameter, a value at which a matrix is not defined.
+
+    Examples:
+        A double pendulum under a follower force flutters:
+
+        >>> import microslip as ms
+        >>> found = ms.stability(([[3, 1], [1, 1]], [[0, 0], [0, 0]], [[2 - 3, 3 - 1], [-1, 1]]))
+        >>> found.verdict
+        ('stable', 'unstable')
+    """
+    from .roots.asked import roots_of
+    from .stages.stability import question
+
+    if isinstance(body, str | Path):
+        q = question(Path(body), [], report)
+        window = (q.asked.growth, q.asked.frequency)
+        growth = window[0] if math.isinf(growth[0]) and math.isinf(growth[1]) else growth
+        neutral, body, at = neutral or q.asked.neutral, q.family(), {**q.at, **(at or {})}
+        frequency = frequency or window[1]
+    return roots_of(body, frequency, growth, over, values, at, accuracy, neutral, certify, report)
 
 
 def assemble(

@@ -424,6 +424,28 @@ def bifurcate(
 
 
 @app.command
+def stability(
+    path: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """Does it move by itself: all complex roots in a window of frequencies and growth rates, none missed.
+
+    Args:
+        path: a body.toml (of matrices with [stability]), the folder that holds it, its name, or a modal file.
+    """
+    from .stages.places import is_case, meant
+    from .stages.stability import stability_stage
+
+    path = path if path.suffix == ".h5" else meant(path)
+    if is_case(path) or (path / "case.toml").is_file() and not (path / "body.toml").is_file():
+        raise UserError(f"{path}: is a case; stability is computed of a body or of a modal file: give one of those")
+    with progress(f"stability of {path}", quiet) as report:
+        made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures)
+    _say("\n".join([*lines, *map(str, made)]), quiet)
+    if not complete:
+        raise NotConverged(f"roots are missing in the window; {made[0]} holds those that were found")
+
+
+@app.command
 def backbone(
     case: Path, basis: Path | None = None, /, *, mode: int | None = None, low: float | None = None,
     high: float | None = None, set_: Set = (), quiet: Quiet = False,

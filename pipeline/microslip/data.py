@@ -130,15 +130,33 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Matrices:
-    """A body that another program has assembled: M x'' + (C + G) x' + K x = f, in SI.
+class MatrixTerm:
+    """A matrix that scales with a parameter: factor (value / reference)^power times it is added to those of its role.
 
     Attributes:
-        stiffness, mass: (m, m) symmetric. damping: (m, m), gyroscopic: (m, m) skew, or None.
+        role: ``stiffness``, ``mass``, ``damping``, ``gyroscopic`` or ``circulatory``. matrix: (m, m), sparse or dense,
+            SI, as symmetric as its role says. parameter: its name; ``speed`` is the speed of rotation, rad/s.
+    """
+
+    role: str
+    matrix: Any
+    parameter: str = "speed"
+    power: float = 0.0
+    factor: float = 1.0
+    reference: float = 1.0
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """A body that another program has assembled: M x'' + (C + G) x' + (K + N) x = f, in SI.
+
+    Attributes:
+        stiffness, mass: (m, m) symmetric. damping: (m, m), gyroscopic: (m, m) skew, circulatory: (m, m), or None.
         mesh: the nodes, and cells and sets if they are known. node: (m,) point of each row, -1 for a generalised
             coordinate of a superelement. component: (m,) 0 to 2: displacement along x, y, z; 3 to 5: rotation about
             them; -1 for a generalised coordinate.
         grounded: whether the supports are in the matrices already. messages: what the reader had to assume.
+        terms: what is added at the value of a parameter.
     """
 
     stiffness: csr_matrix
@@ -150,6 +168,8 @@ class Matrices:
     component: Indices
     grounded: bool = False
     messages: tuple[str, ...] = ()
+    circulatory: csr_matrix | None = None
+    terms: tuple[MatrixTerm, ...] = ()
 
     @property
     def count(self) -> int:
@@ -489,6 +509,11 @@ class ModalGroup:
     invariants: Invariants | None = None
     contacts: Mapping[str, ContactState] = field(default_factory=dict)
     residual: Residual | None = None
+    N_r: Annotated[Array | None, Stored(
+        "mode mode", "s^-2", "circulatory: what the stiffness K_r + N_r holds beside the symmetric K_r, of which the "
+        "modes are; of any symmetry", at="modes/N_r", when="the stiffness is not symmetric: friction, follower forces",
+        order=1,
+    )] = None  # fmt: skip
 
     @property
     def frequency(self) -> Array:

@@ -93,7 +93,8 @@ _Findings = list[tuple[str, float, float, str]]
 def _mesh_checks(basis: ModalBasis) -> _Findings:
     mesh = basis.mesh
     needed = basis.source == "elements"  # foreign matrices and measurements may know points alone
-    lacking = 1.0 if not mesh.n_points or (needed and not mesh.n_cells) else 0.0
+    placeless = basis.source == "matrices" and not mesh.n_points  # generalised coordinates alone
+    lacking = 1.0 if not (mesh.n_points or placeless) or (needed and not mesh.n_cells) else 0.0
     found: _Findings = [("mesh: points and cells", lacking, 0.0, f"{mesh.n_points} points, {mesh.n_cells} cells")]
     tables = [*mesh.cells.values(), *(f for blocks in mesh.faces.values() for f in blocks.values())]
     highest = max((int(c.max()) for c in tables if c.size), default=-1)
@@ -102,7 +103,7 @@ def _mesh_checks(basis: ModalBasis) -> _Findings:
     told: list[Any] = [*numbers(mesh), *numbers(basis)]
     told += [a for m in mesh.materials for a in (m.density, m.elasticity, m.expansion)]
     found.append(("body: every number is finite", _not_finite(told), 0.0, ""))
-    unknown = 0.0 if basis.source == "measured" else 1.0  # a test does not weigh
+    unknown = 0.0 if basis.source == "measured" or placeless else 1.0  # a test does not weigh
     mass = max(-basis.mass, 0.0) if basis.mass else unknown
     found.append(("body: mass is positive", mass, 0.0, f"{basis.mass:.6g} kg" if basis.mass else "not known"))
     found.append(("rotation axis has unit length", abs(float(np.linalg.norm(basis.rotation_axis)) - 1), 1e-9, ""))

@@ -62,7 +62,7 @@ from .checks import TOLERANCES, Check, check_basis
 __all__ = ["Check", "check_basis", "open_file", "read_basis", "write_basis"]
 
 FORMAT = "microslip-modal-basis"
-FORMAT_VERSION = "0.1"
+FORMAT_VERSION = "0.2"
 
 CONVENTIONS = {
     "time": "exp(+i Omega t)",
@@ -265,7 +265,8 @@ def _write_state(group: h5py.Group, g: ModalGroup, axis: Array, scales: Scales) 
     where.attrs["stress_stiffening"] = int(g.prestress in ("linear", "nonlinear"))
     where.attrs["spin_softening"] = int(g.spin_softening)
     where.attrs["gyroscopic"] = 0
-    where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r"
+    where.attrs["terms"] = "1: inside K_r and the modes; the gyroscopic term never is, it stands beside as G_r, and a "
+    "circulatory one as N_r"
     write(group, g, scales, part="rotation/")
     for name, s in sorted(g.stresses.items()):
         write(group, s, None, name, part="rotation/")

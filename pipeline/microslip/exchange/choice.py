@@ -135,6 +135,8 @@ def elastic(g: ModalGroup, form: str) -> ModalGroup:
         raise UserError(f"export --to {form}: the modal file holds rigid motions only; ask for more modes")
     some, v = np.ix_(keep, keep), g.invariants
     assert v is not None
+    if g.N_r is not None:
+        raise UserError(f"export --to {form}: this format has no place for circulatory forces (N_r); use mat or mtx")
     cut = replace(
         v,
         shape=v.shape[:, keep],

@@ -17,8 +17,8 @@ from ..data import INTERFACE_ROWS, VOIGT, ModalBasis, ModalGroup, Rows
 from .choice import STATEMENT, node_numbers
 
 _UNITS = {
-    "omega": "rad/s", "frequency": "Hz", "M_r": "1", "C_r": "1/s", "K_r": "1/s2", "G_r": "1/s", "phi": "kg^-1/2",
-    "u_static": "m", "xyz": "m", "damping_ratio": "1",
+    "omega": "rad/s", "frequency": "Hz", "M_r": "1", "C_r": "1/s", "K_r": "1/s2", "G_r": "1/s", "N_r": "1/s2",
+    "phi": "kg^-1/2", "u_static": "m", "xyz": "m", "damping_ratio": "1",
 }  # fmt: skip
 
 
@@ -53,6 +53,8 @@ def _group(g: ModalGroup, xarray: Any) -> Any:
     own = "mode" if g.to_diagonal is None else "own_mode"
     table: dict[str, Any] = {name: ((own,), getattr(g, name)) for name in ("omega", "frequency", "damping_ratio")}
     table |= {name: (("mode", "mode_column"), getattr(g, name)) for name in ("M_r", "C_r", "K_r", "G_r")}
+    if g.N_r is not None:
+        table["N_r"] = (("mode", "mode_column"), g.N_r)
     if g.to_diagonal is not None:
         table["to_diagonal"] = (("mode", "own_mode"), g.to_diagonal)
     if len(g.phi):

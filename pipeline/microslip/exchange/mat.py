@@ -101,6 +101,7 @@ def _group(g: ModalGroup) -> dict[str, Any]:
         "C": g.C_r,
         "K": g.K_r,
         "G": g.G_r,
+        **({} if g.N_r is None else {"N": g.N_r}),
         "Fex1": np.concatenate(loads).conj().T if loads else np.zeros((g.n_modes, 0)),
         "W": np.concatenate(contacts).conj().T if contacts else np.zeros((g.n_modes, 0)),
         "W_row": np.array([f"{n}:{r}" for n in g.interfaces for r in INTERFACE_ROWS], dtype=object).reshape(-1, 1),

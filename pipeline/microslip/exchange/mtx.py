@@ -74,6 +74,8 @@ def folder_complete_or_absent(path: Path, mark: str) -> Iterator[Path]:
 
 def _write_group(g: ModalGroup, folder: Path) -> None:
     tables: dict[str, Array] = {"M_r": g.M_r, "K_r": g.K_r, "C_r": g.C_r, "G_r": g.G_r, "omega": g.omega[:, None]}
+    if g.N_r is not None:
+        tables["N_r"] = g.N_r
     if g.to_diagonal is not None:
         tables["to_diagonal"] = g.to_diagonal
     for kind, named in (
@@ -134,8 +136,9 @@ def _readme(basis: ModalBasis) -> str:
 Body {" ".join(basis.name.split())}, reduction {basis.reduction}.
 {STATEMENT}. Time factor exp(+i omega t).
 
-M_r q'' + (C_r + G_r) q' + K_r q = T^H f, displacements u = T q, with T the rows in interface_*, excitation_* and
-monitor_* (T^H: conjugate transpose, T^T where everything is real). Eigenmodes are scaled to phi^H M phi = 1.
+M_r q'' + (C_r + G_r) q' + (K_r + N_r) q = T^H f, displacements u = T q, with T the rows in interface_*, excitation_*
+and monitor_* (T^H: conjugate transpose, T^T where everything is real); N_r is zero where it has no file. Eigenmodes are
+scaled to phi^H M phi = 1.
 coordinates.csv: what each coordinate is, in the order of rows and columns of the matrices.
 interface_*: rows u_n u_t1 u_t2 phi_n phi_t1 phi_t2 (then characteristic ones), in the frame of the interface, whose
 axes n (outwards), t1, t2 stand in the modal file. omega: rad/s, with nothing on the interfaces.

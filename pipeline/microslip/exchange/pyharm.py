@@ -43,11 +43,12 @@ def pyharm_tables(basis: ModalBasis, g: ModalGroup) -> dict[str, Any]:
         UserError: interface displacements are not coordinates.
     """
     nodes, order = physical_first(basis, g)
+    N = np.zeros_like(g.K_r) if g.N_r is None else g.N_r
     some, faces = np.ix_(order, order), [g.interfaces[name] for name in nodes]
     loads = [rows.rows for rows in g.excitations.values()]
     names = [f"{name}:{label}" for name, rows in g.excitations.items() for label in rows.labels]
     return {
-        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]), "C": g.C_r[some], "G": g.G_r[some],
+        "M": _symmetric(g.M_r[some]), "K": _symmetric(g.K_r[some]) + N[some], "C": g.C_r[some], "G": g.G_r[some],
         "ndofs": 6.0, "nnodes": float(len(nodes)), "nmodes": float(g.n_modes - 6 * len(nodes)),
         "nodes": np.array(nodes, dtype=object).reshape(-1, 1),
         "dofs": np.array(INTERFACE_ROWS, dtype=object).reshape(-1, 1),

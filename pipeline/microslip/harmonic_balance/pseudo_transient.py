@@ -96,7 +96,7 @@ def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
         UserError: motions that not even sticking contacts hold.
     """
     try:
-        shares, motions = scipy.linalg.eigh(part.K, _stuck(part, stiffness))
+        shares, motions = scipy.linalg.eigh(_symmetric(part.K), _stuck(part, stiffness))
     except np.linalg.LinAlgError as error:
         raise UserError(
             "nothing holds the bodies as a whole, and a steady force has no balance there: hold one of them "
@@ -106,8 +106,12 @@ def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
 
 
 def _stuck(part: Linear, stiffness: Array) -> Array:
-    """(m, m) stiffness with sticking contacts."""
-    return part.K + part.rows.conj().T @ stiffness @ part.rows
+    """(m, m) stiffness with sticking contacts, without circulatory forces."""
+    return _symmetric(part.K) + part.rows.conj().T @ stiffness @ part.rows
+
+
+def _symmetric(K: Array) -> Array:
+    return 0.5 * (K + K.conj().T)
 
 
 def _springs(part: Linear, stiffness: Array) -> Array:

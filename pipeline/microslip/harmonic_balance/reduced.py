@@ -270,10 +270,11 @@ def monitored(part: Linear, q: ComplexArray, force: ComplexArray, share: float =
 def work(
     part: Linear, Omega: float, harmonic: int, q: ComplexArray, force: ComplexArray, share: float = 1.0
 ) -> tuple[float, float, float, float]:
-    """Work of a share of the loads, loss in the bodies' own damping, and what the loads would do in phase with the
-    speed, J per cycle, and the largest kinetic energy, J, in one harmonic that is not 0."""
+    """Work of a share of the loads, loss in the bodies' own damping and to circulatory forces, and what the loads would
+    do in phase with the speed, J per cycle, and the largest kinetic energy, J, in one harmonic that is not 0."""
     moved = share * (part.load.conj() @ q - part.given.conj() @ force)
     lost = (q.conj() @ (Omega * harmonic * part.viscous(Omega * harmonic)) @ q).real
+    lost += 0.5 * (q.conj() @ (part.K - part.K.conj().T) @ q).imag
     if part.residual_loss is not None:
         lost += (force.conj() @ part.residual_loss @ force).real
     cycle, kinetic = np.pi * harmonic, 0.5 * (Omega * harmonic) ** 2 * float((q.conj() @ part.M @ q).real)

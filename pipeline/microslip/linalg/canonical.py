@@ -21,6 +21,8 @@ def clusters(values: Array, zero: int = 0) -> list[slice]:
 
 def by_place(points: Array) -> Indices:
     """(3n,) degrees of freedom ordered by the position of their points, so that numbering decides no tie."""
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
     place = np.round((points - points.min(axis=0)) / max(np.ptp(points, axis=0).max(), 1e-300), 6)
     nodes = np.lexsort((place[:, 2], place[:, 1], place[:, 0]))
     return (3 * nodes[:, None] + np.arange(3)).ravel()

@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..data import Array, Compliance, Indices, Matrices, Mesh, ModalBasis, ModalGroup, Residual, UserError
 from ..frames import skew
 from ..linalg import canonical, eigen
+from ..linalg.parametric import state
 from ..reduction import Reduced, stuck
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -39,6 +40,7 @@ def foreign_basis(
         UserError: matrices that do not belong to the positions, missing sets, unheld bodies.
         NotConverged: the spectrum could not be certified.
     """
+    body = state(body, values_of(settings))
     report(f"matrices of {body.count} rows, {body.mesh.n_points} nodes")
     layout = _layout(body)
     motions = _rigid_rows(body)
@@ -77,6 +79,11 @@ def foreign_basis(
         source="matrices",
     )  # fmt: skip
     return basis, messages
+
+
+def values_of(settings: BodySettings) -> dict[str, float]:
+    """The state of a body given by its matrices: speed of rotation (rad/s) and the values of its other parameters."""
+    return {"speed": from_rpm(settings.rotation.speeds_rpm[0]), **settings.values}
 
 
 # what the rows mean ------------------------------------------------------------------------------------------------
@@ -185,6 +192,8 @@ def _refuse_missing_nodes(body: Matrices, settings: BodySettings) -> None:
 def _rigid_rows(body: Matrices) -> Array:
     """(m, 6) every row under translations along x, y, z and rotations about the middle of the nodes."""
     points = body.mesh.points
+    if not len(points):
+        return np.zeros((body.count, 6))
     fields = rigid.rigid_fields(points, points.mean(axis=0))
     R = np.zeros((body.count, 6))
     moves = (body.component >= 0) & (body.component < 3)
@@ -221,6 +230,8 @@ def _refuse_other_positions(body: Matrices, R: Array) -> list[str]:
 
 def _inertia(body: Matrices, R: Array) -> tuple[float, Array, Array, list[str]]:
     """Mass, centre, inertia about the centre as the mass matrix has them, and what is odd about it."""
+    if not body.mesh.n_points:  # nothing is known of how its rows move
+        return 0.0, np.zeros(3), np.zeros((3, 3)), []
     gram = R.T @ (body.mass @ R)
     each = np.diag(gram)[:3]
     m = float(each[each > 0].mean()) if (each > 0).any() else 0.0  # of the directions that the matrices have
@@ -242,6 +253,8 @@ def _inertia(body: Matrices, R: Array) -> tuple[float, Array, Array, list[str]]:
 
 def _implausible(mesh: Mesh, mass: float) -> list[str]:
     """Warnings of a mean density that no solid has: a mistake of units."""
+    if not mass:
+        return []
     try:
         volume = ConvexHull(mesh.points).volume
     except (QhullError, ValueError):  # nodes on a plane or a line
@@ -375,6 +388,9 @@ def _group(
     if body.gyroscopic is not None:
         G = reduced.vectors.T @ (body.gyroscopic[free][:, free] @ reduced.vectors)
         G = 0.5 * (G - G.T)
+    N = None
+    if body.circulatory is not None:
+        N = reduced.vectors.T @ (body.circulatory[free][:, free] @ reduced.vectors)
     interfaces = reduced_interfaces(rows, settings, whole, shapes)
     return ModalGroup(
         speed=speed, omega=reduced.omega, kind=reduced.kind, damping_ratio=ratios, M_r=reduced.M_r, K_r=reduced.K_r,
@@ -398,7 +414,7 @@ def _group(
             **s.indicators,
         },
         prestress="none" if not speed else "foreign",
-        residual=_residual(settings, s, layout.width // 3, n),
+        residual=_residual(settings, s, layout.width // 3, n), N_r=N,
     )  # fmt: skip
 
 

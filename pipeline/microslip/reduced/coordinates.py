@@ -61,6 +61,7 @@ def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
         K_r=H @ g.K_r @ V,
         C_r=H @ g.C_r @ V,
         G_r=H @ g.G_r @ V,
+        N_r=None if g.N_r is None else H @ g.N_r @ V,
         phi=g.phi @ V,
         interfaces={k: face(i) for k, i in g.interfaces.items()},
         excitations={k: rows(r) for k, r in g.excitations.items()},

@@ -84,7 +84,8 @@ def frequency_response(
     rows, springs, limits = contact_coordinates(group, contacts)
     found, u = [], np.zeros(len(springs), complex)
     for Omega in 2 * np.pi * np.asarray(frequency):
-        S = group.K_r - Omega**2 * group.M_r + 1j * Omega * (group.C_r + group.G_r)
+        N = 0.0 if group.N_r is None else group.N_r
+        S = group.K_r + N - Omega**2 * group.M_r + 1j * Omega * (group.C_r + group.G_r)
         answer = np.linalg.solve(S, np.column_stack([force.astype(complex), rows.T]))
         u, converged = _solve_contacts(springs, limits, rows @ answer[:, 0], rows @ answer[:, 1:], u)
         F = _stiffness(springs, limits, np.abs(u))[0] * u

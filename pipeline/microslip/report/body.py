@@ -100,6 +100,8 @@ def _facts(basis: ModalBasis) -> list[tuple[str, str]]:
     cells = ", ".join(f"{len(c)} {kind}" for kind, c in mesh.cells.items()) or "no cells"
     inertia = _clean(basis.inertia, float(np.abs(basis.inertia).max()))
     alike = f"one of {basis.sectors} alike round the axis; all numbers here are of one; nodal diameters {held}"
+    if not mesh.n_points:
+        return [("coordinates", "of matrices without nodes"), ("damping given as", basis.damping_source)]
     facts = {
         "mass": f"{number(basis.mass, 6)} kg",
         "sector": alike if basis.sectors > 1 else "",

@@ -229,19 +229,64 @@ UnitSystem = Literal["m-kg-s", "mm-t-s", "mm-kg-ms", "in-lbf-s"]
 class MatrixFiles(Model):
     """Stiffness and mass that another program has assembled, the node and direction of every row, and positions.
 
-    A file that holds several matrices is written FILE#NAME.
+    A file that holds several matrices is written FILE#NAME. circulatory: what the stiffness holds beside its
+    symmetric part (friction, follower forces), any square matrix; modes are those of the symmetric part. Without nodes
+    every row is a generalised coordinate, and the supports are in the matrices.
     """
 
     stiffness: str
     mass: str
     damping: str | None = None
     gyroscopic: str | None = None
+    circulatory: str | None = None
     dofs: str | None = None
-    nodes: str
+    nodes: str | None = None
     units: UnitSystem | None = None
     grounded: bool = False
     superelement: bool = False
     sets: dict[FaceName, Annotated[tuple[NodeNumber, ...], BeforeValidator(_tuple)]] = Field(default_factory=dict)
+
+
+class MatrixTerm(Model):
+    """A matrix that scales with a parameter: factor (value / reference)^power times it is added to those of its role.
+
+    name: of the parameter; ``speed`` is the speed of rotation in rad/s, that of rotation.speeds_rpm. Any other one has
+    the value 1, or that of `values`.
+    """
+
+    role: Literal["stiffness", "mass", "damping", "gyroscopic", "circulatory"]
+    matrix: str
+    name: Name = "speed"
+    power: Annotated[float, BeforeValidator(_float), Field(ge=-8, le=8)] = 1.0
+    factor: Number = 1.0
+    reference: Positive = 1.0
+
+
+class StabilitySettings(Model):
+    """Which roots of (s^2 M + s C + K) x = 0 are wanted: all with growth rates (1/s) and frequencies (Hz) from, to.
+
+    over: parameter of the diagram, with its first and last value in `range`. accuracy: relative, of the matrices'
+    entries. neutral: growth rates (1/s) below it are neither growth nor decay, whatever the accuracy.
+    """
+
+    growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-100.0, 1000.0)
+    frequency: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(_finite_vector)]
+    over: Name = "speed"
+    range: Annotated[tuple[Number, Number] | None, BeforeValidator(_finite_vector)] = None
+    points: Annotated[int, Field(ge=2, le=10000)] = 100
+    tolerance: Annotated[float, BeforeValidator(_float), Field(ge=1e-10, le=1e-2)] = 1e-7
+    accuracy: Annotated[float, BeforeValidator(_float), Field(ge=0, le=0.1)] = 1e-8
+    neutral: NotNegative = 0.0
+    certify: bool = True
+
+    @model_validator(mode="after")
+    def _has_area(self) -> StabilitySettings:
+        for key, (low, high) in (("growth", self.growth), ("frequency", self.frequency)):
+            if low >= high:
+                raise ValueError(f"{key}: from {low:g} to {high:g} the window has no area; give the smaller one first")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise ValueError("range must be two values of the parameter, the second above the first")
+        return self
 
 
 class Geometry(Model):
@@ -668,6 +713,9 @@ class BodySettings(Model):
     modes: Modes = Field(default_factory=Modes)
     damping: Damping = Field(default_factory=Damping)
     output: Output = Field(default_factory=Output)
+    parameters: Annotated[tuple[MatrixTerm, ...], BeforeValidator(_tuple)] = ()
+    values: dict[Name, Number] = Field(default_factory=dict)
+    stability: StabilitySettings | None = None
     note: str = ""
 
     @model_validator(mode="before")
@@ -684,6 +732,8 @@ class BodySettings(Model):
         named_once(self, "closures", "bolts", "interfaces", "excitations", "monitors gauges")
         if self.geometry.matrices is not None:
             self._only_what_matrices_can()
+        elif self.parameters:
+            raise ValueError("parameters: belong to geometry.matrices; remove them")
         elif isinstance(self.material, ForeignMaterial):
             if self.material.source == "matrices" or self.geometry.mesh is None:
                 raise ValueError('material.from: "mesh" needs geometry.mesh; write density, young and poisson instead')
@@ -712,6 +762,15 @@ class BodySettings(Model):
         }  # fmt: skip
         if found := [key for key, value in needs.items() if value]:
             raise ValueError(f"{found[0]}: matrices are of one state and bring no elements for this; remove it")
+        placed = ("supports", "interfaces", "excitations", "monitors")
+        if self.geometry.matrices is not None and self.geometry.matrices.nodes is None:
+            if found := [key for key in placed if getattr(self, key)]:
+                raise ValueError(f"{found[0]}: without nodes there are no places; give geometry.matrices.nodes")
+        known = sorted({term.name for term in self.parameters} - {"speed"})
+        if unknown := sorted(set(self.values) - set(known)):
+            names = ", ".join(known) or "none"
+            way = "rotation.speeds_rpm gives it" if unknown[0] == "speed" else f"choose from {names}"
+            raise ValueError(f"values.{unknown[0]}: no matrix scales with it here; {way}")
 
 
 def load_toml(path: Path | str) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def _from_matrices(job: Job, given: MatrixFiles, report: Report) -> tuple[ModalB
     from ..modal.foreign import foreign_basis
 
     try:
-        body = read_matrices(given, job.folder, job.settings.length_unit)
+        body = read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters)
         basis, messages = foreign_basis(body, job.settings, report, provenance(job, job.path))
     except UserError as error:
         text = str(error)
@@ -92,7 +92,7 @@ def matrices_inputs(job: Job, given: MatrixFiles) -> dict[str, Any]:
     from ..exchange.matrices import files_of
 
     settings = {k: v for k, v in job.raw.items() if k not in ("description", "note")}
-    files = [job.folder / name for name in files_of(given)]
+    files = [job.folder / name for name in files_of(given, job.settings.parameters)]
     if missing := [f for f in files if not store.ordinary(f).is_file()]:
         raise UserError(f"{job.path}: geometry.matrices: there is no file {missing[0]}; correct the path")
     return {"settings": settings, "files": [store.hash_file(f) for f in files]}

@@ -35,7 +35,7 @@ def whirl_rows(modes: GyroscopicModes) -> list[str]:
 
 def basis_summary(basis: ModalBasis) -> list[str]:
     """What a modal file holds, in lines for the terminal."""
-    extent = np.ptp(basis.mesh.points, axis=0) * 1e3
+    extent = np.ptp(basis.mesh.points, axis=0) * 1e3 if basis.mesh.n_points else np.zeros(3)
     lines = [
         f"{basis.name}: {basis.mesh.n_points} points, {basis.mesh.n_cells} cells, mass {basis.mass:.6g} kg, "
         f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm, reduction {basis.reduction}",
@@ -49,6 +49,8 @@ def basis_summary(basis: ModalBasis) -> list[str]:
         if basis.source == "measured":
             proof = "measured: others may have been missed"
         lines.append(f"{state}, nodal diameter {harmonic}: {len(g.omega)} modes, {proof}")
+        if g.N_r is not None:
+            lines.append("  circulatory forces stand beside as N_r: microslip stability tells what they do")
         lines += contact_lines(g)
         lines += [f"  {text}" for text in sentences(g, basis.reduction)]
         lines += [

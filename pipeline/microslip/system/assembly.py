@@ -302,6 +302,7 @@ class Assembly:
         sides = [s for _, _, s in self.sides(component.name)]
         loads = [x for x in self.loads if x.component == component.name and x.harmonic == harmonic]
         M, K, C = at.matrices
+        K = K + at.circulatory
         m = len(M)
         T = [s.motion(at, index, self.blades) for s in sides]
         rows = np.vstack(T) if T else np.zeros((0, m))

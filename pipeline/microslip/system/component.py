@@ -104,6 +104,12 @@ class InWave:
         return self._moving(M), self._moving(K), self._moving(C)
 
     @property
+    def circulatory(self) -> Array:
+        """(m, m) N, what the stiffness holds beside the symmetric part in `matrices`."""
+        N = self.group.N_r
+        return np.zeros_like(self.group.K_r) if N is None else self._moving(N)
+
+    @property
     def loss(self) -> Array | None:
         """(m, m) H, see `Component`."""
         return None if self.own_loss is None else self._moving(self.own_loss)

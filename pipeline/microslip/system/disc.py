@@ -37,6 +37,8 @@ def whole(component: Component) -> Component:
             f"{component.name}: a whole ring needs the same aerodynamic damping for both directions of a nodal "
             'diameter; use ring.model = "sector"'
         )
+    if any(w.group.N_r is not None for w in waves):
+        raise UserError(f"{component.name}: a whole ring has no circulatory forces (N_r); use a sector")
     M, K, C = (scipy.linalg.block_diag(*[_real(w.matrices[i], k, N) for k, w in enumerate(waves)]) for i in range(3))
     first = component.at(0).group
     named: Any = {

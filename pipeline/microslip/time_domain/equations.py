@@ -173,7 +173,8 @@ def of(assembly: Assembly, Omega: float) -> Equations:
     Loss factors of bodies count as dampers that take as much at that frequency.
 
     Raises:
-        UserError: a frequency that is not positive; modes that are not real; a law that does not say what it remembers.
+        UserError: a frequency that is not positive; modes that are not real; a law that does not say what it remembers;
+            circulatory forces.
     """
     bounded("frequency", Omega / (2 * np.pi), gt=0)
     assembly = assembly.unrolled()
@@ -184,6 +185,11 @@ def of(assembly: Assembly, Omega: float) -> Equations:
     parts = {h: assembly.joined(h) for h in (0, 1, *harmonics)}
     mean, first = parts[0], parts[1]
     M, K, C, rows = (_real(a, assembly) for a in (first.M, mean.K, first.viscous(Omega), mean.rows))
+    if circulating := [c.name for c in assembly.components if any(g.N_r is not None for g in c.groups.values())]:
+        raise UserError(
+            f"{circulating[0]}: has circulatory forces (N_r in its modal file), which a motion in time does not take; "
+            "the harmonic balance does, and microslip stability tells whether they make it grow"
+        )
     omega2, V = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
     omega2 = np.where(np.abs(omega2) < SEEN * np.abs(omega2).max(initial=0.0), 0.0, omega2)
     C = V.T @ C @ V

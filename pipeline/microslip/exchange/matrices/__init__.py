@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -10,19 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from ...data import Array, Indices, Matrices, Mesh, UserError
+from ...data import Array, Indices, Matrices, MatrixTerm, Mesh, UserError
 from ...files.store import ordinary
 from ...units import SYSTEMS, usual_system
-from . import calculix, hdf5, market, matlab, nastran
+from . import calculix, hdf5, market, matlab, nastran, numpy_archive
 from .found import Found, Unreadable, pick
 from .nodes import read_dofs, read_nodes
 
 if TYPE_CHECKING:
     from ...settings.body import MatrixFiles
+    from ...settings.body import MatrixTerm as TermSettings
 
 READERS: dict[str, ModuleType] = {
     ".mtx": market, ".mm": market, ".mat": matlab, ".h5": hdf5, ".hdf5": hdf5, ".op4": nastran, ".pch": nastran,
     ".bdf": nastran, ".dat": nastran, ".nas": nastran, ".dmig": nastran, ".sti": calculix, ".mas": calculix,
+    ".npz": numpy_archive,
 }  # fmt: skip
 """Suffix -> module with `names(path)` and `read(path, name)`."""
 
@@ -31,6 +34,7 @@ USUAL = {
     "mass": ("M", "MAA", "MAAX", "MXX", "MGG", "M2GG", "MASS", "M_R"),
     "damping": ("C", "B", "BAA", "BAAX", "BXX", "BGG", "B2GG", "DAMPING", "C_R"),
     "gyroscopic": ("G", "GYRO", "GYROSCOPIC", "G_R"),
+    "circulatory": ("N", "KR", "CIRCULATORY", "N_R"),
 }
 """What programs call a matrix."""
 
@@ -44,18 +48,21 @@ def split(reference: str) -> tuple[str, str]:
     return file, name
 
 
-def files_of(given: MatrixFiles) -> list[str]:
+def files_of(given: MatrixFiles, terms: Sequence[TermSettings] = ()) -> list[str]:
     """Every file a body's matrices are read from."""
-    said = (given.stiffness, given.mass, given.damping, given.gyroscopic, given.dofs, given.nodes)
+    said = (*(getattr(given, role) for role in USUAL), given.dofs, given.nodes, *(term.matrix for term in terms))
     found = [split(text)[0] for text in said if text]
     return sorted({*found, *(str(Path(f).with_suffix(".dof")) for f in found if Path(f).suffix in (".sti", ".mas"))})
 
 
-def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrices:
+def read_matrices(
+    given: MatrixFiles, folder: Path, length_unit: str, terms: Sequence[TermSettings] = ()
+) -> Matrices:  # fmt: skip
     """Read and check a body's matrices, in SI.
 
     Args:
-        given: the table of body.toml. folder: its paths start here. length_unit: of positions.
+        given: the table of body.toml. folder: its paths start here. length_unit: of positions. terms: matrices that
+            scale with a parameter.
 
     Raises:
         UserError: with the file at fault.
@@ -66,15 +73,31 @@ def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrice
             found[role] = _read(folder, reference, role)
     mesh = _nodes(folder, given, length_unit)
     dofs, where = _dofs(folder, given, found, mesh)
-    node, component = _meaning(dofs, mesh, found["stiffness"].matrix.shape[0], given.superelement, where)
-    made, messages = {}, []
-    for role, item in found.items():
-        path = folder / split(getattr(given, role))[0]
+    rows, loose = found["stiffness"].matrix.shape[0], given.superelement or given.nodes is None
+    node, component = _meaning(dofs, mesh, rows, loose, where)
+    made: dict[str, sp.csr_matrix] = {}
+    messages, scaling = list[str](), list[MatrixTerm]()
+
+    def checked(item: Found, role: str, reference: str) -> sp.csr_matrix:
+        path = folder / split(reference)[0]
         matrix = _in_order(item, dofs, path) if item.dofs is not None else item.matrix
-        if matrix.shape[0] != len(node):
-            raise UserError(f"{path}: has {matrix.shape[0]} rows, but there are {len(node)} of the stiffness")
-        made[role], message = _symmetric(matrix, role, path)
-        messages += [message] if message else []
+        if matrix.shape[0] != rows:
+            raise UserError(
+                f"{path}: the {role} matrix {split(reference)[1]} has {matrix.shape[0]} rows and the stiffness {rows}; "
+                "give matrices of the same coordinates"
+            )
+        if role == "circulatory":
+            return matrix
+        matrix, message = _symmetric(matrix, role, path)
+        messages.extend([message] if message else [])
+        return matrix
+
+    for role, item in found.items():
+        made[role] = checked(item, role, getattr(given, role))
+    for term in terms:
+        how = (term.name, term.power, term.factor, term.reference)
+        matrix = checked(_read(folder, term.matrix, term.role), term.role, term.matrix)
+        scaling.append(MatrixTerm(term.role, matrix, *how))
     _check_mass(made["mass"], folder / split(given.mass)[0], dofs)
     system = given.units or usual_system(length_unit)
     if system is None:
@@ -83,9 +106,10 @@ def read_matrices(given: MatrixFiles, folder: Path, length_unit: str) -> Matrice
             + ", ".join(SYSTEMS)
         )
     scaled = {role: _in_si(matrix, role, system, component) for role, matrix in made.items()}
+    scaling = [replace(term, matrix=_in_si(term.matrix, term.role, system, component)) for term in scaling]
     return Matrices(
         scaled["stiffness"], scaled["mass"], scaled.get("damping"), scaled.get("gyroscopic"), mesh, node, component,
-        given.grounded, tuple(messages),
+        given.grounded or given.nodes is None, tuple(messages), scaled.get("circulatory"), tuple(scaling),
     )  # fmt: skip
 
 
@@ -129,6 +153,8 @@ def _read(folder: Path, reference: str, role: str) -> Found:
 
 
 def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
+    if given.nodes is None:
+        return Mesh(np.zeros((0, 3)), {}, {}, {}, np.zeros(0, dtype=np.int64))
     file, name = split(given.nodes)
     path = folder / file
     if not ordinary(path).is_file():
@@ -150,6 +176,8 @@ def _nodes(folder: Path, given: MatrixFiles, unit: str) -> Mesh:
 
 def _dofs(folder: Path, given: MatrixFiles, found: dict[str, Found], mesh: Mesh) -> tuple[Indices, str]:
     """(k, 2) node number and component of the rows, and where that is said."""
+    if given.nodes is None:
+        return np.zeros((0, 2), dtype=np.int64), "nothing"
     if given.dofs is not None:
         path = folder / given.dofs
         if not ordinary(path).is_file():
@@ -191,6 +219,8 @@ def _meaning(dofs: Indices, mesh: Mesh, rows: int, superelement: bool, where: st
     if (count > 1).any():
         n, c = pairs[count > 1][0]
         raise UserError(f"geometry.matrices.dofs: {where} names direction {c} of node {n} twice; correct it")
+    if not physical.any():
+        return np.full(rows, -1), np.full(rows, -1)
     order = np.argsort(mesh.node_id, kind="stable")
     at = np.minimum(np.searchsorted(mesh.node_id, whole[:, 0], sorter=order), len(order) - 1)
     missing = physical & (mesh.node_id[order[at]] != whole[:, 0])
@@ -236,9 +266,12 @@ def _symmetric(matrix: sp.csr_matrix, role: str, path: Path) -> tuple[sp.csr_mat
     wrong = _largest(matrix - sign * matrix.T)
     if wrong > _SYMMETRY * top:
         kind = "skew-symmetric" if sign < 0 else "symmetric"
+        way = ""
+        if role == "stiffness":
+            way = ", or give what is not symmetric (friction, follower forces) the role circulatory"
         raise UserError(
             f"{path}: the {role} matrix is not {kind} (entries differ by {wrong / top:.2g} of the largest); rows and "
-            "columns must be in the same order"
+            f"columns must be in the same order{way}"
         )
     return (0.5 * (matrix + sign * matrix.T)).tocsr(), message
 
@@ -258,7 +291,7 @@ def _in_si(matrix: sp.csr_matrix, role: str, system: str, component: Indices) ->
     """A matrix in SI: rotations stay radians, generalised coordinates keep their own scale."""
     length, mass, time = SYSTEMS[system]
     force = mass * length / time**2
-    per_time = {"stiffness": 1.0, "damping": time, "gyroscopic": time, "mass": time**2}[role]
+    per_time = {"damping": time, "gyroscopic": time, "mass": time**2}.get(role, 1.0)
     # a row reads force (or moment, or generalised force = energy), a column displacement (or angle, or 1)
     size: Array = np.where((component >= 0) & (component < 3), 1.0, length)
     scale = sp.diags(size)

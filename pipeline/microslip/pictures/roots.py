@@ -1,0 +1,31 @@
+"""Complex roots: in their plane, and growth and frequency over a parameter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..roots.diagram import Diagram
+from ..roots.spectrum import Spectrum
+from .plots import empty_figure, plain_axes, save_figure, single_panel
+
+
+def plane_picture(found: Spectrum, path: Path) -> Path:
+    """The roots in the complex plane."""
+    figure, axes = single_panel(7.0, 5.2)
+    found.plot(axes)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return save_figure(figure, path)
+
+
+def over_picture(found: Diagram, path: Path) -> Path:
+    """Growth rates above frequencies, over the parameter."""
+    figure = empty_figure(8.0, 7.2)
+    above, below = figure.subplots(2, 1, sharex=True)
+    for axes in (above, below):
+        plain_axes(axes)
+    found.plot(above, "growth")
+    found.plot(below, "frequency")
+    above.set_xlabel("")
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3), frameon=False, fontsize=9)
+    return save_figure(figure, path)

@@ -1,0 +1,77 @@
+"""From what a caller gives to the roots: matrices checked, the window closed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..data import MatrixTerm, ModalBasis, UserError
+from ..linalg import quadratic
+from ..linalg.parametric import Family, family_of_group
+from ..linalg.quadratic import Quadratic, Window
+from .diagram import Diagram, diagram
+from .spectrum import Spectrum, spectrum
+
+Report = Callable[[str], None]
+
+
+def roots_of(
+    body: Any, frequency: tuple[float, float] | None, growth: tuple[float, float], over: str | None, values: Any,
+    at: Mapping[str, float] | None, accuracy: float, neutral: float, certify: bool, report: Report,
+) -> Spectrum | Diagram:  # fmt: skip
+    """See `bodies.stability`; body: a basis, matrices or a family."""
+    family = _family(body)
+    window = _window(family, growth, frequency)
+    if over is None:
+        Q = family.at(at or {})
+        return spectrum(Q, window, accuracy=accuracy, neutral=neutral, certify=certify, report=report)
+    points = np.asarray([] if values is None else values, dtype=float)
+    if len(points) < 2 or not np.isfinite(points).all() or (np.diff(points) <= 0).any():
+        raise UserError(f"stability: values: of '{over}' must be two or more rising numbers")
+    return diagram(family, over, points, window, at=at, neutral=neutral, report=report)
+
+
+def _family(body: Any) -> Family:
+    if isinstance(body, Family):
+        return body
+    if isinstance(body, ModalBasis):
+        return family_of_group(body.name, body.groups[min(body.groups)])
+    if isinstance(body, Quadratic):
+        body = (body.M, body.C, body.K)
+    if not isinstance(body, tuple | list) or len(body) != 3:
+        raise UserError("stability: give a path, a modal basis or three matrices (M, C, K)")
+    found = [_matrix(A, key) for A, key in zip(body, "MCK", strict=True)]
+    sizes = {key: A.shape[0] for A, key in zip(found, "MCK", strict=True)}
+    if len(set(sizes.values())) > 1:
+        told = ", ".join(f"{key} {n} x {n}" for key, n in sizes.items())
+        raise UserError(f"stability: the matrices are {told}; give them the same size")
+    if any(map(sp.issparse, found)):
+        found = [sp.csr_matrix(A) for A in found]
+    return Family(tuple(MatrixTerm(r, A) for r, A in zip(("mass", "damping", "stiffness"), found, strict=True)))
+
+
+def _matrix(A: Any, key: str) -> Any:
+    A = A.tocsr().astype(float) if sp.issparse(A) else np.atleast_2d(np.asarray(A, dtype=float))
+    if A.ndim != 2 or A.shape[0] != A.shape[1]:
+        raise UserError(f"stability: {key}: has shape {A.shape}; give a square matrix")
+    if not np.isfinite(A.data if sp.issparse(A) else A).all():
+        raise UserError(f"stability: {key}: holds a number that is not finite; correct it")
+    return A
+
+
+def _window(family: Family, growth: tuple[float, float], frequency: tuple[float, float] | None) -> Window:
+    """The window in 1/s and rad/s; where everything is computed at once it may be open."""
+    small = family.terms[0].matrix.shape[0] <= quadratic.DENSE
+    low, high = frequency or (0.0, math.inf)
+    if not small and not np.isfinite([low, high, *growth]).all():
+        raise UserError("stability: frequency and growth: give both ends of both for matrices of this size")
+    if not 0 <= low < high or not growth[0] < growth[1]:
+        raise UserError(
+            f"stability: the window of {low:g} to {high:g} Hz and {growth[0]:g} to {growth[1]:g} 1/s has no area or "
+            "begins below 0 Hz; give the smaller number first"
+        )
+    return Window((float(growth[0]), float(growth[1])), (2 * np.pi * low, 2 * np.pi * high))

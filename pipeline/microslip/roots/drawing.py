@@ -1,0 +1,122 @@
+"""Roots in diagrams of matplotlib: their plane, and growth and frequency over a parameter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import Array, ComplexArray
+from ..units import to_rpm
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .diagram import Diagram
+    from .spectrum import Spectrum
+
+KINDS = (
+    ("stable", "#0b4f9c", "o", "#0b4f9c"),
+    ("neutral", "#5b6270", "s", "white"),
+    ("unstable", "#c8382c", "^", "#c8382c"),
+)
+COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f")
+GREY = "#b4bac6"
+LABELLED = 8
+"""Roots that grow and are named in a picture."""
+
+
+def new_axes() -> Axes:
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(layout="constrained")[1]
+
+
+def plane(axes: Axes, found: Spectrum) -> None:
+    """Growth rate to the right, frequency upwards; the side that grows is tinted."""
+    verdict, kilo = np.array(found.verdict), _kilo(found.frequency)
+    y = found.frequency / kilo
+    for kind, colour, mark, inside in KINDS:
+        own = verdict == kind
+        axes.plot(
+            found.growth[own], y[own], mark, color=colour, markerfacecolor=inside, markersize=7,
+            label=f"{kind} ({int(own.sum())})", ls="", clip_on=False, zorder=3,
+        )  # fmt: skip
+    axes.axvline(0.0, color="#333333", linewidth=0.9)
+    left, right = axes.get_xlim()
+    right = max(right, 0.15 * (right - left))
+    axes.axvspan(0.0, right, color=KINDS[2][1], alpha=0.06, lw=0)
+    axes.set_xlim(left, right)
+    grow = np.flatnonzero(verdict == "unstable")
+    for i in grow[np.argsort(-found.growth[grow])][:LABELLED]:
+        text = f"{found.frequency[i]:.2f} Hz\n{found.growth[i]:+.4g} 1/s"
+        beyond = found.growth[i] > left + 0.75 * (right - left)
+        axes.annotate(
+            text, (found.growth[i], y[i]), (-8 if beyond else 8, 0), textcoords="offset points", fontsize=8,
+            va="center", ha="right" if beyond else "left",
+        )  # fmt: skip
+    low, high = np.array(found.window.omega) / (2 * np.pi * kilo)
+    high = high if np.isfinite(high) else 1.1 * max(float(y.max(initial=0.0)), 1e-12)
+    axes.set(xlabel="growth rate in 1/s", ylabel=f"frequency in {'kHz' if kilo > 1 else 'Hz'}", ylim=(low, high))
+
+
+def over(axes: Axes, found: Diagram, frequency: bool) -> None:
+    """Growth rates, or frequencies, over the parameter: in colour what grows anywhere, the others grey."""
+    growing, others = _sorted(found)
+    x, label = _abscissa(found)
+    every = [*growing, *others]
+    kilo = _kilo(np.concatenate([b.imag[np.isfinite(b)] for b in every]) / (2 * np.pi)) if every else 1.0
+
+    def values(b: ComplexArray) -> Array:
+        return b.imag / (2 * np.pi * kilo) if frequency else b.real
+
+    for i, b in enumerate(others):
+        axes.plot(x, values(b), color=GREY, linewidth=1.0, label="" if i else "never grow")
+    for i, b in enumerate(growing):
+        told = f"{np.nanmin(b.imag) / (2 * np.pi):.5g} to {np.nanmax(b.imag) / (2 * np.pi):.5g} Hz"
+        axes.plot(x, values(b), color=COLOURS[i % len(COLOURS)], linewidth=1.8, label=told)
+    axes.set(xlabel=label, ylabel=f"frequency in {'kHz' if kilo > 1 else 'Hz'}" if frequency else "growth rate in 1/s")
+    if not frequency:
+        axes.axhline(0.0, color="#333333", linewidth=0.9)
+        _growth_scale(axes, growing)
+
+
+def _sorted(found: Diagram) -> tuple[list[ComplexArray], list[ComplexArray]]:
+    """Branches that grow anywhere, the fastest first, and the others."""
+    growing, others = list[ComplexArray](), list[ComplexArray]()
+    for b in found.branches:
+        (growing if _grows(b, found) else others).append(b)
+    return sorted(growing, key=lambda b: -float(np.nanmax(b.real))), others
+
+
+def _grows(b: ComplexArray, found: Diagram) -> bool:
+    """Whether a branch grows by more than its error somewhere."""
+    for value, s, error in zip(b, found.s, found.error, strict=True):
+        at = np.flatnonzero(s == value)
+        if len(at) and value.real > max(found.neutral, float(error[at[0]])):
+            return True
+    return False
+
+
+def _kilo(frequency: Array) -> float:
+    return 1e3 if frequency.max(initial=0.0) >= 2e3 else 1.0
+
+
+def _growth_scale(axes: Axes, growing: list[ComplexArray]) -> None:
+    """Linear about 0 and logarithmic beyond, where growth rates differ by more than a factor of 20."""
+    tops = [float(np.nanmax(b.real)) for b in growing]
+    if tops and max(tops) > 20 * min(tops):
+        width = max(min(tops), 1e-3 * max(tops))
+        low, high = axes.get_ylim()
+        axes.set_yscale("asinh", linear_width=width)
+        decades = 10.0 ** np.arange(np.round(np.log10(width)), np.log10(max(abs(low), high)) + 1)
+        ticks = [t for t in (*-decades[::-1], 0.0, *decades) if low <= t <= high]
+        axes.set_yticks(ticks, [f"{t:g}" for t in ticks])
+        axes.set_yticks([], minor=True)
+        axes.set_ylim(low, high)
+
+
+def _abscissa(found: Diagram) -> tuple[Array, str]:
+    if found.parameter == "speed":
+        return to_rpm(found.values), "speed in rpm"
+    return found.values, found.parameter

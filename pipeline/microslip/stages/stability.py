@@ -1,0 +1,215 @@
+"""Roots of a body about its equilibrium or steady sliding: tables, pictures, a page that begins with the answer."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..data import UserError
+from ..files import hdf5, store
+from ..files.tables import columns_csv, rows_csv
+from ..linalg.parametric import Family, family_of, family_of_group
+from ..linalg.quadratic import Window
+from ..modal.foreign import values_of
+from ..report.roots import roots_html
+from ..roots.diagram import Diagram, diagram
+from ..roots.spectrum import Spectrum, spectrum
+from ..settings.body import StabilitySettings
+from ..units import rpm_text
+from .job import Job, open_job
+from .modal import matrices_inputs, modes_stage
+from .stage import Made, Report, Stage
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of which matrices.
+
+    Attributes:
+        name: for titles. folder: of the products. where: begins a refusal. family: makes the matrices. at: values of
+            their parameters. window, asked: of [stability]. inputs: what the answer depends on.
+    """
+
+    name: str
+    folder: Path
+    where: Path
+    family: Callable[[], Family]
+    at: Mapping[str, float]
+    window: Window
+    asked: StabilitySettings
+    inputs: Mapping[str, Any]
+
+    @property
+    def state(self) -> str:
+        """Where the roots of the table are taken: "At 120 rpm"."""
+        others = [f"{name} = {value:g}" for name, value in self.at.items() if name != "speed"]
+        return "At " + ", ".join([rpm_text(self.at["speed"]), *others])
+
+
+def stability_stage(
+    path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it.
+
+    Returns:
+        The files, sentences and lines of a table, and whether the roots are proved complete.
+
+    Raises:
+        UserError: no window, a parameter that there is not, a case.
+    """
+    q = question(path, assignments, report)
+    stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report)
+    stage.make({**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
+    told = json.loads(stage.product.read_text())
+    return [q.folder / name for name in told["files"]], told["lines"], told["complete"]
+
+
+def question(path: Path, assignments: list[str], report: Report = lambda _: None) -> Question:
+    """What a body.toml or a modal file asks.
+
+    Raises:
+        UserError: matrices without a window, a case.
+    """
+    if path.suffix == ".h5":
+        return _of_basis(path, None)
+    job = open_job(path, assignments)
+    given, asked = job.settings.geometry.matrices, job.settings.stability
+    if given is None:
+        return _of_basis(modes_stage(job, report=report)[0], asked)
+    if asked is None:
+        raise UserError(f"{job.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+    return Question(
+        job.settings.name, job.build_folder, job.path, lambda: family(job), values_of(job.settings), window_of(asked),
+        asked, matrices_inputs(job, given),
+    )  # fmt: skip
+
+
+def _of_basis(file: Path, asked: StabilitySettings | None) -> Question:
+    """All roots of a modal file's first speed, or those in a window."""
+    basis = read_basis(file)
+    g = basis.groups[min(basis.groups)]
+    if asked is None:
+        highest = float(g.omega.max(initial=1.0)) / np.pi  # twice the frequency of the highest mode
+        asked = StabilitySettings(growth=(-2 * np.pi * highest, 2 * np.pi * highest), frequency=(0.0, highest))
+    inputs = {"basis": store.hash_file(file), "stability": asked.model_dump()}
+    reduced, window = family_of_group(basis.name, g), window_of(asked)
+    return Question(basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window, asked, inputs)
+
+
+def window_of(asked: StabilitySettings) -> Window:
+    """The window in 1/s and rad/s."""
+    low, high = asked.frequency
+    return Window(asked.growth, (2 * np.pi * low, 2 * np.pi * high))
+
+
+def family(job: Job) -> Family:
+    """The matrices of a body, with what scales with parameters.
+
+    Raises:
+        UserError: see `exchange.matrices.read_matrices`.
+    """
+    from ..exchange.matrices import read_matrices
+
+    given = job.settings.geometry.matrices
+    assert given is not None
+    try:
+        return family_of(read_matrices(given, job.folder, job.settings.length_unit, job.settings.parameters))
+    except UserError as error:
+        text = str(error)
+        raise UserError(text if text.startswith(str(job.folder)) else f"{job.path}: {text}") from error
+
+
+def _work(stage: Stage, q: Question, pictures: bool) -> Made:
+    matrices, asked, report = q.family(), q.asked, stage.report
+    try:
+        for value in asked.range or ():
+            matrices.values({**q.at, asked.over: value}, asked.over)
+        Q = matrices.at(q.at)
+    except UserError as error:
+        raise UserError(f"{q.where}: {error}") from error
+    found = spectrum(
+        Q, q.window, accuracy=asked.accuracy, neutral=asked.neutral, certify=asked.certify, report=report
+    )  # fmt: skip
+    over = None
+    if asked.range is not None:
+        over = diagram(
+            matrices, asked.over, np.linspace(*asked.range, asked.points), q.window, at=q.at,
+            tolerance=asked.tolerance, neutral=asked.neutral, report=report,
+        )  # fmt: skip
+    stage.begin()
+    names = _written(q, found, over, pictures)
+    told = {
+        "files": names,
+        "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else [])],
+        "complete": found.complete or not asked.certify,
+    }
+    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    return Made([q.folder / name for name in names])
+
+
+def _written(q: Question, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:
+    """Names of the files, the page first."""
+    folder = q.folder
+    drawn = _pictures(found, over, folder / "pictures") if pictures else {}
+    texts = {
+        "stability.html": roots_html(f"{q.name}: stability", q.state, found, over, drawn),
+        "stability.csv": table_csv(found),
+    }
+    if over is not None:
+        texts["stability_over.csv"] = columns_csv(over.columns, 12)
+    for name, text in texts.items():
+        store.write_text(folder / name, text)
+    write_roots(folder / "stability.h5", found, over, q.at)
+    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
+
+
+def write_roots(path: Path, found: Spectrum, over: Diagram | None, values: Mapping[str, float]) -> None:
+    """Roots, their right and left vectors, and the roots over a range, as HDF5 with named dimensions.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    with store.complete_or_absent(path) as temporary:
+        with hdf5.create(temporary) as file:
+            file.attrs["format"], file.attrs["complete"] = "microslip-roots", int(found.complete)
+            file.attrs["values"] = json.dumps(dict(values))
+            where = file.create_group("roots")
+            for name, column in found.columns.items():
+                hdf5.put(where, name, np.array(column), dims=("root",))
+            hdf5.put(where, "s", found.roots.s, "1/s", ("root",))
+            for name, vectors in (("shape", found.roots.x), ("left", found.roots.y)):
+                hdf5.put(where, name, vectors, dims=("coordinate", "root"))
+            for name, column in over.columns.items() if over else ():
+                hdf5.put(file.require_group("over"), name, column, dims=("row",))
+        hdf5.seal(temporary)
+
+
+def _pictures(found: Spectrum, over: Diagram | None, folder: Path) -> dict[str, Path]:
+    from ..pictures.roots import over_picture, plane_picture
+
+    folder.mkdir(exist_ok=True)
+    drawn = {"plane": plane_picture(found, folder / "roots.png")}
+    if over is not None:
+        drawn["over"] = over_picture(over, folder / "roots_over.png")
+    return drawn
+
+
+def table_csv(found: Spectrum) -> str:
+    """One row a root, sixteen digits."""
+    rows = zip(*found.columns.values(), strict=True)
+    return rows_csv(found.columns, ((v if isinstance(v, str) else f"{v:.16g}" for v in row) for row in rows))
+
+
+def table_lines(found: Spectrum) -> list[str]:
+    """The table for the terminal."""
+    head = f"{'Hz':>14} {'growth 1/s':>14} {'damping':>11}  {'':8} {'backward error':>14}"
+    c = found.columns
+    shown = ("frequency_Hz", "growth_1_s", "damping_ratio", "verdict", "backward_error")
+    rows = zip(*(c[k] for k in shown), strict=True)
+    return [head, *(f"{f:14.7f} {g:14.7g} {d:11.3e}  {v:8} {e:14.1e}" for f, g, d, v, e in rows)]
