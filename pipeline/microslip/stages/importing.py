@@ -20,7 +20,7 @@ from ..mesh import UNITS, mesh_problems, read_mesh
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
-MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".op4", ".pch", ".dmig", ".sti", ".mas")
+MATRICES = (".mtx", ".mm", ".mat", ".h5", ".hdf5", ".npz", ".op4", ".pch", ".dmig", ".sti", ".mas")
 _NODES = (".inp", ".cdb", ".csv", ".txt", ".bdf", ".dat", ".msh", ".med", ".unv")
 _MESHES = (".inp", ".cdb", ".msh", ".med", ".unv")
 CAD = (".step", ".stp", ".brep", ".iges", ".igs")
