@@ -161,6 +161,7 @@ def by_scipy(system: Dynamics, orbit: Orbit) -> np.ndarray:
     return np.linalg.eigvals(end[n:].reshape(n, n))
 
 
+@pytest.mark.slow
 def test_multipliers_are_those_of_the_variational_equation() -> None:
     """And do not depend on the number of nodes."""
     system = chemical().system
