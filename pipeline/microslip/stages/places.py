@@ -30,7 +30,7 @@ def meant(path: Path, root: Path = Path("."), case: bool = False) -> Path:
     Raises:
         UserError: nothing of that name, with those that there are.
     """
-    beside = path.with_name("case.toml")
+    beside = path.parent / "case.toml"
     if case and path.name in ("body.toml", "system.toml") and beside.is_file():
         return beside
     kinds = ("case",) if case else ("body", "system", "case")
