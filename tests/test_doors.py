@@ -107,7 +107,9 @@ def test_links_give_way_to_exports(form: str, folder: Path) -> None:
     before = (folder / "mine").lstat()
     (folder / "out").symlink_to("mine")
     assert main(["export", "basis.h5", "--to", form, "-o", "out"]) == (2 if form == "mtx" else 0)
-    assert (folder / "mine").lstat() == before and (folder / "out").is_symlink() == (form == "mtx")
+    after = (folder / "mine").lstat()  # a look into a folder may count as a use of it
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    assert (folder / "out").is_symlink() == (form == "mtx")
 
 
 def test_init_writes_through_no_link(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
