@@ -24,8 +24,9 @@ import numpy as np
 
 from ..continuation import Point, Settings, follow, start
 from ..data import Array, UserError
+from ..files.hdf5 import refuse_foreign
 from ..results.checks import Checks
-from ..results.files import Response, write_response
+from ..results.files import FORMAT, Response, write_response
 from ..results.series import Series
 from ..system import assembly
 from ..system.assembly import Linear
@@ -104,11 +105,16 @@ class Backbone:
         if not len(self.amplitude):
             return f"<Backbone: no points; {self.status}>"
         f, a, d = (f"{v[0]:.5g} to {v[-1]:.5g}" for v in (self.frequency, self.amplitude, self.damping))
-        most, ended = f"at most {self.damping.max():.3g}", "complete" if self.complete else self.status
-        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {ended}>"
+        most = f"at most {self.damping.max():.3g}"
+        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {self.status}>"
 
     def save(self, path: Path | str) -> Path:
-        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it."""
+        """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it.
+
+        Raises:
+            UserError: a file that is no response stands there.
+        """
+        refuse_foreign(path, FORMAT)
         known = {"frequency": self.frequency, "parameter": self.amplitude, "damping_ratio": self.damping, "x": self.x}
         known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)
