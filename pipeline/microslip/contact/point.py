@@ -120,13 +120,15 @@ class PointContact(Law):
         lag where the law has none."""
         share, growth = jax.jvp(self.normal.share, (u[:, 0],), (v[:, 0],))
         pressed = self._pressed(u[:, 0], v[:, 0])
-        held = self.friction.coefficient(jnp.zeros_like(pressed), pressed, time) * pressed
+        mu = self.friction.coefficient(jnp.zeros_like(pressed), pressed, time)
+        held = mu * pressed
         beta = lag if self.damping is None else self.damping
         stretching = self.stiffness_1 * share * v.T[1:]
         trial = x + beta * stretching
         beyond = jnp.maximum(1 - ratio(held, norm(trial), 1.0), 0.0) * trial
         lets_go = ratio(jnp.minimum(growth, 0.0), share) * x
         rate = jnp.where(share > 0, stretching - beyond / beta + lets_go, -x / beta)
+        rate = jnp.where(mu > 0, rate, 0.0)  # without friction nothing is remembered, however long the steps are
         return jnp.concatenate([pressed[None], trial - beyond]).T, rate
 
     def memory(self, force: Array, state: PointState) -> Array:
