@@ -87,3 +87,10 @@ def test_starts_that_fit_no_coordinate_are_refused_and_infinite_ones_are_told() 
     growing = ms.structure(1.0, 1.0, -1.0, force={0: 1.0}, output=0)
     found = ms.integrate_many(growing, 1.0, [[1.0]], [[0.0]], unit="rad/s", settle=300, keep=2)
     assert found.attractor[0] < 0 and "diverge" in repr(found)
+
+
+def test_a_contact_without_friction_remembers_nothing() -> None:
+    """Its steps are as long as the motion allows: a force that nobody feels may not grow in them."""
+    u, v = np.array([[1e-6, 0.0, 0.0]]), np.array([[0.0, 1.0, 2.0]])
+    force, rate = BOOK.law.rates(u, v, np.full((2, 1), 1e-3), 0.0, 0.0)
+    assert force[0, 0] > 0 and not np.any(rate) and not np.any(force[0, 1:])
