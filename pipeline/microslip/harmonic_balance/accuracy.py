@@ -90,8 +90,12 @@ def samples_of(problem: Problem) -> int:
     return max((g.model.samples for g in problem.groups if isinstance(g.model, AFT)), default=0)
 
 
-def finer(problem: Problem, harmonics: int, samples: int = 0) -> Problem:
-    """The same assembly with more harmonics, and samples enough for them, or as many as are given if that is more."""
+def finer(problem: Problem, harmonics: int, samples: int = 0, seldom: bool = False) -> Problem:
+    """The same assembly with more harmonics, and samples enough for them, or as many as are given if that is more.
+
+    Args:
+        seldom: see `forces.AFT`.
+    """
     together, least = len(problem.parts[0]) == 1, max(PER_HARMONIC * harmonics, samples)
     parts = [
         *problem.parts[: harmonics + 1],
@@ -100,7 +104,7 @@ def finer(problem: Problem, harmonics: int, samples: int = 0) -> Problem:
     groups = []
     for g in problem.groups:
         if isinstance(g.model, AFT) and g.model.samples < least:
-            g = replace(g, model=replace(g.model, samples=least))
+            g = replace(g, model=replace(g.model, samples=least, seldom=seldom))
         groups.append(g)
     return replace(problem, harmonics=harmonics, parts=tuple(parts), groups=tuple(groups))
 
@@ -109,7 +113,7 @@ def error(problem: Problem, x: Array, Omega: float, output: int = 0) -> Error:
     """Estimated error of the solution x (size,) at Omega (rad/s)."""
     before, samples = _read(problem, x, Omega, output), samples_of(problem)
     sampled, first = _resolved(problem, x, Omega)
-    larger = finer(sampled, more(problem.harmonics))
+    larger = finer(sampled, more(problem.harmonics), seldom=True)
     second = newton(larger.at(Omega), np.concatenate([first.x, np.zeros(larger.size - problem.size)]))
     by_samples = by_harmonics = np.inf
     if first.converged:
@@ -129,7 +133,7 @@ def _resolved(problem: Problem, x: Array, Omega: float) -> tuple[Problem, Point]
     """With more samples, as many as it takes for one to lie where each contact sticks, and its solution."""
     samples = DENSER * samples_of(problem)
     while True:
-        sampled = finer(problem, problem.harmonics, samples)
+        sampled = finer(problem, problem.harmonics, samples, seldom=True)
         point = newton(sampled.at(Omega), x)
         if not point.converged or not samples or samples > FINEST or not _blind(sampled, point.x, Omega):
             return sampled, point
@@ -151,7 +155,7 @@ def _blind(problem: Problem, x: Array, Omega: float) -> bool:
 def left_out(problem: Problem, x: Array, Omega: float) -> float:
     """Largest motion that twice the harmonics and samples ask for at once, over the largest there is: cheap, without
     what it does to the others."""
-    larger = finer(problem, more(problem.harmonics), 2 * samples_of(problem))
+    larger = finer(problem, more(problem.harmonics), 2 * samples_of(problem), seldom=True)
     residual = larger.at(Omega).residual(np.concatenate([x, np.zeros(larger.size - problem.size)]))
     return float(np.abs(residual).max() / max(np.abs(x).max(), 1e-300))
 

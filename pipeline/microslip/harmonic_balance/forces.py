@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics
-from ..contact.law import Law, point_axes, program
+from ..contact.law import Law, point_axes, program, seldom
 from ..contact.patch import Patch
 from ..data import Array
 from .point_cycles import Cycle, Traced, needs_rate, traced
@@ -53,6 +53,7 @@ class AFT:
     Attributes:
         patch. contacts: c, how many equal ones. samples: of a cycle. cycles: at most, the last one counts.
         periodicity: they end when the sliders are periodic within this share of the largest force; 0 marches all.
+        seldom: whether the forces are asked for some dozens of times only, as of an estimate of error.
     """
 
     patch: Patch
@@ -60,6 +61,7 @@ class AFT:
     samples: int
     cycles: int
     periodicity: float = 1e-10
+    seldom: bool = False
 
     @cached_property
     def law(self) -> Law:
@@ -67,27 +69,33 @@ class AFT:
         return repeated(self.patch.law, len(self.patch.points), self.contacts)
 
     @property
-    def _few(self) -> bool:
-        return self.contacts * len(self.patch.points) <= CHUNK
+    def _programs(self) -> tuple[Any, Any]:
+        """What finds the force, and the force with its derivative."""
+        few = self.contacts * len(self.patch.points) <= CHUNK
+        return (_seldom if self.seldom else _few) if few else _many
 
     @cached_property
     def kinematics(self) -> Any:
         """(n, 3, k) jax array."""
         return jnp.asarray(self.patch.kinematics)
 
+    def _given(self, u: Array, period: float) -> tuple[Any, ...]:
+        """Arguments of the programs; a NumPy number as the period would compile them again."""
+        return self.law, self.kinematics, u, float(period), self.periodicity, self.samples, self.cycles
+
     def force(self, u: Array, period: float) -> Array:
-        alone = _alone if self._few else _alone_of_many
-        return np.asarray(alone(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
+        alone, _ = self._programs
+        return np.asarray(alone(*self._given(u, period)))
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
-        both = _both if self._few else _both_of_many
-        F, J = both(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles)
+        _, both = self._programs
+        F, J = both(*self._given(u, period))
         return np.asarray(F), np.asarray(J)
 
     def rate(self, u: Array, period: float) -> Array | None:
         if not needs_rate(self.patch.law):
             return None
-        return np.asarray(_rate(self.law, self.kinematics, u, period, self.periodicity, self.samples, self.cycles))
+        return np.asarray(_rate(*self._given(u, period)))
 
     def point_cycles(self, u: Array, period: float) -> list[Cycle]:
         return [one.cycle for one in self.traced(u, period)]
@@ -135,9 +143,12 @@ def _force(
     return jnp.einsum("nia,cniw->caw", G, force.reshape(u.shape[0], G.shape[0], 3, u.shape[2]))
 
 
-_alone, _both = (partial(program, static_argnames=("samples", "count"))(f) for f in (_force, _with_slopes))
-_alone_of_many, _both_of_many = (jax.jit(f, static_argnames=("samples", "count")) for f in (_force, _with_slopes))
-"""The same, a fifth to a third faster and compiled half a second longer, which pays for hundreds of points."""
+def _compiled(how: Any) -> tuple[Any, Any]:
+    return how(_force, static_argnames=("samples", "count")), how(_with_slopes, static_argnames=("samples", "count"))
+
+
+_few, _seldom, _many = map(_compiled, (program, seldom, jax.jit))
+"""The last is a fifth to a third faster and compiled half a second longer, which pays for hundreds of points."""
 
 
 @partial(program, static_argnames=("samples", "count"))

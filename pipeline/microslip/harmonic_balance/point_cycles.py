@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..contact.harmonics import fourier
-from ..contact.law import Law, State, Step, program
+from ..contact.law import Law, State, Step, seldom
 from ..contact.periodic import periodic
 from ..contact.point import PointContact
 from ..data import Array
@@ -54,7 +54,7 @@ def traced(law: Law, G: Array, u: Array, period: float, samples: int, count: int
         law: of n points. G: (n, 3, k) kinematics. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... period: s.
         samples: of a cycle. count: cycles marched at most before. periodicity: see `contact.periodic.periodic`.
     """
-    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), period, samples, count, periodicity)
+    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), float(period), samples, count, periodicity)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 
@@ -77,7 +77,7 @@ def derivative(coefficients: int) -> Array:
     return out
 
 
-@partial(program, static_argnames=("samples", "count"))
+@partial(seldom, static_argnames=("samples", "count"))
 def _point_cycles(
     law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
     periodicity: jax.Array | float,
