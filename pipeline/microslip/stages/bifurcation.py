@@ -26,7 +26,7 @@ from ..settings.body import override
 from ..settings.mistakes import validate
 from ..system.assembly import Assembly
 from ..system.lumped import load_system
-from .checkpoint import hashes_of
+from .checkpoint import inputs_of
 from .places import lumped
 from .stage import Made, Report, Stage, hash_of_code
 
@@ -92,12 +92,7 @@ def bifurcation_stage(
     if not settings.bifurcation:
         raise UserError(f"{case_path}: bifurcation: is missing; add [[bifurcation]] with keys, start and stop")
     stage = Stage(folder / "bifurcation.json", ("stages.bifurcation",), force, report)
-    inputs = {
-        "case": checkpoint.without_defaults(raw),
-        "basis": hashes_of(files),
-        "pictures": pictures,
-        "files": hashes_of(checkpoint.files_of(settings, case_path)),
-    }
+    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
     own = {key: value for key, value in checkpoint.without_defaults(raw).items() if key != "bifurcation"}
     depends = {**inputs, "case": own, "pictures": None, "code": hash_of_code(stage.code)}
     stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..case import checkpoint
+from ..case import CaseSettings, checkpoint
 from ..case.assemble import Built
 from ..contact.kinds import sources_of_others
 from ..data import UserError
@@ -21,6 +21,17 @@ from .stage import hash_of_code
 def hashes_of(files: Mapping[str, Path]) -> dict[str, str]:
     """Name -> hash of files; what is missing is told where it is read."""
     return {name: store.hash_file(file) for name, file in files.items() if file.is_file()}
+
+
+def inputs_of(
+    raw: Mapping[str, Any], settings: CaseSettings, path: Path, modal_files: Mapping[str, Path]
+) -> dict[str, Any]:  # fmt: skip
+    """What an answer to a case depends on: the case without the keys that say nothing, and hashes of its files."""
+    return {
+        "case": checkpoint.without_defaults(raw),
+        "basis": hashes_of(modal_files),
+        "files": hashes_of(checkpoint.files_of(settings, path)),
+    }
 
 
 @dataclass

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import read_basis
-from ..case import CaseSettings, checkpoint, load_case
+from ..case import CaseSettings, load_case
 from ..case.assemble import Built, build, swept
 from ..case.problem import problem_of
 from ..case.questions import OrbitOfCase, RunUpOfCase
@@ -24,7 +24,7 @@ from ..time_domain.classification import Exponent
 from ..time_domain.orbit import Orbit
 from ..time_domain.ramp import Ramp
 from ..units import METRES, counted, percent
-from .checkpoint import hashes_of
+from .checkpoint import inputs_of
 from .moving import moving_bodies
 from .stage import Made, Report, Stage, hash_of_code
 
@@ -48,12 +48,7 @@ def orbit_stage(
     if settings.orbit is None:
         raise UserError(f"{case_path}: orbit: is missing; add [orbit] with frequency (Hz), Omega (rad/s) or run_up")
     stage = Stage(folder / "orbit.json", ("stages.orbit",), force, report)
-    inputs = {
-        "case": checkpoint.without_defaults(raw),
-        "basis": hashes_of(files),
-        "pictures": pictures,
-        "files": hashes_of(checkpoint.files_of(settings, case_path)),
-    }
+    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
     told = store.hash_settings({**inputs, "code": hash_of_code(stage.code)})
     stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures, told))
     told = json.loads(stage.product.read_text())

@@ -28,7 +28,7 @@ from ..results.checks import sentence
 from ..results.series import CONVERGED
 from ..units import counted, percent, to_rpm
 from . import assessment
-from .checkpoint import Checkpoint, hashes_of
+from .checkpoint import Checkpoint, inputs_of
 from .ring import draw_ring
 from .stage import Made, Report, Stage
 
@@ -69,11 +69,7 @@ def response_stage(
     stage = response_of_case(folder, force, report)
     with stage.making():
         settings, raw = load_case(case_path, assignments)
-        inputs = {
-            "case": checkpoint.without_defaults(raw),
-            "basis": hashes_of(files),
-            "files": hashes_of(checkpoint.files_of(settings, case_path)),
-        }
+        inputs = inputs_of(raw, settings, case_path, files)
         more = {"wanted": asdict(ALL)}  # what is there with all that can be made will do
         if wanted == ALL or not stage.is_made(inputs | more):
             more = {"wanted": asdict(wanted)}

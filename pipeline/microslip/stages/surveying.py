@@ -23,7 +23,7 @@ from ..report.words import number_list
 from ..results import Response, read_journal, response_of, write_response
 from ..results.checks import sentence
 from ..units import counted
-from .checkpoint import Checkpoint, hashes_of
+from .checkpoint import Checkpoint, inputs_of
 from .places import existing_files
 from .stage import Made, Report, Stage
 
@@ -80,8 +80,7 @@ def survey_stage(
         settings = settings if kind == "identification" else checkpoint.as_found(settings, folder, case_path)
         if raw.get("harmonics") == "auto":
             raw = raw | {"harmonics": settings.harmonics}
-        named = hashes_of(checkpoint.files_of(settings, case_path))
-        inputs = {"case": raw, "basis": hashes_of(files), "files": named}
+        inputs = inputs_of(raw, settings, case_path, files)
         stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, kind))
         return _told(stage.product)
 
