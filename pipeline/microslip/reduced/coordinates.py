@@ -22,7 +22,7 @@ from ..data import (
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
-    """The same body in modal coordinates: M_r = 1, K_r = diag(omega^2); itself where it stands so already.
+    """The same body in modal coordinates: M_r = 1, K_r = `own_stiffness`; itself where it stands so already.
 
     Coordinates without mass and interface forces are left out: the compliance they hold is then missing in
     `Compliance.modal` and counts as residual.
@@ -35,11 +35,25 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         in_coordinates(g, V),
         kind=own_kind(g),
         M_r=np.eye(p),
-        K_r=np.diag(g.omega**2),
+        K_r=own_stiffness(g),
         compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
         gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
         to_diagonal=None,
     )
+
+
+def own_stiffness(g: ModalGroup) -> Array:
+    """(p, p) V^H K_r V: diag(omega^2), and of a free body at speed what its rigid motions (omega = 0) meet."""
+    A = np.diag(g.omega**2)
+    rigid = (g.omega == 0) & (g.speed != 0)
+    if not rigid.any():
+        return A
+    V = np.eye(len(g.omega)) if g.to_diagonal is None else g.to_diagonal
+    R = V[:, rigid]
+    rows = R.conj().T @ (0.5 * (g.K_r + g.K_r.conj().T)) @ V
+    A = A.astype(rows.dtype)
+    A[rigid], A[:, rigid] = rows, rows.conj().T
+    return A
 
 
 def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:
