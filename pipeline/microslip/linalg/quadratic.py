@@ -30,6 +30,9 @@ LARGEST_SPACE = 120
 ROUNDING = 10 * np.finfo(float).eps
 """Relative error of an entry that the computation itself makes."""
 
+ASTRAY = 1e-6
+"""Way of a refinement, over the largest frequency, beyond which it has gone to another root."""
+
 
 @dataclass(frozen=True)
 class Window:
@@ -320,7 +323,8 @@ def refined(Q: Quadratic, s: ComplexArray, x: ComplexArray) -> Roots:
 
 
 def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, ComplexArray, ComplexArray]:
-    y = x
+    """One root; as it was found where the iteration leaves it: it has no direction at a double root 0."""
+    y, start = x, (s, x, x)
     for _ in range(5):
         factors, begin = factors_near(Q, s), s
         for _ in range(2):
@@ -329,10 +333,12 @@ def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, Complex
         s = _rayleigh(Q, s, x, y)
         if abs(s - begin) <= 1e-9 * abs(s):
             break
-    return s, x, y
+    stays = abs(s - start[0]) <= ASTRAY * max(abs(start[0]), _scale(Q))
+    return (s, x, y) if stays and np.isfinite(x).all() and np.isfinite(y).all() else start
 
 
 def _unit(x: ComplexArray) -> ComplexArray:
+    x = x / np.abs(x).max()  # about a root of 0 their squares are too large
     return x / np.linalg.norm(x)
 
 
@@ -353,6 +359,8 @@ def judged(Q: Quadratic, found: Iterable[tuple[complex, ComplexArray, ComplexArr
     s = np.array([one[0] for one in found], dtype=complex)
     x, y = (np.array([one[i] for one in found], dtype=complex).reshape(len(s), Q.n).T for i in (1, 2))
     numbers = np.array([_judge(Q, *one) for one in found]).reshape(len(s), 4)
+    zero = np.sqrt(ROUNDING) * _scale(Q)  # what rounding makes of a double root 0, of a motion that nothing drives back
+    numbers[:, 2] = np.where(np.abs(s) <= zero, np.maximum(numbers[:, 2], zero), numbers[:, 2])
     return Roots(s, x, y, *numbers.T)
 
 

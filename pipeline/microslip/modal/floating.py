@@ -98,7 +98,7 @@ def refuse_unbalanced(model: BodyModel, coefficients: Array, centre: Array, sect
     r = mesh.points - model.point
     load = centrifugal_force(model, 1.0, np.zeros_like(r)).reshape(-1)
     R = rigid.rigid_fields(mesh.points, model.point).reshape(-1, 6) @ coefficients
-    size = np.sqrt(np.trace(r.T @ (model.M_full @ r) @ spin_projector(n)))  # M-norm of the load
+    size = np.sqrt(float(np.sum((r @ spin_projector(n)) * (model.M_full @ r))))  # M-norm of the load
     gram = R.T @ (model.M_full @ R.reshape(len(r), -1)).reshape(R.shape)
     push = R.T @ load
     if push @ np.linalg.solve(gram, push) <= (UNBALANCED * size) ** 2:
