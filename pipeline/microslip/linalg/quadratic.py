@@ -31,7 +31,9 @@ ROUNDING = 10 * np.finfo(float).eps
 """Relative error of an entry that the computation itself makes."""
 
 ASTRAY = 1e-6
-"""Way of a refinement, over the largest frequency, beyond which it has gone to another root."""
+"""Share of the largest frequency within which all roots at once know a root: beyond it a refinement has gone to another
+one, below it a root is 0 (a motion that nothing drives back has it twice, and rounding splits it by its square root).
+"""
 
 
 @dataclass(frozen=True)
@@ -318,7 +320,8 @@ def refined(Q: Quadratic, s: ComplexArray, x: ComplexArray) -> Roots:
     Raises:
         NotConverged: Q is singular around a root.
     """
-    found = [_refine(Q, complex(s[i]), x[:, i]) for i in range(len(s))]
+    with np.errstate(all="ignore"):  # about a root of 0 vectors may become infinite
+        found = [_refine(Q, complex(s[i]), x[:, i]) for i in range(len(s))]
     return judged(Q, found)
 
 
@@ -338,7 +341,7 @@ def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, Complex
 
 
 def _unit(x: ComplexArray) -> ComplexArray:
-    x = x / np.abs(x).max()  # about a root of 0 their squares are too large
+    x = x / np.abs(x).max()  # their squares may be too large
     return x / np.linalg.norm(x)
 
 
@@ -359,7 +362,7 @@ def judged(Q: Quadratic, found: Iterable[tuple[complex, ComplexArray, ComplexArr
     s = np.array([one[0] for one in found], dtype=complex)
     x, y = (np.array([one[i] for one in found], dtype=complex).reshape(len(s), Q.n).T for i in (1, 2))
     numbers = np.array([_judge(Q, *one) for one in found]).reshape(len(s), 4)
-    zero = np.sqrt(ROUNDING) * _scale(Q)  # what rounding makes of a double root 0, of a motion that nothing drives back
+    zero = (np.sqrt(ROUNDING) if sp.issparse(Q.K) else ASTRAY) * _scale(Q)  # what rounding makes of a double root 0
     numbers[:, 2] = np.where(np.abs(s) <= zero, np.maximum(numbers[:, 2], zero), numbers[:, 2])
     return Roots(s, x, y, *numbers.T)
 

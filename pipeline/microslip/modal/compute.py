@@ -17,6 +17,7 @@ from ..data import (
 )
 from ..fem.contact import coupled_points
 from ..fem.discretise import discretise, free_upper
+from ..fem.operators import spin_projector
 from ..linalg import eigen
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -111,24 +112,27 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
     sector = make_sector(d, settings, fixed, axis, point) if settings.cyclic else None
     free = free_upper(d.pattern, fixed) if sector is None else sector.static
     rows = body_rows(mesh, settings)
+    materials = materials_of(d, settings)
+    mass, centre, inertia = inertia_of(d, [m.density for m in materials])
+    turning = settings.free and any(settings.rotation.speeds_rpm)
+    if turning and sector is None and not len(fixed):  # such a body turns about its centre of mass
+        point = point + (centre - point) @ spin_projector(axis / np.linalg.norm(axis))
     model = make_model(
-        d, materials_of(d, settings), free, fixed, axis, point, temperature, settings.temperature.reference,
+        d, materials, free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
     rows = with_centrifugal(rows, model, settings)
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
-    mass, centre, inertia = inertia_of(d, [m.density for m in model.materials])
     motions = _floating(model, sector, centre)
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
     refuse_overlap(mesh, settings)
     coefficients = rigid.coefficients_of(mesh.points, model.point, motions)
     if settings.free:
-        turning = any(settings.rotation.speeds_rpm)
         refuse_floating(settings, turning)
-        if turning:
-            refuse_unbalanced(model, coefficients, centre, settings.cyclic.sectors if settings.cyclic else 1)
+    if turning and sector is None:  # all sectors together are balanced
+        refuse_unbalanced(replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia)
     return Prepared(model, rows, motions, coefficients, mass, centre, inertia, sector)
 
 

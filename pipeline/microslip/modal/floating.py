@@ -24,7 +24,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from ..data import Array, Mesh, UserError
+from ..data import Array, UserError
 from ..fem.operators import internal_force, spin_projector
 from ..linalg import eigen
 from ..reduction import Reduced
@@ -78,47 +78,33 @@ def refuse_floating(settings: BodySettings, turning: bool) -> None:
         raise UserError("bolts: a free body under its bolts is taken at rest only; hold it or use speed 0")
     if settings.reduction not in PROJECTED:
         raise UserError(
-            f'reduction: "{settings.reduction}" is not made for a free body at speed; use one of '
-            f"{', '.join(PROJECTED)}"
+            f'reduction: "{settings.reduction}" is not made for a free body at speed; use one of {", ".join(PROJECTED)}'
         )
 
 
-def refuse_unbalanced(model: BodyModel, coefficients: Array, centre: Array, sectors: int = 1) -> None:
+def refuse_unbalanced(model: BodyModel, R: Array, centre: Array, inertia: Array) -> None:
     """Refuse a body whose centrifugal load drives a rigid motion that is free.
 
     Args:
-        coefficients: (6, r) of `rigid.rigid_fields` about the point of the axis. centre: of mass, of all sectors.
+        R: (3n, r) rigid motions that are free. centre: of mass. inertia: (3, 3) about it, kg m2.
 
     Raises:
         UserError: by how much it is off.
     """
-    if sectors > 1:  # all sectors alike are balanced across their axis, and along it nothing pulls
-        return
-    mesh, n = model.d.mesh, model.axis
-    r = mesh.points - model.point
+    r, n = model.d.mesh.points - model.point, model.axis
     load = centrifugal_force(model, 1.0, np.zeros_like(r)).reshape(-1)
-    R = rigid.rigid_fields(mesh.points, model.point).reshape(-1, 6) @ coefficients
-    size = np.sqrt(float(np.sum((r @ spin_projector(n)) * (model.M_full @ r))))  # M-norm of the load
+    size = float(np.sqrt(np.sum((r @ spin_projector(n)) * (model.M_full @ r))))  # M-norm of the load
     gram = R.T @ (model.M_full @ R.reshape(len(r), -1)).reshape(R.shape)
     push = R.T @ load
     if push @ np.linalg.solve(gram, push) <= (UNBALANCED * size) ** 2:
         return
-    raise UserError(_imbalance(model, mesh, centre))
-
-
-def _imbalance(model: BodyModel, mesh: Mesh, centre: Array) -> str:
-    r = mesh.points - model.point
-    off = float(np.linalg.norm((centre - model.point) @ spin_projector(model.axis)))
-    M = model.M_full
-    second = r.T @ (M @ r)
-    inertia = np.trace(second) * np.eye(3) - second
-    values, axes = np.linalg.eigh(inertia)
-    principal = axes[:, np.abs(model.axis @ axes).argmax()]
-    tilt = float(np.degrees(np.arccos(min(abs(principal @ model.axis), 1.0))))
-    return (
-        f"rotation.axis: the free body is not balanced about it (centre of mass {off:.3g} m off the axis, principal "
-        f"axis of inertia {tilt:.3g} degrees from it), so it would not turn steadily; put rotation.point and axis "
-        "where they belong, or hold the body"
+    off = float(np.linalg.norm((centre - model.point) @ spin_projector(n)))
+    nearest = float(np.abs(n @ np.linalg.eigh(inertia)[1]).max())
+    tilt = float(np.degrees(np.arccos(min(nearest, 1.0))))
+    raise UserError(
+        f"rotation.axis: the free body is not balanced about it (its centre of mass {round(off, 9):.3g} m off the "
+        f"axis, its nearest principal axis of inertia {round(tilt, 4):.3g} degrees off), so it would not turn "
+        "steadily; correct rotation.point and axis, or hold the body"
     )
 
 
@@ -242,7 +228,7 @@ def _diagonal(R: Array, KR: Array, pencil: eigen.Pencil) -> tuple[Array, Array]:
 def with_rotation(reduced: Reduced, floating: Floating, pencil: eigen.Pencil) -> Reduced:
     """The reduced body with what its rigid motions meet at speed in K_r: with S = R^H M Phi, A = R^H K R
 
-        Phi^H (K - P^H K P) Phi = S^H (K R)^H Phi + Phi^H K R S - S^H A S.
+    Phi^H (K - P^H K P) Phi = S^H (K R)^H Phi + Phi^H K R S - S^H A S.
     """
     Phi, size = reduced.vectors, np.abs(floating.values).max(initial=0.0)
     S, C = pencil.M(floating.R).conj().T @ Phi, floating.KR.conj().T @ Phi

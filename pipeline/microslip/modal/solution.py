@@ -94,7 +94,7 @@ def search(
     Raises:
         UserError: instability, more modes than degrees of freedom, a part that nothing holds.
     """
-    shift = rigid_shift(model) if R.shape[1] else 0.0
+    shift = rigid_shift(model) if settings.free else 0.0  # a free sector floats while its cut faces are apart
     wanted = settings.modes.count
     if wanted > pencil.n - 2:
         raise UserError(
@@ -112,7 +112,7 @@ def search(
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
     at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
-    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(R.shape[1]))
+    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(shift))
     return Searched(pencil, unknowns, R, shift, found, B, labels, answers, held, floating)
 
 
