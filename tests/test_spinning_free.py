@@ -176,6 +176,20 @@ def test_a_thin_ring_grows_as_its_hoop_stress_says() -> None:
     np.testing.assert_allclose(whole.u_static, ring.expand(g.u_static, 0).real, rtol=0, atol=1e-9 * np.abs(u).max())
 
 
+def test_a_heated_free_body_grows_about_its_centre() -> None:
+    """u = alpha dT (x - centre) without stress or mean motion; frequencies rise with the root of 1 + alpha dT, and
+    where the heat is uneven rigid motions stay exact."""
+    hot = STIFF | {"expansion": 1e-5}
+    mesh = block(*BRICK)
+    cold = modal_basis(mesh, body(hot, free=True, modes={"count": 10})).groups[0, 0]
+    even = modal_basis(mesh, body(hot, free=True, modes={"count": 10}), np.full(mesh.n_points, 793.15)).groups[0, 0]
+    np.testing.assert_allclose(even.u_static, 5e-3 * mesh.points, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(even.omega[6:], cold.omega[6:] * np.sqrt(1.005), rtol=1e-9)
+    uneven = 793.15 + 1e6 * mesh.points[:, 0] ** 3
+    basis = modal_basis(mesh, body(hot, free=True, modes={"count": 10}), uneven)
+    assert not [c for c in check_basis(basis) if not c.passed]
+
+
 # ---------------------------------------------------------------- sector and ring
 
 

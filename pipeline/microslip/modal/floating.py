@@ -177,8 +177,9 @@ def floated(
     if not coefficients.shape[1]:
         return pencil, np.zeros((pencil.n, 0), dtype=pencil.dtype), None
     if not speed:
-        fields = rigid.rigid_fields(model.d.mesh.points, model.point).reshape(-1, 6) @ coefficients
-        return pencil, rigid.mass_orthonormal(unknowns.unknowns_of(fields), pencil.M), None
+        fields = rigid.rigid_fields(model.d.mesh.points + state.u, model.point).reshape(-1, 6) @ coefficients
+        R = rigid.mass_orthonormal(unknowns.unknowns_of(fields), pencil.M)
+        return without_rigid(pencil, R) if model.loaded else pencil, R, None
     found = _turning(model, state, speed, pencil, unknowns, coefficients)
     return without_rigid(pencil, found.R), found.R, found
 
