@@ -341,7 +341,6 @@ def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, Complex
 
 
 def _unit(x: ComplexArray) -> ComplexArray:
-    x = x / np.abs(x).max()  # their squares may be too large
     return x / np.linalg.norm(x)
 
 
