@@ -195,6 +195,7 @@ def test_a_heated_free_body_grows_about_its_centre() -> None:
 
 N = 6
 COUNT = 10
+SLOW = pytest.mark.slow
 
 
 @cache
@@ -231,6 +232,22 @@ def test_a_free_sector_is_its_free_ring_at_every_nodal_diameter(rpm: float) -> N
     moving = both > 1.5 * whole.speed  # double roots of the rigid motions are known to the root of rounding alone
     np.testing.assert_allclose(single[moving], both[moving], rtol=1e-8)
     np.testing.assert_allclose(single[~moving], both[~moving], rtol=0, atol=1e-6 * whole.speed)
+
+
+@pytest.mark.parametrize("reduction", ["rubin", *(pytest.param(r, marks=SLOW) for r in ("macneal", "craig-bampton"))])
+def test_reduced_free_sectors_keep_their_rigid_motions(reduction: str) -> None:
+    """Complex coordinates at k = 1: the whirl at Omega for the translation twice and the tilt once, all checks hold."""
+    faces = [{"name": n, "face": f"contact_{n}", "t2": [0.0, 1.0, 0.0]} for n in ("left", "right")]
+    at = {"axis": AXIS.tolist(), "speeds_rpm": [10000.0]}
+    settings = body(
+        free=True, cyclic={"sectors": N, "nodal_diameters": [0, 1, 2]}, rotation=at, reduction=reduction,
+        interfaces=faces, modes={"count": 8},
+    )  # fmt: skip
+    basis = modal_basis(bladed_sector("hexahedron20", N), settings)
+    assert not [c for c in check_basis(basis) if not c.passed and "ring" not in c.name]
+    assert [int((basis.groups[0, k].omega == 0).sum()) for k in (0, 1, 2)] == [2, 2, 0]
+    y = basis.groups[0, 1].gyroscopic
+    assert y is not None and y.stable and (np.abs(y.omega / basis.groups[0, 1].speed - 1) < 1e-6).sum() == 3
 
 
 def cut_between(omega: Array, highest: float) -> float:

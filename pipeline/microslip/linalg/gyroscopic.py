@@ -94,8 +94,17 @@ def _by_parts(M: Array, G: Array, K: Array) -> tuple[Array, Array, ComplexArray]
             s, shapes[at, to] = general_modes(M[own], G[own], K[own])
             least = GROWTH * np.abs(s).max(initial=0.0)
             omega[to], growth[to] = (np.where(np.abs(a) <= least, 0.0, a) for a in (s.imag, s.real))
+            zero = done + np.flatnonzero((omega[to] == 0) & (growth[to] == 0))
+            shapes[np.ix_(at, zero)] = _null_twice(K[own], len(zero))
         done += 2 * len(at)
     return omega, growth, shapes
+
+
+def _null_twice(K: Array, count: int) -> Array:
+    """(m, count) vectors of the roots 0, two for each direction that K does not resist."""
+    values, X = np.linalg.eigh(K)
+    softest = X[:, np.argsort(np.abs(values), kind="stable")[: (count + 1) // 2]]
+    return np.repeat(softest, 2, axis=1)[:, :count]
 
 
 def _errors(omega: Array, K: Array, G: Array, N: Array, known: Certified) -> Array:

@@ -20,6 +20,7 @@ from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import per_block
 from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
+from ..reduced.coordinates import own_stiffness
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from .body_rows import BodyRows, reduced_gauge, reduced_interfaces, reduced_rows
@@ -175,7 +176,8 @@ def _gyroscopic(
     values = [found.upper_shift, *found.values[kept : kept + 1]] if found.certified else [0.0]
     next_omega = float(np.sqrt(max(min(values), 0.0)))
     known = Certified(P, speed, next_omega, kept if reduced.to_diagonal is None else 0)
-    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, V.conj().T @ reduced.K_r @ V, N, known)
+    K = own_stiffness(reduced.K_r, reduced.omega, reduced.to_diagonal, speed)
+    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, K, N, known)
     return replace(own, shapes=V @ own.shapes)
 
 

@@ -35,22 +35,21 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         in_coordinates(g, V),
         kind=own_kind(g),
         M_r=np.eye(p),
-        K_r=own_stiffness(g),
+        K_r=own_stiffness(g.K_r, g.omega, V, g.speed),
         compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
         gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
         to_diagonal=None,
     )
 
 
-def own_stiffness(g: ModalGroup) -> Array:
-    """(p, p) V^H K_r V: diag(omega^2), and of a free body at speed what its rigid motions (omega = 0) meet."""
-    A = np.diag(g.omega**2)
-    rigid = (g.omega == 0) & (g.speed != 0)
+def own_stiffness(K_r: Array, omega: Array, V: Array | None, speed: float) -> Array:
+    """(p, p) V^H K_r V: diag(omega^2), and of a free body at speed (rad/s) what its rigid motions (omega = 0) meet."""
+    A = np.diag(omega**2)
+    rigid = (omega == 0) & (speed != 0)
     if not rigid.any():
         return A
-    V = np.eye(len(g.omega)) if g.to_diagonal is None else g.to_diagonal
-    R = V[:, rigid]
-    rows = R.conj().T @ (0.5 * (g.K_r + g.K_r.conj().T)) @ V
+    V = np.eye(len(omega)) if V is None else V
+    rows = V[:, rigid].conj().T @ (0.5 * (K_r + K_r.conj().T)) @ V
     A = A.astype(rows.dtype)
     A[rigid], A[:, rigid] = rows, rows.conj().T
     return A
