@@ -122,7 +122,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "description": ("", "one line for the report"),
     "length_unit": ("", "unit of every length in this file and of the mesh or CAD file"),
     "reduction": ("", "method of reduction, see reduction.md"),
-    "free": ("", "the body is meant to float; rigid motions are kept and flagged"),
+    "free": ("", "the body is meant to float; rigid motions are kept, [at speed](rotation.md#free-bodies) too"),
     "values": ("", "table: name of a parameter = its value, 1 if not given; the speed stands in rotation.speeds_rpm"),
     "parameters.role": ("", "matrix it is added to"),
     "parameters.matrix": ("", "FILE or FILE#NAME, times factor (value / reference)^power"),

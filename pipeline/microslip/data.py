@@ -478,7 +478,10 @@ class ModalGroup:
     )]  # fmt: skip
     damping_ratio: Annotated[Array, Stored("own_mode", "1", "D_j of Sextro Eq. (2.4-13)", at="modes/damping_ratio")]
     M_r: Annotated[Array, Stored("mode mode", "1", "reduced mass", at="modes/M_r", order=1)]
-    K_r: Annotated[Array, Stored("mode mode", "s^-2", "stiffness", at="modes/K_r", order=1)]
+    K_r: Annotated[Array, Stored(
+        "mode mode", "s^-2", "stiffness; V^H K_r V is diag(omega^2), and of a free body at speed what its rigid "
+        "motions (omega = 0) meet stands in their rows and columns: -Omega^2 across the axis", at="modes/K_r", order=1,
+    )]  # fmt: skip
     C_r: Annotated[Array, Stored("mode mode", "s^-1", "damping", at="modes/C_r", order=1)]
     G_r: Annotated[Array, Stored(
         "mode mode", "s^-1", "gyroscopic at this speed, skew (Sextro Eq. (2.3-29))", at="modes/G_r", order=1
@@ -499,7 +502,7 @@ class ModalGroup:
     harmonic: int = 0
     spin_softening: bool = True
     to_diagonal: Annotated[Array | None, Stored(
-        "mode own_mode", "1", "V with V^H M_r V = 1, V^H K_r V = diag(omega^2); omega and damping_ratio are those of "
+        "mode own_mode", "1", "V with V^H M_r V = 1, V^H K_r V as K_r says; omega and damping_ratio are those of "
         "V, phi and all rows stand per coordinate. Fewer modes than coordinates (axis `own_mode`) where some have no "
         "mass (`massless-interface`) or are forces (`interface-force`)",
         at="modes/to_diagonal", when="M_r or K_r is not diagonal", order=1,

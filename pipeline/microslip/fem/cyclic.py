@@ -235,6 +235,10 @@ class CyclicUpper:
         """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
         return self.transformation.T @ forces[self.free]
 
+    def unknowns_of(self, displacements: Array) -> Array:
+        """(m, r) unknowns of displacements (3n, r) that move all sectors alike: `expand` turned round."""
+        return self.unknowns.stay.T @ displacements[self.free]
+
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
         return B[:, self.free] @ self.transformation

@@ -166,6 +166,10 @@ class FreeUpper:
         """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
         return forces[self.free]
 
+    def unknowns_of(self, displacements: Array) -> Array:
+        """(m, r) unknowns of displacements (3n, r) that the supports and the sectors allow: `expand` turned round."""
+        return displacements[self.free]
+
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
         return B[:, self.free]

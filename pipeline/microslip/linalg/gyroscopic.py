@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse.csgraph
 
 from ..data import Array, ComplexArray, GyroscopicModes
 
@@ -18,6 +19,10 @@ CIRCULAR = 0.05
 
 GROWTH = 1e-6
 """Growth rates below this share of the largest eigenvalue are rounding: double zeros split by its square root."""
+
+
+COUPLED = 1e-13
+"""Share of what two coordinates meet below which an entry between them is rounding."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,9 @@ def gyroscopic_modes(M: Array, G: Array, K: Array, N: Array, certified: Certifie
     """The modes q = x exp(i omega t) of M q'' + G q' + K q = 0.
 
     With K positive definite the frequencies are the real eigenvalues of a Hermitian pencil (`hermitian_modes`).
-    Otherwise the general eigenvalue problem is solved, and the modes may grow.
+    Otherwise coordinates that hang together are taken by themselves, and where K is not positive definite among them
+    the general eigenvalue problem is solved, whose modes may grow: the repeated roots of a rigid motion, which rounding
+    splits by its square root, then spoil nothing else.
 
     Args:
         M, K: (m, m) Hermitian. G: (m, m) skew-Hermitian, 1/s for mass-normalised coordinates.
@@ -54,12 +61,11 @@ def gyroscopic_modes(M: Array, G: Array, K: Array, N: Array, certified: Certifie
         omega, shapes = hermitian_modes(M, G, K)
         growth = np.zeros(len(omega))
     except np.linalg.LinAlgError:
-        s, shapes = general_modes(M, G, K)
-        omega, growth = s.imag, s.real
-        size = np.abs(s).max(initial=0.0)
-        omega[np.abs(omega) <= GROWTH * size], growth[np.abs(growth) <= GROWTH * size] = 0.0, 0.0
+        omega, growth, shapes = _by_parts(M, G, K)
     wave = any(np.iscomplexobj(a) for a in (M, K, G))
     keep = np.ones(len(omega), dtype=bool) if wave else (omega > 0) | ((omega == 0) & (growth >= 0))
+    still = np.flatnonzero((omega == 0) & (growth == 0) & keep)
+    keep[still[1::2]] = wave  # a motion that nothing drives back has the root 0 twice
     order = np.flatnonzero(keep)[np.argsort(np.abs(omega[keep]), kind="stable")]
     omega, growth, shapes = omega[order], growth[order], definite(shapes[:, order], M)
     sense = orbit_sense(shapes, M, N) * np.sign(omega)
@@ -67,6 +73,38 @@ def gyroscopic_modes(M: Array, G: Array, K: Array, N: Array, certified: Certifie
     if certified is not None and not growth.any():
         error = _errors(omega, K, G, N, certified)
     return GyroscopicModes(omega, shapes, growth, sense, directions(omega, sense, wave), error)
+
+
+def _by_parts(M: Array, G: Array, K: Array) -> tuple[Array, Array, ComplexArray]:
+    """(2m,) omega and growth, (m, 2m) shapes, of each set of coordinates that hang together."""
+    m = len(M)
+    joined = np.zeros((m, m), dtype=bool)
+    for A in (M, G, K):
+        size = np.sqrt(np.abs(A).max(axis=1, initial=0.0))
+        joined |= np.abs(A) > COUPLED * np.outer(size, size)
+    count, part = scipy.sparse.csgraph.connected_components(joined, directed=False)
+    omega, growth, shapes = np.zeros(2 * m), np.zeros(2 * m), np.zeros((m, 2 * m), dtype=complex)
+    done = 0
+    for number in range(count):
+        at = np.flatnonzero(part == number)
+        own, to = np.ix_(at, at), slice(done, done + 2 * len(at))
+        try:
+            omega[to], shapes[at, to] = hermitian_modes(M[own], G[own], K[own])
+        except np.linalg.LinAlgError:
+            s, shapes[at, to] = general_modes(M[own], G[own], K[own])
+            least = GROWTH * np.abs(s).max(initial=0.0)
+            omega[to], growth[to] = (np.where(np.abs(a) <= least, 0.0, a) for a in (s.imag, s.real))
+            zero = done + np.flatnonzero((omega[to] == 0) & (growth[to] == 0))
+            shapes[np.ix_(at, zero)] = _null_twice(K[own], len(zero))
+        done += 2 * len(at)
+    return omega, growth, shapes
+
+
+def _null_twice(K: Array, count: int) -> Array:
+    """(m, count) vectors of the roots 0, two for each direction that K does not resist."""
+    values, X = np.linalg.eigh(K)
+    softest = X[:, np.argsort(np.abs(values), kind="stable")[: (count + 1) // 2]]
+    return np.repeat(softest, 2, axis=1)[:, :count]
 
 
 def _errors(omega: Array, K: Array, G: Array, N: Array, known: Certified) -> Array:

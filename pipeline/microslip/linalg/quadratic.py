@@ -30,6 +30,11 @@ LARGEST_SPACE = 120
 ROUNDING = 10 * np.finfo(float).eps
 """Relative error of an entry that the computation itself makes."""
 
+ASTRAY = 1e-6
+"""Share of the largest frequency within which all roots at once know a root: beyond it a refinement has gone to another
+one, below it a root is 0 (a motion that nothing drives back has it twice, and rounding splits it by its square root).
+"""
+
 
 @dataclass(frozen=True)
 class Window:
@@ -315,12 +320,14 @@ def refined(Q: Quadratic, s: ComplexArray, x: ComplexArray) -> Roots:
     Raises:
         NotConverged: Q is singular around a root.
     """
-    found = [_refine(Q, complex(s[i]), x[:, i]) for i in range(len(s))]
+    with np.errstate(all="ignore"):  # about a root of 0 vectors may become infinite
+        found = [_refine(Q, complex(s[i]), x[:, i]) for i in range(len(s))]
     return judged(Q, found)
 
 
 def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, ComplexArray, ComplexArray]:
-    y = x
+    """One root; as it was found where the iteration leaves it: it has no direction at a double root 0."""
+    y, start = x, (s, x, x)
     for _ in range(5):
         factors, begin = factors_near(Q, s), s
         for _ in range(2):
@@ -329,7 +336,8 @@ def _refine(Q: Quadratic, s: complex, x: ComplexArray) -> tuple[complex, Complex
         s = _rayleigh(Q, s, x, y)
         if abs(s - begin) <= 1e-9 * abs(s):
             break
-    return s, x, y
+    stays = abs(s - start[0]) <= ASTRAY * max(abs(start[0]), _scale(Q))
+    return (s, x, y) if stays and np.isfinite(x).all() and np.isfinite(y).all() else start
 
 
 def _unit(x: ComplexArray) -> ComplexArray:
@@ -353,6 +361,8 @@ def judged(Q: Quadratic, found: Iterable[tuple[complex, ComplexArray, ComplexArr
     s = np.array([one[0] for one in found], dtype=complex)
     x, y = (np.array([one[i] for one in found], dtype=complex).reshape(len(s), Q.n).T for i in (1, 2))
     numbers = np.array([_judge(Q, *one) for one in found]).reshape(len(s), 4)
+    zero = (np.sqrt(ROUNDING) if sp.issparse(Q.K) else ASTRAY) * _scale(Q)  # what rounding makes of a double root 0
+    numbers[:, 2] = np.where(np.abs(s) <= zero, np.maximum(numbers[:, 2], zero), numbers[:, 2])
     return Roots(s, x, y, *numbers.T)
 
 

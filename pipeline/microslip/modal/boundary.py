@@ -80,10 +80,6 @@ def check_held(
             f"supports: nothing holds the body against {names}; add supports{turns}, or write free = true if it is "
             "meant to float"
         )
-    if settings.free and any(settings.rotation.speeds_rpm):
-        raise UserError("rotation.speeds_rpm: a free body has no equilibrium at speed; hold it or use speed 0")
-    if settings.free and settings.rotation.range_rpm is not None:
-        raise UserError("rotation.range_rpm: a free body has no equilibrium at speed; hold it or leave the range out")
     if settings.free and settings.closures and not settings.bolts:
         raise UserError("closures: nothing presses the faces of a free body together; add [[bolts]] or hold the body")
     if settings.free and settings.loads:

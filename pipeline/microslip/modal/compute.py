@@ -17,6 +17,7 @@ from ..data import (
 )
 from ..fem.contact import coupled_points
 from ..fem.discretise import discretise, free_upper
+from ..fem.operators import spin_projector
 from ..linalg import eigen
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -27,6 +28,7 @@ from .boundary import check_held, fixed_dofs, known_materials, materials_of, ref
 from .characteristic import with_characteristic
 from .closures import ContactCurve, bolt_forces, contact_curve, contact_pairs
 from .equilibrium import BodyModel, StaticState, equilibrium, make_model
+from .floating import balanced, refuse_floating, refuse_unbalanced
 from .group import assemble_group, inertia_of, searched_state
 from .invariants import stiffening_operators, with_stiffening
 from .preload import pressed_state
@@ -81,12 +83,14 @@ class Prepared:
     """A body ready to be solved: its model, the rows on it, what floats, and the sector it may be.
 
     Attributes:
-        motions: (3n, r) rigid motions that nothing holds. mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2.
+        motions: (3n, r) rigid motions that nothing holds. coefficients: (6, r) of these (`rigid.coefficients_of`).
+        mass: kg. centre: (3,) m. inertia: (3, 3) about it, kg m2.
     """
 
     model: BodyModel
     rows: BodyRows
     motions: Array
+    coefficients: Array
     mass: float
     centre: Array
     inertia: Array
@@ -108,19 +112,28 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
     sector = make_sector(d, settings, fixed, axis, point) if settings.cyclic else None
     free = free_upper(d.pattern, fixed) if sector is None else sector.static
     rows = body_rows(mesh, settings)
+    materials = materials_of(d, settings)
+    mass, centre, inertia = inertia_of(d, [m.density for m in materials])
+    turning = settings.free and any(settings.rotation.speeds_rpm)
+    if turning and sector is None and not len(fixed):  # such a body turns about its centre of mass
+        point = point + (centre - point) @ spin_projector(axis / np.linalg.norm(axis))
     model = make_model(
-        d, materials_of(d, settings), free, fixed, axis, point, temperature, settings.temperature.reference,
+        d, materials, free, fixed, axis, point, temperature, settings.temperature.reference,
         np.zeros((mesh.n_points, 3)), settings.rotation.spin_softening,
     )  # fmt: skip
     rows = with_centrifugal(rows, model, settings)
     model = with_dead_loads(model, mesh, settings)
     model = replace(model, contacts=pairs, dead_load=model.dead_load + bolt_forces(mesh, settings))
-    mass, centre, inertia = inertia_of(d, [m.density for m in model.materials])
     motions = _floating(model, sector, centre)
     check_held(mesh, settings, centre, motions)
     refuse_unlinked_parts(model, settings)
     refuse_overlap(mesh, settings)
-    return Prepared(model, rows, motions, mass, centre, inertia, sector)
+    coefficients = rigid.coefficients_of(mesh.points, model.point, motions)
+    if settings.free:
+        refuse_floating(settings, turning)
+    if turning and sector is None:  # all sectors together are balanced
+        refuse_unbalanced(replace(model, point=np.array(settings.rotation.point)), motions, centre, inertia)
+    return Prepared(model, rows, motions, coefficients, mass, centre, inertia, sector)
 
 
 def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
@@ -152,19 +165,28 @@ def _at_speeds(
             )
         else:
             start = _guess(state, before, speed)
-            state = equilibrium(b.model, speed, settings.rotation.prestress, solver, start, report)
+            within = balanced(b.model, _alike(b), solver)
+            state = equilibrium(b.model, speed, settings.rotation.prestress, within, start, report)
         before = speed
         settled[speed] = state
         about = b.centre if floats else None
         end = rpm in (settings.rotation.range_rpm or ())  # whose basis begins with its modes and a few more
         asked = with_spares(settings) if end else settings
-        found = searched_state(b.model, asked, state, speed, b.motions, b.rows, solver, b.sector, report, about)
+        found = searched_state(b.model, asked, state, speed, b.coefficients, b.rows, solver, b.sector, report, about)
         if end:
             ends[speed] = found
             found = {k: without_spares(s, settings.modes.count) for k, s in found.items()}
         made = _groups(b.model, settings, state, speed, b.rows, found, report)
         groups |= {(number, k): group for k, group in made.items()}
     return groups, settled, ends
+
+
+def _alike(b: Prepared) -> Array:
+    """(6, r) rigid motions that the static state could have: of a sector those of nodal diameter 0."""
+    if b.sector is None:
+        return b.coefficients
+    cut = b.sector.unknowns.cut
+    return rigid.of_nodal_diameter(b.coefficients, cut.rotation, cut.sectors, 0)
 
 
 def _stiffened(
@@ -189,7 +211,7 @@ def _over_ranges(
     """Nodal diameter -> basis of the range of speeds, where one is asked for."""
     if settings.rotation.range_rpm is None:
         return {}
-    return body_ranges(b.model, settings, b.motions, b.rows, solver, b.sector, settled, ends, report)
+    return body_ranges(b.model, settings, b.coefficients, b.rows, solver, b.sector, settled, ends, report)
 
 
 def closure_curve(

@@ -64,6 +64,8 @@ def foreign_basis(
             check_held(body.mesh, settings, middle, spread, known)
         else:
             check_held(body.mesh, settings, centre, spread)
+        if settings.free and any(settings.rotation.speeds_rpm):
+            raise UserError("rotation.speeds_rpm: matrices tell no balance of a free body at speed; use speed 0")
         shift = _shift(body, motions, free, pencil) if R.shape[1] else 0.0
         s = _search(settings, pencil, unknowns, R, shift, rows, report)
         place = np.concatenate([canonical.by_place(body.mesh.points), np.arange(3 * body.mesh.n_points, layout.width)])

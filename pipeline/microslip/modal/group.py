@@ -16,15 +16,17 @@ from ..data import (
     RunUp,
     StressSet,
 )
-from ..fem.discretise import Discretisation
+from ..fem.discretise import Discretisation, FreeUpper
 from ..fem.operators import per_block
 from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
+from ..reduced.coordinates import own_stiffness
 from ..reduction import Reduced
 from ..settings.body import BodySettings
 from .body_rows import BodyRows, reduced_gauge, reduced_interfaces, reduced_rows
 from .closures import contact_states
 from .equilibrium import BodyModel, StaticState
+from .floating import floated
 from .invariants import inertia_invariants
 from .preload import pressed_modes
 from .run_up import run_up_terms
@@ -55,13 +57,21 @@ def searched_state(
     model: BodyModel, settings: BodySettings, state: StaticState, speed: float, motions: Array, rows: BodyRows,
     solver: eigen.DirectSolver, sector: Sector | None, report: Report, pressed: Array | None = None,
 ) -> dict[int, Searched]:  # fmt: skip
-    """Nodal diameter -> certified modes of one state; pressed: centre of mass of a free body under its bolts."""
+    """Nodal diameter -> certified modes of one state.
+
+    Args:
+        motions: (6, r) rigid motions that are free (`rigid.coefficients_of`). pressed: centre of mass of a free body
+            under its bolts.
+    """
     if sector is not None:
         return sector.searched(model, settings, state, speed, motions, rows, report)
-    pencil = make_pencil(model, state.K, solver)
+    pencil, floating = make_pencil(model, state.K, solver), None
     if pressed is not None:
-        pencil, motions = pressed_modes(model, state, pencil, pressed)
-    return {0: searched(model, settings, pencil, speed, motions, rows, report)}
+        pencil, R = pressed_modes(model, state, pencil, pressed)
+    else:
+        assert isinstance(model.free, FreeUpper)
+        pencil, R, floating = floated(model, state, speed, pencil, model.free, motions)
+    return {0: searched(model, settings, pencil, speed, R, rows, report, floating)}
 
 
 def assemble_group(
@@ -166,7 +176,8 @@ def _gyroscopic(
     values = [found.upper_shift, *found.values[kept : kept + 1]] if found.certified else [0.0]
     next_omega = float(np.sqrt(max(min(values), 0.0)))
     known = Certified(P, speed, next_omega, kept if reduced.to_diagonal is None else 0)
-    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, np.diag(reduced.omega**2), N, known)
+    K = own_stiffness(reduced.K_r, reduced.omega, reduced.to_diagonal, speed)
+    own = gyroscopic_modes(np.eye(len(N)), 2 * speed * N, K, N, known)
     return replace(own, shapes=V @ own.shapes)
 
 

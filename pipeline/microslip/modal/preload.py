@@ -90,7 +90,7 @@ def _refuse_drift(model: BodyModel, motions: Array, centre: Array) -> None:
 def pressed_modes(
     model: BodyModel, state: StaticState, pencil: eigen.Pencil, centre: Array
 ) -> tuple[eigen.Pencil, Array]:
-    """The pencil whose loads turn with the body, and (3n, r) rigid motions about the static state.
+    """The pencil whose loads turn with the body, and (m, r) mass-orthonormal rigid motions about the static state.
 
     The potential depends on the displacement without its rigid part alone, P u with P = 1 - R R^T M (R mass-
     orthonormal: the frame in which the body has no mean motion, Sextro 2.1). Its second derivative in equilibrium is
@@ -100,23 +100,24 @@ def pressed_modes(
     motions = rigid.free_motions(model.d.mesh.points + state.u, centre, model.fixed)
     kept = [g for g in state.contacts if g.pair.stays_closed]
     motions = not_resisted(motions, kept, every=False)
-    if not motions.shape[1]:
-        return pencil, motions
-    R = rigid.mass_orthonormal(model.free.restrict(motions), pencil.M)
-    return without_rigid(pencil, R), motions
+    R = model.free.unknowns_of(motions)
+    if not R.shape[1]:
+        return pencil, R
+    R = rigid.mass_orthonormal(R, pencil.M)
+    return without_rigid(pencil, R), R
 
 
 def without_rigid(pencil: eigen.Pencil, R: Array) -> eigen.Pencil:
     """The pencil with P^T K P in place of K, P = 1 - R R^T M; R: (n, r) mass-orthonormal.
 
-    P^T K P = K - Y Z^T - Z Y^T with Y = M R, Z = K R - Y (R^T K R) / 2.
+    P^T K P = K - Y Z^T - Z Y^T with Y = M R, Z = K R - Y (R^T K R) / 2; of complex numbers T conjugates.
     """
     Y, KR = pencil.M(R), pencil.K(R)
-    A = R.T @ KR
-    Z = KR - 0.5 * Y @ (A + A.T) / 2
+    A = R.conj().T @ KR
+    Z = KR - 0.5 * Y @ (A + A.conj().T) / 2
 
     def stiffness(x: Array) -> Array:
-        return pencil.K(x) - Y @ (Z.T @ x) - Z @ (Y.T @ x)
+        return pencil.K(x) - Y @ (Z.conj().T @ x) - Z @ (Y.conj().T @ x)
 
     return replace(pencil, K=stiffness, solver=Corrected(pencil.solver, Y, Z))
 
@@ -141,12 +142,12 @@ class Corrected(eigen.DirectSolver):
     def factorise(self, upper: sp.csr_matrix) -> None:
         self.inner.factorise(upper)
         self._answers = self.inner.solve(self._U)
-        middle = self._C + self._U.T @ self._answers
-        self._middle = 0.5 * (middle + middle.T)
+        middle = self._C + self._U.conj().T @ self._answers
+        self._middle = 0.5 * (middle + middle.conj().T)
 
     def solve(self, b: Array) -> Array:
         x = self.inner.solve(b)
-        return x - self._answers @ np.linalg.solve(self._middle, self._U.T @ x)
+        return x - self._answers @ np.linalg.solve(self._middle, self._U.conj().T @ x)
 
     def negative(self) -> int:
         return self.inner.negative() + int((np.linalg.eigvalsh(-self._middle) < 0).sum()) - self.rank

@@ -58,6 +58,33 @@ def free_motions_of_ring(points: Array, point: Array, fixed: Indices, turn: Arra
     return scaled if not len(fixed) else scaled @ null_space(np.concatenate(rows))
 
 
+def coefficients_of(points: Array, point: Array, motions: Array) -> Array:
+    """(6, r) translations and rotations about a point that make rigid motions (3n, r)."""
+    fields = rigid_fields(points, point).reshape(-1, 6)
+    return np.linalg.lstsq(fields, motions, rcond=None)[0] if motions.shape[1] else np.zeros((6, 0))
+
+
+def of_nodal_diameter(coefficients: Array, turn: Array, sectors: int, harmonic: int) -> Array:
+    """(6, q) of the motions (6, r) of a whole ring about its axis, those that are of a nodal diameter.
+
+    A ring's motion is of the nodal diameter k where t and theta of the sector turned back are those times the phase:
+    R^-1 t = t exp(+i k 2 pi / N). Along and about the axis it is 0, across it 1. Real for k = 0 and N/2.
+
+    Args:
+        coefficients: of motions that turn into each other by the sector. turn: (3, 3) R from a sector to the next.
+    """
+    back, whole = np.eye(3), np.zeros((3, 3), dtype=complex)
+    for j in range(sectors):
+        whole += back * np.exp(-2j * np.pi * j * harmonic / sectors) / sectors
+        back = turn.T @ back
+    if 2 * harmonic in (0, sectors):
+        whole = whole.real
+    found = np.vstack([whole @ coefficients[:3], whole @ coefficients[3:]])
+    scale = np.linalg.norm(coefficients, axis=0)
+    U, s, _ = np.linalg.svd(found / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    return U[:, s > 1e-8]
+
+
 def describe(points: Array, centre: Array, motions: Array, coefficients: Array | None = None) -> list[str]:
     """Name each free rigid motion: a translation, or a rotation with its axis (screws are named as both).
 
@@ -103,6 +130,6 @@ def _direction(v: Array) -> str:
 
 def mass_orthonormal(motions: Array, mass_product: Callable[[Array], Array]) -> Array:
     """M-orthonormal basis of the span of the columns; `mass_product` maps (n, r) to M times it."""
-    gram = motions.T @ mass_product(motions)
+    gram = motions.conj().T @ mass_product(motions)
     w, Q = np.linalg.eigh(gram)
     return motions @ (Q / np.sqrt(w))

@@ -27,9 +27,11 @@ from ..fem.discretise import Discretisation
 from ..linalg import eigen
 from ..linalg.condensed import Condensed, HarmonicSolver, as_complex, as_real, new_condensed
 from ..settings.body import BodySettings
+from . import rigid
 from .body_rows import BodyRows
 from .boundary import refuse_uncyclic, require_face
 from .equilibrium import BodyModel, StaticState
+from .floating import floated
 from .solution import Report, Searched, certified, search
 from .spectrum import pencil_parts
 
@@ -46,6 +48,14 @@ class HarmonicUnknowns:
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
         return (B[:, self.sector.apart.free] @ self.T).tocsr()
+
+    def restrict(self, forces: Array) -> Array:
+        """(m, r) forces on the unknowns, from forces (3n, r) on all degrees of freedom."""
+        return self.T.conj().T @ forces[self.sector.apart.free]
+
+    def unknowns_of(self, displacements: Array) -> Array:
+        """(m, r) unknowns of displacements (3n, r) of this nodal diameter: `expand` turned round."""
+        return self.sector.stay.T @ displacements[self.sector.apart.free]
 
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n, r) displacements of the sector's n points from the unknowns (m, r)."""
@@ -67,7 +77,11 @@ class Sector:
     ) -> dict[int, Searched]:  # fmt: skip
         """Nodal diameter -> its modes and static answers.
 
-        All are searched on one factorisation of the interior, then certified.
+        All are searched on one factorisation of the interior (those with rigid motions on one of their own), then
+        certified.
+
+        Args:
+            motions: (6, r) rigid motions of the ring that are free, see `rigid.of_nodal_diameter`.
 
         Raises:
             UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
@@ -83,7 +97,9 @@ class Sector:
             report(f"eigenmodes: nodal diameter {k}")
             pencil.tell = report
             unknowns = HarmonicUnknowns(self.unknowns, self.unknowns.transformation(k))
-            found.append(search(model, settings, pencil, unknowns, speed, motions, rows, f"nodal diameter {k}"))
+            own = rigid.of_nodal_diameter(motions, self.unknowns.cut.rotation, self.unknowns.cut.sectors, k)
+            pencil, R, floating = floated(model, state, speed, pencil, unknowns, own)
+            found.append(search(model, settings, pencil, unknowns, speed, R, rows, f"nodal diameter {k}", floating))
         if settings.modes.certify:
             report("certifying the spectra by the inertia count")
             found = certified(found)

@@ -17,9 +17,9 @@ from ..reduced.coordinates import held
 from ..reduction import METHODS, Reduced, Substructure, stuck
 from ..settings.body import BodySettings
 from ..units import rpm_text
-from . import rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel, what_loads
+from .floating import Floating, with_rotation
 from .range_basis import SPARE
 from .spectrum import leading_rows, rigid_shift, static_answers
 from .unconstrained import refuse_unconstrained_parts, refuse_unresolved
@@ -44,7 +44,7 @@ class Searched:
     Attributes:
         R: (m, r) mass-orthonormal rigid motions. shift: of the search. found: the modes. B: (r, m) rows on the
         unknowns, named by `labels`. answers: (m, r) displacement under a unit force on each row. stuck: angular
-        frequencies with every interface held (`reduction.stuck`).
+        frequencies with every interface held (`reduction.stuck`). floating: of a free body at speed.
     """
 
     pencil: eigen.Pencil
@@ -56,6 +56,7 @@ class Searched:
     labels: tuple[str, ...]
     answers: Array
     stuck: Array
+    floating: Floating | None = None
 
 
 @dataclass(frozen=True)
@@ -82,17 +83,18 @@ class Solution:
 
 
 def search(
-    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, speed: float, motions: Array,
-    rows: BodyRows, where: str = "",
+    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, unknowns: Unknowns, speed: float, R: Array,
+    rows: BodyRows, where: str = "", floating: Floating | None = None,
 ) -> Searched:  # fmt: skip
-    """Modes and static answers of the stiffness about one state; where: ``nodal diameter 3``, for messages.
+    """Modes and static answers of the stiffness about one state.
+
+    Args:
+        R: (m, r) mass-orthonormal rigid motions. where: ``nodal diameter 3``, for messages. floating: at speed.
 
     Raises:
         UserError: instability, more modes than degrees of freedom, a part that nothing holds.
     """
-    R = motions[model.free.free] if motions.shape[1] else np.zeros((pencil.n, 0), dtype=pencil.dtype)
-    R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
-    shift = rigid_shift(model) if R.shape[1] else 0.0
+    shift = rigid_shift(model) if settings.free else 0.0  # a free sector floats while its cut faces are apart
     wanted = settings.modes.count
     if wanted > pencil.n - 2:
         raise UserError(
@@ -110,8 +112,8 @@ def search(
     B = unknowns.rows(B) if B.shape[0] else sp.csr_matrix((0, pencil.n))
     answers = static_answers(pencil, found, B, R, shift)
     at = [i for i, label in enumerate(labels) if label.startswith("interface:")]
-    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(R.shape[1]))
-    return Searched(pencil, unknowns, R, shift, found, B, labels, answers, held)
+    held = stuck.reference(pencil, found.values, found.vectors, B[at], answers[:, at], bool(shift))
+    return Searched(pencil, unknowns, R, shift, found, B, labels, answers, held, floating)
 
 
 def certified(searched: Sequence[Searched]) -> list[Searched]:
@@ -164,7 +166,7 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     static = 0.5 * (static + static.conj().T)
     phi = s.unknowns.expand(s.found.vectors, n)
     lead = leading_rows(rows, settings, phi, place)
-    vectors = canonical.turn_clusters(s.found.vectors, s.found.values, lead(phi), zero)
+    vectors = _turned(s, lead(phi))
     phi = s.unknowns.expand(vectors, n)
     vectors = vectors * canonical.signs(lead(phi)[:6] if settings.interfaces else phi[place])
     keep = _band(s.found.values, settings)
@@ -178,21 +180,32 @@ def reduced_on(place: Indices, n: int, settings: BodySettings, s: Searched, rows
     T = np.asarray(s.B @ reduced.vectors)
     held = held_compliance(T, reduced, s.labels)
     quality = stuck.indicators(settings.reduction, reduced, T, s.labels, static, held, s.stuck, problem.values, zero)
+    if s.floating is not None:
+        reduced = with_rotation(reduced, s.floating, s.pencil)
     return Solution(s.found, keep, reduced, s.answers, static, plain, s.unknowns, s.labels, quality, problem.labels)
 
 
+def _turned(s: Searched, rows: Array) -> Array:
+    """(m, k) modes in one definite form; rigid motions that rotation tells apart stay apart."""
+    X, values, zero = s.found.vectors, s.found.values, s.R.shape[1]
+    if s.floating is None:
+        return canonical.turn_clusters(X, values, rows, zero)
+    rigid = canonical.turn_clusters(X[:, :zero], s.floating.values, rows[:, :zero])
+    return np.hstack([rigid, canonical.turn_clusters(X[:, zero:], values[zero:], rows[:, zero:])])
+
+
 def searched(
-    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, motions: Array, rows: BodyRows,
-    report: Report,
+    model: BodyModel, settings: BodySettings, pencil: eigen.Pencil, speed: float, R: Array, rows: BodyRows,
+    report: Report, floating: Floating | None = None,
 ) -> Searched:  # fmt: skip
-    """Modes and static answers of the stiffness about one state, certified if the settings want it.
+    """Modes and static answers of the stiffness about one state, certified if the settings want it; see `search`.
 
     Raises:
         UserError: instability, more modes than degrees of freedom. NotConverged: no certificate.
     """
     report(f"eigenmodes: {pencil.n} free degrees of freedom, solver {pencil.solver.name}")
     pencil.tell = report
-    found = search(model, settings, pencil, model.free, speed, motions, rows)
+    found = search(model, settings, pencil, model.free, speed, R, rows, floating=floating)
     if not settings.modes.certify:
         return found
     report("certifying the spectrum by the inertia count")

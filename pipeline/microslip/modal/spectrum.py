@@ -88,7 +88,7 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     The part in the modes found comes from their eigenvalues: solving for it would carry rounding into what they leave,
     1e-7 of the whole on a slender blade, many times that of a difference between two contacts.
 
-    With rigid motions, the part outside the modes found is solved by fixed-point iteration on the shifted
+    At a shift, with rigid motions, the part outside the modes found is solved by fixed-point iteration on the shifted
     factorisation, which contracts by |shift| / (lambda_next + |shift|) a step; a body so slender that this would
     hardly contract is factorised again, with a smaller shift.
     """
@@ -99,7 +99,7 @@ def static_answers(pencil: eigen.Pencil, found: eigen.Spectrum, B: sp.csr_matrix
     MX = pencil.M(X)
     elastic = found.values[R.shape[1] :]
     within = X[:, R.shape[1] :] @ (np.asarray(B @ X[:, R.shape[1] :]) / elastic).conj().T
-    if not R.shape[1]:
+    if not shift:
         beyond = pencil.solve(F)
         return within + beyond - X @ (MX.conj().T @ beyond)
     if -shift > 0.3 * found.upper_shift:

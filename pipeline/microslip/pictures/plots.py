@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -180,7 +182,10 @@ def _compliance_panel(axes: Axes, name: str, found: Sequence[Coordinate], count:
 
 
 def campbell_plot(basis: ModalBasis, tracks: Tracks, orders: Sequence[int], path: Path) -> Path:
-    """Frequencies over the speed with engine-order lines and their crossings."""
+    """Frequencies over the speed with engine-order lines and their crossings; rigid motions are left out."""
+    moving = np.nanmax(tracks.omega, axis=1) > 0
+    if moving.any():
+        tracks = replace(tracks, modes=tracks.modes[moving], omega=tracks.omega[moving], mac=tracks.mac[moving])
     figure, axes = single_panel(8.6, 6.4)
     orders = sorted({k for k in orders if k > 0})
     top = _ceiling(tracks, orders)
@@ -303,6 +308,7 @@ def _campbell_frame(axes: Axes, basis: ModalBasis, rpm: Array, top: float, track
     if not shown.all():
         note += f"; {int((~shown).sum())} modes lie above"
     axes.set_title(f"{basis.name}: Campbell diagram", fontweight="bold")
+    note = textwrap.fill(note, 110)
     axes.text(0.5, -0.13, note, transform=axes.transAxes, ha="center", va="top", fontsize=8, color="#5b6270")
 
 

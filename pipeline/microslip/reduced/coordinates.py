@@ -22,7 +22,7 @@ from ..data import (
 
 
 def in_modes(g: ModalGroup) -> ModalGroup:
-    """The same body in modal coordinates: M_r = 1, K_r = diag(omega^2); itself where it stands so already.
+    """The same body in modal coordinates: M_r = 1, K_r = `own_stiffness`; itself where it stands so already.
 
     Coordinates without mass and interface forces are left out: the compliance they hold is then missing in
     `Compliance.modal` and counts as residual.
@@ -35,11 +35,24 @@ def in_modes(g: ModalGroup) -> ModalGroup:
         in_coordinates(g, V),
         kind=own_kind(g),
         M_r=np.eye(p),
-        K_r=np.diag(g.omega**2),
+        K_r=own_stiffness(g.K_r, g.omega, V, g.speed),
         compliance=replace(g.compliance, modal=_modal(g)) if p < g.n_modes else g.compliance,
         gyroscopic=_gyroscopic(g.gyroscopic, V, g.M_r),
         to_diagonal=None,
     )
+
+
+def own_stiffness(K_r: Array, omega: Array, V: Array | None, speed: float) -> Array:
+    """(p, p) V^H K_r V: diag(omega^2), and of a free body at speed (rad/s) what its rigid motions (omega = 0) meet."""
+    A = np.diag(omega**2)
+    rigid = (omega == 0) & (speed != 0)
+    if not rigid.any():
+        return A
+    V = np.eye(len(omega)) if V is None else V
+    rows = V[:, rigid].conj().T @ (0.5 * (K_r + K_r.conj().T)) @ V
+    A = A.astype(rows.dtype)
+    A[rigid], A[:, rigid] = rows, rows.conj().T
+    return A
 
 
 def in_coordinates(g: ModalGroup, V: Array) -> ModalGroup:

@@ -133,13 +133,20 @@ def travelling(group: ModalGroup, direction: str) -> ModalGroup:
 
 
 def _waves(group: ModalGroup, direction: str, count: int) -> Indices | None:
-    """(count,) which of the modes with gyroscopic coupling run this way, the lowest; None: not so many are known."""
+    """(count,) which of the modes with gyroscopic coupling run this way, the lowest; None: not so many are known.
+
+    Elastic modes run as often forward as backward, the rigid motions of a free ring do not (a whirl at Omega runs
+    backward): as many stand before the elastic ones as there are at rest, the last of them repeated or left out.
+    """
     g = group.gyroscopic
     if g is None or not g.stable:
         return None
-    chosen = np.flatnonzero(g.omega < 0 if direction == FORWARD else g.omega > 0)
-    chosen = chosen[np.argsort(np.abs(g.omega[chosen]), kind="stable")][:count]
-    return chosen if len(chosen) == count else None
+    chosen = np.flatnonzero(g.omega < 0 if direction == FORWARD else g.omega >= 0)
+    chosen = chosen[np.argsort(np.abs(g.omega[chosen]), kind="stable")]
+    rigid = int((group.omega == 0).sum())
+    if rigid and (lead := len(chosen) - (len(group.omega) - rigid)) > 0:
+        chosen = np.concatenate([chosen[np.minimum(np.arange(rigid), lead - 1)], chosen[lead:]])
+    return chosen[:count] if len(chosen) >= count else None
 
 
 def waves_of(group: ModalGroup) -> dict[str, tuple[Array, Array]]:

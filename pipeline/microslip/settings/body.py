@@ -745,8 +745,6 @@ class BodySettings(Model):
                 f"output.stress_nodal_diameters: {max(beyond)} is more than "
                 f"{f'{self.cyclic.sectors} sectors' if self.cyclic else 'a body without [cyclic]'} can have; correct it"
             )
-        if self.cyclic and self.free:
-            raise ValueError("cyclic: a sector with free = true is not supported; hold the disc")
         return self
 
     def _only_what_matrices_can(self) -> None:

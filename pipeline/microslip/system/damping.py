@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import Array, ModalGroup, UserError
 from ..files.store import ordinary
+from ..reduced.coordinates import own_stiffness
 from ..ring.expansion import BACKWARD, FORWARD
 from .component import Component
 from .excitation import Turning, direction, index_of
@@ -49,7 +50,8 @@ def as_loss(group: ModalGroup) -> tuple[ModalGroup, Array]:
     """
     V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
     P, D, omega = group.M_r @ V, group.damping_ratio, group.omega
-    modal, elastic = (P * (2 * D * omega)) @ P.conj().T, (P * omega**2) @ P.conj().T
+    modal = (P * (2 * D * omega)) @ P.conj().T
+    elastic = P @ own_stiffness(group.K_r, omega, group.to_diagonal, group.speed) @ P.conj().T
     H = (P * (2 * D * omega**2)) @ P.conj().T + 2 * last_ratio(group) * (group.K_r - elastic)
     return replace(group, C_r=group.C_r - modal), 0.5 * (H + H.conj().T)
 

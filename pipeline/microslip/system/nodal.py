@@ -203,10 +203,12 @@ def _motions(face: Face, indices: Sequence[int], Q: Array, take: Array | None) -
 
 
 def _per_energy(wave: InWave) -> Array:
-    """(m, m) coordinates of unit energy q^H (K + omega_1^2 M) q = 1, with the lowest elastic frequency omega_1."""
+    """(m, m) coordinates of unit energy q^H (K + omega_1^2 M) q = 1, with the lowest elastic frequency omega_1, of a
+    free body at speed (K at least -Omega^2 M) not below twice Omega."""
     M, K, _ = wave.matrices
-    elastic = wave.group.omega[wave.group.omega > 0]
-    values, V = scipy.linalg.eigh(K + (elastic.min(initial=np.inf) ** 2 if len(elastic) else 1.0) * M)
+    g = wave.group
+    elastic, speed = g.omega[g.omega > 0], 2 * g.speed if (g.omega == 0).any() else 0.0
+    values, V = scipy.linalg.eigh(K + (max(elastic.min(initial=np.inf), speed) ** 2 if len(elastic) else 1.0) * M)
     keep = values > 1e-14 * values.max()
     return V[:, keep] / np.sqrt(values[keep])
 

@@ -104,7 +104,7 @@ def step(options: Options, groups: tuple[Group, ...], B: Bodies, k: Any, now: No
     held = _held(options, groups, h, now, last, x)
     bent = (now.push - two.push - three.push + last.push) / h**2
     missed = h / 6 * jnp.sqrt(jnp.sum((four.push - last.push) ** 2) + jnp.sum((0.5 * h**2 * (bent - bent_before)) ** 2))
-    size = jnp.sqrt(jnp.sum(y[:, p:] ** 2 + B.omega2 * y[:, :p] ** 2))
+    size = jnp.sqrt(jnp.sum(y[:, p:] ** 2 + jnp.abs(B.omega2) * y[:, :p] ** 2))
     done, level = _judged(options, k, now.level, missed, B.enough * size)
     energy = now.energy.at[:3].add(energy).at[3].add(held.lost).at[4].set(held.stored).at[5].add(held.given)
     after = now._replace(

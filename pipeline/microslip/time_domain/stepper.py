@@ -91,7 +91,8 @@ class Stepper:
         gapes = [g.law.overlap(jnp.zeros((g.G.shape[0] * g.G.shape[1], 3))) for g in self.groups]
         opens = bool(gapes) and not any(bool(jnp.isnan(a).any()) for a in gapes)
         dissipative = np.linalg.eigvalsh(0.5 * (e.C + e.C.T)).min(initial=0.0) >= -1e-9 * np.abs(e.C).max(initial=0.0)
-        leaps = opens and not e.F_0.any() and e.steady is not None and bool(dissipative)
+        bounded = bool(dissipative) and not (e.omega2 < 0).any()  # else (a free body that turns) energy bounds no swing
+        leaps = opens and not e.F_0.any() and e.steady is not None and bounded
         flows = self.order == 4 and bool(self.groups) and not e.R.any() and e.ramp is None
         flows = flows and all(g.law.follows * e.fastest > fourth.SLOW for g in self.groups)
         halvings = fourth.HALVINGS if flows else 0
