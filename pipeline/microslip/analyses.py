@@ -322,8 +322,9 @@ def integrate(
     Args:
         system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. second: of loads
             of a second tone, see `two_tones`. settle: periods of the first that are left to themselves. keep: periods
-            that are kept. samples: of each that are kept. steps: of each; if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least. Of fourth order
-            where every law allows it, and then halved where contacts open, close or slide; else of second.
+            that are kept. samples: of each that are kept. steps: of each; if not given, 150 in a period of the fastest
+            motion with closed contacts, and 512 at least. Of fourth order where every law allows it, and then halved
+            where contacts open, close or slide; else of second.
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
             are taken; a balance or a case has its own.

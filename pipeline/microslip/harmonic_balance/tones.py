@@ -14,7 +14,7 @@ from ..data import Array, UserError
 from ..results.tones import TwoTones
 from . import reduced
 from .readout import measured
-from .torus import commensurate, with_mean
+from .torus import Torus, commensurate, with_mean
 from .two_tone import Stacked, TwoTone
 
 Report = Callable[[str], None]
@@ -239,18 +239,22 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     y = (d.T - offset) / b.problem.scale
     few = replace(b.torus, order=min(b.torus.order, 5))
 
-    def fitted(second: float, torus: Any) -> tuple[Array, float]:
-        E = with_mean(time[:, None] * torus.frequencies(first, second))
+    def fitted(second: float, torus: Torus, which: Any = slice(None)) -> tuple[Array, float]:
+        E = with_mean(time[:, None] * torus.frequencies(first, second)[which])
         c, *_ = np.linalg.lstsq(E, y, rcond=None)
         return c, float(np.square(E @ c - y).sum())
 
     span = np.pi / (time[-1] - time[0])
     grid = np.arange(0.85 * around, 1.15 * around, span)
-    best = grid[int(np.argmin([fitted(g, few)[1] for g in grid]))]
+    line = (few.pairs[:, 1] == 0) | (few.pairs == [0, 1]).all(axis=1)  # the strongest line, not a combination of two
+    best = grid[int(np.argmin([fitted(g, few, line)[1] for g in grid]))]
     options: Any = {"xatol": 1e-10 * around}
-    found = scipy.optimize.minimize_scalar(
-        lambda s: fitted(s, few)[1], bounds=(best - span, best + span), method="bounded", options=options
-    )
+    bounds = (best - span, best + span)
+
+    def missed(second: float) -> float:
+        return fitted(second, few)[1]
+
+    found = scipy.optimize.minimize_scalar(missed, bounds=bounds, method="bounded", options=options)
     c = fitted(float(found.x), b.torus)[0]
     x = np.append(c.ravel(), found.x)
     if not _vibrates(b, x):
