@@ -179,7 +179,7 @@ def two_tones(
         report("a motion in time to begin from")
         at = float(one[0]) / (2 * np.pi)
         seen = start or integrate(assembly, at, settle=200, keep=100, samples=32)
-        begin = tones.from_time(b, seen.time, seen.d, float(one[0]), float(two[0]))
+        b, begin = tones.from_time(b, seen.time, seen.d, float(one[0]), float(two[0]))
     return tones.swept(b, one, two, begin, report)
 
 

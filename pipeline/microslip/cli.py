@@ -424,6 +424,30 @@ def bifurcate(
 
 
 @app.command
+def two_tones(
+    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """Vibration under two frequencies without a common period, as [two_tones] asks: two loads, or a load and a
+    self-excited vibration.
+
+    Args:
+        case: a case.toml, the folder that holds it, its name, or its products.
+    """
+    from .case import load_case
+    from .stages.places import modal_files
+    from .stages.tones import tones_stage
+
+    case = _case_file(case)
+    with progress(f"two tones of {case}", quiet) as report:
+        settings, _ = load_case(case, list(set_))
+        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
+        made, sentences, fine = tones_stage(case, files, folder, list(set_), force, report, not no_pictures)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not fine:
+        raise NotConverged(f"some points did not converge; {made[0]} says which and why")
+
+
+@app.command
 def stability(
     path: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:

@@ -53,7 +53,7 @@ class Solved(TwoTones):
         own = self.points[i]
         if own.status != CONVERGED:
             raise UserError(f"error_estimate: point {i} was not found ({own.status}); take one that was")
-        finer = refined(self.balances[i])
+        finer = refined(self.balances[i]).at(own.first, own.second)
         other = solve(finer, own.first, own.second, [_spread(self.balances[i], own.x, finer)])
         if other.status != CONVERGED:
             return float("inf")
@@ -73,22 +73,20 @@ def _turned(a: dict[Any, complex], b: dict[Any, complex]) -> float:
 
 def refined(b: TwoTone) -> TwoTone:
     """With twice the harmonics, samples and turns."""
-    return of_order(b, 2 * b.torus.order, 2 * b.torus.each, 2 * b.least)
+    return of_order(b, 2 * b.torus.order, 4 * b.torus.count, 2 * b.least)
 
 
-def of_order(b: TwoTone, order: int, each: int, least: int) -> TwoTone:
-    """The same balance with other numbers of harmonics, of samples in a turn and of turns in the line."""
-    torus = replace(b.torus, order=order, each=each)
+def of_order(b: TwoTone, order: int, count: int, least: int) -> TwoTone:
+    """The same balance with other numbers of harmonics, of samples and of turns in the line."""
+    torus = replace(b.torus, order=order, count=count)
     other = replace(b, torus=torus, contacts=tuple(one.on(torus) for one in b.contacts), least=least)
     return other if b.reference is None else replace(other, reference=_coefficients(b, b.reference, other))
 
 
 def _coefficients(b: TwoTone, v: Array, other: TwoTone) -> Array:
     """(W, c) of another balance, missing ones zero."""
-    out, at = (
-        np.zeros((other.torus.coefficients, v.shape[1])),
-        {tuple(k): i for i, k in enumerate(b.torus.pairs.tolist())},
-    )
+    out = np.zeros((other.torus.coefficients, v.shape[1]))
+    at = {tuple(k): i for i, k in enumerate(b.torus.pairs.tolist())}
     out[0] = v[0]
     for j, k in enumerate(map(tuple, other.torus.pairs.tolist())):
         if k in at:
@@ -225,8 +223,8 @@ def _powers(b: TwoTone, p: Point) -> list[float]:
     return [*supplied, damped, exchanged, b.lost(p.x, p.first)]
 
 
-def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) -> Array:
-    """Unknowns of a balance with a free second frequency from motions d (c, t) of the contacts in time.
+def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) -> tuple[TwoTone, Array]:
+    """The balance in units of motions d (c, t) of the contacts in time, and its unknowns by them.
 
     The second frequency (rad/s) is looked for near `around`, where two-tone series fit the motion best.
 
@@ -236,7 +234,10 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     offset = np.zeros(b.problem.count)
     for one in b.contacts:
         offset[one.group.first] = one.group.offset
-    y = (d.T - offset) / b.problem.scale
+    moved = d.T - offset
+    size = float(np.abs((moved - moved.mean(axis=0)) / b.problem.scale).max(initial=0.0))
+    b = replace(b, problem=replace(b.problem, length=b.problem.length * (0.1 * size or 1.0)))
+    y = moved / b.problem.scale
     few = replace(b.torus, order=min(b.torus.order, 5))
 
     def fitted(second: float, torus: Torus, which: Any = slice(None)) -> tuple[Array, float]:
@@ -259,4 +260,4 @@ def from_time(b: TwoTone, time: Array, d: Array, first: float, around: float) ->
     x = np.append(c.ravel(), found.x)
     if not _vibrates(b, x):
         raise UserError("second: the motion in time shows no second frequency near it; correct second, or the start")
-    return x
+    return b, x

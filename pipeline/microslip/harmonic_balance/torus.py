@@ -6,8 +6,8 @@ A motion u(t) = U(omega_1 t, omega_2 t) lives on a torus with the angles theta_1
 
 of every pair k and -k only one. What a contact remembers runs along (omega_1, omega_2), a line that never closes. It is
 marched along one that does: q turns of theta_1 and p of theta_2, p/q near omega_2/omega_1. That is the only thing for
-which the ratio is taken as rational. The samples of the line are a lattice on the torus, q by m places, sheared, so
-that sums over them are the Fourier integrals up to pairs that differ by multiples of (p, -q), and of m.
+which the ratio is taken as rational. The S samples of the line are a lattice on the torus: sums over them are the
+Fourier integrals up to pairs k whose difference has (q, p) . k a multiple of S, or zero.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ def pairs_of(order: int) -> Indices:
 
 
 def closed(first: float, second: float, least: int) -> tuple[int, int]:
-    """(q, p) turns of the first and the second angle in a line that closes after `least` to 3 `least` turns of the
+    """(q, p) turns of the first and the second angle in a line that closes after `least` to 2 `least` turns of the
     faster one: of the lines of coprime turns the one that goes astray least in a turn, for its length."""
     slow, fast = sorted((first, second))
     ratio, found = slow / fast, []
-    for q in range(least, 3 * least + 1):
+    for q in range(least, 2 * least + 1):
         for p in {math.floor(q * ratio), math.ceil(q * ratio)}:
             if p and math.gcd(p, q) == 1:
                 found.append((abs(ratio - p / q) * q**1.5, q, p))
@@ -49,12 +49,12 @@ class Torus:
     """The series of H, and the closed line.
 
     Attributes:
-        order: H. turns: (q, p). each: samples of a turn of the faster angle.
+        order: H. turns: (q, p). count: S, samples of the line, evenly spaced.
     """
 
     order: int
     turns: tuple[int, int]
-    each: int
+    count: int
 
     @cached_property
     def pairs(self) -> Indices:
@@ -65,11 +65,6 @@ class Torus:
     def coefficients(self) -> int:
         """W = 2 P + 1: mean, cosine and sine of every pair."""
         return 2 * len(self.pairs) + 1
-
-    @property
-    def count(self) -> int:
-        """S, samples of the line."""
-        return self.each * max(self.turns)
 
     @cached_property
     def values(self) -> Array:

@@ -78,7 +78,7 @@ class TwoTone:
     Attributes:
         problem: its one-tone balance, for what does not depend on frequencies. parts: pair -> what is linear, with the
             loads of that pair; (0, 0) is the mean. contacts: in groups. torus.
-        second: rad/s; where it is free, the guess. ratio: the second frequency is `second` + `ratio` times the first.
+        second: rad/s; where it is free, the guess.
         free: whether the second frequency is unknown. reference: (W, c) motion whose phase is kept then.
         shares: of the loads of the first and of the second tone. least: turns of the faster angle in the line.
     """
@@ -88,7 +88,6 @@ class TwoTone:
     contacts: tuple[Contacts, ...]
     torus: Torus
     second: float
-    ratio: float = 0.0
     free: bool = False
     reference: Array | None = None
     shares: tuple[float, float] = (1.0, 1.0)
@@ -112,7 +111,7 @@ class TwoTone:
         Raises:
             UserError: contacts that remember while the two have a common period.
         """
-        found = replace(self, second=second - self.ratio * first, lam_scale=first)
+        found = replace(self, second=second, lam_scale=first)
         if not any(one.remember for one in self.contacts):
             return found
         small = commensurate(first, second, self.torus.order)
@@ -127,7 +126,7 @@ class TwoTone:
 
     def frequencies(self, x: Array, first: float) -> tuple[float, float]:
         """rad/s."""
-        return first, float(x[-1]) if self.free else self.second + self.ratio * first
+        return first, float(x[-1]) if self.free else self.second
 
     def displacement(self, x: Array) -> Array:
         """(W, c) m and rad."""
@@ -175,9 +174,8 @@ class TwoTone:
             ((views.rate(excess, self.torus.pairs[:, i]) + views.compliant(by_tone[i][..., None])[..., 0]) / p.scale)
             for i in (0, 1)
         ]
-        along = (tones[0] + self.ratio * tones[1]).ravel()
         if not self.free:
-            return R, A, along
+            return R, A, tones[0].ravel()
         assert self.reference is not None
         phase = (self.torus.differentiated(self.torus.pairs[:, 1].astype(float)) @ self.reference / p.scale).ravel()
         off = (v - self.reference) / p.scale
@@ -309,14 +307,14 @@ def _pointwise(
 
 def of(
     assembly: Assembly, first: float, second: float, order: int = 5, samples: int | None = None,
-    turns: int | None = None, ratio: float | None = None, free: bool = False,
+    turns: int | None = None, free: bool = False,
 ) -> TwoTone:  # fmt: skip
     """The balance of an assembly whose loads have two tones.
 
     Args:
         first, second: rad/s. order: H. samples: of a turn of the faster angle, 8 H and 32 at least if not given. turns:
             of the faster angle in the closed line, at least; as many if not given.
-        ratio: of the two frequencies, where it is held while the first one varies. free: see `TwoTone`.
+        free: see `TwoTone`.
 
     Raises:
         UserError: a ring; a load of a tone that is none; contacts that remember while the two have a common period.
@@ -331,10 +329,9 @@ def of(
         contacts=tuple(replace(c, ground=None) for c in assembly.contacts),
     )
     problem = balance.of(plain, 1, form="relative")
-    torus = Torus(order, closed(first, second, turns), samples)
+    torus = Torus(order, closed(first, second, turns), samples * round(1.5 * turns))  # one program for all lines
     groups = tuple(_contacts(g, grounds, torus) for g in problem.groups)
-    held = (second, 0.0) if ratio is None else (0.0, ratio)
-    made = TwoTone(problem, _parts(assembly, order), groups, torus, *held, free=free, lam_scale=first, least=turns)
+    made = TwoTone(problem, _parts(assembly, order), groups, torus, second, free=free, lam_scale=first, least=turns)
     return made.at(first, second)
 
 
