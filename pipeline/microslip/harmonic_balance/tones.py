@@ -44,8 +44,8 @@ class Solved(TwoTones):
     balances: tuple[TwoTone, ...] = field(default=())
 
     def error_estimate(self, i: int = 0, readout: int = 0) -> float:
-        """What twice the harmonics, samples and turns change of a point's amplitudes, the largest change over the
-        largest amplitude.
+        """Three times what twice the harmonics, samples and turns change of a point's amplitudes, the largest change
+        over the largest amplitude, as `harmonic_balance.accuracy` counts.
 
         Raises:
             UserError: a point that was not found.
@@ -63,7 +63,7 @@ class Solved(TwoTones):
         size = np.abs(a[1:]).max(initial=0.0) or 1.0
         turn = _turned(known, dict(zip(pairs, b, strict=True))) if self.balances[i].free else 0.0
         change = [known.get(k, 0.0) - v * np.exp(1j * k[1] * turn) for k, v in zip(pairs, b, strict=True)]
-        return float(np.abs(change).max() / size)
+        return float(3 * np.abs(change).max() / size)
 
 
 def _turned(a: dict[Any, complex], b: dict[Any, complex]) -> float:
@@ -72,8 +72,8 @@ def _turned(a: dict[Any, complex], b: dict[Any, complex]) -> float:
 
 
 def refined(b: TwoTone) -> TwoTone:
-    """With twice the harmonics, samples and turns."""
-    return of_order(b, 2 * b.torus.order, 4 * b.torus.count, 2 * b.least)
+    """With twice the harmonics, and one more for laws that answer odd with odd ones, twice the samples and turns."""
+    return of_order(b, 2 * b.torus.order + 1, 4 * b.torus.count, 2 * b.least)
 
 
 def of_order(b: TwoTone, order: int, count: int, least: int) -> TwoTone:

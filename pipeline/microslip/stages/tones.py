@@ -99,8 +99,8 @@ def _sentences(found: TwoTones, i: int, error: float) -> list[str]:
     one, two = (sized(float(abs(found.of(*k)[i]))) for k in ((1, 0), (0, 1)))
     kept = f"{100 * error:.2g} % of the largest amplitude" if np.isfinite(error) else "an unknown share"
     return [
-        f"{found.first[i]:.6g} and {found.second[i]:.6g} Hz: {found.readouts[0]} swings by {one} and {two}; twice the "
-        f"harmonics and samples change {kept}.",
+        f"{found.first[i]:.6g} and {found.second[i]:.6g} Hz: {found.readouts[0]} swings by {one} and {two}; the "
+        f"estimated error is {kept}.",
         *said,
     ]
 
