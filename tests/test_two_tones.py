@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -239,3 +243,95 @@ def test_faded() -> None:
     """Where nothing drives a second tone, none is found: the sentence says so."""
     with pytest.raises(UserError, match="second"):
         ms.two_tones(alone(), 1.3, 0.9, free=True, unit="rad/s")
+
+
+def test_page(capsys: pytest.CaptureFixture[str]) -> None:
+    """The page prints what its block prints; harmonics bring a slider's amplitudes nearer to those in time."""
+    text = (Path(__file__).parents[1] / "docs" / "two_tones.md").read_text()
+    code, printed = re.findall(r"```python\n(.*?)```\n\n((?:    [^\n]*\n)+)", text, flags=re.S)[0]
+    exec(code, {})
+    assert [line.strip() for line in printed.splitlines()] == capsys.readouterr().out.splitlines()
+    table = text.split("<!-- table slider -->")[1].split("<!-- end -->")[0].strip().splitlines()[2:]
+    *found, exact = ([float(cell) for cell in row.split("|")[4:6]] for row in table)
+    away = [max(abs(a - b) / b for a, b in zip(one, exact, strict=True)) for one in found]
+    assert away[-1] < 1e-4 and away[-1] < 0.5 * away[0]
+
+
+CASE = """
+name = "two-masses"
+body = "pair"
+[[excitations]]
+row = "push"
+amplitude = 0.5
+[[excitations]]
+row = "push"
+tone = 2
+amplitude = 0.3
+[[monitors]]
+monitor = "second"
+[[contacts]]
+interface = "sole"
+normal_force = 1.0
+points = [1, 1]
+normal_stiffness = 1e6
+tangential_stiffness = 1.0
+friction = 0.3
+law = "jenkins"
+[two_tones]
+start = 0.14
+stop = 0.15
+points = 2
+second = 0.1137
+harmonics = 3
+"""
+
+SYSTEM = """
+name = "pair"
+[[masses]]
+name = "second"
+mass = 1.0
+at = [2.0, 0.0, 0.0]
+free = "x"
+[[springs]]
+between = ["ground", "second"]
+stiffness = 1.0
+[[dampers]]
+between = ["ground", "second"]
+damping = 0.2
+[[contacts]]
+name = "sole"
+on = "second"
+normal = [0.0, 0.0, -1.0]
+t2 = [0.0, -1.0, 0.0]
+[[forces]]
+name = "push"
+on = "second"
+direction = [1.0, 0.0, 0.0]
+[[monitors]]
+name = "second"
+on = "second"
+"""
+
+
+@pytest.mark.slow
+def test_case(tmp_path: Path) -> None:
+    """`microslip run` of a case leaves page, table and file with the same numbers; the same elements from Python give
+    them too; a case without a second tone is refused, exit code 2."""
+    (tmp_path / "pair").mkdir()
+    (tmp_path / "pair" / "system.toml").write_text(SYSTEM)
+    (tmp_path / "case.toml").write_text(CASE)
+    run = [sys.executable, "-m", "microslip", "run", "case.toml"]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "build" / "two-masses"
+    found = ms.load(folder / "two_tones.h5")
+    rows = list(csv.DictReader((folder / "two_tones.csv").open()))
+    for row, one, two in zip(rows, found.of(1, 0), found.of(0, 1), strict=True):
+        assert float(row["amplitude_m_1_0"]) == pytest.approx(abs(one), rel=1e-9)
+        assert float(row["amplitude_m_0_1"]) == pytest.approx(abs(two), rel=1e-9)
+    assert (folder / "two_tones.html").is_file() and (folder / "pictures" / "two_tones.png").is_file()
+    system = ms.structure(1.0, 1.0, 0.2, force={0: 0.5}, second_force={0: 0.3}, elements=[ms.jenkins(1.0, 0.3)])
+    same = ms.two_tones(system, [0.14, 0.15], 0.1137, harmonics=3)
+    np.testing.assert_allclose(np.abs(found.of(1, 0)), np.abs(same.of(1, 0)), rtol=1e-6)
+    refused = subprocess.run([*run, "--set", "excitations.1.tone=1"], cwd=tmp_path, capture_output=True, text=True)
+    assert refused.returncode == 2 and "two_tones: second" in refused.stderr and "Traceback" not in refused.stderr

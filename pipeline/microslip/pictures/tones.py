@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,14 @@ from ..results.tones import TwoTones
 from ..units import Quantity
 from .plots import empty_figure, plain_axes, save_figure, single_panel
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 def point_picture(found: TwoTones, i: int, path: Path, title: str, readout: int = 0) -> Path:
     """Spectrum and torus above, the motion in time below."""
     figure = empty_figure(9.0, 6.4)
-    panels = figure.subplot_mosaic([["spectrum", "torus"], ["time", "time"]], height_ratios=[1.5, 1.0])
+    panels: dict[str, Axes] = figure.subplot_mosaic([["spectrum", "torus"], ["time", "time"]], height_ratios=[1.5, 1.0])
     for name in ("spectrum", "time"):
         plain_axes(panels[name])
     found.plot(panels["spectrum"], readout, i)
@@ -24,7 +28,8 @@ def point_picture(found: TwoTones, i: int, path: Path, title: str, readout: int 
     by, unit = Quantity(found.units[readout]).scale(float(np.abs(y).max(initial=0.0)))
     panels["time"].plot(time, by * y, color="#0b4f9c", linewidth=1.0)
     panels["time"].set(xlabel="time in s", ylabel=f"{found.readouts[readout]} in {unit}", xlim=(0.0, time[-1]))
-    figure.suptitle(title)
+    if title:
+        figure.suptitle(title)
     return save_figure(figure, path)
 
 

@@ -71,8 +71,8 @@ def _work(
         raise UserError(f"{case_path}: two_tones: {error}") from error
     stage.begin()
     best = int(np.argmax(np.where(found.converged, np.abs(found.of(1, 0)), -1.0)))
-    error = found.error_estimate(best) if found.converged[best] else np.inf
-    messages = [*_sentences(found, best, error), *found.messages, *built.messages]
+    left_out = found.error_estimate(best) if found.converged[best] else np.inf
+    messages = [*_sentences(found, best, left_out), *found.messages, *built.messages]
     columns = found.columns()
     cells = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in zip(*columns.values(), strict=True))
     store.write_text(folder / "two_tones.csv", rows_csv(list(columns), cells))
