@@ -335,3 +335,23 @@ def test_case(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.abs(found.of(1, 0)), np.abs(same.of(1, 0)), rtol=1e-6)
     refused = subprocess.run([*run, "--set", "excitations.1.tone=1"], cwd=tmp_path, capture_output=True, text=True)
     assert refused.returncode == 2 and "two_tones: second" in refused.stderr and "Traceback" not in refused.stderr
+
+
+def test_moving_ground(tmp_path: Path) -> None:
+    """A mass on a belt that slides under it all the time, pushed with two frequencies: as in time."""
+    from microslip.case import load_case
+    from microslip.case.assemble import build
+    from microslip.system.lumped import load_system
+
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    rate = 'law = { kind = "rate", slope = 10.0 }\nground = { velocity = 1.0 }'
+    (tmp_path / "case.toml").write_text(CASE.replace('law = "jenkins"', rate))
+    settings, _ = load_case(tmp_path / "case.toml", ["excitations.0.amplitude=0.2", "excitations.1.amplitude=0.1"])
+    built = build(settings, {"pair": load_system(tmp_path / "system.toml").basis()}, tmp_path / "case.toml")
+    found = ms.two_tones(built, 0.14, 0.1137, harmonics=9)
+    orbit = ms.integrate(built, 0.14, second=0.1137, settle=40, keep=8, samples=64, steps=512)
+    largest = np.abs(orbit.y[0]).max()
+    readout = [name.split()[-1] for name in found.readouts].index("u_x")
+    row = [label.split()[-1] for label in orbit.labels].index("u_x")
+    assert np.abs(found.motion(orbit.time, 0, readout) - orbit.y[row]).max() < orbit.error * largest < 1e-4
+    assert found.lost[0] != 0 and abs(found.exchanged[0] - found.lost[0]) < 1e-9 * found.supplied.sum()

@@ -234,7 +234,8 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+        marked = page.name if page.name == "two_tones.html" else "response.csv"
+        raise NotConverged(f"some points of the response did not converge; they are marked in {marked}")
 
 
 @app.command
