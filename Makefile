@@ -85,6 +85,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/ring_response.py
 	@$(PYTHON) benchmarks/time_domain.py
 	@$(PYTHON) benchmarks/bifurcation.py
+	@$(PYTHON) benchmarks/two_tone.py
 	@$(PYTHON) benchmarks/stability.py
 
 clean: ## remove products

@@ -1113,6 +1113,16 @@ def python() -> None:
     save(drawn(fig), "python")
 
 
+def two_tones() -> None:
+    """Duffing's oscillator under two forces, and how a slider's amplitudes converge to those of motions in time."""
+    import tones_study as study
+
+    from microslip.pictures.tones import point_picture
+
+    save(from_file(point_picture(study.duffing(), 0, BUILD / "two_tones.png", "")), "two_tones")
+    fill("two_tones.md", "slider", table(*study.slider()))
+
+
 # the stability page ------------------------------------------------------------------------------------------------
 
 
@@ -1488,6 +1498,7 @@ STUDIES = {
     for f in (
         reference,
         python,
+        two_tones,
         stability,
         geometry,
         meeting,

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
+    from .harmonic_balance.tones import Solved
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -120,6 +121,82 @@ def harmonic_response(
     points, hertz = sweep(problem, asked, report), _hertz(unit)
     known = {} if hertz == 1 else {"parameter": asked / hertz}
     return Motions("response", points, lambda _: problem, over=_over("frequency", unit), known=known)
+
+
+def two_tones(
+    system: Assembly | Built, first: Any, second: Any, *, free: bool = False, harmonics: int = 5,
+    samples: int | None = None, turns: int | None = None, start: Orbit | None = None,
+    unit: Literal["Hz", "rad/s"] = "Hz", report: Report = lambda _: None,
+) -> Solved:  # fmt: skip
+    """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
+
+    Args:
+        system: what vibrates, with loads of both tones (``second_force`` of `structure`, ``tone = 2`` of a case).
+        first, second: numbers or (f,) in the unit, point by point: hold one of them, or ``second=ratio * first``.
+        free: the second frequency is that of a self-excited vibration, unknown, and ``second`` a guess within 15 %; no
+            load has a second tone then. start: a motion in time to begin from then, of `integrate`; if not given 200
+            periods of the first tone from rest, and a hundred that are kept.
+        harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
+            32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
+        report: is told what is under way.
+
+    Returns:
+        A `Solved`: ``of(k1, k2)``, ``plot()``, ``plot_torus()``, ``motion(time)``, ``to_dataframe()``,
+        ``to_xarray()``, ``save(path)``, ``error_estimate(i)``. A point that was not found says why in ``status``.
+
+    Raises:
+        UserError: a frequency that is not positive, two that are equal; no load of a second tone, or one with ``free``;
+            a ring; contacts that remember where the frequencies are as small whole numbers; rigid stops.
+
+    Examples:
+        Duffing's oscillator under two forces:
+
+        >>> import microslip as ms
+        >>> forces = {"force": {0: 0.2}, "second_force": {0: 0.1}}
+        >>> duffing = ms.structure(1.0, 1.0, 0.05, **forces, elements=[ms.polynomial({3: 0.05})])
+        >>> found = ms.two_tones(duffing, 1.3, 0.8, unit="rad/s")
+        >>> [round(float(abs(found.of(*k)[0])), 5) for k in ((1, 0), (0, 1), (1, -2))]
+        [0.29221, 0.26934, 0.00087]
+    """
+    from .harmonic_balance import tones, two_tone
+
+    assembly = _pressed(system) if isinstance(system, Built) else system
+    if not isinstance(assembly, Assembly):
+        raise UserError(f"system: {type(system).__name__} is no assembly; make one by structure or assemble")
+    turn = 2 * np.pi * _hertz(unit)
+    one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
+    for key, f in (("first", one), ("second", two)):
+        bounded(key, f, gt=0)
+    bounded("harmonics", harmonics, ge=1)
+    try:
+        one, two = np.broadcast_arrays(one, two)
+    except ValueError:
+        raise UserError(f"second: {len(two)} frequencies and {len(one)} first ones; give as many, or one") from None
+    _check_tones(assembly, one, two, free)
+    b = two_tone.of(assembly, float(one[0]), float(two[0]), harmonics, samples, turns, free=free)
+    begin = None
+    if free:
+        report("a motion in time to begin from")
+        at = float(one[0]) / (2 * np.pi)
+        seen = start or integrate(assembly, at, settle=200, keep=100, samples=32)
+        b, begin = tones.from_time(b, seen.time, seen.d, float(one[0]), float(two[0]))
+    return tones.swept(b, one, two, begin, report)
+
+
+def _check_tones(assembly: Assembly, first: np.ndarray, second: np.ndarray, free: bool) -> None:
+    """Raise `UserError` where there are no two tones."""
+    if (np.abs(first - second) <= 1e-9 * first).any():
+        raise UserError("second: is the first frequency; give loads of one tone and use harmonic_response")
+    tones = {x.tone for x in assembly.loads if x.harmonic}
+    if not free and 2 not in tones:
+        raise UserError(
+            "second: no load has this frequency; give second_force to structure or tone = 2 in a case, or free=True "
+            "where the assembly vibrates by itself"
+        )
+    if free and 2 in tones:
+        raise UserError("free: a load has the second frequency, which is known then; leave free out, or the load")
+    if 1 not in tones:
+        raise UserError("first: no load has this frequency; give force to structure, or a load of tone 1 in a case")
 
 
 def follow(
@@ -230,7 +307,8 @@ def _hertz(unit: str) -> float:
 
 
 def integrate(
-    system: System, frequency: float, *, unit: Literal["Hz", "rad/s"] = "Hz", settle: int = 100, keep: int = 20,
+    system: System, frequency: float, *, second: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz",
+    settle: int = 100, keep: int = 20,
     samples: int = 256, steps: int | None = None, start: Literal["static", "rest", "balance"] = "static",
     method: Literal["stepper", "reference"] = "stepper", tolerance: float = 1e-9, file: Path | str | None = None,
     report: Report = lambda _: None,
@@ -242,10 +320,11 @@ def integrate(
     to.
 
     Args:
-        system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. settle: periods
-            that are left to themselves. keep: periods that are kept. samples: of each that are kept. steps: of each;
-            if not given, 150 in a period of the fastest motion with closed contacts, and 512 at least. Of fourth order
-            where every law allows it, and then halved where contacts open, close or slide; else of second.
+        system: what vibrates, with its loads. frequency: of the loads' first harmonic, in the unit. second: of loads
+            of a second tone, see `two_tones`. settle: periods of the first that are left to themselves. keep: periods
+            that are kept. samples: of each that are kept. steps: of each; if not given, 150 in a period of the fastest
+            motion with closed contacts, and 512 at least. Of fourth order where every law allows it, and then halved
+            where contacts open, close or slide; else of second.
         start: ``static``, at rest under the steady loads; ``rest``, at rest in the preloaded state; ``balance``, on
             the vibration that harmonic balance finds, its contacts remembering it. Of an assembly `IN_TIME` harmonics
             are taken; a balance or a case has its own.
@@ -277,7 +356,10 @@ def integrate(
     if method not in ("stepper", "reference"):
         raise UserError(f"method: '{method}' is none of stepper, reference")
     assembly = assembly.assembly if isinstance(assembly, Problem) else assembly
-    found = equations.of(assembly, 2 * np.pi * frequency * _hertz(unit))
+    turn = 2 * np.pi * _hertz(unit)
+    found = equations.of(assembly, turn * frequency, None if second is None else turn * second)
+    if second is not None and start == "balance":
+        raise UserError('second: "balance" begins on a periodic vibration; take "static" or "rest"')
     if method == "reference":
         if start == "balance" or file is not None:
             raise UserError('method: "reference" begins from "static" or "rest", and writes no file; use the stepper')

@@ -234,7 +234,8 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        raise NotConverged("some points of the response did not converge; they are marked in response.csv")
+        marked = page.name if page.name == "two_tones.html" else "response.csv"
+        raise NotConverged(f"some points of the response did not converge; they are marked in {marked}")
 
 
 @app.command
@@ -421,6 +422,30 @@ def bifurcate(
     _say("\n".join([*sentences, *map(str, made)]), quiet)
     if not whole:
         raise NotConverged(f"some branches could not be followed to their end; {made[0]} says where and why")
+
+
+@app.command
+def two_tones(
+    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """Vibration under two frequencies without a common period, as [two_tones] asks: two loads, or a load and a
+    self-excited vibration.
+
+    Args:
+        case: a case.toml, the folder that holds it, its name, or its products.
+    """
+    from .case import load_case
+    from .stages.places import modal_files
+    from .stages.tones import tones_stage
+
+    case = _case_file(case)
+    with progress(f"two tones of {case}", quiet) as report:
+        settings, _ = load_case(case, list(set_))
+        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
+        made, sentences, fine = tones_stage(case, files, folder, list(set_), force, report, not no_pictures)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not fine:
+        raise NotConverged(f"some points did not converge; {made[0]} says which and why")
 
 
 @app.command

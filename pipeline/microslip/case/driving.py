@@ -121,8 +121,9 @@ class ExcitationOfCase(Model):
     """A harmonic force: a row of a body's modal file times an amplitude (N, or Pa for a unit pressure).
 
     row: ``excitation``, or ``body:excitation``. phase: degrees. harmonic: of the frequency that is swept; 0: steady.
-    engine_order: instead of the harmonic; the swept frequency is that of the greatest common divisor of all engine
-    orders, or of ring.engine_order where that is given. stimulus times steady (N or Pa): instead of the amplitude.
+    tone: 2, where the harmonic is one of a second frequency ([two_tones]). engine_order: instead of the harmonic; the
+    swept frequency is that of the greatest common divisor of all engine orders, or of ring.engine_order where that is
+    given. stimulus times steady (N or Pa): instead of the amplitude.
     speed_rpm: of a centrifugal excitation, steady. magnets: instead of amplitude and order.
 
     field: a complex pressure field on a face (an interface, or a face that an excitation of the body names) instead of
@@ -134,6 +135,7 @@ class ExcitationOfCase(Model):
     amplitude: Number = 1.0
     phase: Number = 0.0
     harmonic: Annotated[int, Field(ge=0, le=1000)] = 1
+    tone: Literal[1, 2] = 1
     engine_order: Order | None = None
     steady: Number | None = None
     stimulus: NotNegative | None = None
@@ -157,6 +159,8 @@ class ExcitationOfCase(Model):
             raise ValueError("stimulus and steady come together, instead of amplitude")
         if self.engine_order is not None and "harmonic" in given:
             raise ValueError("engine_order and harmonic: an order is a harmonic of the base order; give one of them")
+        if self.tone == 2 and (self.harmonic == 0 or given & {"engine_order", "magnets", "speed_rpm"}):
+            raise ValueError("tone: a second frequency belongs to a harmonic from 1 on; leave tone out, or the rest")
         if self.engine_order == 0:
             raise ValueError("engine_order: 0 is steady; write harmonic = 0")
         if self.phase and self.engine_order is None and self.harmonic == 0:
@@ -247,7 +251,8 @@ def loads_of(
     if x.speed_rpm is not None:
         return (Load(component, row, (x.speed_rpm * np.pi / 30) ** 2, 0),)
     h = x.harmonic if x.engine_order is None else harmonic_of(x.engine_order, wave, turning)
-    return field_loads(component, row, h, x.size) if x.field is not None else (Load(component, row, x.size, h),)
+    loads = field_loads(component, row, h, x.size) if x.field is not None else (Load(component, row, x.size, h),)
+    return tuple(replace(one, tone=x.tone) for one in loads)
 
 
 def with_field(

@@ -43,6 +43,7 @@ from .questions import (
     OrdersOfCase,
     RangesOfCase,
     SpeedsOfCase,
+    TwoTonesOfCase,
 )
 
 FIRST_HARMONICS = 3
@@ -325,6 +326,7 @@ class CaseSettings(Model):
     orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
     bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
+    two_tones: TwoTonesOfCase | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -332,14 +334,15 @@ class CaseSettings(Model):
         """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
         if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
             raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
-        if isinstance(raw, dict) and raw.get("bifurcation") and "sweep" not in raw:
+        if isinstance(raw, dict) and (raw.get("bifurcation") or raw.get("two_tones")) and "sweep" not in raw:
             raw = raw | {"sweep": NO_SWEEP}
         return raw
 
     @property
     def is_only_followed(self) -> bool:
-        """Whether it asks for bifurcations and for no sweep."""
-        return bool(self.bifurcation) and self.orbit is None and self.sweep == Sweep.model_validate(NO_SWEEP)
+        """Whether it asks for bifurcations or two tones and for no sweep."""
+        asked = bool(self.bifurcation or self.two_tones) and self.orbit is None
+        return asked and self.sweep == Sweep.model_validate(NO_SWEEP)
 
     @property
     def is_only_in_time(self) -> bool:
@@ -435,8 +438,8 @@ class CaseSettings(Model):
         moves = [c.interface for c in self.contacts if c.ground is not None]
         if moves and not self.is_only_in_time and not self.is_only_followed:
             raise ValueError(
-                f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit] or "
-                "[[bifurcation]] and no sweep"
+                f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit], "
+                "[[bifurcation]] or [two_tones], and no sweep"
             )
         bare = [c for c in self.contacts if c.normal_force is None and c.interference is None]
         open_ = [c.interface for c in bare if not self.is_thrown(c)]
@@ -451,6 +454,8 @@ class CaseSettings(Model):
             raise ValueError(
                 'bodies: aerodynamics belong to waves, which a full ring does not have; write model = "sector"'
             )
+        if self.two_tones is not None and self.ring is not None:
+            raise ValueError("two_tones: one sector that stands for a ring follows one wave; leave [ring] out")
         if any(c.against_sector for c in self.contacts) and self.ring is None:
             raise ValueError("contacts: against_sector belongs to a ring; add [ring] with blades and engine_order")
         return self
@@ -541,7 +546,7 @@ class CaseSettings(Model):
 
 
 NO_SWEEP = {"start": 1.0, "stop": 2.0}
-"""Stands for the sweep of a case that asks for bifurcations alone."""
+"""Stands for the sweep of a case that asks for bifurcations or two tones alone."""
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:

@@ -10,14 +10,13 @@ first cycle.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import jax.numpy as jnp
 import numpy as np
 
 from ..contact.elements import Spring
 from ..contact.friction import Coulomb
-from ..contact.harmonics import fourier
 from ..contact.jenkins import Jenkins
 from ..contact.law import Law
 from ..contact.normal import Preload
@@ -25,7 +24,8 @@ from ..contact.patch import Patch
 from ..contact.point import PointContact
 from ..data import Array, Indices
 from .forces import AFT, Forces
-from .point_cycles import Cycle, Traced, above_rounding, derivative
+from .point_cycles import Cycle, Traced, above_rounding
+from .torus import Torus
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class OneCoordinate(AFT):
 
     def _sampled(self, u: Array) -> tuple[Array, Array, Array]:
         """(c, s) the coordinate over a cycle, (s, W) values of the harmonics, (W, s) their transform."""
-        values, transform = _waves(u.shape[2] // 2, self.samples)
+        values, transform = self.waves(u.shape[2])
         return u[:, 0] @ values.T, values, transform
 
     def rate(self, u: Array, period: float) -> None:
@@ -42,9 +42,7 @@ class OneCoordinate(AFT):
 
     def _speed(self, u: Array) -> Array:
         """(c, s) change of the coordinate from sample to sample, by its derivative."""
-        return (
-            u[:, 0] @ (_waves(u.shape[2] // 2, self.samples)[0] @ derivative(u.shape[2])).T * (2 * np.pi / self.samples)
-        )
+        return u[:, 0] @ self.ahead(u.shape[2]).T / len(self.waves(u.shape[2])[0])
 
     @cached_property
     def _length(self) -> float:
@@ -151,12 +149,6 @@ class JenkinsPlay(OneCoordinate):
         return path, np.where(dragged >= 0, at, 0.0), dragged
 
 
-@lru_cache(maxsize=8)
-def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
-    values, transform = fourier(harmonics, samples)
-    return np.asarray(values), np.asarray(transform)
-
-
 def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
     """Of every sample of the second cycle of a path: the sample that dragged the slider last (-1: none yet),
     and in which direction, +1 or -1. It begins at 0."""
@@ -174,12 +166,14 @@ def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
     return dragged, signs
 
 
-def model(patch: Patch, contacts: int, samples: int, cycles: int, periodicity: float) -> Forces:
+def model(
+    patch: Patch, contacts: int, samples: int, cycles: int, periodicity: float, torus: Torus | None = None
+) -> Forces:  # fmt: skip
     """Of the forces of equal contacts: by hand where that is possible, else marched."""
     kind = AFT
     if patch.kinematics.shape == (1, 3, 1):
         kind = _by_hand(patch.law, patch.kinematics[0, :, 0], cycles)
-    return kind(patch, contacts, samples, cycles, periodicity)
+    return kind(patch, contacts, samples, cycles, periodicity, torus)
 
 
 def _by_hand(law: Law, along: Array, cycles: int) -> type[AFT]:

@@ -8,18 +8,20 @@ displacements u (c, k, W).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics
+from ..contact.harmonics import CHUNK, CHUNK_ALONE, force_alone, force_harmonics, fourier
 from ..contact.law import Law, point_axes, program, seldom
 from ..contact.patch import Patch
+from ..contact.periodic import periodic, with_slopes
 from ..data import Array
-from .point_cycles import Cycle, Traced, needs_rate, traced
+from .point_cycles import Cycle, Traced, derivative, needs_rate, traced
+from .torus import Torus
 
 
 class Forces(Protocol):
@@ -53,6 +55,7 @@ class AFT:
     Attributes:
         patch. contacts: c, how many equal ones. samples: of a cycle. cycles: at most, the last one counts.
         periodicity: they end when the sliders are periodic within this share of the largest force; 0 marches all.
+        torus: of motions of two frequencies, W their coefficients and the cycle its closed line; None: of one.
         seldom: whether the forces are asked for some dozens of times only, as of an estimate of error.
     """
 
@@ -61,7 +64,18 @@ class AFT:
     samples: int
     cycles: int
     periodicity: float = 1e-10
+    torus: Torus | None = None
     seldom: bool = False
+
+    def waves(self, coefficients: int) -> tuple[Array, Array]:
+        """(s, W) of the series at the samples of a cycle, and (W, s) its coefficients from samples."""
+        return _waves(coefficients // 2, self.samples) if self.torus is None else self.torus.waves
+
+    def ahead(self, coefficients: int) -> Array:
+        """(s, W) derivative of the series over the time in cycles, at the samples."""
+        if self.torus is not None:
+            return self.torus.ahead
+        return 2 * np.pi * self.waves(coefficients)[0] @ derivative(coefficients)
 
     @cached_property
     def law(self) -> Law:
@@ -83,13 +97,22 @@ class AFT:
         """Arguments of the programs; a NumPy number as the period would compile them again."""
         return self.law, self.kinematics, u, float(period), self.periodicity, self.samples, self.cycles
 
+    def _given_on_line(self, u: Array, period: float) -> tuple[Any, ...]:
+        assert self.torus is not None
+        return self.law, self.kinematics, u, float(period), self.periodicity, *self.torus.waves, self.cycles
+
     def force(self, u: Array, period: float) -> Array:
+        if self.torus is not None:
+            return np.asarray(_on_line(*self._given_on_line(u, period)))
         alone, _ = self._programs
         return np.asarray(alone(*self._given(u, period)))
 
     def forces(self, u: Array, period: float) -> tuple[Array, Array]:
-        _, both = self._programs
-        F, J = both(*self._given(u, period))
+        if self.torus is not None:
+            F, J = _slopes_on_line(*self._given_on_line(u, period))
+        else:
+            _, both = self._programs
+            F, J = both(*self._given(u, period))
         return np.asarray(F), np.asarray(J)
 
     def rate(self, u: Array, period: float) -> Array | None:
@@ -102,7 +125,14 @@ class AFT:
 
     def traced(self, u: Array, period: float) -> list[Traced]:
         G = self.kinematics
-        return [traced(self.patch.law, G, one, period, self.samples, self.cycles, self.periodicity) for one in u]
+        given = self.samples, self.cycles, self.periodicity, (self.waves(u.shape[2])[0], self.ahead(u.shape[2]))
+        return [traced(self.patch.law, G, one, period, *given) for one in u]
+
+
+@lru_cache(maxsize=8)
+def _waves(harmonics: int, samples: int) -> tuple[Array, Array]:
+    values, transform = fourier(harmonics, samples)
+    return np.asarray(values), np.asarray(transform)
 
 
 def repeated(law: Law, n: int, times: int) -> Law:
@@ -157,3 +187,33 @@ def _rate(
     count: int,
 ) -> jax.Array:  # fmt: skip
     return jax.jvp(lambda T: _force(law, G, u, T, periodicity, samples, count), (period,), (jnp.ones(()),))[1]
+
+
+@partial(program, static_argnames=("count",))
+def _slopes_on_line(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, values: jax.Array,
+    transform: jax.Array, count: int,
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    """`_with_slopes` of any series (s, W) in place of a cycle's."""
+    c, n, W = u.shape[0], G.shape[0], u.shape[2]
+    found, slope = with_slopes(law, _path(G, u, values), period, count, periodicity, values, transform)
+    slope = slope.reshape(W, W, 3, c, n, 3)  # of force w by motion x along j, of point n of contact c along i
+    return _summed(G, found.force, c, transform), jnp.einsum("nia,wxjcni,njb->cawbx", G, slope, G)
+
+
+@partial(program, static_argnames=("count",))
+def _on_line(
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, periodicity: jax.Array | float, values: jax.Array,
+    transform: jax.Array, count: int,
+) -> jax.Array:  # fmt: skip
+    return _summed(G, periodic(law, _path(G, u, values), period, count, periodicity).force, u.shape[0], transform)
+
+
+def _path(G: jax.Array, u: jax.Array, values: jax.Array) -> jax.Array:
+    """(s, c n, 3) of all points."""
+    return jnp.einsum("sw,nia,caw->scni", values, G, u).reshape(len(values), -1, 3)
+
+
+def _summed(G: jax.Array, force: jax.Array, c: int, transform: jax.Array) -> jax.Array:
+    """(c, k, W) of forces (s, c n, 3)."""
+    return jnp.einsum("ws,scni,nia->caw", transform, force.reshape(len(force), c, -1, 3), G)

@@ -47,14 +47,21 @@ class Traced(NamedTuple):
     cycle: Cycle
 
 
-def traced(law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0) -> Traced:
+def traced(
+    law: Law, G: Array, u: Array, period: float, samples: int, count: int, periodicity: float = 0.0,
+    waves: tuple[Array, Array] | None = None,
+) -> Traced:  # fmt: skip
     """One more cycle than the force is found from, looked at in time.
 
     Args:
         law: of n points. G: (n, 3, k) kinematics. u: (k, 2 H + 1) mean, cos, sin, cos 2, ... period: s.
         samples: of a cycle. count: cycles marched at most before. periodicity: see `contact.periodic.periodic`.
+        waves: (s, W) of another series at the samples, and its derivative over the time in cycles.
     """
-    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), float(period), samples, count, periodicity)
+    if waves is None:
+        values = np.asarray(fourier(u.shape[1] // 2, samples)[0])
+        waves = values, 2 * np.pi * values @ derivative(u.shape[1])
+    parts = _point_cycles(law, jnp.asarray(G), jnp.asarray(u), float(period), *waves, count, periodicity)
     dissipated, by_slip, lost, slipping, open_ = (np.asarray(p) for p in parts[:5])
     return Traced(parts[6], Cycle(dissipated, by_slip, lost, slipping, open_, float(parts[5])))
 
@@ -77,13 +84,13 @@ def derivative(coefficients: int) -> Array:
     return out
 
 
-@partial(seldom, static_argnames=("samples", "count"))
+@partial(seldom, static_argnames=("count",))
 def _point_cycles(
-    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, samples: int, count: int,
+    law: Law, G: jax.Array, u: jax.Array, period: jax.Array | float, values: jax.Array, ahead: jax.Array, count: int,
     periodicity: jax.Array | float,
 ) -> tuple[jax.Array, ...]:  # fmt: skip
-    values, _ = fourier(u.shape[1] // 2, samples)
-    path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, values @ derivative(u.shape[1])))
+    samples = len(values)
+    path, ahead = (jnp.einsum("sk,nia,ak->sni", v, G, u) for v in (values, ahead))
     before, state = periodic(law, path, period, count, periodicity)[:2]
     moved = path - jnp.roll(path, 1, axis=0)
     dt = period / samples
@@ -102,5 +109,5 @@ def _point_cycles(
     size = jnp.abs(jnp.einsum("nia,sni->sa", G, force)[:, :3]).max()
     unsteady = jnp.where(size > 0, jnp.abs(change).max() / jnp.where(size > 0, size, 1.0), 0.0)
     by_slip = jnp.sum(mean[..., 1:] * slid * moves[..., None], axis=(0, 2))
-    work = above_rounding(force * ahead * (2 * jnp.pi / samples), (0, 2))
+    work = above_rounding(force * ahead / samples, (0, 2))
     return work, by_slip, lost.sum(axis=0), slips.mean(axis=0), open_.mean(axis=0), unsteady, force

@@ -25,6 +25,7 @@ from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
 from .stage import Report
+from .tones import tones_stage
 
 
 def run_body(
@@ -57,11 +58,12 @@ def _answered(
     path: Path, case: CaseSettings, files: Mapping[str, Path], folder: Path, assignments: list[str] | None,
     force: bool, report: Report, wanted: Wanted,
 ) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
-    """The response of a case, None if it asks for none, motions in time and bifurcations; whether all converged."""
+    """The response of a case, None if it asks for none, and what else it asks for; whether all converged."""
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
-    for asked, stage in ((case.orbit, orbit_stage), (case.bifurcation, bifurcation_stage)):
+    stages = (case.orbit, orbit_stage), (case.bifurcation, bifurcation_stage), (case.two_tones, tones_stage)
+    for asked, stage in stages:
         if asked:
             converged = stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
     return response, converged
@@ -85,7 +87,9 @@ def run_case_file(
             return report_stage(job, response, force, report, wanted.pictures), converged
     folder = Path(".") / "build" / case.name
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
-    page = "bifurcation.html" if case.is_only_followed else "orbit.html" if case.is_only_in_time else "response.csv"
+    page = "orbit.html" if case.is_only_in_time else "response.csv"
+    if case.is_only_followed:
+        page = "bifurcation.html" if case.bifurcation else "two_tones.html"
     return folder / page, converged
 
 

@@ -165,13 +165,15 @@ class Load:
 
     Attributes:
         component. row: name of an excitation. amplitude: complex 0-peak number that multiplies the row, N for a unit
-            force, Pa for a unit pressure. harmonic: of the base frequency; 0 for a steady load.
+            force, Pa for a unit pressure. harmonic: of the base frequency; 0 for a steady load. tone: 1, or 2 where the
+            base frequency is a second one, which only `two_tones` and a motion in time know.
     """
 
     component: str
     row: str
     amplitude: complex = 1.0
     harmonic: int = 1
+    tone: int = 1
 
     def __post_init__(self) -> None:
         bounded(f"load on '{self.component}': amplitude", [complex(self.amplitude).real, complex(self.amplitude).imag])
@@ -267,7 +269,10 @@ class Assembly:
         return ()
 
     def check_names(self) -> None:
-        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no component."""
+        """Raise `UserError` for a side, a load or a read-out of what is not there, or where there is no component; for
+        a load of a second frequency, which who knows of it takes out before."""
+        if any(x.tone != 1 for x in self.loads):
+            raise UserError("loads: one has a second frequency (tone 2), which this analysis lacks; use two_tones")
         if not self.components:
             raise UserError("an assembly needs a component")
         has = {m.name: next(iter(m.groups.values())) for m in self.components}
@@ -367,7 +372,7 @@ class Assembly:
 
         def load(x: Load, j: int) -> Load:
             turn = complex(np.exp(2j * np.pi * (j * ring.index(x.harmonic) % N) / N))
-            return Load(body(x.component, j), row(x.component, x.row, j), x.amplitude * turn, x.harmonic)
+            return Load(body(x.component, j), row(x.component, x.row, j), x.amplitude * turn, x.harmonic, x.tone)
 
         def output(w: Output, j: int) -> Output:
             return Output(body(w.component, j), row(w.component, w.monitor, j), w.label)

@@ -149,6 +149,7 @@ def stop(
 
 def structure(
     M: Any, K: Any, C: Any = None, *, force: Mapping[int, complex] | Array | None = None,
+    second_force: Mapping[int, complex] | Array | None = None,
     steady: Mapping[int, float] | Array | None = None,
     elements: Sequence[Element] = (), output: int | Sequence[int] | None = None,
     damping_ratio: float | Sequence[float] = 0.0, name: str = "structure",
@@ -159,6 +160,7 @@ def structure(
         M, K, C: (n, n) mass (kg), stiffness (N/m) and damping (N s/m), or numbers where there is one coordinate. M and
             K are symmetric; C may hold gyroscopic forces, its skew part.
         force: coordinate -> 0-peak amplitude (N) of the harmonic force, or (n,) of all.
+        second_force: the same of a force with a second frequency, see `microslip.two_tones`.
         steady: coordinate -> force (N) that does not change, or (n,) of all.
         elements: see `polynomial`, `jenkins`, `stop`, `friction` and `Element`.
         output: coordinates that are read; where a force acts, if not given.
@@ -186,21 +188,25 @@ def structure(
             "its symmetric part, and gyroscopic forces in C"
         )
     C = C + _modal_damping(M, K, damping_ratio)
-    f, f_0 = _force(force, n), _force(steady, n, "steady").real
-    watched = [int(i) for i in (np.flatnonzero(np.abs(f) + np.abs(f_0)) if output is None else np.atleast_1d(output))]
+    f, f_2, f_0 = _force(force, n), _force(second_force, n, "second_force"), _force(steady, n, "steady").real
+    driven = np.abs(f) + np.abs(f_2) + np.abs(f_0)
+    watched = [int(i) for i in (np.flatnonzero(driven) if output is None else np.atleast_1d(output))]
     rows = np.array([_row(i, n, "structure: output") for i in watched]).reshape(-1, n)
     nowhere = np.zeros(3)
     group = ModalGroup(
         speed=0.0, omega=np.zeros(n), kind=("normal",) * n, damping_ratio=np.zeros(n), M_r=M, K_r=K, C_r=C,
         G_r=np.zeros((n, n)), phi=np.zeros((0, 3, n)), interfaces={},
-        excitations={k: Rows(x[None].conj(), (k,), "m", nowhere) for k, x in (("force", f), ("steady", f_0))},
+        excitations={k: Rows(x[None].conj(), (k,), "m", nowhere)
+                     for k, x in (("force", f), ("second", f_2), ("steady", f_0)) if k != "second" or x.any()},
         monitors={"q": Rows(rows, tuple(map(str, watched)), "m", nowhere)}, gauges={},
         compliance=Compliance((), np.zeros((0, 0)), np.zeros((0, 0)), False), stresses={}, u_static=np.zeros((0, 3)),
         checks={},
     )  # fmt: skip
-    loads = tuple(Load(name, k, 1.0, h) for k, x, h in (("force", f, 1), ("steady", f_0, 0)) if x.any())
+    asked = (("force", f, 1, 1), ("second", f_2, 1, 2), ("steady", f_0, 0, 1))
+    loads = tuple(Load(name, k, 1.0, h, tone) for k, x, h, tone in asked if x.any())
     outputs = tuple(Output(name, "q", str(i)) for i in watched)
-    return Assembly((Component(name, {0: group}),), _contacts(elements, name, K, f), loads, outputs)
+    contacts = _contacts(elements, name, K, np.abs(f) + np.abs(f_2))
+    return Assembly((Component(name, {0: group}),), contacts, loads, outputs)
 
 
 def _matrix(A: Any, key: str) -> Array:

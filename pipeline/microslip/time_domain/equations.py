@@ -167,8 +167,10 @@ def _stiffest(contact: Contact) -> Array:
     return found
 
 
-def of(assembly: Assembly, Omega: float) -> Equations:
+def of(assembly: Assembly, Omega: float, second: float | None = None) -> Equations:
     """The equations of an assembly driven at a frequency (rad/s); a sector that stands for a ring is unrolled.
+
+    Loads of a second frequency (rad/s) count as a harmonic of the first one that is no whole number.
 
     Loss factors of bodies count as dampers that take as much at that frequency.
 
@@ -177,7 +179,7 @@ def of(assembly: Assembly, Omega: float) -> Equations:
             circulatory forces.
     """
     bounded("frequency", Omega / (2 * np.pi), gt=0)
-    assembly = assembly.unrolled()
+    assembly = (assembly if second is None else _of_two(assembly, second / Omega)).unrolled()
     assembly.check_names()
     for contact in assembly.contacts:
         _remembers(contact)
@@ -203,6 +205,15 @@ def of(assembly: Assembly, Omega: float) -> Equations:
         _real(mean.output, assembly) @ V, _of_harmonics(parts, harmonics, lambda p: p.output_given),
         _real(mean.output_residual, assembly),
     )  # fmt: skip
+
+
+def _of_two(assembly: Assembly, ratio: float) -> Assembly:
+    """The same with loads of the second tone as harmonics of the first."""
+    bounded("second", ratio, gt=0)
+    if assembly.ring is not None:
+        raise UserError("second: of a ring, one engine order drives; leave second out")
+    loads = (x if x.tone == 1 else replace(x, tone=1, harmonic=x.harmonic * ratio) for x in assembly.loads)  # type: ignore[arg-type]
+    return replace(assembly, loads=tuple(loads))
 
 
 def _remembers(contact: Contact) -> None:

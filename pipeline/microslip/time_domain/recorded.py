@@ -16,6 +16,7 @@ from ..files.store import fingerprint
 from ..harmonic_balance import solved
 from ..harmonic_balance.nonlinear_modes import Backbone
 from ..results.series import Series
+from ..results.tones import TwoTones, is_of_tones, read_tones
 from . import orbit, samples
 from .equations import Equations
 from .orbit import Orbit, Start
@@ -162,14 +163,17 @@ def read_orbits(path: Path | str) -> tuple[Recorded, ...]:
         return tuple(Recorded(path, i, file[f"motion_{i}"]) for i in range(1, count + 1))
 
 
-def load(path: Path | str) -> Series | Backbone | Recorded:
-    """What a result's `save` wrote: the only series of a response file, a nonlinear mode, or the only motion in time.
+def load(path: Path | str) -> Series | Backbone | Recorded | TwoTones:
+    """What a result's `save` wrote: the only series of a response file, a nonlinear mode, the only motion in time, or
+    motions of two frequencies.
 
     Files of several are read by `read_response` and `read_orbits`.
 
     Raises:
         UserError: no such file, or one of several series or motions.
     """
+    if is_of_tones(path):
+        return read_tones(path)
     if not samples.is_of_motions(path):
         return solved.load(path)
     found = read_orbits(path)

@@ -1,0 +1,122 @@
+"""Motions of two frequencies: Fourier series over two angles, and a closed line that nearly follows the motion there.
+
+A motion u(t) = U(omega_1 t, omega_2 t) lives on a torus with the angles theta_1 and theta_2,
+
+    U = mean + sum of a_k cos(k . theta) + b_k sin(k . theta),   0 < |k_1| + |k_2| <= H,
+
+of every pair k and -k only one. What a contact remembers runs along (omega_1, omega_2), a line that never closes. It is
+marched along one that does: q turns of theta_1 and p of theta_2, p/q near omega_2/omega_1. That is the only thing for
+which the ratio is taken as rational. The S samples of the line are a lattice on the torus: sums over them are the
+Fourier integrals up to pairs k whose difference has (q, p) . k a multiple of S, or zero.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..data import Array, Indices
+
+ABOVE = 1e-9
+"""Share of a frequency within which a combination of two is told from none at all."""
+
+
+def pairs_of(order: int) -> Indices:
+    """(P, 2) of H, one of k and -k, the pairs of one frequency alone first."""
+    H = range(-order, order + 1)
+    half = [(a, b) for a in H for b in H if 0 < abs(a) + abs(b) <= order and (a > 0 or (a == 0 and b > 0))]
+    return np.array(sorted(half, key=lambda k: (abs(k[0]) + abs(k[1]), k[0] * k[1] != 0, -k[0], -k[1])))
+
+
+def closed(first: float, second: float, least: int) -> tuple[int, int]:
+    """(q, p) turns of the first and the second angle in a line that closes after `least` to 2 `least` turns of the
+    faster one: of the lines of coprime turns the one that goes astray least in a turn, for its length."""
+    slow, fast = sorted((first, second))
+    ratio, found = slow / fast, []
+    for q in range(least, 2 * least + 1):
+        for p in {math.floor(q * ratio), math.ceil(q * ratio)}:
+            if p and math.gcd(p, q) == 1:
+                found.append((abs(ratio - p / q) * q**1.5, q, p))
+    _, q, p = min(found)
+    return (q, p) if first >= second else (p, q)
+
+
+@dataclass(frozen=True, eq=False)
+class Torus:
+    """The series of H, and the closed line.
+
+    Attributes:
+        order: H. turns: (q, p). count: S, samples of the line, evenly spaced.
+    """
+
+    order: int
+    turns: tuple[int, int]
+    count: int
+
+    @cached_property
+    def pairs(self) -> Indices:
+        """(P, 2)."""
+        return pairs_of(self.order)
+
+    @property
+    def coefficients(self) -> int:
+        """W = 2 P + 1: mean, cosine and sine of every pair."""
+        return 2 * len(self.pairs) + 1
+
+    @cached_property
+    def values(self) -> Array:
+        """(S, W) of the series at the samples."""
+        turned = np.arange(self.count) * (self.pairs @ np.array(self.turns))[:, None] % self.count
+        return with_mean(2 * np.pi * turned.T / self.count)
+
+    @property
+    def waves(self) -> tuple[Array, Array]:
+        """`values` and `transform`."""
+        return self.values, self.transform
+
+    @cached_property
+    def ahead(self) -> Array:
+        """(S, W) derivative of the series over the time in closed lines, at the samples."""
+        return self.values @ self.differentiated(2 * np.pi * (self.pairs @ np.array(self.turns)))
+
+    @cached_property
+    def transform(self) -> Array:
+        """(W, S) coefficients of samples."""
+        weights = np.full(self.coefficients, 2.0 / self.count)
+        weights[0] *= 0.5
+        return np.ascontiguousarray(weights[:, None] * self.values.T)
+
+    def frequencies(self, first: float, second: float) -> Array:
+        """(P,) k . omega of every pair; zero where two frequencies cancel."""
+        found = self.pairs @ np.array([first, second])
+        return np.where(np.abs(found) < ABOVE * max(first, second), 0.0, found)
+
+    def differentiated(self, factors: Array) -> Array:
+        """(W, W) coefficients of a derivative that multiplies the argument of every pair by (P,) factors."""
+        out, a = np.zeros((self.coefficients, self.coefficients)), np.arange(1, self.coefficients, 2)
+        out[a, a + 1], out[a + 1, a] = factors, -factors
+        return out
+
+    def at(self, angles: Array) -> Array:
+        """(..., W) of the series at angles (..., 2)."""
+        return with_mean(angles @ self.pairs.T)
+
+
+def with_mean(arguments: Array) -> Array:
+    """(..., 2 P + 1) of arguments (..., P): 1, and cosine and sine of each."""
+    waves = np.stack([np.cos(arguments), np.sin(arguments)], axis=-1).reshape(*arguments.shape[:-1], -1)
+    return np.concatenate([np.ones((*waves.shape[:-1], 1)), waves], axis=-1)
+
+
+def commensurate(first: float, second: float, order: int) -> tuple[int, int] | None:
+    """(q, p), small whole numbers with p first = q second: two pairs of the series have one frequency; None if all
+    differ."""
+    k = pairs_of(2 * order)
+    together = k[np.abs(k @ np.array([first, second])) < ABOVE * max(first, second)]
+    if not len(together):
+        return None
+    a, b = together[np.abs(together).sum(axis=1).argmin()]
+    return abs(int(b)), abs(int(a))

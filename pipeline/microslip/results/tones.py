@@ -1,0 +1,291 @@
+"""Motions of two frequencies as a reader asks for them: amplitudes of every pair, spectrum, torus, motion in time."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from ..data import Array, ComplexArray, Indices, UserError
+from ..files.hdf5 import IMAGINARY, create, put, refuse_foreign, seal
+from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
+from ..files.store import complete_or_absent, ordinary
+from ..units import Quantity
+from .series import CONVERGED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = "microslip-two-tones"
+FORMAT_VERSION = "1.0"
+
+UNITS = {
+    "first": "Hz", "second": "Hz", "amplitude": "", "supplied": "W", "damped": "W", "exchanged": "W", "lost": "W",
+    "error": "",
+}  # fmt: skip
+"""Array of a file -> its unit; that of amplitudes is the read-outs' own."""
+
+SHOWN = 6
+"""Pairs that a curve shows at most."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TwoTones:
+    """Quasi-periodic motions, a point for each pair of frequencies.
+
+    A read-out is y = Re sum over k of amplitude_k exp(i (k_1 Omega_1 + k_2 Omega_2) t); of k and -k only one is there.
+
+    Attributes:
+        first, second: (f,) Hz. pairs: (P, 2) k; the first one is (0, 0), the mean. amplitude: (f, w, P) complex,
+            0-peak, in the units of the read-outs. readouts: (w,) names. units: (w,) SI.
+        supplied: (f, 2) W by the loads of either tone, in the mean. damped: (f,) W in the bodies. exchanged: (f,) W
+            that goes into contacts, by their forces' harmonics; lost: (f,) W that the contacts count themselves, as
+            friction times the path slid.
+        status: of every point. error: (f,) of the last step of Newton's method, over the size of the unknowns.
+            messages: what a reader must know. over: what a sweep runs over.
+    """
+
+    first: Array
+    second: Array
+    pairs: Indices
+    amplitude: ComplexArray
+    readouts: tuple[str, ...]
+    units: tuple[str, ...]
+    supplied: Array
+    damped: Array
+    exchanged: Array
+    lost: Array
+    status: tuple[str, ...]
+    error: Array
+    messages: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    @property
+    def converged(self) -> Array:
+        """(f,) bool."""
+        return np.array([s == CONVERGED for s in self.status], dtype=bool)
+
+    @property
+    def failures(self) -> list[tuple[float, str]]:
+        """Hz of the first tone and cause of every point that was not found."""
+        return [(float(f), s) for f, s in zip(self.first, self.status, strict=True) if s != CONVERGED]
+
+    @property
+    def order(self) -> int:
+        """H, the largest |k_1| + |k_2|."""
+        return int(np.abs(self.pairs).sum(axis=1).max())
+
+    def of(self, k_1: int, k_2: int, readout: int = 0) -> ComplexArray:
+        """(f,) complex amplitudes of k_1 times the first and k_2 times the second frequency.
+
+        Raises:
+            UserError: a pair that is not balanced.
+        """
+        for sign in (1, -1):
+            found = np.flatnonzero((self.pairs == sign * np.array([k_1, k_2])).all(axis=1))
+            if len(found):
+                one = self.amplitude[:, readout, found[0]]
+                return one if sign > 0 else one.conj()
+        raise UserError(f"pair: ({k_1}, {k_2}) is not among those of {self.order} harmonics; ask for more of them")
+
+    def frequencies(self, i: int = 0) -> Array:
+        """(P,) Hz of all pairs at a point; negative where the faster part is subtracted."""
+        return self.pairs @ np.array([self.first[i], self.second[i]])
+
+    def motion(self, time: Any, i: int = 0, readout: int = 0) -> Array:
+        """(t,) a read-out of point i at times (t,) s."""
+        turned = 2j * np.pi * np.asarray(time, dtype=float)[..., None] * self.frequencies(i)
+        return np.asarray((np.exp(turned) @ self.amplitude[i, readout]).real)
+
+    def torus(self, i: int = 0, readout: int = 0, count: int = 64) -> Array:
+        """(n, n) a read-out over both angles, n places of either, theta_1 along the first axis."""
+        at = np.exp(2j * np.pi * np.outer(np.arange(count), np.arange(-self.order, self.order + 1)) / count)
+        square = np.zeros((2 * self.order + 1, 2 * self.order + 1), dtype=complex)
+        square[tuple((self.pairs + self.order).T)] = self.amplitude[i, readout]
+        return np.asarray((at @ square @ at.T).real)
+
+    @property
+    def balance(self) -> Array:
+        """(f,) what the loads supply less what bodies and contacts lose by their own count, over what is supplied."""
+        size = np.abs(self.supplied).sum(axis=1) + np.abs(self.damped) + np.abs(self.lost)
+        return np.asarray((self.supplied.sum(axis=1) - self.damped - self.lost) / np.where(size > 0, size, 1.0))
+
+    def to_dataframe(self, readout: int = 0) -> Any:
+        """A `pandas.DataFrame`: one point by pairs, several by points with a column of each pair's amplitude."""
+        import pandas
+
+        return pandas.DataFrame(self.columns(readout))
+
+    def columns(self, readout: int = 0) -> dict[str, Any]:
+        """Name with unit -> column of the table, see `to_dataframe`."""
+        name = Quantity(self.units[readout]).column("amplitude") if self.units else "amplitude"
+        size = np.abs(self.amplitude[:, readout])
+        if len(self) == 1:
+            phase = np.angle(self.amplitude[0, readout])
+            return {
+                "k1": self.pairs[:, 0], "k2": self.pairs[:, 1], "frequency_Hz": self.frequencies(), name: size[0],
+                "phase_rad": phase,
+            }  # fmt: skip
+        each = {f"{name}_{a}_{b}": size[:, j] for j, (a, b) in enumerate(self.pairs)}
+        own = {"supplied_1_W": self.supplied[:, 0], "supplied_2_W": self.supplied[:, 1], "damped_W": self.damped}
+        tones = {"frequency_1_Hz": self.first, "frequency_2_Hz": self.second}
+        return {**tones, **each, **own, "lost_W": self.lost, "status": list(self.status)}
+
+    def to_xarray(self) -> Any:
+        """Everything as an `xarray.Dataset` over ``point``, ``readout`` and ``pair``; units are attributes."""
+        import xarray
+
+        axes = {"amplitude": ("point", "readout", "pair"), "supplied": ("point", "tone")}
+        variables = {n: (axes.get(n, ("point",)), getattr(self, n), {"units": unit}) for n, unit in UNITS.items()} | {
+            "unit": ("readout", list(self.units))
+        }
+        coords = {
+            "first": variables.pop("first"), "second": variables.pop("second"), "readout": list(self.readouts),
+            "k1": ("pair", self.pairs[:, 0]), "k2": ("pair", self.pairs[:, 1]), "tone": [1, 2],
+            "status": ("point", list(self.status)),
+        }  # fmt: skip
+        return xarray.Dataset(variables, coords=coords, attrs={"messages": list(self.messages)})
+
+    def save(self, path: Path | str) -> Path:
+        """Write a file (``docs/two_tones.md``), complete or absent; `microslip.load` reads it.
+
+        Raises:
+            UserError: no permission, no space; a file that is none of two tones stands there.
+        """
+        refuse_foreign(path, FORMAT)
+        with complete_or_absent(Path(path)) as temporary:
+            with create(temporary) as file:
+                file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+                for key in ("readouts", "units", "status", "messages"):
+                    file.attrs[key] = json.dumps(list(getattr(self, key)))
+                put(file, "pairs", self.pairs)
+                for name, unit in UNITS.items():
+                    value = getattr(self, name)
+                    put(file, name, np.real(value), unit)
+                    if np.iscomplexobj(value):
+                        put(file, f"{name}{IMAGINARY}", value.imag, unit)
+            seal(temporary)
+        return Path(path)
+
+    # pictures --------------------------------------------------------------------------------------------------------
+
+    def plot(self, axes: Axes | None = None, readout: int = 0, point: int | None = None) -> Axes:
+        """Draw the spectrum of a point, or over all points the amplitudes of the strongest pairs.
+
+        Args:
+            axes: of matplotlib, new ones if not given. readout: its number. point: its number; of a single point it
+                need not be given.
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            axes = plt.subplots(layout="constrained")[1]
+        if point is None and len(self) > 1:
+            return self._curves(axes, readout)
+        return self._spectrum(axes, readout, point or 0)
+
+    def _spectrum(self, axes: Axes, readout: int, i: int) -> Axes:
+        f, a = np.abs(self.frequencies(i)[1:]), np.abs(self.amplitude[i, readout, 1:])
+        by, unit = Quantity(self.units[readout]).scale(a.max(initial=0.0))
+        seen = a > 1e-6 * a.max(initial=0.0)
+        low = 10.0 ** np.floor(np.log10(by * a[seen].min(initial=1.0))) if seen.any() else 1e-6
+        own = (self.pairs[1:] == 0).any(axis=1)
+        for which, color, label in ((own, "#0b4f9c", "one tone"), (~own, "#c8382c", "combinations")):
+            chosen = which & seen
+            axes.vlines(f[chosen], low, by * a[chosen], color=color, linewidth=1.2)
+            axes.plot(f[chosen], by * a[chosen], "o", color=color, markersize=3, label=label)
+        axes.set(yscale="log", xlabel="frequency in Hz", ylabel=f"amplitude of {self.readouts[readout]} in {unit}")
+        axes.legend(fontsize=8, frameon=False)
+        return axes
+
+    def _curves(self, axes: Axes, readout: int) -> Axes:
+        size = np.where(self.converged[:, None], np.abs(self.amplitude[:, readout]), np.nan)
+        by, unit = Quantity(self.units[readout]).scale(float(np.nanmax(size, initial=0.0)))
+        strongest = [j for j in np.argsort(-np.nanmax(size, axis=0, initial=0.0)) if self.pairs[j].any()][:SHOWN]
+        for j in strongest:
+            axes.plot(self.first, by * size[:, j], label="({}, {})".format(*self.pairs[j]))
+        axes.set(xlabel="first frequency in Hz", ylabel=f"amplitude of {self.readouts[readout]} in {unit}")
+        axes.legend(title="multiples of both", fontsize=8, frameon=False)
+        return axes
+
+    def plot_torus(self, axes: Axes | None = None, i: int = 0, readout: int = 0) -> Axes:
+        """Draw a read-out over both angles, and the way that the motion takes there."""
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            axes = plt.subplots(layout="constrained")[1]
+        U = self.torus(i, readout, 96)
+        by, unit = Quantity(self.units[readout]).scale(float(np.abs(U).max(initial=0.0)))
+        drawn = axes.contourf(np.arange(97) / 96, np.arange(97) / 96, by * np.pad(U.T, (0, 1), mode="wrap"), 24)
+        axes.figure.colorbar(drawn, ax=axes, label=f"{self.readouts[readout]} in {unit}")
+        t = np.linspace(0.0, 6.0 / max(self.first[i], self.second[i]), 2000)
+        x, y = np.mod(self.first[i] * t, 1.0), np.mod(self.second[i] * t, 1.0)
+        jumps = np.flatnonzero((np.diff(x) < 0) | (np.diff(y) < 0)) + 1
+        axes.plot(np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan), color="white", linewidth=0.8)
+        axes.set(xlabel="turns of the first angle", ylabel="turns of the second angle", xlim=(0, 1), ylim=(0, 1))
+        return axes
+
+    def __repr__(self) -> str:
+        said = f"{len(self)} point{'s' if len(self) != 1 else ''}, {self.order} harmonics"
+        if len(self):
+            said += (
+                f"; first {self.first.min():.6g} to {self.first.max():.6g} Hz"
+                if len(self) > 1
+                else (f"; {self.first[0]:.6g} and {self.second[0]:.6g} Hz")
+            )
+        if self.amplitude.size and self.converged.any():
+            one, two = (np.where(self.converged, np.abs(self.of(*k)), 0.0).max() for k in ((1, 0), (0, 1)))
+            said += f"; amplitudes at most {one:.4g} and {two:.4g} {Quantity(self.units[0]).said}"
+        bad = self.failures
+        return f"<TwoTones: {said}; {f'{len(bad)} not converged: {bad[0][1]}' if bad else 'all converged'}>"
+
+
+def is_of_tones(path: Path | str) -> bool:
+    """Whether a file is one of two tones, as far as its head can be read."""
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("format") == FORMAT)
+    except (OSError, *DAMAGE):
+        return False
+
+
+def read_tones(path: Path | str) -> TwoTones:
+    """What `TwoTones.save` wrote.
+
+    Raises:
+        UserError: missing, damaged, foreign or of another version.
+    """
+    path = Path(path)
+    if not ordinary(path).is_file():
+        raise UserError(f"{path}: no such file; save the motions first or correct the path")
+    refuse_damaged(path, "from microslip.results.tones import _read; _read(path)", "save the motions again")
+    return _read(path)
+
+
+def _read(path: Path) -> TwoTones:
+    try:
+        with h5py.File(path, "r") as file:
+            form, version = file.attrs.get("format"), str(file.attrs.get("format_version"))
+            if (form, version) != (FORMAT, FORMAT_VERSION):
+                raise UserError(
+                    f"{path}: is '{form}' {version} and not '{FORMAT}' {FORMAT_VERSION}; save the motions again"
+                )
+            inspect(file)
+            told: dict[str, Any] = {
+                key: tuple(json.loads(file.attrs[key])) for key in ("readouts", "units", "status", "messages")
+            }
+            arrays: dict[str, Any] = {name: file[name][()] for name in (*UNITS, "pairs")}
+            arrays["amplitude"] = arrays["amplitude"] + 1j * file[f"amplitude{IMAGINARY}"][()]
+            points = len(told["status"])
+            shape = points, len(told["readouts"]), len(arrays["pairs"])
+            if arrays["amplitude"].shape != shape or any(len(arrays[name]) != points for name in UNITS):
+                raise ValueError("arrays of different lengths")
+            return TwoTones(**arrays, **told)
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); save the motions again") from error
