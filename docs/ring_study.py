@@ -156,11 +156,13 @@ def forces_picture(r: Ring, left: Any, right: Any) -> None:
     left.legend(title="normal force")
     forces = np.geomspace(0.5, 780.0, 15)
     found = over_forces(r, forces.tolist(), WIDE)
-    right.loglog(forces, [1e6 * h.amplitude for h in found], "o-", ms=4, label="amplitude in µm")
-    right.loglog(forces, [1e-6 * h.stress for h in found], "s-", ms=4, label="stress at the foot in MPa")
+    right.loglog(forces, [1e6 * h.amplitude for h in found], "o-", ms=4, label="amplitude")
     right.axvline(3.5, color="0.4", ls=":", label="3.5 N, printed optimum")
-    right.set(xlabel="normal force in N", ylabel="highest resonance, engine order 2")
-    right.legend()
+    right.set(xlabel="normal force in N", ylabel="highest amplitude, engine order 2, in µm")
+    stress = right.twinx()
+    stress.loglog(forces, [1e-6 * h.stress for h in found], "s-", ms=4, color="C1", label="stress at the foot (right)")
+    stress.set(ylabel="highest stress at the foot in MPa")
+    stress.legend(handles=[*right.lines, *stress.lines], loc="upper left")
 
 
 def optimum(make: Any, basis: ModalBasis, low: float = 4.0, high: float = 25.0) -> tuple[float, Highest]:
