@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..roots.diagram import Diagram
+from ..roots.map import Map
 from ..roots.spectrum import Spectrum
 from .plots import empty_figure, plain_axes, save_figure, single_panel
 
@@ -28,4 +30,14 @@ def over_picture(found: Diagram, path: Path) -> Path:
     above.set_xlabel("")
     handles, labels = above.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3), frameon=False, fontsize=9)
+    return save_figure(figure, path)
+
+
+def map_picture(found: Map, full: Sequence[tuple[float, float, int]], path: Path) -> Path:
+    """Where how many roots grow. full: states (x, y) counted in unreduced matrices, and their number there."""
+    figure, axes = single_panel(7.0, 5.2)
+    axes.grid(visible=False)
+    found.plot(axes)
+    for x, y, count in full:
+        axes.plot(x, y, "o", color="#c8382c" if count else "white", markeredgecolor="black", markersize=7, zorder=4)
     return save_figure(figure, path)

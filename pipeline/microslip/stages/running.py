@@ -24,6 +24,7 @@ from .orbit import orbit_stage
 from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
+from .squeal import squeal_stage
 from .stage import Report
 
 
@@ -61,7 +62,8 @@ def _answered(
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
-    for asked, stage in ((case.orbit, orbit_stage), (case.bifurcation, bifurcation_stage)):
+    answers = (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage)
+    for asked, stage in answers:
         if asked:
             converged = stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
     return response, converged
@@ -85,7 +87,9 @@ def run_case_file(
             return report_stage(job, response, force, report, wanted.pictures), converged
     folder = Path(".") / "build" / case.name
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
-    page = "bifurcation.html" if case.is_only_followed else "orbit.html" if case.is_only_in_time else "response.csv"
+    page = "orbit.html" if case.is_only_in_time else "response.csv"
+    if case.is_only_followed:
+        page = "stability.html" if case.stability else "bifurcation.html"
     return folder / page, converged
 
 

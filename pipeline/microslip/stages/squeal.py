@@ -1,0 +1,244 @@
+"""Roots of a case about steady sliding, and a map of where they grow: tables, pictures, a page that begins with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import sliding
+from ..basis import read_basis
+from ..case import CaseSettings, checkpoint, load_case
+from ..case.questions import StabilityOfCase
+from ..data import Array, NotConverged, UserError
+from ..files import store
+from ..files.tables import columns_csv
+from ..linalg.quadratic import Quadratic, Window
+from ..modal.unreduced import Unreduced, unreduced
+from ..report.squeal import squeal_html
+from ..roots.full import compared, full_matrices, growing
+from ..roots.map import Axis, Map, over_map
+from ..roots.spectrum import Spectrum, spectrum
+from ..sliding import Sliding, Tangent
+from ..system.assembly import Assembly
+from .checkpoint import hashes_of
+from .job import open_job
+from .meshing import load_mesh, mesh_stage
+from .places import find_body
+from .stability import table_csv, table_lines, window_of, write_roots
+from .stage import Made, Report, Stage
+from .varied import Varied
+
+
+@dataclass(frozen=True)
+class State:
+    """An assembly that slides: its equations, its equilibrium z, and what is linearised there."""
+
+    assembly: Assembly
+    equations: Sliding
+    z: Array
+
+    @cached_property
+    def contacts(self) -> list[Tangent]:
+        return sliding.tangents(self.assembly, self.equations, self.z)
+
+    @property
+    def matrices(self) -> Quadratic:
+        """M = 1, C and K."""
+        C, K = sliding.linearised(self.equations, self.z)
+        return Quadratic(np.eye(len(K)), C, K)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A state of the map in unreduced matrices: values of both parameters, number of roots that grow in the reduced and
+    the full matrices, largest relative distance of the two, and whether the count proves that none is missing."""
+
+    x: float
+    y: float
+    reduced: int
+    full: int
+    distance: float
+    complete: bool
+
+
+def squeal_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """Roots of a case about steady sliding, in a folder.
+
+    Args:
+        files: body of the case -> its modal file.
+
+    Returns:
+        The files, sentences and lines of a table, and whether the roots are proved complete.
+
+    Raises:
+        UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
+    """
+    settings, raw = load_case(case_path, assignments)
+    if settings.stability is None:
+        raise UserError(f"{case_path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+    stage = Stage(folder / "stability.json", ("stages.squeal",), force, report)
+    inputs = {
+        "case": checkpoint.without_defaults(raw),
+        "basis": hashes_of(files),
+        "pictures": pictures,
+        "files": hashes_of(checkpoint.files_of(settings, case_path)),
+    }
+    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures))
+    told = json.loads(stage.product.read_text())
+    return [folder / name for name in told["files"]], told["lines"], told["complete"]
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], path: Path, files: Mapping[str, Path], pictures: bool
+) -> Made:
+    asked, folder = settings.stability, stage.product.parent
+    assert asked is not None
+    varied = Varied(path, raw, {name: read_basis(file) for name, file in files.items()})
+    state = state_of(varied, {}, path)
+    found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
+    over, full = None, list[Compared]()
+    if asked.over:
+        over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
+        full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
+    stage.begin()
+    folder.mkdir(parents=True, exist_ok=True)
+    said = [found.sentence, *pressed(state), *([over.sentence] if over else []), *_told(full)]
+    names = _written(folder, settings.name, found, over, full, said, pictures)
+    complete = found.complete and all(one.complete for one in full)
+    answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
+    store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
+    return Made([folder / name for name in names])
+
+
+def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str = "stability") -> State:
+    """The case about its sliding, with other values of keys.
+
+    Raises:
+        UserError: a contact that does not slide, or lifts off; no equilibrium.
+    """
+    assembly = varied.under(values, where)
+    if not assembly.contacts:
+        raise UserError(f"{path}: contacts: there are none, so nothing slides; add [[contacts]] with friction")
+    equations = sliding.of(assembly)
+    try:
+        state = State(assembly, equations, sliding.equilibrium(equations))
+    except NotConverged as error:
+        raise UserError(f"{path}: {error}") from error
+    for c, at in zip(assembly.unrolled().contacts, state.contacts, strict=True):
+        if not np.linalg.norm(at.velocity[:, 1:], axis=1).min() > 0:
+            raise UserError(
+                f"{path}: contacts.{c.name}.ground: is missing: the contact does not slide, and friction at rest has no "
+                "direction; add ground = { rpm = ... } or { velocity = ... }"
+            )
+        if not (at.force[:, 0] > 0).any():
+            raise UserError(
+                f"{path}: contacts.{c.name}: lifts off: at the equilibrium no point of it is pressed; raise its "
+                "normal_force"
+            )
+    return state
+
+
+def pressed(state: State) -> list[str]:
+    """A sentence for each contact of which points are open at the equilibrium."""
+    said = []
+    for c, at in zip(state.assembly.unrolled().contacts, state.contacts, strict=True):
+        open_ = int((at.force[:, 0] <= 0).sum())
+        if open_:
+            said.append(f"{c.name}: {open_} of {len(at.force)} points are open at the equilibrium")
+    return said
+
+
+def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
+    """What makes the assemblies of the map, and its axes; both keys are tried at the corners first."""
+    x, y = (Axis(o.parameter, o.unit, np.linspace(o.start, o.stop, o.points), o.keys) for o in asked.over)
+
+    def make(values: dict[str, float]) -> Assembly:
+        return varied.under(values, "stability.over.keys")
+
+    for a, b in ((0, 0), (-1, -1)):
+        make({**x.at(x.values[a]), **y.at(y.values[b])})
+    return make, x, y
+
+
+def _in_full(
+    varied: Varied, asked: StabilityOfCase, over: Map, settings: CaseSettings, path: Path, report: Report
+) -> list[Compared]:  # fmt: skip
+    """States of the map, evenly spread over it, in unreduced matrices."""
+    bodies = {b.name: unreduced_body(b.body or b.name, path) for b in settings.components}
+    window, (ny, nx) = window_of(asked), over.unstable.shape
+    grows = Window((max(asked.neutral, 0.0), window.growth[1]), window.omega)
+    found = []
+    for n in range(asked.full):
+        share = (n + 0.5) / asked.full
+        i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
+        x, y = float(over.x.values[j]), float(over.y.values[i])
+        state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
+        own = spectrum(state.matrices, window).roots.s
+        report(f"unreduced, state {n + 1} of {asked.full}")
+        full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
+        mine = own[own.real > grows.growth[0]]
+        found.append(Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete))
+    return found
+
+
+def unreduced_body(name: str, path: Path) -> Unreduced:
+    """The unreduced matrices of a body that a case names.
+
+    Raises:
+        UserError: it has no mesh; see `modal.unreduced`.
+    """
+    job = open_job(find_body(path, name, Path(".")))
+    if job.settings.geometry.matrices is not None:
+        raise UserError(f"{path}: stability.full: '{name}' has no mesh, so there is nothing unreduced; leave full out")
+    return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
+
+
+def _told(full: Sequence[Compared]) -> list[str]:
+    if not full:
+        return []
+    same = sum(one.reduced == one.full and one.complete for one in full)
+    worst = np.nanmax([one.distance for one in full if np.isfinite(one.distance)], initial=0.0)
+    return [
+        f"unreduced matrices at {len(full)} states of the map: the same number of roots that grow at {same}, counted by "
+        f"the argument principle; roots differ by {worst:.1e} at most"
+    ]
+
+
+def _written(
+    folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
+    pictures: bool,
+) -> list[str]:  # fmt: skip
+    """Names of the files, the page first."""
+    drawn = _pictures(found, over, full, folder / "pictures") if pictures else {}
+    texts = {
+        "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
+        "stability.csv": table_csv(found),
+    }
+    if over is not None:
+        texts["stability_map.csv"] = columns_csv(over.columns, 12)
+    if full:
+        columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
+        texts["stability_full.csv"] = columns_csv(columns, 12)
+    for file, text in texts.items():
+        store.write_text(folder / file, text)
+    write_roots(folder / "stability.h5", found, None, {})
+    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
+
+
+def _pictures(found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path) -> dict[str, Path]:
+    from ..pictures.roots import map_picture, plane_picture
+
+    folder.mkdir(exist_ok=True)
+    drawn = {"plane": plane_picture(found, folder / "roots.png")}
+    if over is not None:
+        drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")
+    return drawn
