@@ -1,12 +1,13 @@
 """An annular brake disc, clamped at its bore, with a patch on either side where a pad lies (geometry/pad).
 
-Axes: the disc turns about z through the origin, its middle plane is z = 0. The pads lie about the x-axis, on the part of
-the ring from pad_inner to pad_outer and from -pad_angle / 2 to pad_angle / 2. Faces: bore, pad_top (z > 0), pad_bottom.
+Axes: the disc turns about z through the origin, its middle plane is z = 0. The pads lie about the x-axis, on the part
+of the ring from pad_inner to pad_outer and from -pad_angle / 2 to pad_angle / 2. Faces: bore, pad_top (z > 0),
+pad_bottom.
 
 A structured mesh of bricks of second order, with whole elements under the pad.
 """
 
-from math import ceil, radians
+from math import ceil
 
 import gmsh
 import numpy as np
@@ -90,12 +91,16 @@ def divide(p: dict, size: float) -> None:
 
 def name_surfaces(p: dict) -> None:
     near, middle = 1e-3 * p["thickness"], (p["pad_inner"] + p["pad_outer"]) / 2
-    name_face("bore", surfaces_where(lambda c, box: np.abs(box[:, :2]).max() < p["bore_radius"] + near and abs(c[2]) < near))
-    for name, side in (("pad_top", 1), ("pad_bottom", -1)):
-        high = side * p["thickness"] / 2
-        name_face(name, surfaces_where(lambda c, _, z=high: bool(
+    inside = p["bore_radius"] + near
+
+    def on_patch(z: float):
+        return lambda c, _: bool(
             abs(c[2] - z) < near and abs(c[1]) < near and abs(c[0] - middle) < (p["pad_outer"] - p["pad_inner"]) / 2
-        )))
+        )
+
+    name_face("bore", surfaces_where(lambda c, box: bool(np.abs(box[:, :2]).max() < inside and abs(c[2]) < near)))
+    name_face("pad_top", surfaces_where(on_patch(p["thickness"] / 2)))
+    name_face("pad_bottom", surfaces_where(on_patch(-p["thickness"] / 2)))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """A brake pad: a block with the plan of a part of a ring that lies on a brake disc (geometry/brake-disc).
 
-Axes: those of the disc, whose axis is z through the origin; the pad lies about the x-axis, its lining, the face "lining",
-in the plane z = lining_height, its back at z = lining_height + height. A structured mesh of bricks of second order.
+Axes: those of the disc, whose axis is z through the origin; the pad lies about the x-axis, its face "lining" in the
+plane z = lining_height, its "back" at z = lining_height + height. A structured mesh of bricks of second order.
 """
 
 from math import ceil, radians
@@ -33,7 +33,8 @@ def draw(parameters: dict, mesh: dict) -> None:
     section = add.addRectangle(p["inner_radius"], low, 0, width, p["height"])
     add.rotate([(2, section)], 0, 0, 0, 1, 0, 0, np.pi / 2)
     add.rotate([(2, section)], 0, 0, 0, 0, 0, 1, radians(-p["angle"] / 2))
-    counts = [max(2, ceil(radians(p["angle"]) * p["outer_radius"] / size)), ceil(width / size), ceil(p["height"] / size)]
+    along = max(2, ceil(radians(p["angle"]) * p["outer_radius"] / size))
+    counts = [along, ceil(width / size), ceil(p["height"] / size)]
     add.revolve([(2, section)], 0, 0, 0, 0, 0, 1, radians(p["angle"]))
     gmsh.model.occ.synchronize()
     divide(counts, p)

@@ -196,7 +196,7 @@ class ContactSettings(ContactLaw):
         if self.temperature is not None and not self.heated:
             raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
         if self.ground is not None and self.against != GROUND and (self.ground.waviness or self.ground.spectrum):
-            raise ValueError(f"ground: the contact is against {self.against}; waves belong to the ground: leave them out")
+            raise ValueError(f"ground: the contact is against {self.against}, which has no waves; leave them out")
         self.fits_here()
         return self._curved()
 
@@ -334,14 +334,16 @@ class CaseSettings(Model):
         """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
         if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
             raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
-        if isinstance(raw, dict) and (raw.get("bifurcation") or raw.get("stability")) and "sweep" not in raw:
+        asks = isinstance(raw, dict) and (raw.get("bifurcation") or raw.get("stability"))
+        if isinstance(raw, dict) and asks and "sweep" not in raw:
             raw = raw | {"sweep": NO_SWEEP}
         return raw
 
     @property
     def is_only_followed(self) -> bool:
         """Whether it asks for stability or bifurcations and for no sweep."""
-        return bool(self.bifurcation or self.stability) and self.orbit is None and self.sweep == Sweep.model_validate(NO_SWEEP)
+        asks = bool(self.bifurcation or self.stability) and self.orbit is None
+        return asks and self.sweep == Sweep.model_validate(NO_SWEEP)
 
     @property
     def is_only_in_time(self) -> bool:

@@ -38,8 +38,8 @@ def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
     damping, b = settings.damping, prepared(mesh, settings, None)
     if damping.ratio or damping.table or b.sector is not None or any(settings.rotation.speeds_rpm):
         raise UserError(
-            f"{settings.name}: the unreduced matrices of a body have no damping by modes, no sector and no speed; write "
-            "alpha and beta in [damping]"
+            f"{settings.name}: the unreduced matrices of a body have no damping by modes, no sector and no speed; "
+            "write alpha and beta in [damping]"
         )
     free = b.model.free.free
     M = sp.kron(b.model.M_full, sp.eye(3)).tocsr()[free][:, free]

@@ -25,6 +25,7 @@ from .checkpoint import hashes_of
 from .stage import Made, Report, Stage, hash_of_code
 from .varied import Varied
 
+
 @dataclass(frozen=True)
 class Changed:
     """A case whose keys follow a parameter. Attributes: varied: the case. asked: the diagram."""

@@ -63,7 +63,7 @@ def _bodies_in(root: Path) -> set[str]:
 
 
 def is_case(path: Path) -> bool:
-    """True for a case file (it has a sweep, or bodies and contacts of which another thing is asked), False for a body."""
+    """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
     keys = set(load_toml(path)) if path.is_file() and path.suffix == ".toml" else set()
     return bool(keys & {"body", "sweep"}) or bool(keys & {"bodies"} and keys & ASKED)
 

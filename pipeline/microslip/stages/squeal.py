@@ -15,15 +15,18 @@ from .. import sliding
 from ..basis import read_basis
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.questions import StabilityOfCase
-from ..data import Array, NotConverged, UserError
+from ..case.settings import GROUND
+from ..data import Array, ModalBasis, NotConverged, UserError
 from ..files import store
 from ..files.tables import columns_csv
+from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced, unreduced
 from ..report.squeal import squeal_html
 from ..roots.full import compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
 from ..roots.spectrum import Spectrum, spectrum
+from ..roots.waves import waves
 from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
 from .checkpoint import hashes_of
@@ -111,7 +114,8 @@ def _work(
         full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
     stage.begin()
     folder.mkdir(parents=True, exist_ok=True)
-    said = [found.sentence, *pressed(state), *([over.sentence] if over else []), *_told(full)]
+    told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
+    said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
     names = _written(folder, settings.name, found, over, full, said, pictures)
     complete = found.complete and all(one.complete for one in full)
     answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
@@ -136,8 +140,8 @@ def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str
     for c, at in zip(assembly.unrolled().contacts, state.contacts, strict=True):
         if not np.linalg.norm(at.velocity[:, 1:], axis=1).min() > 0:
             raise UserError(
-                f"{path}: contacts.{c.name}.ground: is missing: the contact does not slide, and friction at rest has no "
-                "direction; add ground = { rpm = ... } or { velocity = ... }"
+                f"{path}: contacts.{c.name}.ground: is missing: the contact does not slide, and friction at rest has "
+                "no direction; add ground = { rpm = ... } or { velocity = ... }"
             )
         if not (at.force[:, 0] > 0).any():
             raise UserError(
@@ -145,6 +149,28 @@ def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str
                 "normal_force"
             )
     return state
+
+
+def shapes(state: State, found: Spectrum, bases: Mapping[str, ModalBasis], settings: CaseSettings) -> list[str]:
+    """A sentence for each root that grows: the waves that run round each body whose material turns."""
+    said = []
+    components = [m.name for m in state.assembly.components]
+    grow = [i for i, verdict in enumerate(found.verdict) if verdict == "unstable"]
+    for name, turning in turned(settings).items():
+        basis = bases[name]
+        first = sum(3 * len(bases[other].mesh.points) for other in components[: components.index(name)])
+        for i in grow:
+            u = sliding.points_moved(state.assembly) @ np.asarray(state.equations.shapes) @ found.roots.x[:, i]
+            own = u[first : first + 3 * len(basis.mesh.points)].reshape(-1, 3)
+            seen = waves(basis.mesh.points, own, turning * np.asarray(basis.rotation_axis), basis.rotation_point)
+            said.append(f"{found.frequency[i]:.6g} Hz at the rim of {name}: {seen.sentence}")
+    return said
+
+
+def turned(settings: CaseSettings) -> dict[str, float]:
+    """Body whose material runs through it -> 1, or -1 where it turns against its axis."""
+    against = [(c.against, c.ground.rpm) for c in settings.contacts if c.ground and c.ground.rpm and not c.ground.axis]
+    return {settings.address(to)[0]: float(np.sign(rpm)) for to, rpm in against if to != GROUND}
 
 
 def pressed(state: State) -> list[str]:
@@ -182,10 +208,10 @@ def _in_full(
         i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
         x, y = float(over.x.values[j]), float(over.y.values[i])
         state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
-        own = spectrum(state.matrices, window).roots.s
+        own = quadratic.every_value(state.matrices)
         report(f"unreduced, state {n + 1} of {asked.full}")
         full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
-        mine = own[own.real > grows.growth[0]]
+        mine = own[grows.holds(own)]
         found.append(Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete))
     return found
 
@@ -208,8 +234,8 @@ def _told(full: Sequence[Compared]) -> list[str]:
     same = sum(one.reduced == one.full and one.complete for one in full)
     worst = np.nanmax([one.distance for one in full if np.isfinite(one.distance)], initial=0.0)
     return [
-        f"unreduced matrices at {len(full)} states of the map: the same number of roots that grow at {same}, counted by "
-        f"the argument principle; roots differ by {worst:.1e} at most"
+        f"unreduced matrices at {len(full)} states of the map: the same number of roots that grow at {same}, counted "
+        f"by the argument principle; roots differ by {worst:.1e} at most"
     ]
 
 

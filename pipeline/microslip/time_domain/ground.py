@@ -41,8 +41,8 @@ class Moving(Law):
 
     Attributes:
         law: of the contact. velocity: V, m/s. along: (2, 1) e along t1 and t2; of ground that turns (n,) and (2, n).
-            place: (n,) of the points along e, m. amplitude, number, phase: (w, 1) y_A in m, 2 pi / lambda in 1/m, and rad, of the waves. pushes: whether
-            their slope does.
+            place: (n,) of the points along e, m. amplitude, number, phase: (w, 1) y_A in m, 2 pi / lambda in 1/m, and
+            rad, of the waves. pushes: whether their slope does.
     """
 
     law: Law
