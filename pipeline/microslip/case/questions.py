@@ -214,12 +214,21 @@ class Over(Model):
         return self
 
 
+class Cycle(Over):
+    """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
+
+    points: of a branch at most.
+    """
+
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+
+
 class StabilityOfCase(Model):
     """Roots of the assembly about its steady sliding, by `microslip stability`: all that grow, and those of a window.
 
     frequency: Hz and growth: 1/s, from and to, of the window. accuracy, neutral: as of a body's [stability]. over: two
     parameters of a map of how many roots grow, and how fast the fastest. full: states of the map, evenly spread, at
-    which the unreduced matrices are counted as well.
+    which the unreduced matrices are counted as well. cycle: the limit cycles that follow.
     """
 
     growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-1000.0, 10000.0)
@@ -228,6 +237,7 @@ class StabilityOfCase(Model):
     neutral: NotNegative = 0.0
     over: Annotated[tuple[Over, ...], BeforeValidator(_tuple)] = ()
     full: Annotated[int, Field(ge=0, le=1000)] = 0
+    cycle: Cycle | None = None
 
     @model_validator(mode="after")
     def _has_area(self) -> StabilityOfCase:

@@ -20,6 +20,12 @@ OF_MAP = (
 )
 
 
+OF_CYCLES = (
+    "Half of the way from the smallest to the largest value of the first read-out in a period, from the Hopf point on. "
+    "Supercritical: the limit cycle grows out of the equilibrium softly; subcritical: it is reached by a jump."
+)
+
+
 def squeal_html(
     title: str, said: Sequence[str], found: Spectrum, over: Map | None, full: Sequence[Compared],
     pictures: Mapping[str, Path],
@@ -27,7 +33,7 @@ def squeal_html(
     """The page, which begins with the answer.
 
     Args:
-        said: sentences. pictures: ``map``, ``plane``.
+        said: sentences. pictures: ``map``, ``cycles``, ``plane``.
     """
     album = Album(pictures)
     pieces: list[Piece] = [say(*(f"{s[0].upper()}{s[1:]}." for s in said), tone="lead"), album.take("map", OF_MAP)]
@@ -35,5 +41,6 @@ def squeal_html(
         rows = [(f"{c.x:.4g}", f"{c.y:.4g}", c.reduced, c.full, f"{c.distance:.1e}") for c in full]
         head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
         pieces.append(fold("States in unreduced matrices", table(head, rows)))
+    pieces.append(album.take("cycles", OF_CYCLES))
     pieces += [album.take("plane", CAPTIONS["plane"]), root_table(found), say(READ_AS, tone="note")]
     return page(title, pieces)

@@ -13,8 +13,10 @@ import numpy as np
 
 from .. import sliding
 from ..basis import read_basis
+from ..bifurcation import mechanics
+from ..bifurcation.cycles import PERIODS, Cycles, cycles, drift
 from ..case import CaseSettings, checkpoint, load_case
-from ..case.questions import StabilityOfCase
+from ..case.questions import Cycle, StabilityOfCase
 from ..case.settings import GROUND
 from ..data import Array, ModalBasis, NotConverged, UserError
 from ..files import store
@@ -112,11 +114,13 @@ def _work(
     if asked.over:
         over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
         full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
+    born = _cycles(varied, asked, stage.report) if asked.cycle else []
     stage.begin()
     folder.mkdir(parents=True, exist_ok=True)
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
     said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
-    names = _written(folder, settings.name, found, over, full, said, pictures)
+    said += [sentence_of(c, asked.cycle) for c in born if asked.cycle]
+    names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle))
     complete = found.complete and all(one.complete for one in full)
     answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
     store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
@@ -216,6 +220,33 @@ def _in_full(
     return found
 
 
+def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycles]:
+    over = asked.cycle
+    assert over is not None
+
+    def make(p: float) -> Assembly:
+        return varied.under({key: factor * p for key, factor in over.keys.items()}, "stability.cycle.keys")
+
+    report(f"equations over {over.parameter}")
+    system = mechanics.dynamics(make, over.start, over.stop)
+    begin = sliding.equilibrium(sliding.of(make(over.start)))
+    band = window_of(asked).omega
+    return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+
+
+def sentence_of(c: Cycles, over: Cycle) -> str:
+    """Where a limit cycle is born, of which kind, how far it was followed, and how a motion in time keeps to it."""
+    unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
+    kind = "supercritical" if c.supercritical else "subcritical"
+    tried = [c.orbits[(len(c.orbits) - 1) * k // 3] for k in (1, 2, 3)]
+    off = ", ".join(f"{drift(c.system, o):.1e} at {o.p:.4g}{unit}" for o in tried)
+    return (
+        f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {kind}: its limit "
+        f"cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz; in {PERIODS} "
+        f"periods a motion in time leaves it by {off} of its amplitude"
+    )
+
+
 def unreduced_body(name: str, path: Path) -> Unreduced:
     """The unreduced matrices of a body that a case names.
 
@@ -241,10 +272,10 @@ def _told(full: Sequence[Compared]) -> list[str]:
 
 def _written(
     folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
-    pictures: bool,
+    pictures: bool, born: tuple[Sequence[Cycles], Cycle | None],
 ) -> list[str]:  # fmt: skip
     """Names of the files, the page first."""
-    drawn = _pictures(found, over, full, folder / "pictures") if pictures else {}
+    drawn = _pictures(found, over, full, folder / "pictures", born) if pictures else {}
     texts = {
         "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
         "stability.csv": table_csv(found),
@@ -254,17 +285,25 @@ def _written(
     if full:
         columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
         texts["stability_full.csv"] = columns_csv(columns, 12)
+    for number, c in enumerate(born[0], 1):
+        texts[f"stability_cycle_{number}.csv"] = columns_csv(c.columns, 12)
     for file, text in texts.items():
         store.write_text(folder / file, text)
     write_roots(folder / "stability.h5", found, None, {})
     return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
 
 
-def _pictures(found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path) -> dict[str, Path]:
-    from ..pictures.roots import map_picture, plane_picture
+def _pictures(
+    found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path,
+    born: tuple[Sequence[Cycles], Cycle | None],
+) -> dict[str, Path]:  # fmt: skip
+    from ..pictures.roots import cycles_picture, map_picture, plane_picture
 
     folder.mkdir(exist_ok=True)
     drawn = {"plane": plane_picture(found, folder / "roots.png")}
     if over is not None:
         drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")
+    if born[0] and (asked := born[1]) is not None:
+        title = f"{asked.parameter} in {asked.unit}".removesuffix(" in ")
+        drawn["cycles"] = cycles_picture(born[0], title, folder / "roots_cycles.png")
     return drawn
