@@ -1,4 +1,4 @@
-"""Steady sliding: ground that turns, tangents one by one, waves, limit cycles, what is refused; the brake of the case."""
+"""Steady sliding: ground that turns, tangents one by one, waves, limit cycles, what is refused; the case itself."""
 
 from __future__ import annotations
 
@@ -11,9 +11,15 @@ from test_bifurcation import normal_form
 from test_sliding import masses
 
 from microslip import sliding
+from microslip.basis import read_basis
 from microslip.bifurcation.cycles import cycles, drift
+from microslip.case import load_case
 from microslip.cli import main
+from microslip.linalg.quadratic import every_root, every_value
 from microslip.roots.waves import waves
+from microslip.stages.places import modal_files
+from microslip.stages.squeal import State, state_of
+from microslip.stages.varied import Varied
 from microslip.system.ground import turning
 
 ROOT = Path(__file__).parents[1]
@@ -126,3 +132,62 @@ def test_a_case_that_does_not_ask_is_refused(belt: Path, capsys: pytest.CaptureF
     belt.write_text((CASES / "belt.toml").read_text())
     assert main(["stability", str(belt), "--quiet"]) == 2
     assert "stability" in capsys.readouterr().err
+
+
+# the brake of the case ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def brake(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Disc and pads of the case, each by Rubin's method and by Craig and Bampton's, and the case beside them."""
+    folder = tmp_path_factory.mktemp("brake")
+    for body in ("brake-disc", "pad"):
+        shutil.copytree(ROOT / "geometry" / body, folder / "geometry" / body)
+    shutil.copy(CASES / "squeal.toml", folder / "squeal.toml")
+    return folder
+
+
+def state_at(folder: Path, *assignments: str) -> State:
+    """The case with other keys, about its sliding."""
+    path = folder / "squeal.toml"
+    settings, raw = load_case(path, list(assignments))
+    files = modal_files(settings, path, folder, lambda _: None)
+    return state_of(Varied(path, raw, {name: read_basis(file) for name, file in files.items()}), {}, path)
+
+
+def mu(value: float) -> list[str]:
+    return [f"contacts.{side}:lining.friction={value!r}" for side in ("upper", "lower")]
+
+
+def fastest(state: State) -> complex:
+    s = every_value(state.matrices)
+    s = s[s.imag < 2 * np.pi * 4000]
+    return complex(s[np.argmax(s.real)])
+
+
+@pytest.mark.slow
+def test_friction_makes_the_brake_squeal_by_the_work_it_does(brake: Path) -> None:
+    """Nothing grows without friction; the printed root grows with it, by the work of the part of K that is not
+    symmetric over a cycle less what C takes; two modes come together as friction rises."""
+    for force in ("100.0", "3000.0"):
+        sets = [f"contacts.{side}:lining.normal_force={force}" for side in ("upper", "lower")]
+        assert fastest(state_at(brake, *mu(0.0), *sets)).real < 0
+    Q = state_at(brake).matrices
+    every = every_root(Q)
+    i = int(np.argmax(np.where(every.s.imag < 2 * np.pi * 4000, every.s.real, -np.inf)))
+    s, x = every.s[i], every.x[:, i]
+    assert s.imag / (2 * np.pi) == pytest.approx(2362.08, abs=0.01) and s.real == pytest.approx(43.53, abs=0.01)
+    work = -np.pi * np.vdot(x, Q.K @ x).imag
+    taken = np.pi * s.imag * np.vdot(x, Q.C @ x).real
+    assert work > 0
+    assert (work - taken) / (2 * np.pi * s.imag * np.vdot(x, x).real) == pytest.approx(s.real, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_the_root_that_grows_does_not_depend_on_the_reduction(brake: Path) -> None:
+    """Rubin's bodies against Craig and Bampton's."""
+    rubin = fastest(state_at(brake))
+    for body in ("brake-disc", "pad"):
+        file = brake / "geometry" / body / "body.toml"
+        file.write_text(file.read_text().replace('reduction = "rubin"', 'reduction = "craig-bampton"'))
+    assert abs(fastest(state_at(brake)) - rubin) < 1e-4 * abs(rubin)
