@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ..roots.full import Compared
 from ..roots.map import Map
 from ..roots.spectrum import Spectrum
 from .page import Album, Piece, fold, page, say, table
 from .roots import CAPTIONS, READ_AS, root_table
-
-if TYPE_CHECKING:
-    from ..stages.squeal import Compared
 
 OF_MAP = (
     "Colour: number of roots that grow. Black lines: Hopf lines, where the fastest growth rate is zero. Grey lines: "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -67,3 +68,16 @@ def compared(reduced: ComplexArray, full: ComplexArray) -> float:
     if len(reduced) != len(full):
         return float("inf")
     return float(max((np.abs(full - s).min() / abs(s) for s in reduced), default=np.nan))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A state of the map in unreduced matrices: values of both parameters, number of roots that grow in the reduced and
+    the full matrices, largest relative distance of the two, and whether the count proves that none is missing."""
+
+    x: float
+    y: float
+    reduced: int
+    full: int
+    distance: float
+    complete: bool

@@ -25,7 +25,7 @@ from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced, unreduced
 from ..report.squeal import squeal_html
-from ..roots.full import compared, full_matrices, growing
+from ..roots.full import Compared, compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
 from ..roots.spectrum import Spectrum, spectrum
 from ..roots.waves import waves
@@ -57,19 +57,6 @@ class State:
         """M = 1, C and K."""
         C, K = sliding.linearised(self.equations, self.z)
         return Quadratic(np.eye(len(K)), C, K)
-
-
-@dataclass(frozen=True)
-class Compared:
-    """A state of the map in unreduced matrices: values of both parameters, number of roots that grow in the reduced and
-    the full matrices, largest relative distance of the two, and whether the count proves that none is missing."""
-
-    x: float
-    y: float
-    reduced: int
-    full: int
-    distance: float
-    complete: bool
 
 
 def squeal_stage(
