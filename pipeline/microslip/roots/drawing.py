@@ -101,7 +101,7 @@ def states(axes: Axes, found: Map) -> None:
     kinds = {-1: "no equilibrium", 0: "no root grows", 1: "1 root grows"}
     seen = np.unique(found.unstable).astype(int)
     handles = [Patch(color=colours[k + 1], label=kinds.get(int(k), f"{k} roots grow")) for k in seen]
-    axes.legend(handles=handles, loc="lower left", fontsize=9, framealpha=0.9)
+    axes.legend(handles=handles, loc="upper left", fontsize=9, framealpha=0.9)
     axes.set(xlabel=found.x.title, ylabel=found.y.title, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
 
 
