@@ -169,7 +169,7 @@ def fastest(state: State) -> complex:
 @pytest.mark.slow
 def test_friction_makes_the_brake_squeal_by_the_work_it_does(brake: Path) -> None:
     """Nothing grows without friction; the printed root grows with it, by the work of the part of K that is not
-    symmetric over a cycle less what C takes; two modes come together as friction rises."""
+    symmetric over a cycle less what C takes."""
     for force in ("100.0", "3000.0"):
         sets = [f"contacts.{side}:lining.normal_force={force}" for side in ("upper", "lower")]
         assert fastest(state_at(brake, *mu(0.0), *sets)).real < 0
