@@ -1144,6 +1144,15 @@ def stability() -> None:
     fill("stability.md", "stability_speeds", table(["speed", "roots that grow"], rows))
 
 
+def squeal() -> None:
+    """The map and the limit cycle of `make squeal`, from the folder in which it works."""
+    from microslip.stages.running import run_case_file
+
+    page, _ = run_case_file(ROOT / "pipeline" / "cases" / "squeal.toml")
+    for name, drawn_as in (("roots_map", "squeal_map"), ("roots_cycles", "squeal_cycle")):
+        save(from_file(page.parent / "pictures" / f"{name}.png"), drawn_as)
+
+
 # the cyclic page ---------------------------------------------------------------------------------------------------
 
 SHROUD_ORDERS = (2, 4, 6, 8, 12, 24)
@@ -1500,6 +1509,7 @@ STUDIES = {
         python,
         two_tones,
         stability,
+        squeal,
         geometry,
         meeting,
         damping_element,

@@ -375,3 +375,17 @@ def test_results_as_tables():
     over = ms.stability(rotor(0.02, 0.05), over="speed", values=[1.0, 2.0])
     assert len(over.to_dataframe()) == 4 and over.to_xarray().sizes == {"branch": 2, "speed": 2}
     assert len(found.plot().lines) == 4 and len(over.plot(what="frequency").lines) == 2
+
+
+def test_thousands_of_roots_far_outside_turn_the_phase_and_are_no_roots_inside() -> None:
+    """Stiffness-proportional damping of 5,000 high modes turns the phase by whole turns in every step, alike in both of
+    its halves: they count nothing, and the two inside are counted."""
+    w = np.concatenate([[2e3, 9e3], np.geomspace(4e4, 1e7, 5000)])
+    beta = np.full(len(w), 4e-7)
+    beta[:2] = -1e-6  # these grow
+    Q = Quadratic(sp.identity(len(w), format="csr"), sp.diags(beta * w**2).tocsr(), sp.diags(w**2).tocsr())
+    window = Window((0.0, 1e4), (0.0, 2.5e4))
+    grow = 0.5e-6 * w[:2] ** 2
+    roots = grow + 1j * np.sqrt(w[:2] ** 2 - grow**2)
+    assert missed(Q, window, roots[:0]).missed == 2
+    assert missed(Q, window, roots).missed == 0

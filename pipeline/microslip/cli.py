@@ -455,16 +455,24 @@ def stability(
     """Does it move by itself: all complex roots in a window of frequencies and growth rates, none missed.
 
     Args:
-        path: a body.toml (of matrices with [stability]), the folder that holds it, its name, or a modal file.
+        path: a body.toml (of matrices with [stability]), the folder that holds it, its name, or a modal file; or a case
+            whose contacts slide, with [stability].
     """
-    from .stages.places import is_case, meant
+    from .case import load_case
+    from .stages.places import is_case, meant, modal_files
+    from .stages.squeal import squeal_stage
     from .stages.stability import stability_stage
 
     path = path if path.suffix == ".h5" else meant(path)
-    if is_case(path) or (path / "case.toml").is_file() and not (path / "body.toml").is_file():
-        raise UserError(f"{path}: is a case; stability is computed of a body or of a modal file: give one of those")
+    if (path / "case.toml").is_file() and not (path / "body.toml").is_file():
+        path = path / "case.toml"
     with progress(f"stability of {path}", quiet) as report:
-        made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures)
+        if is_case(path):
+            case, _ = load_case(path, list(set_))
+            files, folder = modal_files(case, path, Path("."), report), Path("build") / case.name
+            made, lines, complete = squeal_stage(path, files, folder, list(set_), force, report, not no_pictures)
+        else:
+            made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures)
     _say("\n".join([*lines, *map(str, made)]), quiet)
     if not complete:
         raise NotConverged(f"roots are missing in the window; {made[0]} holds those that were found")

@@ -147,7 +147,7 @@ def _ground(contact: Contact) -> Array:
     if (ground := contact.ground) is not None:
         if ground.waves:
             raise UserError(f"contacts.{contact.name}.ground: wavy ground has no equilibrium; leave waviness out")
-        found[:, 1:] = ground.velocity * np.array([np.cos(ground.angle), np.sin(ground.angle)])
+        found[:, 1:] = ground.velocities(contact.patch.points)
     return found
 
 
@@ -188,22 +188,33 @@ def state_matrix(s: Sliding, z: Array) -> Array:
     return np.asarray(_slope(s, z))
 
 
+EXACT = 1e-12
+"""Last step to an equilibrium, over displacements and what the loads alone would move."""
+
+
 def equilibrium(s: Sliding, z: Array | None = None) -> Array:
     """(n,) where nothing moves, with what drives it at its mean: Newton's method from z, or from rest.
 
     Raises:
         NotConverged: there is none that it finds.
     """
-    mean = s._replace(cosine=0 * s.cosine, sine=0 * s.sine)
-    z = np.zeros(s.order) if z is None else np.asarray(z, dtype=float)
+    mean, m = s._replace(cosine=0 * s.cosine, sine=0 * s.sine), len(s.push)
+    z = np.zeros(s.order) if z is None else np.array(z, dtype=float)
+    z[m : 2 * m] = 0.0
+    free = np.r_[0:m, 2 * m : s.order]
+    push = np.concatenate([s.push, np.zeros(s.order - 2 * m)])
     for _ in range(50):
-        change = np.linalg.lstsq(state_matrix(mean, z), -np.asarray(_rate(mean, z)), rcond=1e-14)[0]
-        z = z + change
-        if np.abs(change).max(initial=0.0) <= 1e-13 * np.abs(z).max(initial=1e-300):
+        sides = np.stack([-np.asarray(_rate(mean, z))[m:], push], axis=1)
+        change, alone = np.linalg.lstsq(state_matrix(mean, z)[m:, free], sides, rcond=1e-14)[0].T
+        z[free] += change
+        if np.abs(change).max(initial=0.0) <= EXACT * max(np.abs(z).max(initial=0.0), np.abs(alone).max(initial=0.0)):
             return z
         if not np.isfinite(z).all():
             break
     raise NotConverged("sliding: no equilibrium is found near the start; give another start, or larger dampers")
+
+
+REMEMBERS = "sliding: contacts that remember have more than a stiffness and a damping; take state_matrix"
 
 
 def linearised(s: Sliding, z: Array) -> tuple[Array, Array]:
@@ -213,6 +224,45 @@ def linearised(s: Sliding, z: Array) -> tuple[Array, Array]:
         UserError: contacts that remember: take `state_matrix`.
     """
     if s.order != 2 * len(s.push):
-        raise UserError("sliding: contacts that remember have more than a stiffness and a damping; take state_matrix")
+        raise UserError(REMEMBERS)
     A, m = state_matrix(s, z), len(s.push)
     return -A[m:, m:], -A[m:, :m]
+
+
+class Tangent(NamedTuple):
+    """A contact at an equilibrium: (k, k) damping C and stiffness K along its coordinates, neither symmetric; (n, 3) N
+    that its points take, and (n, 3) m/s with which they slide."""
+
+    C: Array
+    K: Array
+    force: Array
+    velocity: Array
+
+
+def tangents(assembly: Assembly, s: Sliding, z: Array) -> list[Tangent]:
+    """What the contacts of an assembly are at an equilibrium z of its equations s, one by one.
+
+    Raises:
+        UserError: contacts that remember.
+    """
+    if s.order != 2 * len(s.push):
+        raise UserError(REMEMBERS)
+    assembly = assembly.unrolled()
+    moved = np.real(assembly.joined(0).rows) @ np.asarray(s.shapes) @ z[: len(s.push)]
+    found, begin = [], 0
+    for c in assembly.contacts:
+        G, n, ground = c.patch.kinematics, len(c.patch.points), _ground(c)
+        u = G @ (c.offset + moved[begin : begin + c.patch.count])
+        begin += c.patch.count
+
+        def force(u: Any, v: Any, law: Any = c.patch.law, n: int = n) -> Any:
+            return law.rates(u, v, jnp.zeros((0, n)), 0.0, 0.0)[0]
+
+        at = jnp.asarray(u), jnp.asarray(-ground)
+        still = jnp.zeros_like(at[0])
+        ways = [still.at[:, j].set(1.0) for j in range(3)]
+        stiff = np.stack([np.asarray(jax.jvp(force, at, (way, still))[1]) for way in ways], axis=2)
+        viscous = np.stack([np.asarray(jax.jvp(force, at, (still, way))[1]) for way in ways], axis=2)
+        C, K = (np.einsum("nia,nij,njb->ab", G, A, G) for A in (viscous, stiff))
+        found.append(Tangent(C, K, np.asarray(force(*at)), -ground))
+    return found

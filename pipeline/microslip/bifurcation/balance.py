@@ -144,11 +144,12 @@ class Balance:
         moving = differentiated(c)
         found = np.zeros((k, n, k, n))
         found[:, range(n), :, range(n)] += omega * D
-        for i, j in np.ndindex(n, n):
-            mean = J[:, i, j].mean()
-            found[:, i, :, j] -= mean * np.eye(k)
-            if np.ptp(J[:, i, j]) > 1e-13 * np.abs(J).max():
-                found[:, i, :, j] -= P.T @ ((J[:, i, j] - mean)[:, None] * E)
+        mean = J.mean(axis=0)
+        found[range(k), :, range(k), :] -= mean
+        i, j = np.nonzero(np.ptp(J, axis=0) > 1e-13 * np.abs(J).max())
+        products = (P[:, :, None] * E[:, None]).reshape(len(E), k * k)
+        swinging = products.T @ (J - mean)[:, i, j]
+        found[:, i, :, j] -= swinging.reshape(k, k, len(i)).transpose(2, 0, 1)
         size = len(x)
         R, A, over = np.zeros(size), np.zeros((size, size)), np.zeros(size)
         R[: k * n], A[: k * n, : k * n] = (omega * moving - P.T @ f).ravel(), found.reshape(k * n, k * n)

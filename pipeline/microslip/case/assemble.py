@@ -25,6 +25,7 @@ from ..reduced.compliance import SURFACE, has_residual
 from ..reduced.coordinates import first_modes, in_modes, of_density
 from ..system.assembly import Assembly, Contact, ContactFace, Load, Output, preloaded_contact
 from ..system.component import Component, Ring
+from ..system.ground import Ground
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
 from .compliance import Face, Springs, counted_once, residual_share, static_answer
@@ -324,6 +325,7 @@ def _contact(
     if len(ends) == 2:
         met = _in_contact(path, c, lambda: _met(settings, c, loaded, faces))
         second = ContactFace(*ends[1], met.frame, c.against_sector)
+    moved = _ground(c, loaded, faces[0])
     said, found, compliance = [f"{c.interface}: {words}" for words in met.messages] if met else [], None, None
     if c.patch == "nodal":
         found, first, second, compliance = _in_contact(
@@ -347,9 +349,18 @@ def _contact(
         more = [words] * bool(words) + _in_contact(path, c, lambda: resolved(c, patch, load))
         press = partial(preloaded_contact, second=second, normal=c.normal_force, interference=c.interference or 0.0)
         made = _in_contact(path, c, lambda: press(c.interface, patch, first, compliance=compliance))
-        return replace(made, ground=c.ground.ground if c.ground else None), more
+        return replace(made, ground=moved), more
 
     return at, said
+
+
+def _ground(c: ContactSettings, loaded: list[Loaded], face: Interface) -> Ground | None:
+    """How the other side of a contact moves; about the axis of its body, where nothing else is said."""
+    if c.ground is None:
+        return None
+    other = place_of(loaded[-1])
+    axis, point = other.turn @ loaded[-1].basis.rotation_axis, other.turn @ loaded[-1].basis.rotation_point
+    return c.ground.ground(axis, point + other.shift, face, place_of(loaded[0]))
 
 
 def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:

@@ -10,14 +10,26 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..data import ModalGroup, UserError
-from ..settings.body import Model, NotNegative, Number, Numbers, Positive, _tuple
+from ..data import Array, Interface, ModalGroup, UserError
+from ..settings.body import (
+    Direction,
+    Model,
+    NotNegative,
+    Number,
+    Numbers,
+    Positive,
+    Vector,
+    _finite_vector,
+    _tuple,
+)
 from ..system.assembly import Load
 from ..system.component import Component, Ring
 from ..system.damping import read_aerodynamics, structural, unstable, with_ratios
 from ..system.excitation import Turning, base_order, harmonic_of, magnets, pattern_loads, unheard
-from ..system.ground import Ground, spectrum
+from ..system.ground import Ground, spectrum, turning
+from ..system.pairing import Place
 from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure
+from ..units import from_rpm
 from .keys import Address, Order
 
 ROTATION: dict[str, Turning] = {"+": 1, "-": -1}
@@ -90,27 +102,49 @@ class SpectrumOfCase(Model):
 
 
 class GroundOfCase(Model):
-    """Ground that moves under a contact, of a motion in time (Sextro, sections 4.1 and 4.3).
+    """Ground that moves under a contact, of a motion in time or of steady sliding (Sextro, sections 4.1 and 4.3).
 
     velocity: m/s, steady. direction: degrees of it, from t1 towards t2. waviness: sine waves, along the direction.
     spectrum: more of them. pushes: whether the slope of a wave turns the normal force, so that it pushes the body along
-    the ground; false, as the book has it, leaves that out.
+    the ground; false, as the book has it, leaves that out. rpm: instead of the velocity, of material that turns about
+    the axis of the body that the contact is against, and runs through that body while its shape stands; axis: direction
+    and point: m, in the axes of the case, where it turns about another one.
     """
 
     velocity: Number = 0.0
     direction: Number = 0.0
+    rpm: Number | None = None
+    axis: Direction | None = None
+    point: Annotated[Vector, BeforeValidator(_finite_vector)] | None = None
     waviness: Annotated[tuple[WaveOfCase, ...], BeforeValidator(_tuple)] = ()
     spectrum: SpectrumOfCase | None = None
     pushes: bool = True
 
     @model_validator(mode="after")
     def _moves(self) -> GroundOfCase:
-        if not self.velocity and not self.waviness and self.spectrum is None:
+        straight = self.velocity or self.direction or self.waviness or self.spectrum
+        if self.rpm is not None and straight:
+            raise ValueError("rpm: ground that turns has no velocity, direction or waves; leave these out, or rpm")
+        if self.rpm is None and (self.axis or self.point):
+            raise ValueError("axis and point belong to ground that turns; add rpm")
+        if self.rpm == 0:
+            raise ValueError("rpm: 0 does not move; give the speed at which it slides")
+        if self.rpm is None and not self.velocity and not self.waviness and self.spectrum is None:
             raise ValueError("velocity: is missing; ground that neither moves nor is wavy needs no table")
         return self
 
-    @property
-    def ground(self) -> Ground:
+    def ground(self, axis: Array, point: Array, face: Interface, place: Place) -> Ground:
+        """As the contact sees it.
+
+        Args:
+            axis, point: (3,) about which it turns, in the axes of the case, where none are given here. face: of the
+                first body, which stands at `place`.
+        """
+        if self.rpm is not None:
+            n = np.asarray(axis if self.axis is None else self.axis, dtype=float)
+            rate = place.turn.T @ n * (float(from_rpm(self.rpm)) / float(np.linalg.norm(n)))
+            centre = place.turn.T @ (np.asarray(point if self.point is None else self.point) - place.shift)
+            return turning(rate, centre, face.origin, face.rotation)
         waves = [(w.amplitude, w.length, float(np.radians(w.phase))) for w in self.waviness]
         if (s := self.spectrum) is not None:
             waves += spectrum(s.height, s.longest, s.shortest, s.exponent, s.waves, s.seed)

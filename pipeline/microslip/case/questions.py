@@ -228,6 +228,64 @@ class TwoTonesOfCase(Model):
         return first, first * self.ratio if self.ratio is not None else np.full(self.points, self.second or 0.0)
 
 
+class Over(Model):
+    """A parameter of a map: keys of this case, dotted, which follow it, each with the factor that makes its value.
+
+    parameter: what its axis says, in unit. start, stop: its first and last value. points: of them, evenly spaced.
+    """
+
+    parameter: str
+    unit: str = ""
+    keys: dict[str, Number]
+    start: Number
+    stop: Number
+    points: Annotated[int, Field(ge=2, le=1000)] = 40
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> Over:
+        if self.start >= self.stop:
+            raise ValueError("stop: must be above start; exchange them")
+        if not self.keys:
+            raise ValueError("keys: name one or more keys of the case that follow the parameter, with a factor each")
+        return self
+
+
+class Cycle(Over):
+    """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
+
+    points: of a branch at most.
+    """
+
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+
+
+class StabilityOfCase(Model):
+    """Roots of the assembly about its steady sliding, by `microslip stability`: all that grow, and those of a window.
+
+    frequency: Hz and growth: 1/s, from and to, of the window. accuracy, neutral: as of a body's [stability]. over: two
+    parameters of a map of how many roots grow, and how fast the fastest. full: states of the map, evenly spread, at
+    which the unreduced matrices are counted as well. cycle: the limit cycles that follow.
+    """
+
+    growth: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] = (-1000.0, 10000.0)
+    frequency: Pair
+    accuracy: Annotated[Number, Field(ge=0, le=0.1)] = 1e-8
+    neutral: NotNegative = 0.0
+    over: Annotated[tuple[Over, ...], BeforeValidator(_tuple)] = ()
+    full: Annotated[int, Field(ge=0, le=1000)] = 0
+    cycle: Cycle | None = None
+
+    @model_validator(mode="after")
+    def _has_area(self) -> StabilityOfCase:
+        for key in ("growth", "frequency"):
+            low, high = getattr(self, key)
+            if low >= high:
+                raise ValueError(f"{key}: from {low:g} to {high:g} the window has no area; give the smaller one first")
+        if len(self.over) not in (0, 2):
+            raise ValueError("over: a map has two parameters; give two [[stability.over]], or none")
+        return self
+
+
 class BifurcationOfCase(Model):
     """A diagram of equilibria and periodic orbits over a parameter, by `microslip bifurcate`.
 

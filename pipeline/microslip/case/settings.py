@@ -43,6 +43,7 @@ from .questions import (
     OrdersOfCase,
     RangesOfCase,
     SpeedsOfCase,
+    StabilityOfCase,
     TwoTonesOfCase,
 )
 
@@ -136,7 +137,7 @@ class ContactSettings(ContactLaw):
     their ``approach`` or ``width`` (fit), at the load `fitted_at` (N; if not given the force that presses it: its own,
     or each of the sweep); or fit = ``exact``: a line of contact in pieces, or one round contact, with Hertz' own law.
     isotropic: of both tangential stiffnesses that Hertz' contact has the geometric mean, as mode = ``book`` needs it.
-    ground: how the other side moves, of a motion in time.
+    ground: how the other side moves; of another body, how fast its material runs through.
     """
 
     interface: Address
@@ -195,8 +196,8 @@ class ContactSettings(ContactLaw):
             raise ValueError("normal_force and interference: a contact is pressed by one or by the other; give one")
         if self.temperature is not None and not self.heated:
             raise ValueError("temperature: belongs to friction that the heat of sliding changes; leave it out")
-        if self.ground is not None and self.against != GROUND:
-            raise ValueError(f"ground: the contact is against {self.against}; leave ground or against out")
+        if self.ground is not None and self.against != GROUND and (self.ground.waviness or self.ground.spectrum):
+            raise ValueError(f"ground: the contact is against {self.against}, which has no waves; leave them out")
         self.fits_here()
         return self._curved()
 
@@ -325,6 +326,7 @@ class CaseSettings(Model):
     curve: CurveOfCase | None = None
     orbit: OrbitOfCase | None = None
     identification: IdentificationOfCase | None = None
+    stability: StabilityOfCase | None = None
     bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
     two_tones: TwoTonesOfCase | None = None
 
@@ -334,14 +336,15 @@ class CaseSettings(Model):
         """A case that asks for a motion in time alone needs no sweep: it is an octave on either side."""
         if isinstance(raw, dict) and isinstance(asked := raw.get("orbit"), dict) and "sweep" not in raw:
             raw = raw | {"sweep": band_of(asked)} if band_of(asked) else raw
-        if isinstance(raw, dict) and (raw.get("bifurcation") or raw.get("two_tones")) and "sweep" not in raw:
+        asks = isinstance(raw, dict) and (raw.get("stability") or raw.get("bifurcation") or raw.get("two_tones"))
+        if isinstance(raw, dict) and asks and "sweep" not in raw:
             raw = raw | {"sweep": NO_SWEEP}
         return raw
 
     @property
     def is_only_followed(self) -> bool:
-        """Whether it asks for bifurcations or two tones and for no sweep."""
-        asked = bool(self.bifurcation or self.two_tones) and self.orbit is None
+        """Whether it asks for stability, bifurcations or two tones and for no sweep."""
+        asked = bool(self.stability or self.bifurcation or self.two_tones) and self.orbit is None
         return asked and self.sweep == Sweep.model_validate(NO_SWEEP)
 
     @property
@@ -351,7 +354,7 @@ class CaseSettings(Model):
 
     @model_validator(mode="after")
     def _fits_together(self) -> CaseSettings:
-        free = self.bifurcation or any(s.motion for s in self.springs)
+        free = self.bifurcation or self.stability or any(s.motion for s in self.springs)
         moved = free and not self.excitation and not self.excitations
         for short, many in (("body", "bodies"), ("excitation", "excitations"), ("monitor", "monitors")):
             if bool(getattr(self, short)) == bool(getattr(self, many)) and not (moved and short == "excitation"):
@@ -439,7 +442,7 @@ class CaseSettings(Model):
         if moves and not self.is_only_in_time and not self.is_only_followed:
             raise ValueError(
                 f"contacts.{moves[0]}.ground: only a motion in time knows ground that moves; give [orbit], "
-                "[[bifurcation]] or [two_tones], and no sweep"
+                "[stability], [[bifurcation]] or [two_tones], and no sweep"
             )
         bare = [c for c in self.contacts if c.normal_force is None and c.interference is None]
         open_ = [c.interface for c in bare if not self.is_thrown(c)]
@@ -546,7 +549,7 @@ class CaseSettings(Model):
 
 
 NO_SWEEP = {"start": 1.0, "stop": 2.0}
-"""Stands for the sweep of a case that asks for bifurcations or two tones alone."""
+"""Stands for the sweep of a case that asks for stability, bifurcations or two tones alone."""
 
 
 def band_of(orbit: Mapping[str, Any]) -> dict[str, float]:

@@ -12,13 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import ComplexArray
-from .quadratic import Quadratic, Window, factors_near
+from .quadratic import DENSE, Quadratic, Window, factors_near
 
 SAFE = np.pi / 2
 """Largest turn of the phase in one step."""
 
 BEND = 0.25
 """Largest difference of the logarithm in the middle of a step from the mean of its ends: 0.55 beside a lone zero."""
+
+STEADY = 0.5
+"""Largest difference of its rates along a side, over the largest of them, with which the phase turns steadily."""
 
 SMALLEST = 1e-10
 """Shortest step, over the length of the border."""
@@ -47,6 +50,9 @@ def missed(Q: Quadratic, window: Window, known: ComplexArray) -> Count:
     was invented is a pole. Each straight step is halved until the phase turns by less than `SAFE` and the logarithm
     bends by less than `BEND` in its middle; a zero near the border bends it, however the phase is folded.
 
+    Thousands of roots far outside turn the phase steadily, and alike in both halves of a step, by whole turns perhaps:
+    exp(c s + d s^2) with the c and d that they have, real and without a zero, is divided out as well.
+
     A window from the frequency 0 on is counted together with its mirror image, so the path begins and ends on the real
     axis and never runs along it, where real roots lie.
 
@@ -54,6 +60,8 @@ def missed(Q: Quadratic, window: Window, known: ComplexArray) -> Count:
         known: (r,) roots in the window and around it, frequencies not below 0.
     """
     smooth = _Smooth(Q, known)
+    if Q.n > DENSE:
+        smooth.calm(window)
     path = _border(window)
     length = float(np.abs(np.diff(path)).sum())
     total = 0.0
@@ -83,12 +91,29 @@ class _Smooth:
         self._known = np.concatenate([pairs, pairs.conj(), known[known.imag == 0]])
         self.at: dict[complex, complex] = {}
         self.largest = 0.0
+        self._steady = (0.0, 0.0)
+
+    def calm(self, window: Window) -> None:
+        """Find what turns the phase steadily: its rate along both sides of the window, where that is about the same in
+        three places; else roots nearby turn it, and nothing is taken out."""
+        (a, b), (c, d) = window.growth, window.omega
+        step = 1e-4 * (d - c)
+        middles = c + np.array([0.25, 0.5, 0.75]) * (d - c)
+        rates = np.array([[_fold(self(complex(g, w + step)) - self(complex(g, w))).imag / step for w in middles]
+                          for g in (a, b)])  # fmt: skip
+        if np.ptp(rates, axis=1).max() <= STEADY * np.abs(rates).max():
+            left, right = np.median(rates, axis=1)
+            slope = (right - left) / (b - a)
+            self._steady = (float(left - slope * a), float(slope))
+            self.at.clear()
 
     def __call__(self, s: complex) -> complex:
         if s not in self.at:
             away = s - self._known
             away = np.where(away == 0, 1e-300, away)
-            self.at[s] = factors_near(self._Q, s).log_determinant() - complex(np.log(away).sum())
+            c, d = self._steady
+            steady = s * (c + 0.5 * d * s)
+            self.at[s] = factors_near(self._Q, s).log_determinant() - complex(np.log(away).sum()) - steady
         return self.at[s]
 
 

@@ -28,7 +28,7 @@ def roots_html(
     pieces = [
         say(*lead, tone="lead"),
         album.take("plane", CAPTIONS["plane"]),
-        _table(found),
+        root_table(found),
         say(READ_AS, tone="note"),
         album.take("over", CAPTIONS["over"]),
     ]
@@ -38,7 +38,8 @@ def roots_html(
     return page(title, pieces)
 
 
-def _table(found: Spectrum) -> Piece:
+def root_table(found: Spectrum) -> Piece:
+    """A row a root."""
     c = found.columns
     rows: list[Sequence[object]] = [
         (f"{f:.7f}", f"{g:.7g}", f"{d:.3e}", v, f"{t:.1e}", f"{r:.1e}", f"{e:.1e}")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .diagram import Diagram
+    from .map import Map
     from .spectrum import Spectrum
 
 KINDS = (
@@ -22,6 +23,8 @@ KINDS = (
 )
 COLOURS = ("#0b4f9c", "#c8382c", "#26863c", "#8a4fb5", "#d98410", "#16919c", "#8c564b", "#c2408f")
 GREY = "#b4bac6"
+TINTS = ("#dfe9f5", "#f6c9a8", "#e58f6a", "#c8503c", "#8f2a2a", "#5c1a24")
+"""Of states in which 0, 1, 2, ... roots grow."""
 LABELLED = 8
 """Roots that grow and are named in a picture."""
 
@@ -79,6 +82,36 @@ def over(axes: Axes, found: Diagram, frequency: bool) -> None:
     if not frequency:
         axes.axhline(0.0, color="#333333", linewidth=0.9)
         _growth_scale(axes, growing)
+
+
+def states(axes: Axes, found: Map) -> None:
+    """Number of roots that grow in colour, Hopf lines in black, growth rates in grey."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+
+    x, y, most = found.x.values, found.y.values, max(int(found.unstable.max(initial=0)), 1)
+    colours = ["#f0f0f0", *TINTS[: most + 1]]
+    axes.pcolormesh(x, y, found.unstable, cmap=ListedColormap(colours),
+                    norm=BoundaryNorm(np.arange(-1.5, most + 1), len(colours)), shading="nearest")  # fmt: skip
+    if np.isfinite(found.growth).all():
+        top = float(found.growth.max())
+        lines = axes.contour(x, y, found.growth, levels=_levels(top), colors="#5b6270", linewidths=0.8)
+        axes.clabel(lines, fmt="%g", fontsize=8)
+        axes.contour(x, y, found.growth, levels=[0.0], colors="black", linewidths=2.0)
+    kinds = {-1: "no equilibrium", 0: "no root grows", 1: "1 root grows"}
+    seen = np.unique(found.unstable).astype(int)
+    handles = [Patch(color=colours[k + 1], label=kinds.get(int(k), f"{k} roots grow")) for k in seen]
+    axes.legend(handles=handles, loc="upper left", fontsize=9, framealpha=0.9)
+    axes.set(xlabel=found.x.title, ylabel=found.y.title, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+
+
+def _levels(top: float) -> Array:
+    """Round growth rates above zero, about five of them."""
+    if not top > 0:
+        return np.array([1e300])
+    step = 10.0 ** np.floor(np.log10(top / 2))
+    step *= next(k for k in (1, 2, 5, 10) if top / (k * step) <= 6)
+    return np.arange(1, int(top / step) + 1) * step if top > step else np.array([0.5 * top])
 
 
 def _sorted(found: Diagram) -> tuple[list[ComplexArray], list[ComplexArray]]:

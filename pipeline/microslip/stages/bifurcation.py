@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,32 +15,22 @@ from ..basis import read_basis
 from ..bifurcation import branches, mechanics
 from ..bifurcation.diagram import Asked, Diagram, diagram
 from ..case import CaseSettings, checkpoint, load_case
-from ..case.assemble import build
 from ..case.questions import BifurcationOfCase
-from ..data import ModalBasis, NotConverged, UserError
+from ..data import NotConverged, UserError
 from ..files import hdf5, store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
-from ..settings.body import override
-from ..settings.mistakes import validate
 from ..system.assembly import Assembly
-from ..system.lumped import load_system
 from .checkpoint import inputs_of
-from .places import lumped
 from .stage import Made, Report, Stage, hash_of_code
-
-OF_SYSTEM = "system."
-"""Begins keys that are those of a system.toml and not of the case."""
+from .varied import Varied
 
 
 @dataclass(frozen=True)
 class Changed:
-    """A case whose keys follow a parameter. Attributes: path. raw: its text as a table. bases: body -> modal basis.
-    asked: the diagram."""
+    """A case whose keys follow a parameter. Attributes: varied: the case. asked: the diagram."""
 
-    path: Path
-    raw: Mapping[str, Any]
-    bases: Mapping[str, ModalBasis]
+    varied: Varied
     asked: BifurcationOfCase
 
     def at(self, p: float) -> Assembly:
@@ -51,26 +40,7 @@ class Changed:
             UserError: a key that is none of the case or the system.
         """
         values = dict(self.asked.fixed) | {key: factor * p for key, factor in self.asked.keys.items()}
-        raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
-        own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
-        others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
-        where = f"{self.path}: bifurcation.{self.asked.name}.keys"
-        try:
-            settings = validate(CaseSettings, override(raw, own, self.path), self.path)
-            built = build(settings, self._systems(others, where) if others else self.bases, self.path)
-        except UserError as error:
-            raise UserError(f"{where}: {str(error).removeprefix('--set ')}") from error
-        return built.assembly
-
-    def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:
-        found = dict(self.bases)
-        made = {name: lumped(self.path, basis.name) for name, basis in self.bases.items()}
-        for name, file in made.items():
-            if file is not None:
-                found[name] = load_system(file, assignments).basis()
-        if not any(made.values()):
-            raise UserError(f"{where}: '{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one")
-        return found
+        return self.varied.under(values, f"bifurcation.{self.asked.name}.keys")
 
 
 def bifurcation_stage(
@@ -106,7 +76,7 @@ def _work(
 ) -> Made:  # fmt: skip
     folder = stage.product.parent
     bases = {name: read_basis(file) for name, file in files.items()}
-    changed = [Changed(case_path, raw, bases, asked) for asked in settings.bifurcation]
+    changed = [Changed(Varied(case_path, raw, bases), asked) for asked in settings.bifurcation]
     for one in changed:
         one.at(one.asked.start)  # what is wrong in a later diagram is said before the first one is made
     stage.begin()
@@ -140,7 +110,7 @@ def _diagram(one: Changed, folder: Path, depends: Mapping[str, Any], stage: Stag
     try:
         begin = sliding.equilibrium(sliding.of(one.at(asked.start)))
     except NotConverged as error:
-        raise UserError(f"{one.path}: bifurcation.{name}.start: {error}") from error
+        raise UserError(f"{one.varied.path}: bifurcation.{name}.start: {error}") from error
     return diagram(
         system, begin, given,
         lambda branch: None if stage.force else branches.kept(file(branch), inputs),

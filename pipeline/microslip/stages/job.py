@@ -83,10 +83,14 @@ def holds_a_case_alone(path: Path) -> bool:
     return [(path / f"{name}.toml").is_file() for name in ("case", "body", "system")] == [True, False, False]
 
 
+ASKED = frozenset({"sweep", "orbit", "stability", "bifurcation"})
+"""Keys of a case, one of which it has, and a system.toml none."""
+
+
 def system_file(path: Path) -> Path | None:
     """The system.toml that a path names: a file of masses, rigid bodies or matrices, or the folder that holds it."""
     if path.is_dir() and not (path / "body.toml").is_file():
         path = path / "system.toml"
     if path.is_file() and path.suffix == ".toml" and {"masses", "bodies", "matrices"} & set(keys := load_toml(path)):
-        return None if "sweep" in keys else path  # a case has bodies too
+        return None if ASKED & set(keys) else path  # a case has bodies too
     return None

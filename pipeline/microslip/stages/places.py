@@ -14,7 +14,7 @@ from ..case.settings import BodyOfCase
 from ..data import UserError
 from ..files import store
 from ..settings.body import load_toml
-from .job import open_job, system_file
+from .job import ASKED, open_job, system_file
 from .modal import modes_stage, system_stage
 from .stage import Report
 
@@ -63,8 +63,9 @@ def _bodies_in(root: Path) -> set[str]:
 
 
 def is_case(path: Path) -> bool:
-    """True for a case file (it has a sweep), False for a body file."""
-    return path.is_file() and path.suffix == ".toml" and bool({"body", "sweep"} & set(load_toml(path)))
+    """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
+    keys = set(load_toml(path)) if path.is_file() and path.suffix == ".toml" else set()
+    return bool(keys & {"body", "sweep"}) or bool(keys & {"bodies"} and keys & ASKED)
 
 
 def modal_files(

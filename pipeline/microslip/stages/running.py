@@ -24,6 +24,7 @@ from .orbit import orbit_stage
 from .page import report_stage
 from .places import existing_files, find_body, modal_files
 from .response import ALL, Wanted, response_of_case, response_stage
+from .squeal import squeal_stage
 from .stage import Report
 from .tones import tones_stage
 
@@ -62,8 +63,11 @@ def _answered(
     response, converged = None, True
     if not case.is_only_in_time and not case.is_only_followed:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
-    stages = (case.orbit, orbit_stage), (case.bifurcation, bifurcation_stage), (case.two_tones, tones_stage)
-    for asked, stage in stages:
+    answers = (
+        (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
+        (case.two_tones, tones_stage),
+    )  # fmt: skip
+    for asked, stage in answers:
         if asked:
             converged = stage(path, files, folder, assignments, force, report, wanted.pictures)[2] and converged
     return response, converged
@@ -89,7 +93,8 @@ def run_case_file(
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
     page = "orbit.html" if case.is_only_in_time else "response.csv"
     if case.is_only_followed:
-        page = "bifurcation.html" if case.bifurcation else "two_tones.html"
+        pages = {"stability": case.stability, "bifurcation": case.bifurcation, "two_tones": case.two_tones}
+        page = next(f"{name}.html" for name, asked in pages.items() if asked)
     return folder / page, converged
 
 

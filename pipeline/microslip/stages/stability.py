@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..basis import read_basis
+from ..case.questions import StabilityOfCase
 from ..data import UserError
 from ..files import hdf5, store
 from ..files.tables import columns_csv, rows_csv
@@ -102,7 +103,7 @@ def _of_basis(file: Path, asked: StabilitySettings | None) -> Question:
     return Question(basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window, asked, inputs)
 
 
-def window_of(asked: StabilitySettings) -> Window:
+def window_of(asked: StabilitySettings | StabilityOfCase) -> Window:
     """The window in 1/s and rad/s."""
     low, high = asked.frequency
     return Window(asked.growth, (2 * np.pi * low, 2 * np.pi * high))

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..analyses import two_tones
 from ..basis import read_basis
-from ..case import CaseSettings, checkpoint, load_case
+from ..case import CaseSettings, load_case
 from ..case.assemble import build
 from ..data import UserError
 from ..files import store
 from ..files.tables import rows_csv
 from ..report.tones import tones_html
 from ..units import Quantity
-from .checkpoint import hashes_of
+from .checkpoint import inputs_of
 from .stage import Made, Report, Stage
 
 if TYPE_CHECKING:
@@ -44,12 +44,7 @@ def tones_stage(
     if settings.two_tones is None:
         raise UserError(f"{case_path}: two_tones: is missing; add [two_tones] with start and second (Hz), or ratio")
     stage = Stage(folder / "two_tones.json", ("stages.tones",), force, report)
-    inputs = {
-        "case": checkpoint.without_defaults(raw),
-        "basis": hashes_of(files),
-        "pictures": pictures,
-        "files": hashes_of(checkpoint.files_of(settings, case_path)),
-    }
+    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
     stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["sentences"], told["converged"]

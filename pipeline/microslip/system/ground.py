@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..data import Array
+
 Wave = tuple[float, float, float]
 """Amplitude y_A (m), length lambda (m), phase (rad)."""
 
@@ -15,14 +17,33 @@ class Ground:
     """The other side of a contact, which moves in its plane.
 
     Attributes:
-        velocity: V, m/s. angle: rad of its direction, from t1 towards t2. waves. pushes: whether the slope of a wave
-            turns the normal force.
+        velocity: V, m/s, at the origin of the contact. angle: rad of its direction, from t1 towards t2. waves. pushes:
+            whether the slope of a wave turns the normal force. spin: rad/s about the normal, by which the velocity
+            differs from point to point.
     """
 
     velocity: float = 0.0
     angle: float = 0.0
     waves: tuple[Wave, ...] = ()
     pushes: bool = True
+    spin: float = 0.0
+
+    def velocities(self, points: Array) -> Array:
+        """(n, 2) m/s along t1 and t2 at points (n, 2), m."""
+        straight = self.velocity * np.array([np.cos(self.angle), np.sin(self.angle)])
+        return straight + self.spin * np.stack([-points[:, 1], points[:, 0]], axis=1)
+
+
+def turning(rate: Array, centre: Array, origin: Array, frame: Array) -> Ground:
+    """Ground that turns, where it touches a contact.
+
+    Args:
+        rate: (3,) rad/s, along the axis. centre: (3,) m, a point of it. origin: (3,) m and frame: (3, 3) rows n, t1, t2
+            of the contact, in the same axes.
+    """
+    n, t1, t2 = frame
+    V = np.cross(rate, origin - centre)
+    return Ground(float(np.hypot(V @ t1, V @ t2)), float(np.arctan2(V @ t2, V @ t1)), spin=float(rate @ n))
 
 
 def spectrum(height: float, longest: float, shortest: float, exponent: float, count: int, seed: int) -> list[Wave]:

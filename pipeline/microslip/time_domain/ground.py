@@ -40,9 +40,9 @@ class Moving(Law):
     """A law on ground that moves: time counts from its first step, which takes none.
 
     Attributes:
-        law: of the contact. velocity: V, m/s. along: (2, 1) e along t1 and t2. place: (n,) of the points along e, m.
-            amplitude, number, phase: (w, 1) y_A in m, 2 pi / lambda in 1/m, and rad, of the waves. pushes: whether
-            their slope does.
+        law: of the contact. velocity: V, m/s. along: (2, 1) e along t1 and t2; of ground that turns (n,) and (2, n).
+            place: (n,) of the points along e, m. amplitude, number, phase: (w, 1) y_A in m, 2 pi / lambda in 1/m, and
+            rad, of the waves. pushes: whether their slope does.
     """
 
     law: Law
@@ -73,7 +73,7 @@ class Moving(Law):
         push = self._felt(self.law.step(met, meeting, dt, state.own)[0] * jnp.array([1.0, 0.0, 0.0]), u, time)
         trial = meeting - yielding[:, None] * push * jnp.array([0.0, 1.0, 1.0])
         found = self.law.slowed(met, trial, dt, state.own, yielding)
-        return v.at[:, 1:].set(found[:, 1:] + self.velocity * self.along.T)
+        return v.at[:, 1:].set(found[:, 1:] + (self.velocity * self.along).T)
 
     def limit(self, force: Array, state: OnGround) -> Array:
         return self.law.limit(force, state.own)
@@ -139,8 +139,12 @@ def moving(law: Law, ground: Ground, points: np.ndarray) -> Moving:
     e = np.array([np.cos(ground.angle), np.sin(ground.angle)])
     amplitude, length, phase = np.array(ground.waves or [(0.0, 1.0, 0.0)]).T[:, :, None]
     waves = jnp.asarray(amplitude), jnp.asarray(2 * np.pi / length), jnp.asarray(phase)
-    along, place = jnp.asarray(e[:, None]), jnp.asarray(points @ e)
-    return Moving(law, value(ground.velocity), along, place, *waves, ground.pushes, bool(ground.waves))
+    along, place, speed = jnp.asarray(e[:, None]), jnp.asarray(points @ e), value(ground.velocity)
+    if ground.spin:
+        V = ground.velocities(points).T
+        fastest = np.linalg.norm(V, axis=0)
+        along, speed = jnp.asarray(V / np.where(fastest > 0, fastest, 1.0)), jnp.asarray(fastest)
+    return Moving(law, speed, along, place, *waves, ground.pushes, bool(ground.waves))
 
 
 def steps_of_waves(contacts: Iterable[Contact], period: float) -> int:

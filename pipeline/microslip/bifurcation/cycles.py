@@ -1,0 +1,132 @@
+"""Limit cycles born at Hopf points, by harmonic balance with unknown frequency: of systems too large for shooting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.integrate
+
+from ..continuation import Settings, branch_off, follow
+from ..data import Array
+from .balance import Balance, Harmonics
+from .diagram import Asked, diagram
+from .dynamics import Dynamics
+from .equilibria import Hopf
+from .switching import OFF
+
+Report = Callable[[str], None]
+
+PERIODS = 5
+"""Of a motion in time that an orbit is checked by."""
+
+FINE = 1e-9
+"""Relative tolerance of that motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """The orbits born at a Hopf point, from the smallest on.
+
+    Attributes:
+        hopf. orbits. ended: why there are no more. system.
+    """
+
+    hopf: Hopf
+    orbits: tuple[Harmonics, ...]
+    ended: str
+    system: Dynamics
+
+    @property
+    def supercritical(self) -> bool:
+        """Whether orbits are born where the equilibrium is unstable, and as stable as it was."""
+        return self.hopf.criticality < 0
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Column -> (o,) values: parameter, frequency, half of the way from the smallest to the largest read-out, and
+        the share of the highest harmonic in the first."""
+        turns = np.arange(256) / 256
+        swing = [np.ptp(self.system.seen(o.at(turns), o.p), axis=0) / 2 for o in self.orbits]
+        named = {f"amplitude {name}": np.array([s[i] for s in swing]) for i, name in enumerate(self.system.named)}
+        return {
+            "parameter": np.array([o.p for o in self.orbits]),
+            "frequency_Hz": np.array([o.omega / (2 * np.pi) for o in self.orbits]),
+            **named,
+            "highest_harmonic": np.array([self._tail(o) for o in self.orbits]),
+        }
+
+    def _tail(self, o: Harmonics) -> float:
+        size = np.asarray(self.system.scale)
+        return float(np.linalg.norm(o.c[-2:] / size) / np.linalg.norm(o.c[1:3] / size))
+
+
+def cycles(
+    system: Dynamics, x: Array, start: float, stop: float, harmonics: int, band: tuple[float, float], points: int = 40,
+    report: Report = lambda _: None,
+) -> list[Cycles]:  # fmt: skip
+    """The limit cycles of every Hopf point between two values of the parameter.
+
+    Args:
+        x: (n,) near an equilibrium at the start. band: rad/s, of the Hopf points that are wanted. points: of a branch.
+
+    Raises:
+        UserError: no equilibrium near x.
+    """
+    still = diagram(system, x, Asked(start, stop, orbits=False))
+    wanted = [h for h in still.hopf if band[0] <= h.omega <= band[1]]
+    return [_born_at(system, h, harmonics, (start, stop), points, report) for h in wanted]
+
+
+def _born_at(
+    system: Dynamics, hopf: Hopf, H: int, ends: tuple[float, float], points: int, report: Report
+) -> Cycles:  # fmt: skip
+    way = np.zeros((2 * H + 1, system.count))
+    way[1:3] = hopf.shape.real, -hopf.shape.imag
+    way /= np.sqrt(np.mean((way[1:3] / np.asarray(system.scale)) ** 2) * system.count)
+    rest = np.zeros_like(way)
+    rest[0] = hopf.x
+    problem = Balance(system, Harmonics(rest + OFF * way, hopf.omega, hopf.p))
+    low, high = sorted(ends)
+    asked = Settings(low=low, high=high, step=0.02, step_max=0.2, points=points)
+    first = branch_off(problem, problem.unknowns(problem.reference), hopf.p, (np.append(way, 0.0), 0.0), asked)
+    orbits, ended = list[Harmonics](), ""
+    for state in follow(problem, first, asked):
+        for one in state.found:
+            orbit = problem.orbit(one.x, one.lam)
+            orbits.append(orbit)
+        ended = state.status
+        report(f"limit cycle {len(orbits)} of {points}, {state.y[-1] * system.parameter_scale:.6g}")
+    return Cycles(hopf, tuple(orbits), ended, system)
+
+
+def drift(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> float:
+    """How far a motion in time that begins on an orbit leaves it in some periods, over its largest swing in scales."""
+    size = np.asarray(system.scale)
+
+    def rate(t: float, y: Array) -> Array:
+        return np.asarray(_rate(system)(y * size, orbit.p)) / size
+
+    turns = np.linspace(0.0, periods, 16 * periods + 1)
+    times = turns * 2 * np.pi / orbit.omega
+    own = orbit.at(turns) / size
+    run = scipy.integrate.solve_ivp(
+        rate, (0.0, times[-1]), own[0], method="DOP853", t_eval=times, rtol=FINE, atol=FINE * np.ptp(own, axis=0).max()
+    )
+    if not run.success:
+        return float("inf")
+    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2))
+
+
+def _rate(system: Dynamics) -> Any:
+    if system not in _COMPILED:
+        _COMPILED.clear()
+        _COMPILED[system] = jax.jit(lambda x, p: system.rate(x, p, jnp.zeros(())))
+    return _COMPILED[system]
+
+
+_COMPILED: dict[Dynamics, Any] = {}

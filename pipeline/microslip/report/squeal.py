@@ -1,0 +1,43 @@
+"""The page of an assembly that slides: the map first, then the roots at the case's own state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ..roots.full import Compared
+from ..roots.map import Map
+from ..roots.spectrum import Spectrum
+from .page import Album, Piece, fold, page, say, table
+from .roots import CAPTIONS, READ_AS, root_table
+
+OF_MAP = (
+    "Colour: number of roots that grow. Black lines: Hopf lines, where the fastest growth rate is zero. Grey lines: "
+    "growth rate in 1/s. Dots: states counted in the unreduced matrices as well."
+)
+
+
+OF_CYCLES = (
+    "Half of the way from the smallest to the largest value of the first read-out in a period, from the Hopf point on. "
+    "Supercritical: the limit cycle grows out of the equilibrium softly; subcritical: it is reached by a jump."
+)
+
+
+def squeal_html(
+    title: str, said: Sequence[str], found: Spectrum, over: Map | None, full: Sequence[Compared],
+    pictures: Mapping[str, Path],
+) -> str:  # fmt: skip
+    """The page, which begins with the answer.
+
+    Args:
+        said: sentences. pictures: ``map``, ``cycles``, ``plane``.
+    """
+    album = Album(pictures)
+    pieces: list[Piece] = [say(*(f"{s[0].upper()}{s[1:]}." for s in said), tone="lead"), album.take("map", OF_MAP)]
+    if full and over is not None:
+        rows = [(f"{c.x:.4g}", f"{c.y:.4g}", c.reduced, c.full, f"{c.distance:.1e}") for c in full]
+        head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
+        pieces.append(fold("States in unreduced matrices", table(head, rows)))
+    pieces.append(album.take("cycles", OF_CYCLES))
+    pieces += [album.take("plane", CAPTIONS["plane"]), root_table(found), say(READ_AS, tone="note")]
+    return page(title, pieces)

@@ -1,0 +1,291 @@
+"""Roots of a case about steady sliding, and a map of where they grow: tables, pictures, a page that begins with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import sliding
+from ..basis import read_basis
+from ..bifurcation import mechanics
+from ..bifurcation.cycles import PERIODS, Cycles, cycles, drift
+from ..case import CaseSettings, load_case
+from ..case.questions import Cycle, StabilityOfCase
+from ..case.settings import GROUND
+from ..data import Array, ModalBasis, NotConverged, UserError
+from ..files import store
+from ..files.tables import columns_csv
+from ..linalg import quadratic
+from ..linalg.quadratic import Quadratic, Window
+from ..modal.unreduced import Unreduced, unreduced
+from ..report.squeal import squeal_html
+from ..roots.full import Compared, compared, full_matrices, growing
+from ..roots.map import Axis, Map, over_map
+from ..roots.spectrum import Spectrum, spectrum
+from ..roots.waves import waves
+from ..sliding import Sliding, Tangent
+from ..system.assembly import Assembly
+from .checkpoint import inputs_of
+from .job import open_job
+from .meshing import load_mesh, mesh_stage
+from .places import find_body
+from .stability import table_csv, table_lines, window_of, write_roots
+from .stage import Made, Report, Stage
+from .varied import Varied
+
+
+@dataclass(frozen=True)
+class State:
+    """An assembly that slides: its equations, its equilibrium z, and what is linearised there."""
+
+    assembly: Assembly
+    equations: Sliding
+    z: Array
+
+    @cached_property
+    def contacts(self) -> list[Tangent]:
+        return sliding.tangents(self.assembly, self.equations, self.z)
+
+    @property
+    def matrices(self) -> Quadratic:
+        """M = 1, C and K."""
+        C, K = sliding.linearised(self.equations, self.z)
+        return Quadratic(np.eye(len(K)), C, K)
+
+
+def squeal_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """Roots of a case about steady sliding, in a folder.
+
+    Args:
+        files: body of the case -> its modal file.
+
+    Returns:
+        The files, sentences and lines of a table, and whether the roots are proved complete.
+
+    Raises:
+        UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
+    """
+    settings, raw = load_case(case_path, assignments)
+    if settings.stability is None:
+        raise UserError(f"{case_path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
+    stage = Stage(folder / "stability.json", ("stages.squeal",), force, report)
+    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
+    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures))
+    told = json.loads(stage.product.read_text())
+    return [folder / name for name in told["files"]], told["lines"], told["complete"]
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], path: Path, files: Mapping[str, Path], pictures: bool
+) -> Made:
+    asked, folder = settings.stability, stage.product.parent
+    assert asked is not None
+    varied = Varied(path, raw, {name: read_basis(file) for name, file in files.items()})
+    state = state_of(varied, {}, path)
+    found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
+    over, full = None, list[Compared]()
+    if asked.over:
+        over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
+        full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
+    born = _cycles(varied, asked, stage.report) if asked.cycle else []
+    stage.begin()
+    folder.mkdir(parents=True, exist_ok=True)
+    told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
+    said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
+    said += [sentence_of(c, asked.cycle) for c in born if asked.cycle]
+    names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle))
+    complete = found.complete and all(one.complete for one in full)
+    answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
+    store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
+    return Made([folder / name for name in names])
+
+
+def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str = "stability") -> State:
+    """The case about its sliding, with other values of keys.
+
+    Raises:
+        UserError: a contact that does not slide, or lifts off; no equilibrium.
+    """
+    assembly = varied.under(values, where)
+    if not assembly.contacts:
+        raise UserError(f"{path}: contacts: there are none, so nothing slides; add [[contacts]] with friction")
+    equations = sliding.of(assembly)
+    try:
+        state = State(assembly, equations, sliding.equilibrium(equations))
+    except NotConverged as error:
+        raise UserError(f"{path}: {error}") from error
+    for c, at in zip(assembly.unrolled().contacts, state.contacts, strict=True):
+        if not np.linalg.norm(at.velocity[:, 1:], axis=1).min() > 0:
+            raise UserError(
+                f"{path}: contacts.{c.name}.ground: is missing: the contact does not slide, and friction at rest has "
+                "no direction; add ground = { rpm = ... } or { velocity = ... }"
+            )
+        if not (at.force[:, 0] > 0).any():
+            raise UserError(
+                f"{path}: contacts.{c.name}: lifts off: at the equilibrium no point of it is pressed; raise its "
+                "normal_force"
+            )
+    return state
+
+
+def shapes(state: State, found: Spectrum, bases: Mapping[str, ModalBasis], settings: CaseSettings) -> list[str]:
+    """A sentence for each root that grows: the waves that run round each body whose material turns."""
+    said = []
+    components = [m.name for m in state.assembly.components]
+    grow = [i for i, verdict in enumerate(found.verdict) if verdict == "unstable"]
+    for name, turning in turned(settings).items():
+        basis = bases[name]
+        first = sum(3 * len(bases[other].mesh.points) for other in components[: components.index(name)])
+        for i in grow:
+            u = sliding.points_moved(state.assembly) @ np.asarray(state.equations.shapes) @ found.roots.x[:, i]
+            own = u[first : first + 3 * len(basis.mesh.points)].reshape(-1, 3)
+            seen = waves(basis.mesh.points, own, turning * np.asarray(basis.rotation_axis), basis.rotation_point)
+            said.append(f"{found.frequency[i]:.6g} Hz at the rim of {name}: {seen.sentence}")
+    return said
+
+
+def turned(settings: CaseSettings) -> dict[str, float]:
+    """Body whose material runs through it -> 1, or -1 where it turns against its axis."""
+    against = [(c.against, c.ground.rpm) for c in settings.contacts if c.ground and c.ground.rpm and not c.ground.axis]
+    return {settings.address(to)[0]: float(np.sign(rpm)) for to, rpm in against if to != GROUND}
+
+
+def pressed(state: State) -> list[str]:
+    """A sentence for each contact of which points are open at the equilibrium."""
+    said = []
+    for c, at in zip(state.assembly.unrolled().contacts, state.contacts, strict=True):
+        open_ = int((at.force[:, 0] <= 0).sum())
+        if open_:
+            said.append(f"{c.name}: {open_} of {len(at.force)} points are open at the equilibrium")
+    return said
+
+
+def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
+    """What makes the assemblies of the map, and its axes; both keys are tried at the corners first."""
+    x, y = (Axis(o.parameter, o.unit, np.linspace(o.start, o.stop, o.points), o.keys) for o in asked.over)
+
+    def make(values: dict[str, float]) -> Assembly:
+        return varied.under(values, "stability.over.keys")
+
+    for a, b in ((0, 0), (-1, -1)):
+        make({**x.at(x.values[a]), **y.at(y.values[b])})
+    return make, x, y
+
+
+def _in_full(
+    varied: Varied, asked: StabilityOfCase, over: Map, settings: CaseSettings, path: Path, report: Report
+) -> list[Compared]:  # fmt: skip
+    """States of the map, evenly spread over it, in unreduced matrices."""
+    bodies = {b.name: unreduced_body(b.body or b.name, path) for b in settings.components}
+    window, (ny, nx) = window_of(asked), over.unstable.shape
+    grows = Window((max(asked.neutral, 0.0), window.growth[1]), window.omega)
+    found = []
+    for n in range(asked.full):
+        share = (n + 0.5) / asked.full
+        i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
+        x, y = float(over.x.values[j]), float(over.y.values[i])
+        state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
+        own = quadratic.every_value(state.matrices)
+        report(f"unreduced, state {n + 1} of {asked.full}")
+        full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
+        mine = own[grows.holds(own)]
+        found.append(Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete))
+    return found
+
+
+def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycles]:
+    over = asked.cycle
+    assert over is not None
+
+    def make(p: float) -> Assembly:
+        return varied.under({key: factor * p for key, factor in over.keys.items()}, "stability.cycle.keys")
+
+    report(f"equations over {over.parameter}")
+    system = mechanics.dynamics(make, over.start, over.stop)
+    begin = sliding.equilibrium(sliding.of(make(over.start)))
+    band = window_of(asked).omega
+    return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+
+
+def sentence_of(c: Cycles, over: Cycle) -> str:
+    """Where a limit cycle is born, of which kind, how far it was followed, and how a motion in time keeps to it."""
+    unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
+    kind = "supercritical" if c.supercritical else "subcritical"
+    tried = [c.orbits[(len(c.orbits) - 1) * k // 3] for k in (1, 2, 3)]
+    off = ", ".join(f"{drift(c.system, o):.1e} at {o.p:.4g}{unit}" for o in tried)
+    return (
+        f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {kind}: its limit "
+        f"cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz; in {PERIODS} "
+        f"periods a motion in time leaves it by {off} of its amplitude"
+    )
+
+
+def unreduced_body(name: str, path: Path) -> Unreduced:
+    """The unreduced matrices of a body that a case names.
+
+    Raises:
+        UserError: it has no mesh; see `modal.unreduced`.
+    """
+    job = open_job(find_body(path, name, Path(".")))
+    if job.settings.geometry.matrices is not None:
+        raise UserError(f"{path}: stability.full: '{name}' has no mesh, so there is nothing unreduced; leave full out")
+    return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
+
+
+def _told(full: Sequence[Compared]) -> list[str]:
+    if not full:
+        return []
+    same = sum(one.reduced == one.full and one.complete for one in full)
+    worst = np.nanmax([one.distance for one in full if np.isfinite(one.distance)], initial=0.0)
+    return [
+        f"unreduced matrices at {len(full)} states of the map: the same number of roots that grow at {same}, counted "
+        f"by the argument principle; roots differ by {worst:.1e} at most"
+    ]
+
+
+def _written(
+    folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
+    pictures: bool, born: tuple[Sequence[Cycles], Cycle | None],
+) -> list[str]:  # fmt: skip
+    """Names of the files, the page first."""
+    drawn = _pictures(found, over, full, folder / "pictures", born) if pictures else {}
+    texts = {
+        "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
+        "stability.csv": table_csv(found),
+    }
+    if over is not None:
+        texts["stability_map.csv"] = columns_csv(over.columns, 12)
+    if full:
+        columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
+        texts["stability_full.csv"] = columns_csv(columns, 12)
+    for number, c in enumerate(born[0], 1):
+        texts[f"stability_cycle_{number}.csv"] = columns_csv(c.columns, 12)
+    for file, text in texts.items():
+        store.write_text(folder / file, text)
+    write_roots(folder / "stability.h5", found, None, {})
+    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
+
+
+def _pictures(
+    found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path,
+    born: tuple[Sequence[Cycles], Cycle | None],
+) -> dict[str, Path]:  # fmt: skip
+    from ..pictures.roots import cycles_picture, map_picture, plane_picture
+
+    folder.mkdir(exist_ok=True)
+    drawn = {"plane": plane_picture(found, folder / "roots.png")}
+    if over is not None:
+        drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")
+    if born[0] and (asked := born[1]) is not None:
+        title = f"{asked.parameter} in {asked.unit}".removesuffix(" in ")
+        drawn["cycles"] = cycles_picture(born[0], title, folder / "roots_cycles.png")
+    return drawn

@@ -1,0 +1,57 @@
+"""A case with other values of its keys: the assembly that it then describes."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..case import CaseSettings
+from ..case.assemble import build
+from ..data import ModalBasis, UserError
+from ..settings.body import override
+from ..settings.mistakes import validate
+from ..system.assembly import Assembly
+from ..system.lumped import load_system
+from .places import lumped
+
+OF_SYSTEM = "system."
+"""Begins keys that are those of a system.toml and not of the case."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A case. Attributes: path. raw: its text as a table. bases: body -> modal basis."""
+
+    path: Path
+    raw: Mapping[str, Any]
+    bases: Mapping[str, ModalBasis]
+
+    def under(self, values: Mapping[str, float], where: str) -> Assembly:
+        """The assembly with other values of keys, dotted. where: the key that says so, for messages.
+
+        Raises:
+            UserError: a key that is none of the case or the system.
+        """
+        raw: dict[str, Any] = copy.deepcopy(dict(self.raw))
+        own = [f"{k}={v!r}" for k, v in values.items() if not k.startswith(OF_SYSTEM)]
+        others = [f"{k.removeprefix(OF_SYSTEM)}={v!r}" for k, v in values.items() if k.startswith(OF_SYSTEM)]
+        where = f"{self.path}: {where}"
+        try:
+            settings = validate(CaseSettings, override(raw, own, self.path), self.path)
+            built = build(settings, self._systems(others, where) if others else self.bases, self.path)
+        except UserError as error:
+            raise UserError(f"{where}: {str(error).removeprefix('--set ')}") from error
+        return built.assembly
+
+    def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:
+        found = dict(self.bases)
+        made = {name: lumped(self.path, basis.name) for name, basis in self.bases.items()}
+        for name, file in made.items():
+            if file is not None:
+                found[name] = load_system(file, assignments).basis()
+        if not any(made.values()):
+            raise UserError(f"{where}: '{OF_SYSTEM}' names a key of a system.toml, but no body of this case has one")
+        return found

@@ -1,0 +1,203 @@
+"""Steady sliding: ground that turns, tangents one by one, waves, limit cycles, what is refused; the case itself."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_bifurcation import normal_form
+from test_sliding import masses
+
+from microslip import sliding
+from microslip.basis import read_basis
+from microslip.bifurcation.cycles import cycles, drift
+from microslip.case import load_case
+from microslip.cli import main
+from microslip.linalg.quadratic import every_root, every_value
+from microslip.roots.waves import waves
+from microslip.stages.places import modal_files
+from microslip.stages.squeal import State, state_of
+from microslip.stages.varied import Varied
+from microslip.system.ground import turning
+
+ROOT = Path(__file__).parents[1]
+CASES = ROOT / "pipeline" / "cases"
+
+
+def test_ground_that_turns_moves_every_point_by_the_cross_product() -> None:
+    """Omega x r, along t1 and t2 of a frame that stands anyhow."""
+    random = np.random.default_rng(3)
+    frame = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    frame *= np.linalg.det(frame)
+    rate, centre, origin, points = *random.standard_normal((3, 3)), random.standard_normal((20, 2))
+    V = np.cross(rate, origin + points @ frame[1:] - centre) @ frame[1:].T
+    np.testing.assert_allclose(turning(rate, centre, origin, frame).velocities(points), V, atol=1e-12)
+
+
+def test_tangents_of_contacts_add_up_to_the_linearised_matrices() -> None:
+    """C and K less those of the bodies are the contacts', each through its own rows."""
+    assembly = masses(8.0)
+    s = sliding.of(assembly)
+    z = sliding.equilibrium(s)
+    C, K = sliding.linearised(s, z)
+    rows, begin = assembly.joined(0).rows @ np.asarray(s.shapes), 0
+    for c, at in zip(assembly.contacts, sliding.tangents(assembly, s, z), strict=True):
+        own = rows[begin : begin + c.patch.count]
+        C, K, begin = C - own.T @ at.C @ own, K - own.T @ at.K @ own, begin + c.patch.count
+        assert at.force[:, 0].sum() == pytest.approx(8.0) and np.hypot(*at.velocity[0, 1:]) == pytest.approx(1.0)
+    np.testing.assert_allclose(C, s.C, atol=1e-9)
+    np.testing.assert_allclose(K, s.K, atol=1e-9)
+
+
+def test_waves_forward_and_backward() -> None:
+    """Three parts of nodal diameter 4 run towards growing angles and four against it; a second turns the axis round."""
+    phi = 2 * np.pi * np.arange(40) / 40
+    points = np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+    u = np.zeros((40, 3), dtype=complex)
+    u[:, 2] = 3 * np.exp(-4j * phi) + 4 * np.exp(4j * phi)
+    for axis, forward in ((1.0, 9 / 25), (-1.0, 16 / 25)):
+        seen = waves(points, u, np.array([0.0, 0.0, axis]), np.zeros(3))
+        assert seen.leading == 4 and seen.shares[4, 0] == pytest.approx(forward) and seen.shares[4].sum() == 1.0
+
+
+def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -> None:
+    """Radius sqrt(p), frequency 1; a motion in time stays on them."""
+    (found,) = cycles(normal_form(), np.zeros(2), -1.0, 1.0, 2, (0.5, 2.0))
+    assert found.supercritical and "bound" in found.ended
+    for o in found.orbits:
+        assert np.hypot(*o.at(np.zeros(1))[0]) == pytest.approx(np.sqrt(o.p), abs=1e-8)
+        assert o.omega == pytest.approx(1.0, abs=1e-9)
+    assert drift(found.system, found.orbits[-1]) < 1e-7
+
+
+@pytest.fixture
+def belt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None) -> Path:
+    """The two masses on a belt, asked for their roots."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(CASES / "masses-on-belt", tmp_path / "masses-on-belt")
+    whole = (CASES / "belt.toml").read_text()
+    text = whole[: whole.index("[[bifurcation]]")]
+    over = "".join(
+        f'[[stability.over]]\nparameter = "{name}"\nkeys = {{ {keys} }}\nstart = {low}\nstop = {high}\npoints = 5\n'
+        for name, low, high, keys in (
+            ("load", 0.5, 9.5, '"contacts.sole-1.normal_force" = 1.0, "contacts.sole-2.normal_force" = 1.0'),
+            ("velocity", 0.8, 3.0, '"contacts.sole-1.ground.velocity" = 1.0, "contacts.sole-2.ground.velocity" = 1.0'),
+        )
+    )
+    (tmp_path / "belt.toml").write_text(f"{text}[stability]\nfrequency = [0.0, 1.0]\n{over}")
+    return tmp_path / "belt.toml"
+
+
+def test_map_of_two_masses_has_as_many_roots_as_each_state_alone(
+    belt: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Counts of the map against the eigenvalues of the assembly made anew; H1 and H2 lie between its columns."""
+    assert main(["stability", str(belt), "--quiet"]) == 0
+    rows = [line.split(",") for line in Path("build/belt/stability_map.csv").read_text().splitlines()[1:]]
+    assert len(rows) == 25 and {row[2] for row in rows} == {"0", "1", "2"}
+    for load, velocity, count, growth, _ in [[float(v) for v in row] for row in rows[::6]]:
+        V = [f"contacts.sole-{i}.ground.velocity={velocity!r}" for i in (1, 2)]
+        s = sliding.of(masses(load, *V))
+        values = np.linalg.eigvals(sliding.state_matrix(s, sliding.equilibrium(s)))
+        assert (values.real[values.imag > 0] > 0).sum() == count
+        assert values.real[values.imag > 0].max() == pytest.approx(growth, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "text, wrong, key",
+    [
+        ('keys = { "contacts.sole-1.normal_force"', 'keys = { "contacts.sole-9.normal_force"', "sole-9"),
+        ('keys = { "contacts.sole-1.normal_force"', 'keys = { "contacts.sole-1.normal_farce"', "normal_farce"),
+        ("mu_0 = 0.470610579508", "mu_0 = -0.47", "mu_0"),
+        ("ground = { velocity = 1.0 }              # v_0", "", "ground"),
+        ("[stability]\nfrequency = [0.0, 1.0]", "[stability]\nfrequency = [1.0, 1.0]", "frequency"),
+        ("ground = { velocity = 1.0 }              # v_0", "ground = { rpm = 1.0, velocity = 1.0 }", "rpm"),
+        ("normal_force = 8.0          # N; the load parameter B in m", "interference = -1.0", "lifts off"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence(
+    belt: Path, capsys: pytest.CaptureFixture[str], text: str, wrong: str, key: str
+) -> None:
+    whole = belt.read_text()
+    assert text in whole
+    belt.write_text(whole.replace(text, wrong, 1))
+    assert main(["stability", str(belt), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert key in said and "Traceback" not in said and not Path("build/belt/stability.csv").exists()
+
+
+def test_a_case_that_does_not_ask_is_refused(belt: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    belt.write_text((CASES / "belt.toml").read_text())
+    assert main(["stability", str(belt), "--quiet"]) == 2
+    assert "stability" in capsys.readouterr().err
+
+
+# the brake of the case ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def brake(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Disc and pads of the case, each by Rubin's method and by Craig and Bampton's, and the case beside them."""
+    folder = tmp_path_factory.mktemp("brake")
+    for body in ("brake-disc", "pad"):
+        shutil.copytree(ROOT / "geometry" / body, folder / "geometry" / body)
+    shutil.copy(CASES / "squeal.toml", folder / "squeal.toml")
+    return folder
+
+
+def state_at(folder: Path, *assignments: str) -> State:
+    """The case with other keys, about its sliding."""
+    path = folder / "squeal.toml"
+    settings, raw = load_case(path, list(assignments))
+    files = modal_files(settings, path, folder, lambda _: None)
+    return state_of(Varied(path, raw, {name: read_basis(file) for name, file in files.items()}), {}, path)
+
+
+def mu(value: float) -> list[str]:
+    return [f"contacts.{side}:lining.friction={value!r}" for side in ("upper", "lower")]
+
+
+def fastest(state: State) -> complex:
+    s = every_value(state.matrices)
+    s = s[s.imag < 2 * np.pi * 4000]
+    return complex(s[np.argmax(s.real)])
+
+
+@pytest.mark.slow
+def test_friction_makes_the_brake_squeal_by_the_work_it_does(brake: Path) -> None:
+    """Nothing grows without friction; the printed root grows with it, by the work of the part of K that is not
+    symmetric over a cycle less what C takes."""
+    for force in ("100.0", "3000.0"):
+        sets = [f"contacts.{side}:lining.normal_force={force}" for side in ("upper", "lower")]
+        assert fastest(state_at(brake, *mu(0.0), *sets)).real < 0
+    Q = state_at(brake).matrices
+    every = every_root(Q)
+    i = int(np.argmax(np.where(every.s.imag < 2 * np.pi * 4000, every.s.real, -np.inf)))
+    s, x = every.s[i], every.x[:, i]
+    assert s.imag / (2 * np.pi) == pytest.approx(2362.08, abs=0.01) and s.real == pytest.approx(43.53, abs=0.01)
+    work = -np.pi * np.vdot(x, Q.K @ x).imag
+    taken = np.pi * s.imag * np.vdot(x, Q.C @ x).real
+    assert work > 0
+    assert (work - taken) / (2 * np.pi * s.imag * np.vdot(x, x).real) == pytest.approx(s.real, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_the_root_that_grows_does_not_depend_on_the_reduction(brake: Path) -> None:
+    """Twice the modes of the pads move it by less than 3e-5; bodies by Craig and Bampton, which converge
+    from above, come nearer with more modes."""
+    rubin = fastest(state_at(brake))
+    files = [brake / "geometry" / body / "body.toml" for body in ("brake-disc", "pad")]
+    own = [file.read_text() for file in files]
+
+    def away(reduction: str, *counts: int) -> float:
+        for file, text, count in zip(files, own, counts, strict=True):
+            text = text.replace('reduction = "rubin"', f'reduction = "{reduction}"')
+            file.write_text(re.sub(r"(?m)^count = \d+", f"count = {count}", text))
+        return abs(fastest(state_at(brake)) - rubin) / abs(rubin)
+
+    assert away("rubin", 24, 40) < 3e-5
+    few, many = away("craig-bampton", 24, 20), away("craig-bampton", 60, 60)
+    assert many < 0.6 * few < 0.6 * 4e-3
