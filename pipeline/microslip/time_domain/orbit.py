@@ -491,7 +491,7 @@ def _error(stepper: Stepper, now: Now, samples: int, each: int, done: int) -> tu
         return min(1.0, share * done), ""
     keeps = float((parts[-half:].sum() / parts[:half].sum()) ** (1 / (len(parts) - half)))
     n = max(done - 1 - len(parts), 0)
-    grown = np.expm1(min(n * np.log(keeps), 700.0))  # beyond it chaos has left nothing
+    grown = np.expm1(min(n * np.log(keeps), 100.0))  # beyond it nothing is left of what there was
     more = parts[-half:].mean() * (n if abs(keeps - 1) < 1e-9 else keeps * grown / (keeps - 1))
     whole = min(1.0, share * (1 + parts.sum() + more))
     if keeps <= 1 or whole < FOLLOWED:
