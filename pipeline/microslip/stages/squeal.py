@@ -96,7 +96,7 @@ def _work(
     if asked.over:
         over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
         full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
-    born = _cycles(varied, asked, stage.report) if asked.cycle else []
+    born = _cycles(varied, asked, path, stage.report) if asked.cycle else []
     stage.begin()
     folder.mkdir(parents=True, exist_ok=True)
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
@@ -202,7 +202,7 @@ def _in_full(
     return found
 
 
-def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycles]:
+def _cycles(varied: Varied, asked: StabilityOfCase, path: Path, report: Report) -> list[Cycles]:
     over = asked.cycle
     assert over is not None
 
@@ -213,7 +213,10 @@ def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycl
     system = mechanics.dynamics(make, over.start, over.stop)
     begin = sliding.equilibrium(sliding.of(make(over.start)))
     band = window_of(asked).omega
-    return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+    try:
+        return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+    except UserError as error:
+        raise UserError(f"{path}: stability.cycle: {over.parameter}: {error}") from error
 
 
 def sentence_of(c: Cycles, over: Cycle) -> str:
