@@ -14,7 +14,7 @@ from closed_forms.oscillators import brusselator
 from scipy.integrate import solve_ivp
 
 import microslip as ms
-from microslip.bifurcation import balance, branches, floquet
+from microslip.bifurcation import balance, branches, equilibria, floquet
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.shooting import Orbit, Shooting
@@ -262,6 +262,16 @@ def test_no_driven_motion_near_the_start() -> None:
 def test_same_value_twice_is_refused() -> None:
     with pytest.raises(UserError, match="stop"):
         ms.bifurcate(brusselator(), 1.0, 1.0)
+
+
+def test_pairs_that_meet_without_damping_are_no_hopf_point() -> None:
+    """q'' + [[1, p], [-p, 2]] q = 0: both pairs stand on the imaginary axis until they meet at p = 1/2."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        return jnp.stack([z[2], z[3], -z[0] - p * z[1], p * z[0] - 2 * z[1]])
+
+    with pytest.raises(UserError, match=r"near 0\.\d+ of the parameter no single pair .*give the bodies damping"):
+        equilibria._sought(Dynamics(rate, tuple("abcd"), np.ones(4), 1.0), np.zeros(4), 0.5, np.sqrt(1.5))
 
 
 def test_contacts_that_stick_are_refused() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from microslip.data import Array, ModalGroup
 from microslip.modal.campbell import LINK, Tracks, crossings, mac, track, track_basis
+from microslip.pictures.plots import _ceiling
 
 
 def shapes(n: int, m: int, seed: int = 0) -> Array:
@@ -135,3 +136,11 @@ def test_the_curves_of_a_modal_file() -> None:
     assert sorted(tracks.modes[:, 1].tolist()) == sorted(range(basis.groups[0, 0].n_modes))
     assert tracks.mac.min() > 0.95
     np.testing.assert_allclose(tracks.speeds, [0.0, 100 * np.pi])
+
+
+@pytest.mark.parametrize("lowest", [40.0, 500.0])
+def test_the_lowest_mode_is_seen_above_all_engine_orders(lowest: float) -> None:
+    """Orders reach 100 Hz; the diagram ends above the first mode wherever it is."""
+    omega = 2 * np.pi * np.array([[lowest, 1.1 * lowest], [9e3, 9e3]])
+    tracks = Tracks(np.array([0.0, 200 * np.pi]), np.array([[0, 0], [1, 1]]), omega, np.ones((2, 1)))
+    assert _ceiling(tracks, [1]) == pytest.approx(max(120.0, 1.1 * 1.1 * lowest))

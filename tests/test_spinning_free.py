@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +14,13 @@ import scipy.sparse as sp
 from meshes import body, brick
 from rings import AXIS, bladed_sector, disc_sector, full_ring
 
+import microslip as ms
+from microslip.basis import write_basis
 from microslip.basis.checks import check_basis
+from microslip.cli import main
 from microslip.data import Mesh, ModalBasis, ModalGroup, UserError
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance import pseudo_transient
 from microslip.linalg import eigen
 from microslip.linalg.gyroscopic import general_modes
 from microslip.linalg.parametric import family_of_group
@@ -22,6 +29,7 @@ from microslip.modal.compute import modal_basis
 from microslip.modal.floating import Balanced
 from microslip.reduced.coordinates import in_modes
 from microslip.roots.spectrum import Spectrum, spectrum
+from microslip.stages.summary import frequency_lines
 from microslip.units import from_rpm, to_rpm
 
 Array = np.ndarray
@@ -135,6 +143,69 @@ def test_a_free_body_is_neutral_and_inner_damping_moves_its_nutation_alone() -> 
         unstable = [s.imag / SPEED for s, v in zip(found.roots.s, found.verdict, strict=True) if v == "unstable"]
         assert len(unstable) == grows and all(0.1 < w < 0.99 for w in unstable)
         assert found.verdict.count("neutral") >= 7
+
+
+@cache
+def pressed() -> tuple[ModalBasis, Any]:
+    """A free plate whose end is pressed by a contact that turns with it, and its assembly at speed."""
+    settings = body(
+        RUBBER | {"young": 2e9}, free=True, rotation=about_z(speeds_rpm=[0.0, RPM]), modes={"count": 7},
+        damping={"ratio": 0.01}, **TIP, monitors=[{"name": "foot", "point": [0.04, 0.05, -0.01]}],
+        excitations=[{"name": "push", "point": [0.04, 0.05, 0.01], "direction": [1.0, 0.0, 0.0]}],
+    )  # fmt: skip
+    basis = modal_basis(block(*PLATE), settings)
+    touch = {"interface": "tip", "normal_stiffness": 2e5, "tangential_stiffness": 1e4, "includes": "surface"}
+    touch |= {"friction": 0.3, "points": [2, 2], "normal_force": 50.0}
+    case = {"body": basis.name, "speed": 1, "excitation": "push", "amplitude": 0.5, "monitor": "foot"}
+    return basis, ms.assemble(case | {"contacts": [touch]}, **{basis.name: basis})
+
+
+def test_a_contact_that_turns_with_a_free_body_holds_it() -> None:
+    """Centrifugal forces leave a negative stiffness beside that of the sticking contact, and no motion without any.
+    Without the contact nothing holds the body."""
+    _, assembly = pressed()
+    problem = balance.of(assembly.assembly)
+    part, k = problem.parts[0][0], problem.stiffness[0]
+    lowest = scipy.linalg.eigvalsh(part.K + part.rows.T @ k @ part.rows)[0]
+    assert lowest < -0.1 * SPEED**2 and not pseudo_transient.unheld(problem)
+    with pytest.raises(UserError, match="nothing holds the bodies as a whole"):
+        pseudo_transient.unconstrained(part, np.zeros_like(k))
+
+
+@pytest.mark.slow
+def test_a_motion_in_time_stays_on_the_balance_of_a_free_body_at_speed() -> None:
+    _, assembly = pressed()
+    found = ms.harmonic_response(assembly, [70.0], harmonics=3)
+    run = ms.integrate(assembly, 70.0, settle=0, keep=2, start="balance")
+    assert found.converged.all()
+    assert np.ptp(run.y) / 2 == pytest.approx(found.amplitude[0], rel=1e-3)
+
+
+def test_roots_are_those_of_the_speed_that_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file of two speeds: the first if nothing is said, and the terminal says so; whirls at Omega at the other."""
+    basis, _ = pressed()
+    write_basis(file := tmp_path / "basis.h5", basis)
+    ask = ["stability", str(file), "--no-pictures"]
+    for more, text, whirls in (([], "At 0 rpm, one of the 2 speeds", 0), (["--speed", "1"], f"At {RPM:g} rpm", 3)):
+        assert main([*ask, *more]) == 0
+        out = capsys.readouterr().out
+        assert text in out
+        hertz = [float(line.split()[0]) for line in out.splitlines() if "neutral " in line]
+        assert sum(abs(f - RPM / 60) < 1e-3 for f in hertz) == whirls
+    before = (tmp_path / "stability.csv").read_bytes()
+    wrong = {("--speed", "2"): "--speed 2: the file has 2", ("--set", "a=1"): "a modal file has no settings"}
+    for more, text in wrong.items():
+        assert main([*ask, *more]) == 2
+        assert text in capsys.readouterr().err
+    assert (tmp_path / "stability.csv").read_bytes() == before
+
+
+def test_the_first_frequencies_on_the_terminal_are_elastic_ones() -> None:
+    basis, _ = pressed()
+    (line, *_), g = frequency_lines(basis), basis.groups[0, 0]
+    shown = [float(f) for f in line.partition("rpm")[2].partition("Hz")[0].split()]
+    np.testing.assert_allclose(shown, g.frequency[g.omega > 0][:5], rtol=1e-4)
+    assert line.endswith("beside 6 rigid motions")
 
 
 # ---------------------------------------------------------------- the static state

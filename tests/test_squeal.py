@@ -112,6 +112,8 @@ def test_map_of_two_masses_has_as_many_roots_as_each_state_alone(
         ('keys = { "contacts.sole-1.normal_force"', 'keys = { "contacts.sole-9.normal_force"', "sole-9"),
         ('keys = { "contacts.sole-1.normal_force"', 'keys = { "contacts.sole-1.normal_farce"', "normal_farce"),
         ("mu_0 = 0.470610579508", "mu_0 = -0.47", "mu_0"),
+        ("[stability]\n", "[stability]\nfull = 2\n", "has no mesh, so there is nothing unreduced"),
+        ('law = { kind = "rate", slope = 100.0 }', 'law = "smooth"', "belt.toml: contacts.sole-1: its law"),
         ("ground = { velocity = 1.0 }              # v_0", "", "ground"),
         ("[stability]\nfrequency = [0.0, 1.0]", "[stability]\nfrequency = [1.0, 1.0]", "frequency"),
         ("ground = { velocity = 1.0 }              # v_0", "ground = { rpm = 1.0, velocity = 1.0 }", "rpm"),

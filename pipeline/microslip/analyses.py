@@ -164,9 +164,9 @@ def two_tones(
     if not isinstance(assembly, Assembly):
         raise UserError(f"system: {type(system).__name__} is no assembly; make one by structure or assemble")
     turn = 2 * np.pi * _hertz(unit)
-    one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
-    for key, f in (("first", one), ("second", two)):
+    for key, f in (("first", first), ("second", second)):
         bounded(key, f, gt=0)
+    one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
     bounded("harmonics", harmonics, ge=1)
     try:
         one, two = np.broadcast_arrays(one, two)

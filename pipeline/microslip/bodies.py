@@ -75,8 +75,8 @@ def stability(
     """Roots s of (s^2 M + s C + K) x = 0 in a window, none missed: what grows by itself, and how fast.
 
     Args:
-        body: a body.toml of matrices or its folder, a modal file or basis, matrices (M, C, K), none of which need be
-            symmetric, sparse or not, or a `linalg.parametric.Family`.
+        body: a body.toml of matrices or its folder, a modal file or basis (of its first speed), matrices (M, C, K),
+            none of which need be symmetric, sparse or not, or a `linalg.parametric.Family`.
         frequency: Hz, from, to; of a body.toml, what its [stability] says if not given. growth: 1/s, from, to. Both may
             be left out where there are no more than 300 coordinates.
         over: parameter that matrices scale with, and values: of it, rising; then the roots at each of them come from

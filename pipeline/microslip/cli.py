@@ -450,13 +450,15 @@ def two_tones(
 
 @app.command
 def stability(
-    path: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
-) -> None:
+    path: Path, /, *, speed: int | None = None, no_pictures: NoPictures = False, set_: Set = (), force: Force = False,
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
     """Does it move by itself: all complex roots in a window of frequencies and growth rates, none missed.
 
     Args:
         path: a body.toml (of matrices with [stability]), the folder that holds it, its name, or a modal file; or a case
             whose contacts slide, with [stability].
+        speed: of a modal file, or a body with a mesh: which of its speeds, counted from 0; the first if not given.
     """
     from .case import load_case
     from .stages.places import is_case, meant, modal_files
@@ -468,11 +470,13 @@ def stability(
         path = path / "case.toml"
     with progress(f"stability of {path}", quiet) as report:
         if is_case(path):
+            if speed is not None:
+                raise UserError(f"{path}: --speed {speed}: is of a modal file; a case has bodies.speed")
             case, _ = load_case(path, list(set_))
             files, folder = modal_files(case, path, Path("."), report), Path("build") / case.name
             made, lines, complete = squeal_stage(path, files, folder, list(set_), force, report, not no_pictures)
         else:
-            made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures)
+            made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _say("\n".join([*lines, *map(str, made)]), quiet)
     if not complete:
         raise NotConverged(f"roots are missing in the window; {made[0]} holds those that were found")

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..continuation import Lost, Scaled, Segment, Settings, advance, root, start
 from ..continuation.curve import State
-from ..data import Array, ComplexArray
+from ..data import Array, ComplexArray, UserError
 from .dynamics import Dynamics
 
 
@@ -56,7 +56,11 @@ def eigenvalues(system: Dynamics, x: Array, p: float) -> ComplexArray:
 
 
 def hopf_between(system: Dynamics, before: State, after: State, settings: Settings) -> list[Hopf]:
-    """The Hopf points between two neighbouring states of the curve."""
+    """The Hopf points between two neighbouring states of the curve.
+
+    Raises:
+        UserError: roots meet on the imaginary axis, as they do without damping.
+    """
     scaled = Scaled(Still(system))
 
     def real(k: int) -> Callable[[Array, Array], float]:
@@ -74,8 +78,18 @@ def hopf_between(system: Dynamics, before: State, after: State, settings: Settin
         x, p = y[:-1] * scaled.x_scale, float(y[-1] * scaled.lam_scale)
         value = eigenvalues(system, x, p)[k]
         if abs(value.imag) > 1e-6 * np.abs(eigenvalues(system, x, p)).max():
-            found.append(hopf(system, x, p, abs(value.imag)))
+            found.append(_sought(system, x, p, abs(value.imag)))
     return found
+
+
+def _sought(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:
+    try:
+        return hopf(system, x, p, omega)
+    except (Lost, np.linalg.LinAlgError) as error:
+        raise UserError(
+            f"near {p:.4g} of the parameter no single pair of roots crosses the imaginary axis at {omega:.4g} rad/s: "
+            "without damping pairs run along it until two of them meet; give the bodies damping"
+        ) from error
 
 
 def hopf(system: Dynamics, x: Array, p: float, omega: float) -> Hopf:

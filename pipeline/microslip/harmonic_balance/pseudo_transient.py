@@ -34,6 +34,9 @@ HELD = 1e-3
 FREE = 1e-9
 """The same for a motion that nothing holds at all: rounding."""
 
+ROUNDING = 1e-13
+"""Share of the largest stiffness below which another one is none."""
+
 
 def at_rest(problem: Problem) -> Places:
     """Nothing moves."""
@@ -90,14 +93,19 @@ def unconstrained(part: Linear, stiffness: Array) -> tuple[Array, Array]:
         part: in harmonic 0. stiffness: (c, c) of the sticking contacts.
 
     Returns:
-        (m, l) motions of unit stiffness with sticking contacts, (l,) what share of it is not the contacts'.
+        (m, l) motions of unit stiffness with sticking contacts, (l,) what share of it is not the contacts'. None where
+        sticking contacts leave a negative stiffness, of a free body that spins: Coriolis forces hold it then.
 
     Raises:
         UserError: motions that not even sticking contacts hold.
     """
+    stuck = _stuck(part, stiffness)
     try:
-        shares, motions = scipy.linalg.eigh(_symmetric(part.K), _stuck(part, stiffness))
+        shares, motions = scipy.linalg.eigh(_symmetric(part.K), stuck)
     except np.linalg.LinAlgError as error:
+        values = scipy.linalg.eigvalsh(stuck)
+        if np.abs(values).min() > ROUNDING * values[-1]:  # a free body that spins drives itself away; all are held
+            return np.zeros((len(stuck), 0)), np.zeros(0)
         raise UserError(
             "nothing holds the bodies as a whole, and a steady force has no balance there: hold one of them "
             "([[supports]] of its body.toml), or give free bodies weak_springs in the case"

@@ -297,7 +297,8 @@ def _campbell_ceiling(curves: dict[int, Tracks], orders: Sequence[int], fastest:
         return 1.05 * highest
     reached = max(orders) * fastest / (2 * np.pi)
     above = [float(np.nanmin(f)) for f in every if 1.1 * reached < np.nanmin(f) < 1.5 * reached]
-    return min(1.05 * highest, max([1.15 * reached, *(1.05 * f for f in above)]))
+    least = min((float(np.nanmax(f)) for f in every if np.nanmax(f) > 0), default=0.0)
+    return min(1.05 * highest, max([1.15 * reached, 1.05 * least, *(1.05 * f for f in above)]))
 
 
 def _waves(

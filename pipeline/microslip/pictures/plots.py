@@ -230,14 +230,15 @@ def _split(axes: Axes, basis: ModalBasis, split: Tracks, rpm: Array, top: float)
 
 
 def _ceiling(tracks: Tracks, orders: Sequence[int]) -> float:
-    """Hz shown: all modes, or with engine orders the part they reach and a bit more."""
+    """Hz shown: all modes, or with engine orders the part they reach and a bit more, the lowest mode at least."""
     highest = float(np.nanmax(tracks.omega)) / (2 * np.pi)
     if not orders:
         return 1.05 * highest
     reached = max(orders) * tracks.speeds[-1] / (2 * np.pi)
     lowest = np.nanmin(tracks.omega, axis=1) / (2 * np.pi)
     above = lowest[(lowest > 1.1 * reached) & (lowest < 1.5 * reached)]
-    return float(min(1.05 * highest, max([1.2 * reached, *(1.1 * above)])))
+    least = 1.1 * float(np.nanmax(tracks.omega, axis=1).min()) / (2 * np.pi)
+    return float(min(1.05 * highest, max([1.2 * reached, least, *(1.1 * above)])))
 
 
 def _curves(axes: Axes, tracks: Tracks, rpm: Array, top: float) -> None:

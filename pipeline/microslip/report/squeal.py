@@ -13,8 +13,10 @@ from .roots import CAPTIONS, READ_AS, root_table
 
 OF_MAP = (
     "Colour: number of roots that grow. Black lines: Hopf lines, where the fastest growth rate is zero. Grey lines: "
-    "growth rate in 1/s. Dots: states counted in the unreduced matrices as well."
+    "growth rate in 1/s."
 )
+
+OF_FULL = " Dots: states counted in the unreduced matrices as well."
 
 
 OF_CYCLES = (
@@ -33,7 +35,8 @@ def squeal_html(
         said: sentences. pictures: ``map``, ``cycles``, ``plane``.
     """
     album = Album(pictures)
-    pieces: list[Piece] = [say(*(f"{s[0].upper()}{s[1:]}." for s in said), tone="lead"), album.take("map", OF_MAP)]
+    words = OF_MAP + OF_FULL * bool(full)
+    pieces: list[Piece] = [say(*(f"{s[0].upper()}{s[1:]}." for s in said), tone="lead"), album.take("map", words)]
     if full and over is not None:
         rows = [(f"{c.x:.4g}", f"{c.y:.4g}", c.reduced, c.full, f"{c.distance:.1e}") for c in full]
         head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]

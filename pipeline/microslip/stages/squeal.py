@@ -34,7 +34,7 @@ from ..system.assembly import Assembly
 from .checkpoint import inputs_of
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
-from .places import find_body
+from .places import find_body, lumped
 from .stability import table_csv, table_lines, window_of, write_roots
 from .stage import Made, Report, Stage
 from .varied import Varied
@@ -96,7 +96,7 @@ def _work(
     if asked.over:
         over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
         full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
-    born = _cycles(varied, asked, stage.report) if asked.cycle else []
+    born = _cycles(varied, asked, path, stage.report) if asked.cycle else []
     stage.begin()
     folder.mkdir(parents=True, exist_ok=True)
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
@@ -118,10 +118,10 @@ def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str
     assembly = varied.under(values, where)
     if not assembly.contacts:
         raise UserError(f"{path}: contacts: there are none, so nothing slides; add [[contacts]] with friction")
-    equations = sliding.of(assembly)
     try:
+        equations = sliding.of(assembly)
         state = State(assembly, equations, sliding.equilibrium(equations))
-    except NotConverged as error:
+    except (NotConverged, UserError) as error:
         raise UserError(f"{path}: {error}") from error
     for c, at in zip(assembly.unrolled().contacts, state.contacts, strict=True):
         if not np.linalg.norm(at.velocity[:, 1:], axis=1).min() > 0:
@@ -202,7 +202,7 @@ def _in_full(
     return found
 
 
-def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycles]:
+def _cycles(varied: Varied, asked: StabilityOfCase, path: Path, report: Report) -> list[Cycles]:
     over = asked.cycle
     assert over is not None
 
@@ -213,7 +213,10 @@ def _cycles(varied: Varied, asked: StabilityOfCase, report: Report) -> list[Cycl
     system = mechanics.dynamics(make, over.start, over.stop)
     begin = sliding.equilibrium(sliding.of(make(over.start)))
     band = window_of(asked).omega
-    return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+    try:
+        return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
+    except UserError as error:
+        raise UserError(f"{path}: stability.cycle: {over.parameter}: {error}") from error
 
 
 def sentence_of(c: Cycles, over: Cycle) -> str:
@@ -235,8 +238,8 @@ def unreduced_body(name: str, path: Path) -> Unreduced:
     Raises:
         UserError: it has no mesh; see `modal.unreduced`.
     """
-    job = open_job(find_body(path, name, Path(".")))
-    if job.settings.geometry.matrices is not None:
+    job = None if lumped(path, name) else open_job(find_body(path, name, Path(".")))
+    if job is None or job.settings.geometry.matrices is not None:
         raise UserError(f"{path}: stability.full: '{name}' has no mesh, so there is nothing unreduced; leave full out")
     return unreduced(load_mesh(job, mesh_stage(job))[0], job.settings)
 

@@ -13,12 +13,14 @@ import numpy as np
 from ..basis import read_basis
 from ..case.questions import StabilityOfCase
 from ..data import UserError
+from ..exchange.choice import select
 from ..files import hdf5, store
 from ..files.tables import columns_csv, rows_csv
 from ..linalg.parametric import Family, family_of, family_of_group
 from ..linalg.quadratic import Window
 from ..modal.foreign import values_of
 from ..report.roots import roots_html
+from ..ring.resonances import speeds_of
 from ..roots.diagram import Diagram, diagram
 from ..roots.spectrum import Spectrum, spectrum
 from ..settings.body import StabilitySettings
@@ -34,7 +36,8 @@ class Question:
 
     Attributes:
         name: for titles. folder: of the products. where: begins a refusal. family: makes the matrices. at: values of
-            their parameters. window, asked: of [stability]. inputs: what the answer depends on.
+            their parameters. window, asked: of [stability]. inputs: what the answer depends on. speeds: how many
+            the modal file has.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Question:
     window: Window
     asked: StabilitySettings
     inputs: Mapping[str, Any]
+    speeds: int = 1
 
     @property
     def state(self) -> str:
@@ -54,9 +58,13 @@ class Question:
 
 
 def stability_stage(
-    path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True
+    path: Path, assignments: list[str], force: bool = False, report: Report = lambda _: None, pictures: bool = True,
+    speed: int | None = None,
 ) -> tuple[list[Path], list[str], bool]:  # fmt: skip
     """Roots of a body or of a modal file, and over a range of a parameter where [stability] asks for it.
+
+    Args:
+        speed: which of the modal file's, counted from 0.
 
     Returns:
         The files, sentences and lines of a table, and whether the roots are proved complete.
@@ -64,25 +72,32 @@ def stability_stage(
     Raises:
         UserError: no window, a parameter that there is not, a case.
     """
-    q = question(path, assignments, report)
+    q = question(path, assignments, report, speed)
     stage = Stage(q.folder / "stability.json", ("stages.stability",), force, report)
     stage.make({**q.inputs, "pictures": pictures}, lambda: _work(stage, q, pictures))
     told = json.loads(stage.product.read_text())
     return [q.folder / name for name in told["files"]], told["lines"], told["complete"]
 
 
-def question(path: Path, assignments: list[str], report: Report = lambda _: None) -> Question:
+def question(
+    path: Path, assignments: list[str], report: Report = lambda _: None, speed: int | None = None
+) -> Question:  # fmt: skip
     """What a body.toml or a modal file asks.
 
     Raises:
-        UserError: matrices without a window, a case.
+        UserError: matrices without a window, or with a number of a speed; one that the modal file does not have; a
+            case; settings for a modal file.
     """
     if path.suffix == ".h5":
-        return _of_basis(path, None)
+        if assignments:
+            raise UserError(f"{path}: --set {assignments[0]}: a modal file has no settings; give its body.toml instead")
+        return _of_basis(path, None, speed)
     job = open_job(path, assignments)
     given, asked = job.settings.geometry.matrices, job.settings.stability
     if given is None:
-        return _of_basis(modes_stage(job, report=report)[0], asked)
+        return _of_basis(modes_stage(job, report=report)[0], asked, speed)
+    if speed is not None:
+        raise UserError(f"{job.path}: --speed {speed}: is of a modal file; matrices have rotation.speeds_rpm")
     if asked is None:
         raise UserError(f"{job.path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
     return Question(
@@ -91,16 +106,19 @@ def question(path: Path, assignments: list[str], report: Report = lambda _: None
     )  # fmt: skip
 
 
-def _of_basis(file: Path, asked: StabilitySettings | None) -> Question:
-    """All roots of a modal file's first speed, or those in a window."""
-    basis = read_basis(file)
+def _of_basis(file: Path, asked: StabilitySettings | None, speed: int | None) -> Question:
+    """All roots of one of a modal file's speeds, the first if not given, or those in a window."""
+    whole = read_basis(file)
+    basis = select(whole, speed or 0, None)
     g = basis.groups[min(basis.groups)]
     if asked is None:
         highest = float(g.omega.max(initial=1.0)) / np.pi  # twice the frequency of the highest mode
         asked = StabilitySettings(growth=(-2 * np.pi * highest, 2 * np.pi * highest), frequency=(0.0, highest))
-    inputs = {"basis": store.hash_file(file), "stability": asked.model_dump()}
-    reduced, window = family_of_group(basis.name, g), window_of(asked)
-    return Question(basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window, asked, inputs)
+    inputs = {"basis": store.hash_file(file), "stability": asked.model_dump(), "speed": g.speed}
+    reduced, speeds = family_of_group(basis.name, g), len(speeds_of(whole))
+    return Question(
+        basis.name, file.parent, file, lambda: reduced, {"speed": g.speed}, window_of(asked), asked, inputs, speeds
+    )
 
 
 def window_of(asked: StabilitySettings | StabilityOfCase) -> Window:
@@ -147,11 +165,18 @@ def _work(stage: Stage, q: Question, pictures: bool) -> Made:
     names = _written(q, found, over, pictures)
     told = {
         "files": names,
-        "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else [])],
+        "lines": [*table_lines(found), found.sentence, *([over.sentence] if over else []), *_which(q)],
         "complete": found.complete or not asked.certify,
     }
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
     return Made([q.folder / name for name in names])
+
+
+def _which(q: Question) -> list[str]:
+    """Of which speed the roots are, where a modal file holds several."""
+    if q.speeds == 1:
+        return []
+    return [f"{q.state}, one of the {q.speeds} speeds of the modal file: --speed 0 to {q.speeds - 1} chooses"]
 
 
 def _written(q: Question, found: Spectrum, over: Diagram | None, pictures: bool) -> list[str]:

@@ -113,11 +113,16 @@ def _hertz_line(frequency: Array, most: int = MOST_COLUMNS) -> str:
     return "".join(f"{f:10.5g}" for f in frequency[:most])
 
 
+def _first(g: ModalGroup, columns: int) -> str:
+    f, rigid = eigenmodes(g).frequency, int((g.omega == 0).sum())
+    of = f"  of {g.n_modes - rigid}" if g.n_modes - rigid > columns else ""
+    return f"{_hertz_line(f[f > 0], columns)}  Hz{of}{f' beside {rigid} rigid motions' if rigid else ''}"
+
+
 def frequency_lines(basis: ModalBasis, columns: int = 5, rows: int = 15) -> list[str]:
-    """The first frequencies of each speed and nodal diameter, a line each, in few lines for the terminal."""
+    """The first elastic frequencies of each speed and nodal diameter, a line each, in few lines for the terminal."""
     table = [
-        f"{to_rpm(g.speed):8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  "
-        f"{_hertz_line(eigenmodes(g).frequency, columns)}  Hz{f'  of {g.n_modes}' if g.n_modes > columns else ''}"
+        f"{to_rpm(g.speed):8.6g} rpm{f', k = {k:3d}' if basis.sectors > 1 else ''}  {_first(g, columns)}"
         for (_, k), g in sorted(basis.groups.items())[:rows]
     ]
     more = len(basis.groups) - rows

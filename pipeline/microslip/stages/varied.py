@@ -43,7 +43,8 @@ class Varied:
             settings = validate(CaseSettings, override(raw, own, self.path), self.path)
             built = build(settings, self._systems(others, where) if others else self.bases, self.path)
         except UserError as error:
-            raise UserError(f"{where}: {str(error).removeprefix('--set ')}") from error
+            text = str(error).removeprefix("--set ").removeprefix(f"{self.path}: ")
+            raise UserError(f"{where}: {text}") from error
         return built.assembly
 
     def _systems(self, assignments: list[str], where: str) -> dict[str, ModalBasis]:

@@ -212,6 +212,10 @@ def _of_two(assembly: Assembly, ratio: float) -> Assembly:
     bounded("second", ratio, gt=0)
     if assembly.ring is not None:
         raise UserError("second: of a ring, one engine order drives; leave second out")
+    if all(x.tone == 1 for x in assembly.loads):
+        raise UserError(
+            "second: no load has this frequency; give second_force to structure or tone = 2 in a case, or leave it out"
+        )
     loads = (x if x.tone == 1 else replace(x, tone=1, harmonic=x.harmonic * ratio) for x in assembly.loads)  # type: ignore[arg-type]
     return replace(assembly, loads=tuple(loads))
 
