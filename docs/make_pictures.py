@@ -1151,6 +1151,11 @@ def squeal() -> None:
     page, _ = run_case_file(ROOT / "pipeline" / "cases" / "squeal.toml")
     for name, drawn_as in (("roots_map", "squeal_map"), ("roots_cycles", "squeal_cycle")):
         save(from_file(page.parent / "pictures" / f"{name}.png"), drawn_as)
+    moving, frames = from_file(page.parent / "pictures" / "root_1_disc.gif"), []
+    for i in range(3):  # the other half of the period is its mirror
+        moving.seek(i * moving.n_frames // 6)
+        frames.append(moving.convert("RGB"))
+    save(lettering.side_by_side(frames), "squeal_wave")
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------

@@ -270,7 +270,7 @@ MISTAKES = [
     (["info", "zero.h5"], "zero.h5"),
     (["info", "bad.stl"], "bad.stl"),
     (["info", "meshes/box.msh", "--unit", "parsec"], "unknown unit of length; choose one of m, "),
-    (["init", "rotor"], "there is no such body; choose one of blade, damper, disc-brake, half-pipe, pendulum, pin, "),
+    (["init", "rotor"], "there is no such body; choose one of blade, brake-disc, damper, disc-brake, half-pipe, pad, "),
     (["init", "blade", "body.toml/x"], "body.toml/x"),
 ]
 

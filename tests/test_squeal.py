@@ -6,8 +6,11 @@ import re
 import shutil
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
+import small
+from PIL import Image
 from test_bifurcation import normal_form
 from test_sliding import masses
 
@@ -16,10 +19,12 @@ from microslip.basis import read_basis
 from microslip.bifurcation.cycles import cycles, drift
 from microslip.case import load_case
 from microslip.cli import main
-from microslip.linalg.quadratic import every_root, every_value
+from microslip.linalg.quadratic import Window, every_root, every_value
+from microslip.roots.spectrum import spectrum
 from microslip.roots.waves import waves
+from microslip.stages.moving import moving_shape
 from microslip.stages.places import modal_files
-from microslip.stages.squeal import State, state_of
+from microslip.stages.squeal import State, moving, shapes, state_of
 from microslip.stages.varied import Varied
 from microslip.system.ground import turning
 
@@ -61,6 +66,24 @@ def test_waves_forward_and_backward() -> None:
     for axis, forward in ((1.0, 9 / 25), (-1.0, 16 / 25)):
         seen = waves(points, u, np.array([0.0, 0.0, axis]), np.zeros(3))
         assert seen.leading == 4 and seen.shares[4, 0] == pytest.approx(forward) and seen.shares[4].sum() == 1.0
+
+
+def test_a_root_moves_its_bodies_through_one_period_as_cosine_and_sine(tmp_path: Path) -> None:
+    """Re(u exp(i omega t)) in every file for ParaView, at most a millimetre long, over all bodies;
+    a wave that runs by a quarter of its length in a quarter of the period."""
+    basis = small.basis()
+    z = basis.mesh.points[:, 2] / np.ptp(basis.mesh.points[:, 2])
+    u = np.zeros((len(z), 3), dtype=complex)
+    u[:, 0] = np.exp(-2j * np.pi * z)
+    made = moving_shape({"a": 3 * u, "b": 6 * u}, {"a": basis, "b": basis}, 50.0, (), "", 1, tmp_path)
+    assert [p.name for p in made if p.suffix == ".pvd"] == ["root_1_a.pvd", "root_1_b.pvd"]
+    times = [float(t) for t in re.findall(r'timestep="([^"]+)"', made[0].read_text())]
+    np.testing.assert_allclose(times, np.arange(32) / 32 / 50.0, atol=1e-9)
+    for body, size in (("a", 5e-4), ("b", 1e-3)):
+        for k in (0, 8, 20):
+            shown = meshio.read(tmp_path / "motion" / f"root_1_{body}_{k:03d}.vtu")
+            x = np.cos(2 * np.pi * (k / 32 - shown.points[:, 2] / np.ptp(basis.mesh.points[:, 2])))
+            np.testing.assert_allclose(shown.point_data["displacement"][:, 0], size * x, atol=1e-6 * size)
 
 
 def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -> None:
@@ -184,6 +207,34 @@ def test_friction_makes_the_brake_squeal_by_the_work_it_does(brake: Path) -> Non
     taken = np.pi * s.imag * np.vdot(x, Q.C @ x).real
     assert work > 0
     assert (work - taken) / (2 * np.pi * s.imag * np.vdot(x, x).real) == pytest.approx(s.real, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_the_wave_of_the_root_that_grows_is_drawn_as_it_is_told(brake: Path, tmp_path: Path) -> None:
+    """The rim of the disc in the files for ParaView, Fourier transformed round the axis and over time: four nodal
+    diameters, and forward and backward shares as in the sentence; the animation has all frames and moves."""
+    path = brake / "squeal.toml"
+    settings, raw = load_case(path)
+    files = modal_files(settings, path, brake, lambda _: None)
+    bases = {name: read_basis(file) for name, file in files.items()}
+    state = state_of(Varied(path, raw, bases), {}, path)
+    found = spectrum(state.matrices, Window((0.0, 1e4), (1e3, 2 * np.pi * 4000)), certify=False)
+    made = moving(state, found, bases, settings, tmp_path)
+    assert {p.stem for p in made if p.suffix == ".pvd"} == {f"root_1_{body}" for body in ("disc", "upper", "lower")}
+    shown = [meshio.read(p) for p in made if re.fullmatch(r"root_1_disc_\d+\.vtu", p.name)]
+    points = shown[0].points
+    rim = np.flatnonzero(np.hypot(*points[:, :2].T) > 0.1499)
+    u = np.fft.fft([m.point_data["displacement"][rim, 2] for m in shown], axis=0)[1]
+    seen = waves(points[rim], np.stack([0 * u, 0 * u, u], axis=1), np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    (told,) = shapes(state, found, bases, settings)
+    assert told.endswith(seen.sentence) and seen.leading == 4
+    (animation,) = [p for p in made if p.suffix == ".gif"]
+    with Image.open(animation) as drawn:
+        frames = []
+        for k in (0, 8):
+            drawn.seek(k)
+            frames.append(np.asarray(drawn.convert("L"), dtype=float))
+        assert drawn.n_frames == len(shown) == 32 and np.abs(frames[1] - frames[0]).mean() > 5
 
 
 @pytest.mark.slow

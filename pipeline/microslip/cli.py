@@ -477,7 +477,7 @@ def stability(
             made, lines, complete = squeal_stage(path, files, folder, list(set_), force, report, not no_pictures)
         else:
             made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures, speed)
-    _say("\n".join([*lines, *map(str, made)]), quiet)
+    _say("\n".join([*lines, *(str(path) for path in made if path.suffix != ".vtu")]), quiet)
     if not complete:
         raise NotConverged(f"roots are missing in the window; {made[0]} holds those that were found")
 

@@ -25,7 +25,10 @@ pytestmark = [
 ]
 
 SPEED = 400.0  # rad/s
-FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))  # S1 to S6 of C3D20
+FACES = {  # S1, S2, ... by their corners
+    "hexahedron20": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    "tetra10": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+}
 CENTRIFUGAL = f"*DLOAD\nEALL, CENTRIF, {SPEED**2:.12e}, 0., 0., 0., 0., 1., 0.\n"
 CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1.e-7, 1.e-7, 1.e-7, , 1.e-7\n"
 
@@ -41,10 +44,11 @@ def pair(n: tuple[int, int, int], gap: float, lean: tuple[float, float]) -> Mesh
 
 def surface(mesh: Mesh, face: str, name: str) -> str:
     """Element faces of a named face."""
-    wanted = {tuple(sorted(f)) for f in mesh.faces[face]["quad8"][:, :4].tolist()}
+    ((kind, cells),), (facets,) = mesh.cells.items(), mesh.faces[face].values()
+    wanted = {tuple(sorted(f)) for f in facets[:, : facets.shape[1] // 2].tolist()}
     lines = [f"*SURFACE, NAME={name}, TYPE=ELEMENT"]
-    for e, cell in enumerate(mesh.cells["hexahedron20"]):
-        for number, local in enumerate(FACES):
+    for e, cell in enumerate(cells):
+        for number, local in enumerate(FACES[kind]):
             if tuple(sorted(cell[list(local)].tolist())) in wanted:
                 lines.append(f"{e + 1}, S{number + 1}")
     assert len(lines) == 1 + len(wanted)

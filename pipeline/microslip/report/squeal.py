@@ -25,6 +25,9 @@ OF_CYCLES = (
 )
 
 
+OF_WAVES = "One period of a root that grows, without its growth. Its size is chosen; motion/ holds it for ParaView."
+
+
 def squeal_html(
     title: str, said: Sequence[str], found: Spectrum, over: Map | None, full: Sequence[Compared],
     pictures: Mapping[str, Path],
@@ -32,7 +35,7 @@ def squeal_html(
     """The page, which begins with the answer.
 
     Args:
-        said: sentences. pictures: ``map``, ``cycles``, ``plane``.
+        said: sentences. pictures: ``map``, ``cycles``, ``plane``, and motions of roots, ``root_...``.
     """
     album = Album(pictures)
     words = OF_MAP + OF_FULL * bool(full)
@@ -41,6 +44,7 @@ def squeal_html(
         rows = [(f"{c.x:.4g}", f"{c.y:.4g}", c.reduced, c.full, f"{c.distance:.1e}") for c in full]
         head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
         pieces.append(fold("States in unreduced matrices", table(head, rows)))
+    pieces += [album.take(name, OF_WAVES) for name in pictures if name.startswith("root_")]
     pieces.append(album.take("cycles", OF_CYCLES))
     pieces += [album.take("plane", CAPTIONS["plane"]), root_table(found), say(READ_AS, tone="note")]
     return page(title, pieces)

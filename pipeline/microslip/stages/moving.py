@@ -1,15 +1,16 @@
-"""Bodies that move in time, over their last period: for ParaView, and as animations where PyVista is."""
+"""Bodies that move, over the last period of a motion or one of a root: for ParaView, and as animations."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..case.assemble import Built, Loaded
-from ..data import Array, ModalBasis, ModalGroup
+from ..data import Array, ComplexArray, ModalBasis, ModalGroup
 from ..exchange.vtu import write_motion
+from ..operating.cycle import longest
 from ..ring.expansion import sector_rotation
 from ..system.disc import spread
 from ..time_domain import classification
@@ -17,6 +18,9 @@ from ..time_domain.orbit import Orbit
 
 FRAMES = 32
 """Of a period that is animated."""
+
+SIZE = 1e-3
+"""m, the largest displacement of a root's shape, which has no size of its own."""
 
 
 def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path) -> list[Path]:
@@ -44,6 +48,35 @@ def moving_bodies(found: Sequence[tuple[str, Orbit]], built: Built, folder: Path
                 path = folder / "pictures" / f"moving_{i}_{component.name}.gif"
                 title = f"{built.settings.name}: {name}, one period of the excitation"
                 made.append(moving_gif(body.basis, moved, path, title))
+    return made
+
+
+def moving_shape(
+    shape: Mapping[str, ComplexArray], bases: Mapping[str, ModalBasis], frequency: float, animated: Collection[str],
+    title: str, number: int, folder: Path,
+) -> list[Path]:  # fmt: skip
+    """One period of the shape of a root, Re(u exp(i omega t)) without its growth, largest over all bodies `SIZE`.
+
+    Args:
+        shape: body -> (n, 3) complex motion u of its points. frequency: Hz. animated: bodies that are drawn.
+        number: of the root, in names.
+
+    Returns:
+        Files of every body in ``motion/`` for ParaView, and animations in ``pictures/`` where PyVista is.
+    """
+    from ..pictures import can_draw
+    from ..pictures.moving import moving_gif
+
+    made, part, scenes = list[Path](), np.arange(FRAMES) / FRAMES, bool(animated) and can_draw() is None
+    scale = SIZE / max(float(longest(u).max()) for u in shape.values())
+    for name, u in shape.items():
+        moved = scale * np.real(np.exp(2j * np.pi * part)[:, None, None, None] * u)
+        for kind in ("motion", "pictures"):
+            (folder / kind).mkdir(parents=True, exist_ok=True)
+        made += write_motion(bases[name], part / frequency, moved, folder / "motion" / f"root_{number}_{name}.pvd")
+        if scenes and name in animated:
+            path = folder / "pictures" / f"root_{number}_{name}.gif"
+            made.append(moving_gif(bases[name], moved, path, title))
     return made
 
 

@@ -18,7 +18,7 @@ from ..bifurcation.cycles import PERIODS, Cycles, cycles, drift
 from ..case import CaseSettings, load_case
 from ..case.questions import Cycle, StabilityOfCase
 from ..case.settings import GROUND
-from ..data import Array, ModalBasis, NotConverged, UserError
+from ..data import Array, ComplexArray, ModalBasis, NotConverged, UserError
 from ..files import store
 from ..files.tables import columns_csv
 from ..linalg import quadratic
@@ -34,6 +34,7 @@ from ..system.assembly import Assembly
 from .checkpoint import inputs_of
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
+from .moving import moving_shape
 from .places import find_body, lumped
 from .stability import table_csv, table_lines, window_of, write_roots
 from .stage import Made, Report, Stage
@@ -57,6 +58,25 @@ class State:
         """M = 1, C and K."""
         C, K = sliding.linearised(self.equations, self.z)
         return Quadratic(np.eye(len(K)), C, K)
+
+    def shapes(self, x: ComplexArray, bases: Mapping[str, ModalBasis]) -> dict[str, ComplexArray]:
+        """Body -> (n, 3) complex motion of its n points in a root's vector (m,); sectors of rings are left out."""
+        u, found, begin = self._moved @ x, dict[str, ComplexArray](), 0
+        for component in self.assembly.unrolled().components:
+            phi = next(iter(component.groups.values())).phi
+            end = begin + (phi[..., 0].size or phi.shape[-1])
+            if phi.size and component.name in bases and bases[component.name].sectors == 1:
+                found[component.name] = u[begin:end].reshape(-1, 3)
+            begin = end
+        return found
+
+    @cached_property
+    def _moved(self) -> Array:
+        return sliding.points_moved(self.assembly) @ np.asarray(self.equations.shapes)
+
+
+FASTEST = 4
+"""Roots that grow whose shapes are written as motions."""
 
 
 def squeal_stage(
@@ -102,7 +122,8 @@ def _work(
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
     said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
     said += [sentence_of(c, asked.cycle) for c in born if asked.cycle]
-    names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle))
+    moves = moving(state, found, varied.bases, settings, folder) if pictures else []
+    names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full)
     answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
     store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
@@ -139,18 +160,34 @@ def state_of(varied: Varied, values: Mapping[str, float], path: Path, where: str
 
 def shapes(state: State, found: Spectrum, bases: Mapping[str, ModalBasis], settings: CaseSettings) -> list[str]:
     """A sentence for each root that grows: the waves that run round each body whose material turns."""
-    said = []
-    components = [m.name for m in state.assembly.components]
-    grow = [i for i, verdict in enumerate(found.verdict) if verdict == "unstable"]
+    said, u = [], {i: state.shapes(found.roots.x[:, i], bases) for i in growing_ones(found)}
     for name, turning in turned(settings).items():
         basis = bases[name]
-        first = sum(3 * len(bases[other].mesh.points) for other in components[: components.index(name)])
-        for i in grow:
-            u = sliding.points_moved(state.assembly) @ np.asarray(state.equations.shapes) @ found.roots.x[:, i]
-            own = u[first : first + 3 * len(basis.mesh.points)].reshape(-1, 3)
-            seen = waves(basis.mesh.points, own, turning * np.asarray(basis.rotation_axis), basis.rotation_point)
+        for i in (i for i in u if name in u[i]):
+            axis = turning * np.asarray(basis.rotation_axis)
+            seen = waves(basis.mesh.points, u[i][name], axis, basis.rotation_point)
             said.append(f"{found.frequency[i]:.6g} Hz at the rim of {name}: {seen.sentence}")
     return said
+
+
+def growing_ones(found: Spectrum) -> list[int]:
+    """Numbers of the roots that grow."""
+    return [i for i, verdict in enumerate(found.verdict) if verdict == "unstable"]
+
+
+def moving(
+    state: State, found: Spectrum, bases: Mapping[str, ModalBasis], settings: CaseSettings, folder: Path
+) -> list[Path]:
+    """Shapes of the fastest `FASTEST` roots that grow and swing, as motions of their bodies; those whose material turns
+    are animated, or all where none does."""
+    grow = sorted((i for i in growing_ones(found) if found.frequency[i] > 0), key=lambda i: -found.growth[i])
+    made = list[Path]()
+    for number, i in enumerate(grow[:FASTEST], 1):
+        u = {n: v for n, v in state.shapes(found.roots.x[:, i], bases).items() if bases[n].mesh.n_cells}
+        title = f"{found.frequency[i]:.6g} Hz, grows by {found.growth[i]:.4g} 1/s; size chosen"
+        if u:
+            made += moving_shape(u, bases, found.frequency[i], turned(settings) or u, title, number, folder)
+    return made
 
 
 def turned(settings: CaseSettings) -> dict[str, float]:
@@ -257,10 +294,11 @@ def _told(full: Sequence[Compared]) -> list[str]:
 
 def _written(
     folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
-    pictures: bool, born: tuple[Sequence[Cycles], Cycle | None],
+    pictures: bool, born: tuple[Sequence[Cycles], Cycle | None], moves: Sequence[Path],
 ) -> list[str]:  # fmt: skip
-    """Names of the files, the page first."""
+    """Names of the files, the page first. moves: of `moving`."""
     drawn = _pictures(found, over, full, folder / "pictures", born) if pictures else {}
+    drawn |= {path.stem: path for path in moves if path.suffix == ".gif"}
     texts = {
         "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
         "stability.csv": table_csv(found),
@@ -275,7 +313,7 @@ def _written(
     for file, text in texts.items():
         store.write_text(folder / file, text)
     write_roots(folder / "stability.h5", found, None, {})
-    return [*texts, "stability.h5", *(str(p.relative_to(folder)) for p in drawn.values())]
+    return [*texts, "stability.h5", *dict.fromkeys(str(p.relative_to(folder)) for p in (*drawn.values(), *moves))]
 
 
 def _pictures(
