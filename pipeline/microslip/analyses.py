@@ -19,7 +19,7 @@ from .harmonic_balance.nonlinear_modes import Backbone
 from .harmonic_balance.problem import Problem
 from .harmonic_balance.solved import Motions
 from .harmonic_balance.solver import sweep
-from .settings.mistakes import bounded
+from .settings.mistakes import bounded, whole
 from .system.assembly import Assembly
 
 if TYPE_CHECKING:
@@ -51,6 +51,9 @@ def balanced(system: System, harmonics: int | None = None, samples: int | None =
     Raises:
         UserError: a case whose contacts wait for a normal force.
     """
+    for name, value in (("harmonics", harmonics), ("samples", samples)):
+        if value is not None:
+            whole(name, value, ge=1)
     if isinstance(system, Problem):
         if harmonics is not None or samples is not None:
             raise UserError(
@@ -117,6 +120,7 @@ def harmonic_response(
         [0.221, 0.3, 0.669]
     """
     problem = _driven(balanced(system, harmonics, samples))
+    bounded("frequency", frequency)
     asked = np.atleast_1d(np.asarray(frequency, dtype=float)) * _hertz(unit)
     points, hertz = sweep(problem, asked, report), _hertz(unit)
     known = {} if hertz == 1 else {"parameter": asked / hertz}
@@ -167,7 +171,9 @@ def two_tones(
     for key, f in (("first", first), ("second", second)):
         bounded(key, f, gt=0)
     one, two = (np.atleast_1d(np.asarray(f, dtype=float)) * turn for f in (first, second))
-    bounded("harmonics", harmonics, ge=1)
+    for key, count in (("harmonics", harmonics), ("samples", samples), ("turns", turns)):
+        if count is not None:
+            whole(key, count, ge=1)
     try:
         one, two = np.broadcast_arrays(one, two)
     except ValueError:

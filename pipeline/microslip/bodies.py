@@ -70,23 +70,24 @@ def modes(
 def stability(
     body: Any, *, frequency: tuple[float, float] | None = None, growth: tuple[float, float] = (-math.inf, math.inf),
     over: str | None = None, values: Any = None, at: Mapping[str, float] | None = None, accuracy: float = 1e-8,
-    neutral: float = 0.0, certify: bool = True, report: Report = lambda _: None,
+    neutral: float = 0.0, certify: bool = True, speed: int | None = None, report: Report = lambda _: None,
 ) -> Spectrum | Diagram:  # fmt: skip
     """Roots s of (s^2 M + s C + K) x = 0 in a window, none missed: what grows by itself, and how fast.
 
     Args:
-        body: a body.toml of matrices or its folder, a modal file or basis (of its first speed), matrices (M, C, K),
+        body: a body.toml of matrices or its folder, a modal file or basis, matrices (M, C, K),
             none of which need be symmetric, sparse or not, or a `linalg.parametric.Family`.
         frequency: Hz, from, to; of a body.toml, what its [stability] says if not given. growth: 1/s, from, to. Both may
             be left out where there are no more than 300 coordinates.
         over: parameter that matrices scale with, and values: of it, rising; then the roots at each of them come from
             one basis. at: values of the other parameters.
         accuracy: relative, of the matrices' entries. neutral: 1/s, growth rates below it are not decided.
-        certify: count the roots by the argument principle too.
+        certify: count the roots by the argument principle too. speed: which of a modal file's or basis's, from 0, where
+            there are several.
 
     Raises:
-        UserError: matrices of different sizes or with numbers that are not finite, a window without area, an unknown
-            parameter, a value at which a matrix is not defined.
+        UserError: several speeds and none chosen, matrices of different sizes or with numbers that are not finite, a
+            window without area, an unknown parameter, a value at which a matrix is not defined.
 
     Examples:
         A double pendulum under a follower force flutters:
@@ -100,12 +101,14 @@ def stability(
     from .stages.stability import question
 
     if isinstance(body, str | Path):
-        q = question(Path(body), [], report)
+        q = question(Path(body), [], report, speed)
+        if q.speeds > 1 and speed is None:
+            raise UserError(f"stability: {q.where} holds {q.speeds} speeds; give speed = 0 to {q.speeds - 1}")
         window = (q.asked.growth, q.asked.frequency)
         growth = window[0] if math.isinf(growth[0]) and math.isinf(growth[1]) else growth
         neutral, body, at = neutral or q.asked.neutral, q.family(), {**q.at, **(at or {})}
         frequency = frequency or window[1]
-    return roots_of(body, frequency, growth, over, values, at, accuracy, neutral, certify, report)
+    return roots_of(body, frequency, growth, over, values, at, accuracy, neutral, certify, speed, report)
 
 
 def assemble(

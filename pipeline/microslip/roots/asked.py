@@ -10,9 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import MatrixTerm, ModalBasis, UserError
+from ..exchange.choice import select
 from ..linalg import quadratic
 from ..linalg.parametric import Family, family_of_group
 from ..linalg.quadratic import Quadratic, Window
+from ..ring.resonances import speeds_of
 from .diagram import Diagram, diagram
 from .spectrum import Spectrum, spectrum
 
@@ -21,10 +23,11 @@ Report = Callable[[str], None]
 
 def roots_of(
     body: Any, frequency: tuple[float, float] | None, growth: tuple[float, float], over: str | None, values: Any,
-    at: Mapping[str, float] | None, accuracy: float, neutral: float, certify: bool, report: Report,
+    at: Mapping[str, float] | None, accuracy: float, neutral: float, certify: bool, speed: int | None,
+    report: Report,
 ) -> Spectrum | Diagram:  # fmt: skip
     """See `bodies.stability`; body: a basis, matrices or a family."""
-    family = _family(body)
+    family = _family(body, speed)
     window = _window(family, growth, frequency)
     if over is None:
         Q = family.at(at or {})
@@ -35,10 +38,14 @@ def roots_of(
     return diagram(family, over, points, window, at=at, neutral=neutral, report=report)
 
 
-def _family(body: Any) -> Family:
+def _family(body: Any, speed: int | None) -> Family:
     if isinstance(body, Family):
         return body
     if isinstance(body, ModalBasis):
+        speeds = len(speeds_of(body))
+        if speeds > 1 and speed is None:
+            raise UserError(f"stability: {body.name} holds {speeds} speeds; give speed = 0 to {speeds - 1}")
+        body = select(body, speed or 0, None)
         return family_of_group(body.name, body.groups[min(body.groups)])
     if isinstance(body, Quadratic):
         body = (body.M, body.C, body.K)

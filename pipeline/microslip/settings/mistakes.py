@@ -73,6 +73,17 @@ def bounded(what: str, value: Any, gt: float | None = None, ge: float | None = N
             raise UserError(f"{what}: {words} (it is {wrong:g}); correct it")
 
 
+def whole(what: str, value: Any, ge: int = 0) -> None:
+    """Check a count that is given in Python.
+
+    Raises:
+        UserError: no whole number, or one below ge.
+    """
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        raise UserError(f"{what}: {value!r} is no whole number; correct it")
+    bounded(what, value, ge=ge)
+
+
 def _sentences(errors: list[Any], raw: dict[str, Any], model: type[BaseModel]) -> Iterator[str]:
     """One sentence a key, though a setting that may be one thing or another is complained about twice."""
     by_key: dict[tuple[Any, ...], list[tuple[tuple[Any, ...], Any]]] = {}
