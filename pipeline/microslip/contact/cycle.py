@@ -30,28 +30,6 @@ def march(law: Law, path: Array, dt: Array | float, state: State) -> tuple[Array
     return force, after
 
 
-def recall(law: Law, path: Array, dt: Array | float, state: State) -> tuple[tuple[Array, State], Array]:
-    """`march`, and (2, ..., 2, n) how the memory at the end follows either direction of that at the beginning, of a law
-    whose sliders can be solved for (`Law.recalled`)."""
-
-    def one(carried: tuple[State, Array], row: tuple[Array, Array]) -> tuple[tuple[State, Array], Array]:
-        state, slope = carried
-
-        def remembered(memory: Array) -> tuple[Array, tuple[Array, State]]:
-            force, after = stepped(law, *row, dt, law.recalled(state, memory))
-            return law.memory(force, after), (force, after)
-
-        def along(way: Array) -> tuple[Array, Array, tuple[Array, State]]:
-            return jax.jvp(remembered, (law.memory(row[0], state),), (way,), has_aux=True)
-
-        _, slope, (force, after) = jax.vmap(along, out_axes=(None, 0, None))(slope)
-        return (after, slope), force
-
-    begin = (state, directions(law.memory(path[-1], state)))
-    (after, slope), force = jax.lax.scan(one, begin, (path, rates(path, dt)))
-    return (force, after), slope
-
-
 def push(
     law: Law, path: Array, dt: Array | float, state: State, tangents: State, moves: Array
 ) -> tuple[tuple[Array, State], tuple[Array, State]]:
@@ -81,13 +59,3 @@ def push(
 def blank(state: State, count: int) -> State:
     """No tangents, so many."""
     return jax.tree_util.tree_map(lambda leaf: jnp.zeros((count, *leaf.shape)), state)
-
-
-def units(law: Law, state: State, memory: Array) -> State:
-    """Tangents of a state along both directions of its memory (..., 2, n)."""
-    return jax.vmap(law.recalled)(blank(state, 2), directions(memory))
-
-
-def directions(memory: Array) -> Array:
-    """(2, ..., 2, n): 1 N along either direction of a memory (..., 2, n)."""
-    return jnp.stack([jnp.zeros_like(memory).at[..., k, :].set(1.0) for k in range(2)])

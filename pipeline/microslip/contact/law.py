@@ -183,6 +183,12 @@ class Law:
     brakes: ClassVar[bool] = False
     smooth: ClassVar[bool] = False
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        """A class with a step of its own alone has not the way of the class that it is made from."""
+        super().__init_subclass__(**more)
+        if "step" in vars(cls) and "way" not in vars(cls):
+            cls.way, cls.drag = Law.way, Law.drag  # type: ignore[method-assign]
+
     def init(self, n: int) -> State:
         """State of n points that were never loaded, at u = 0."""
         raise NotImplementedError
@@ -245,6 +251,17 @@ class Law:
         need the force.
         """
         return None
+
+    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
+        """What a step is of besides the memory, of a law with `recalled`: once for all cycles of a path. What a law
+        offers here saves time; what is left of the state need not be true but for that."""
+        return u, v, dt, state
+
+    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
+        """(3, n) force in N and the memory at the end of a step that `way` tells, from that at its beginning."""
+        u, v, dt, state = way
+        force, after = self.step(u, v, dt, self.recalled(state, memory))
+        return force.T, self.memory(force, after)
 
     def scaled(self, share: Array) -> Law | None:
         """The law of points that carry shares of the whole contact, in numbers of its own; None, the default: it is

@@ -11,13 +11,14 @@ with, so that one cycle tells what every beginning would give.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from .cycle import blank, stepped, units
+from .cycle import blank, stepped
 from .law import Array, Law, State
+from .settling import Ways, directions
 
 BLOCK = 2048
 """Samples times sliders that are differentiated at once, for the cache and for memory that does not grow with them."""
@@ -60,25 +61,23 @@ class _Steps(NamedTuple):
 
 
 def linearised(
-    law: Law, path: Array, rate: Array, dt: Array | float, start: State, whole: Array, signals: Array, weights: Array
+    law: Law, path: Array, dt: Array | float, ways: Ways, memory: Array, whole: Array, signals: Array, weights: Array
 ) -> Linearised:  # fmt: skip
-    """The cycle that begins with a state, of a law whose sliders can be solved for (`Law.recalled`).
+    """A cycle of a law whose sliders can be solved for (`Law.recalled`).
 
     Args:
-        path: (s, n, 3) m. rate: (s, n, 3) m/s over the steps. start: of rest, or after such a cycle; then ``whole``
-            asks for the tangents of the force as well. signals: (s, w) by which all points move alike, periodic.
-            weights: (h, s).
+        path: (s, n, 3) m. ways: of its steps. memory: that every step begins with. whole: whether the cycle is the
+            periodic one, and the tangents of the force are asked for as well, or that from rest. signals: (s, w) by
+            which all points move alike, periodic. weights: (h, s).
     """
-    (samples, w), h = signals.shape, len(weights)
-    memory = sliders(law.memory(path[-1], start), 0)
-    m, n = memory.shape[0], memory.shape[2]
+    (samples, w), h, n = signals.shape, len(weights), path.shape[1]
+    m = sliders(memory, 1).shape[1]
     size = max(k for k in range(1, samples + 1) if samples % k == 0 and k * m * n <= max(BLOCK, m * n))
 
     def block(carried: tuple, rows: tuple[Array, ...]) -> tuple[tuple, None]:
-        state, held, x, by_memory, *sums = carried
-        u, v, signal, before, weight = rows
-        after, states = jax.lax.scan(lambda one, row: (stepped(law, *row, dt, one)[1], one), state, (u, v))
-        steps, held = _steps(law, u, v, dt, states, held)
+        x, by_memory, *sums = carried
+        *place, signal, before, weight = rows
+        steps = jax.vmap(lambda *row: _step(law, dt, *row))(*place)
         (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, signal, before))
 
         def more() -> list[Array]:
@@ -86,14 +85,18 @@ def linearised(
             return [a + jnp.einsum("sh,s...->h...", weight, b) for a, b in zip(sums, forces, strict=True)]
 
         sums = jax.lax.cond(whole, more, lambda: sums)
-        return (after, held, x, by_memory, *sums), None
+        return (x, by_memory, *sums), None
 
-    held = jax.tree_util.tree_map(lambda leaf: leaf * whole, _held(law, path[-1], rate[-1], dt, start))
+    held = jax.vmap(lambda u, v: _held(law, u, v, dt))(path, ways.rate)
+    held = jax.tree_util.tree_map(lambda leaf: jnp.roll(leaf, 1, axis=0).at[0].multiply(whole), held)
+    begun = jax.tree_util.tree_map(
+        lambda first, placed: jnp.where(whole, jnp.roll(placed, 1, axis=0), first), ways.begun, ways.placed
+    )
     each = jnp.broadcast_to(jnp.eye(2)[:, None, :, None], (2, m, 2, n))
     sums = jnp.zeros((h, w, 3, 3, n)), jnp.zeros((h, 2, 3, m, n))
-    rows = (path, rate, signals, jnp.roll(signals, 1, axis=0), weights.T)
-    blocks = tuple(row.reshape(samples // size, size, *row.shape[1:]) for row in rows)
-    _, _, *found = jax.lax.scan(block, (start, held, jnp.zeros((w, 3, m, 2, n)), each, *sums), blocks)[0]
+    rows = (path, ways.rate, begun, held, memory, signals, jnp.roll(signals, 1, axis=0), weights.T)
+    blocks = jax.tree_util.tree_map(lambda row: row.reshape(samples // size, size, *row.shape[1:]), rows)
+    found, _ = jax.lax.scan(block, (jnp.zeros((w, 3, m, 2, n)), each, *sums), blocks)
     return Linearised(*found)
 
 
@@ -102,53 +105,47 @@ def sliders(memory: Array, lead: int) -> Array:
     return memory.reshape(*memory.shape[:lead], -1, *memory.shape[-2:])
 
 
-def _steps(law: Law, u: Array, v: Array, dt: Array | float, states: State, held: State) -> tuple[_Steps, State]:
-    """Derivatives of steps to (s, n, 3) from states, and what goes on: `_held` of the last step.
+def _step(law: Law, dt: Array | float, u: Array, v: Array, state: State, held: State, memory: Array) -> _Steps:
+    """Derivatives of a step to u (n, 3) m at the rate v (n, 3) m/s.
 
     Args:
-        held: of the step before.
+        state: that it begins with but for the memory. held: its tangents, see `_held`.
     """
-    ways = _ways(u.shape[1])
-    after = jax.vmap(lambda u, v, state: _held(law, u, v, dt, state))(u, v, states)
-    before = jax.tree_util.tree_map(lambda one, many: jnp.concatenate([one[None], many[:-1]]), held, after)
+    moves, none = _ways(u.shape[0]), blank(state, 3)
+    along = jax.tree_util.tree_map(lambda *both: jnp.concatenate(both), none, held)
+    du, dv = jnp.concatenate([moves, 0 * moves]), jnp.concatenate([moves / dt, -moves / dt])
+    way, pushed = jax.vmap(
+        lambda *moved: jax.jvp(lambda u, v, s: law.way(u, v, dt, s), (u, v, state), moved), out_axes=(None, 0)
+    )(du, dv, along)
 
-    def step(u: Array, v: Array, state: State, held: State) -> _Steps:
-        memory = law.memory(u, state)
-        along = (blank(state, 3), held, units(law, state, memory))
-        tangents = jax.tree_util.tree_map(lambda *leaves: jnp.concatenate(leaves), *along)
-        still = jnp.zeros_like(ways[:2])
-        du, dv = jnp.concatenate([ways, 0 * ways, still]), jnp.concatenate([ways / dt, -ways / dt, still])
-        force, ended = _pushed(law, u, v, dt, state, du, dv, tangents)
-        remembered, force = sliders(jax.vmap(law.memory, (None, 0))(u, ended), 1), force.swapaxes(1, 2)
-        one = remembered.shape[1] == 1
-        G = force[6:].swapaxes(0, 1)[:, None] if one else _by_slider(law, u, v, dt, state, memory)
-        return _Steps(remembered[6:], remembered[:3], remembered[3:6], force[:3], force[3:6], G)
+    def moved(tangent: Any) -> tuple[Array, Array]:
+        return jax.jvp(lambda way: law.drag(way, memory), (way,), (tangent,))[1]
 
-    return jax.vmap(step)(u, v, states, before), jax.tree_util.tree_map(lambda leaf: leaf[-1], after)
+    def remembered(tangent: Array) -> tuple[Array, Array]:
+        return jax.jvp(lambda memory: law.drag(way, memory), (memory,), (tangent,))[1]
+
+    (force, after), (by_memory, A) = jax.vmap(moved)(pushed), jax.vmap(remembered)(directions(memory))
+    A, after = sliders(A, 1), sliders(after, 1)
+    G = by_memory.swapaxes(0, 1)[:, None] if A.shape[1] == 1 else _by_slider(law, way, memory)
+    return _Steps(A, after[:3], after[3:], force[:3], force[3:], G)
 
 
-def _by_slider(law: Law, u: Array, v: Array, dt: Array | float, state: State, memory: Array) -> Array:
+def _by_slider(law: Law, way: Any, memory: Array) -> Array:
     """(3, m, 2, n) derivatives of the force with respect to the memory of each slider."""
-    _, pull = jax.vjp(lambda x: stepped(law, u, v, dt, law.recalled(state, x))[0], memory)
-    return sliders(jax.vmap(pull)(_ways(u.shape[0]))[0], 1)
+    _, pull = jax.vjp(lambda memory: law.drag(way, memory)[0], memory)
+    unit = jnp.broadcast_to(jnp.eye(3)[:, :, None], (3, 3, memory.shape[-1]))
+    return sliders(jax.vmap(pull)(unit)[0], 1)
 
 
-def _pushed(
-    law: Law, u: Array, v: Array, dt: Array | float, state: State, du: Array, dv: Array, along: State
-) -> tuple[Array, State]:  # fmt: skip
-    """Tangents of force and state at the end of a step along several changes: (p, n, 3) m, m/s, and of the state."""
+def _held(law: Law, u: Array, v: Array, dt: Array | float) -> State:
+    """(3, ...) tangents of the state at a place along where that is, but for the memory."""
+    ways, rest = _ways(len(u)), law.init(len(u))
 
-    def push(du: Array, dv: Array, along: State) -> tuple[Array, State]:
-        return jax.jvp(lambda u, v, s: stepped(law, u, v, dt, s), (u, v, state), (du, dv, along))[1]
+    def push(du: Array, dv: Array) -> State:
+        return jax.jvp(lambda u, v: stepped(law, u, v, dt, rest)[1], (u, v), (du, dv))[1]
 
-    return jax.vmap(push)(du, dv, along)
-
-
-def _held(law: Law, u: Array, v: Array, dt: Array | float, state: State) -> State:
-    """Tangents of the state at the end of a step along where that is, but for the memory."""
-    ways = _ways(len(u))
-    _, after = _pushed(law, u, v, dt, state, ways, ways / dt, blank(state, 3))
-    return jax.vmap(law.recalled, (0, None))(after, jnp.zeros_like(law.memory(u, state)))
+    after = jax.vmap(push)(ways, ways / dt)
+    return jax.vmap(law.recalled, (0, None))(after, jnp.zeros_like(law.memory(u, rest)))
 
 
 def _ways(n: int) -> Array:

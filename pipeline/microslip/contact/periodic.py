@@ -20,18 +20,16 @@ slider that Newton's step does not bring closer goes on so for a while, longer e
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from .cycle import blank, march, push, rates, recall
+from .cycle import blank, march, push
 from .law import Array, Law, State
 from .linearised import Linearised, linearised
-
-PLAIN = 1
-"""Cycles that are marched before slow sliders are solved for: the second one costs a third more with the derivative of
-its memory, and where it is needed, saves one."""
+from .settling import Cycle, Ways, cycle, recall, ways
 
 FEWEST = 4
 """Cycles that have to be allowed if sliders are to be solved for; fewer are marched."""
@@ -43,7 +41,6 @@ RECALL = 1e-5
 _STRAIGHT = 0.5  # share of what was missing above which a cycle is marched before another step
 _GAIN = 0.9  # share of it above which the step was in vain
 _SOLVED = 1e-8  # share of the largest force to which sliders are solved for at least: derivatives are of the solution
-_STILL = 1e-13  # share of the largest force within which two marched cycles are the same
 
 
 class Periodic(NamedTuple):
@@ -59,26 +56,36 @@ class Periodic(NamedTuple):
 
 
 class _At(NamedTuple):
-    """Between two cycles.
+    """Between two marched cycles.
 
     Attributes:
-        found: the last one. begun: state it began with. start: state the next one begins with. memory: of that.
-        change: of the memory over the last marched cycle, the largest entry. tried: (..., n) what each slider missed of
-            the solution when it was solved for last. solved: (..., n) whether the next start was solved for.
-        failed: (..., n) how often that was in vain. wait: (..., n) cycles to march before it is tried again.
-        first: memory after the first cycle. periodic: whether the memory is periodic.
+        found: the last one. memory: at its end. change: of the memory over it, the largest entry. periodic: whether the
+            memory is periodic.
     """
 
     found: Periodic
-    begun: State
-    start: State
     memory: Array
     change: Array
+    periodic: Array
+
+
+class _Solving(NamedTuple):
+    """Between two cycles of sliders that are solved for.
+
+    Attributes:
+        last: the last one. memory: that the next one begins with. tried: (..., n) what each slider missed of the
+            solution when it was solved for last. solved: (..., n) whether the next beginning was solved for.
+        failed: (..., n) how often that was in vain. wait: (..., n) cycles to march before it is tried again.
+        cycles: how many. periodic: whether the memory is periodic.
+    """
+
+    last: Cycle
+    memory: Array
     tried: Array
     solved: Array
     failed: Array
     wait: Array
-    first: Array
+    cycles: Array
     periodic: Array
 
 
@@ -96,9 +103,11 @@ def periodic(
         path: (s, n, 3) m. period: s. count: of cycles at most. periodicity: tolerance as a share of the cycle's largest
             force; 0 marches all of them and solves for nothing.
     """
-    loop = _Loop(law, path, period / len(path), periodicity, count)
-    at = jax.lax.while_loop(loop.unfinished, loop.marching, loop.rest())
-    return (loop.solved(at) if loop.solves else at).found
+    dt = period / len(path)
+    if solves(law, count):
+        return _Sliders(law, path, dt, periodicity, count).periodic
+    loop = _Loop(law, path, dt, periodicity, count)
+    return jax.lax.while_loop(loop.unfinished, loop.marching, loop.rest()).found
 
 
 def with_slopes(
@@ -115,8 +124,16 @@ def with_slopes(
     Returns:
         The cycle, and (h, w, 3, n, 3) weighted sums of the derivatives over its samples.
     """
-    loop = _Loop(law, path, period / len(path), periodicity, count)
-    return loop.periodic_slopes(signals, weights) if loop.solves else loop.marched_slopes(signals, weights)
+    dt = period / len(path)
+    if solves(law, count):
+        return _Sliders(law, path, dt, periodicity, count).slopes(signals, weights)
+    return _Loop(law, path, dt, periodicity, count).slopes(signals, weights)
+
+
+def solves(law: Law, count: int) -> bool:
+    """Whether sliders are solved for where so many cycles are allowed."""
+    one = law.init(1)
+    return count >= FEWEST and law.recalled(one, law.memory(jnp.zeros((1, 3)), one)) is not None
 
 
 class _Loop:
@@ -124,67 +141,94 @@ class _Loop:
 
     def __init__(self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int) -> None:
         self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
-        one = law.init(1)
-        self.solves = count >= FEWEST and law.recalled(one, law.memory(jnp.zeros((1, 3)), one)) is not None
 
     def rest(self) -> _At:
         """Before the first cycle."""
         state, force = self.law.init(self.path.shape[1]), jnp.zeros(self.path.shape)
-        memory, no, never = self.law.memory(force[-1], state), jnp.asarray(0), jnp.asarray(False)
-        each = jnp.zeros((*memory.shape[:-2], memory.shape[-1]))
-        none, counted, far = each > 0, each.astype(int), jnp.asarray(jnp.inf)
-        found = Periodic(force, state, no)
-        return _At(found, state, state, memory, far, each + jnp.inf, none, counted, counted, memory, never)
+        found = Periodic(force, state, jnp.asarray(0))
+        return _At(found, self.law.memory(force[-1], state), jnp.asarray(jnp.inf), jnp.asarray(False))
 
     def unfinished(self, at: _At) -> Array:
-        """Whether to march on; where sliders can be solved for, not for long."""
-        return (at.found.cycles < (PLAIN if self.solves else self.count)) & ~at.periodic
+        """Whether to march on."""
+        return (at.found.cycles < self.count) & ~at.periodic
 
     def marching(self, at: _At) -> _At:
-        """One cycle more, and the next begins where it ends."""
-        force, state = march(self.law, self.path, self.dt, at.start)
-        return self._marched(at, force, state)
+        """One cycle more."""
+        return self._marched(at, *march(self.law, self.path, self.dt, at.found.state))
 
-    def solved(self, at: _At) -> _At:
-        """Cycles that begin where Newton's method puts them."""
-        return jax.lax.while_loop(
-            lambda at: (at.found.cycles >= PLAIN) & (at.found.cycles < self.count) & ~at.periodic, self._solving, at
-        )
-
-    def marched_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
+    def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents are marched along with every cycle."""
 
         def cycle(carried: tuple[_At, State, Array]) -> tuple[_At, State, Array]:
             at, tangents, _ = carried
-            (force, after), (slope, changed) = push(self.law, self.path, self.dt, at.start, tangents, moves)
+            pushed = push(self.law, self.path, self.dt, at.found.state, tangents, moves)
+            (force, after), (slope, changed) = pushed
             return self._marched(at, force, after), changed, jnp.einsum("ws,spnk->wpnk", weights, slope)
 
         moves = jnp.einsum("sw,jk->swjk", signals, jnp.eye(3)).reshape(len(signals), -1, 3)
         size, rest = moves.shape[1], self.rest()
-        begin = rest, blank(rest.start, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
+        begin = rest, blank(rest.found.state, size), jnp.zeros((len(weights), size, *self.path.shape[1:]))
         at, _, slope = jax.lax.while_loop(lambda c: self.unfinished(c[0]), cycle, begin)
         return at.found, slope.reshape(len(weights), -1, 3, *self.path.shape[1:])
 
-    def periodic_slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
+    def _marched(self, at: _At, force: Array, state: State) -> _At:
+        memory = self.law.memory(force[-1], state)
+        change, ended = self._change(at, force, memory)
+        return _At(Periodic(force, state, at.found.cycles + 1), memory, change, ended)
+
+    def _change(self, at: _At, force: Array, memory: Array) -> tuple[Array, Array]:
+        """Largest change of the memory over the cycle, and whether it is periodic as `periodic` says of marching."""
+        first = at.found.cycles == 0  # began where no cycle ends, though an open contact's memory may be the same
+        change = jnp.where(first, jnp.inf, jnp.abs(memory - at.memory).max())
+        gap, size = at.change - change, jnp.abs(force).max()
+        left = jnp.where(gap > 0, change**2 / jnp.where(gap > 0, gap, 1.0), jnp.inf)
+        rounding = change <= jnp.minimum(self.periodicity, 1e-15) * size
+        return change, rounding | (jnp.maximum(change, left) <= self.periodicity * size)
+
+
+class _Sliders:
+    """A path through a law whose sliders are solved for; arguments as in `periodic`."""
+
+    def __init__(self, law: Law, path: Array, dt: Array | float, periodicity: Array | float, count: int) -> None:
+        self.law, self.path, self.dt, self.periodicity, self.count = law, path, dt, periodicity, count
+        rest = law.init(path.shape[1])
+        self.rest = law.memory(jnp.zeros(path.shape[1:]), rest)
+        self.ways: Ways = ways(law, path, dt)
+        self.first = cycle(law, self.ways.first, self.rest)
+
+    @cached_property
+    def solution(self) -> _Solving:
+        """Cycles that begin where Newton's method puts them."""
+        each = jnp.zeros((*self.rest.shape[:-2], self.rest.shape[-1]))
+        counted = each.astype(int)
+        begin = _Solving(
+            self.first, self.first.memory, each + jnp.inf, each > 0, counted, counted, jnp.asarray(1),
+            jnp.asarray(False),
+        )  # fmt: skip
+        return jax.lax.while_loop(lambda at: (at.cycles < self.count) & ~at.periodic, self._solving, begin)
+
+    @property
+    def periodic(self) -> Periodic:
+        """See `periodic`."""
+        at, last = self.solution, jax.tree_util.tree_map(lambda leaf: leaf[-1], self.ways.placed)
+        return Periodic(at.last.force.swapaxes(1, 2), self.law.recalled(last, at.last.memory), at.cycles)
+
+    def slopes(self, signals: Array, weights: Array) -> tuple[Periodic, Array]:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
-        rest = self.rest()
-        at = self.solved(jax.lax.while_loop(self.unfinished, self.marching, rest))  # as `periodic` does
-        rate = rates(self.path, self.dt)
-        starts = jax.tree_util.tree_map(lambda *both: jnp.stack(both), rest.start, at.begun)
+        both = jax.tree_util.tree_map(lambda *both: jnp.stack(both), self.first.begun, self.solution.last.begun)
         found = jax.lax.map(
-            lambda one: linearised(self.law, self.path, rate, self.dt, one[0], one[1], signals, weights),
-            (starts, jnp.array([False, True])),
+            lambda one: linearised(self.law, self.path, self.dt, self.ways, *one, signals, weights),
+            (both, jnp.array([False, True])),
         )  # fmt: skip
         first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))
         begin = _Newton(last.by_memory)(last.memory + RECALL * first.memory)
-        return at.found, jnp.einsum("hwkin->hwkni", last.begun_with(begin))
+        return self.periodic, jnp.einsum("hwkin->hwkni", last.begun_with(begin))
 
-    def _solving(self, at: _At) -> _At:
+    def _solving(self, at: _Solving) -> _Solving:
         """One cycle more, and the next begins where Newton's method expects the solution."""
-        (force, after), slope = recall(self.law, self.path, self.dt, at.start)
-        memory, size = self.law.memory(force[-1], after), jnp.abs(force).max()
-        newton = _Newton(slope)
-        missing = memory - at.memory + RECALL * (at.first - at.memory)
+        last, slope = recall(self.law, self.ways.all, at.memory)
+        memory, size, newton = last.memory, jnp.abs(last.force).max(), _Newton(slope)
+        missing = memory - at.memory + RECALL * (self.first.memory - at.memory)
         left = _length(missing)
         step = jnp.where((left > 1e-15 * size)[..., None, :], newton(missing), 0.0)  # below is rounding
 
@@ -196,32 +240,10 @@ class _Loop:
         wait = jnp.where(vain, failed, jnp.maximum(at.wait - 1, 0))
         use = ready & ~vain & newton.regular & (self.periodicity > 0)
         tried = jnp.where(vain, jnp.inf, jnp.where(use, left, at.tried))  # after waiting it is tried whatever is left
-        marched = jnp.where(self.periodicity > 0, (memory + RECALL * at.first) / (1 + RECALL), memory)
+        marched = jnp.where(self.periodicity > 0, (memory + RECALL * self.first.memory) / (1 + RECALL), memory)
         held = jnp.where(use[..., None, :], at.memory + step, marched)
         ended = (self.periodicity > 0) & (jnp.abs(step).max() <= jnp.minimum(self.periodicity, _SOLVED) * size)
-        found = Periodic(force, after, at.found.cycles + 1)
-        start = self.law.recalled(after, held)
-        return _At(found, at.start, start, held, at.change, tried, use, failed, wait, at.first, ended)
-
-    def _marched(self, at: _At, force: Array, state: State) -> _At:
-        memory = self.law.memory(force[-1], state)
-        change, ended = self._change(at, force, memory)
-        found = Periodic(force, state, at.found.cycles + 1)
-        first = jnp.where(at.found.cycles > 0, at.first, memory)
-        return at._replace(
-            found=found, begun=at.start, start=state, memory=memory, change=change, first=first, periodic=ended
-        )
-
-    def _change(self, at: _At, force: Array, memory: Array) -> tuple[Array, Array]:
-        """Largest change of the memory over the cycle, and whether it is periodic as `periodic` says of marching."""
-        first = at.found.cycles == 0  # began where no cycle ends, though an open contact's memory may be the same
-        change = jnp.where(first, jnp.inf, jnp.abs(memory - at.memory).max())
-        gap, size = at.change - change, jnp.abs(force).max()
-        left = jnp.where(gap > 0, change**2 / jnp.where(gap > 0, gap, 1.0), jnp.inf)
-        if self.solves:
-            return change, change <= jnp.minimum(self.periodicity, _STILL) * size
-        rounding = change <= jnp.minimum(self.periodicity, 1e-15) * size
-        return change, rounding | (jnp.maximum(change, left) <= self.periodicity * size)
+        return _Solving(last, held, tried, use, failed, wait, at.cycles + 1, ended)
 
 
 def _length(memory: Array) -> Array:

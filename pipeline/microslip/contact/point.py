@@ -40,6 +40,24 @@ class PointState(NamedTuple):
     time: Array
 
 
+class Stretch(NamedTuple):
+    """Of a step of n points what does not depend on the force of their springs.
+
+    Attributes: pressed: (n,) N. share: (n,) of the area. springs, stiffness: (2, n) N/m at its end, and what they and
+        their dampers count over the step. left: (n,) share of the area before that is left. way: (2, n) N, stiffness
+        times displacement. before, held: (n,) N that friction holds, at the beginning of what is left, and at the end.
+    """
+
+    pressed: Array
+    share: Array
+    springs: Array
+    stiffness: Array
+    left: Array
+    way: Array
+    before: Array
+    held: Array
+
+
 @settings
 class PointContact(Law):
     """Point contact with stick, slip and separation in three dimensions.
@@ -79,27 +97,41 @@ class PointContact(Law):
         return PointState(pair, pair, one, jnp.ones(n), pair, one)  # the first step is taken with all of its area
 
     def step(self, u: Array, v: Array, dt: Array | float, state: PointState) -> tuple[Array, PointState]:
+        w, time = self._stretch(u, v, dt, state), state.time + dt
+        relaxed = state.elastic * w.left
+        if self._straight:
+            force = dragged(relaxed, w.way, w.before, w.held)
+        else:
+            relative = self._relative(w.stiffness)
+            theta = slide(relaxed + w.way, w.stiffness, relative, self.friction, w.pressed, dt, time)
+            force = (relaxed + w.way) * weight(theta, relative)
+        stretched = ratio(force - relaxed, w.stiffness)
+        elastic = force if self.damping is None else relaxed + w.springs * stretched
+        tangential = u.T[1:]
+        slipped = state.slipped + jnp.where(w.share > 0, tangential - state.tangential - stretched, 0.0)
+        after = PointState(tangential, elastic, w.held, w.share, slipped, time)
+        return jnp.concatenate([w.pressed[None], force]).T, after
+
+    def way(self, u: Array, v: Array, dt: Array | float, state: PointState) -> Any:
+        return self._stretch(u, v, dt, state) if self._straight else super().way(u, v, dt, state)
+
+    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
+        if not self._straight:
+            return super().drag(way, memory)
+        force = dragged(memory * way.left, way.way, way.before, way.held)
+        return jnp.concatenate([way.pressed[None], force]), force
+
+    def _stretch(self, u: Array, v: Array, dt: Array | float, state: PointState) -> Stretch:
         approach, tangential = u.T[0], u.T[1:]
-        share = self.normal.share(approach)
-        pressed = self._pressed(approach, v.T[0])
+        share, pressed = self.normal.share(approach), self._pressed(approach, v.T[0])
         springs = self._springs(met(share, jnp.maximum(state.share, touching(self.normal, approach))))
         left = jnp.minimum(ratio(share, state.share), 1.0)
-        relaxed = state.elastic * left
         stiffness = springs if self.damping is None else springs + self._springs(share) * self.damping / dt
-        way = stiffness * (tangential - state.tangential)
-        time = state.time + dt
+        held = state.held
         if self._straight:
-            held = self.friction.coefficient(jnp.zeros_like(pressed), pressed, time) * pressed
-            force = dragged(relaxed, way, state.held * left, held)
-        else:
-            held = state.held
-            theta = slide(relaxed + way, stiffness, self._relative(stiffness), self.friction, pressed, dt, time)
-            force = (relaxed + way) * weight(theta, self._relative(stiffness))
-        stretched = ratio(force - relaxed, stiffness)
-        elastic = force if self.damping is None else relaxed + springs * stretched
-        slipped = state.slipped + jnp.where(share > 0, tangential - state.tangential - stretched, 0.0)
-        after = PointState(tangential, elastic, held, share, slipped, time)
-        return jnp.concatenate([pressed[None], force]).T, after
+            held = self.friction.coefficient(jnp.zeros_like(pressed), pressed, state.time + dt) * pressed
+        way = stiffness * (tangential - state.tangential)
+        return Stretch(pressed, share, springs, stiffness, left, way, state.held * left, held)
 
     @property
     def remembers(self) -> int | None:
@@ -250,27 +282,39 @@ class _Way(NamedTuple):
 
 
 def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Array, _Way]:
-    trial = force + way
-    tried, length, grows = norm(trial), norm(way), held - before
-    room = jnp.maximum(before**2 - jnp.sum(force**2, axis=0), 0.0)
-    a, b = length**2 - grows**2, jnp.sum(force * way, axis=0) - before * grows
-    found = root(b**2 + a * room)  # where a s^2 + 2 b s = room the force reaches R
-    share = jnp.clip(jnp.where(b > 0, ratio(room, b + found), ratio(found - b, a)), 0.0, 1.0)
+    trial, grows = force + way, held - before
+    tried, longer = _square(trial), _square(way)
+    room = jnp.maximum(before**2 - _square(force), 0.0)
+    a, b = longer - grows**2, _inner(force, way) - before * grows
+    found, length = root(b**2 + a * room), root(longer)  # where a s^2 + 2 b s = room the force reaches R
+    ahead = b > 0
+    share = jnp.clip(ratio(jnp.where(ahead, room, found - b), jnp.where(ahead, b + found, a)), 0.0, 1.0)
     reached, on_cone = before + share * grows, force + share * way
     e = ratio(way, length)
-    along, across = jnp.sum(e * on_cone, axis=0), e[0] * on_cone[1] - e[1] * on_cone[0]
+    along, across = _inner(e, on_cone), e[0] * on_cone[1] - e[1] * on_cone[0]
     softness = mean_inverse(reached, held)
     left, ahead = jnp.exp(-(1 - share) * length * softness[0]), along >= 0
     # cosine and sine of beta / 2 but for their size, without a difference of equal numbers
     cosine, first = jnp.where(ahead, reached + along, across), jnp.where(ahead, across, reached - along)
     sine = first * left
     size = cosine**2 + sine**2
-    x, y = ratio(cosine**2 - sine**2, size), ratio(2 * cosine * sine, size)
-    turned = jnp.where(size > 0, jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), ratio(trial, tried))
-    slides = tried > held
-    angles = ratio(left * (cosine**2 + first**2), size)
+    over = ratio(jnp.ones_like(size), size)
+    x, y = (cosine**2 - sine**2) * over, 2 * cosine * sine * over
+    straight = ratio(trial, root(tried))
+    turned = jnp.where(size > 0, jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), straight)
+    slides = tried > held**2
+    angles = left * (cosine**2 + first**2) * over
     told = _Way(slides, share, ratio(jnp.ones_like(found), found), on_cone, reached, length, e, softness, y, angles)
     return jnp.where(slides, held * turned, trial), told
+
+
+def _inner(a: Array, b: Array) -> Array:
+    """Of two vectors along the first axis; a sum over that axis would be a loop of its own."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _square(a: Array) -> Array:
+    return _inner(a, a)
 
 
 def mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
@@ -278,10 +322,12 @@ def mean_inverse(first: Array, last: Array) -> tuple[Array, Array, Array]:
     derivatives with respect to both; without a difference of equal numbers where they are alike."""
     both = first + last
     r = jnp.clip(ratio(last - first, both), -_ALIKE, _ALIKE)
-    near = jnp.abs(r) < 1e-3
+    near, z = jnp.abs(r) < 0.03, r**2
     at = jnp.where(near, 0.5, r)
-    G = jnp.where(near, 1 + r**2 / 3 + r**4 / 5, jnp.arctanh(at) / at)
-    slope = jnp.where(near, 2 * r / 3 + 4 * r**3 / 5, (1 / (1 - at**2) - jnp.arctanh(at) / at) / at)
+    over = jnp.log((1 + at) / (1 - at)) / (2 * at)  # arctanh(r) / r
+    G = jnp.where(near, 1 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z / 11)))), over)
+    bend = r * (2 / 3 + z * (4 / 5 + z * (6 / 7 + z * (8 / 9 + z * 10 / 11))))
+    slope = jnp.where(near, bend, (1 / (1 - at**2) - over) / at)
     mean, bend = ratio(2 * G, both), ratio(4 * slope, both**3)
     return mean, -ratio(mean, both) - bend * last, -ratio(mean, both) + bend * first
 
@@ -298,20 +344,23 @@ def _dragged_jvp(given: tuple[Array, ...], moved: tuple[Any, ...]) -> tuple[Arra
     s, share_of, (inverse, by_first, by_last) = w.share, 1 - w.share, w.softness
     turn = ratio(jnp.stack([-w.on_cone[1], w.on_cone[0]]), w.reached**2)  # d angle of P over dP
     at_first, at_last = (-w.sine * share_of * w.length * by for by in (by_first, by_last))  # d angle over dR
-    by_share = w.angles * jnp.sum(turn * way, axis=0) + w.sine * w.length * inverse + at_first * (held - before)
+    by_share = w.angles * _inner(turn, way) + w.sine * ratio(w.length, w.reached)
     by_excess = by_share * w.by_excess
     by_force = w.angles * turn - by_excess * w.on_cone
     across = ratio(jnp.stack([-w.e[1], w.e[0]]), w.length)
     by_way = (1 - w.angles) * across + s * by_force - w.sine * share_of * inverse * w.e
     by_before = share_of * (at_first + by_excess * w.reached)
     by_held = at_first * s + at_last + by_excess * w.reached * s
-    alone = all(isinstance(one, SymbolicZero) for one in moved[1:])
-    of_force, of_way, of_before, of_held = (0.0 if isinstance(one, SymbolicZero) else one for one in moved)
-    angle, turned = jnp.sum(by_force * of_force, axis=0), jnp.stack([-out[1], out[0]])
-    if alone:
-        return out, jnp.where(w.slides, turned * angle, of_force)
-    angle += jnp.sum(by_way * of_way, axis=0) + by_before * of_before + by_held * of_held
-    return out, jnp.where(w.slides, ratio(out, held) * of_held + turned * angle, of_force + of_way)
+    of_force, of_way, of_before, of_held = (None if isinstance(one, SymbolicZero) else one for one in moved)
+    straight, angle, size = jnp.zeros_like(out), jnp.zeros_like(held), jnp.zeros_like(held)
+    for by, of in ((by_force, of_force), (by_way, of_way)):
+        if of is not None:
+            straight, angle = straight + of, angle + _inner(by, of)
+    if of_before is not None:
+        angle = angle + by_before * of_before
+    if of_held is not None:
+        angle, size = angle + by_held * of_held, ratio(of_held, held)
+    return out, jnp.where(w.slides, jnp.stack([size * out[0] - angle * out[1], size * out[1] + angle * out[0]]), straight)
 
 
 def weight(theta: Array, relative: Array | None) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from .law import Array, Law, State, Step, number, settings
 
 
@@ -60,6 +62,13 @@ class Portion(Law):
 
     def recalled(self, state: State, memory: Array) -> State | None:
         return self.whole.recalled(state, memory / self.share)
+
+    def way(self, u: Array, v: Array, dt: Array | float, state: State) -> Any:
+        return self.whole.way(u, v, dt, state)
+
+    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
+        force, after = self.whole.drag(way, memory / self.share)
+        return self.share * force, self.share * after
 
     def limit(self, force: Array, state: State) -> Array:
         return self.share * self.whole.limit((force.T / self.share).T, state)

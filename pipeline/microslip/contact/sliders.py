@@ -8,7 +8,7 @@ the other; `Iwan` sliders share one normal force and differ in strength.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -24,7 +24,7 @@ from .kinds import LawKind
 from .law import Array, Law, Step, norm, number, ratio, settings, static, value
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
-from .point import PointContact, dragged, let_go, met, slide, touching, weight
+from .point import PointContact, Stretch, dragged, let_go, met, slide, touching, weight
 from .series import BULK
 from .stiffness import OfHertz
 
@@ -79,13 +79,26 @@ class Sliders(Law):
         left, relaxed, both = self._met(u.T[0], springs, state)
         way = both * (u.T[1:] - state.tangential)
         if self.stiffness_ratio is None:
-            of_each = (jnp.moveaxis(part, 1, 0) for part in (relaxed, way))
-            elastic = jnp.moveaxis(dragged(*of_each, state.limits * left, limits), 0, 1)
+            elastic = _each(dragged(*map(_each, (relaxed, way)), state.limits * left, limits))
         else:
             elastic = _held_of_two(relaxed + way, both, limits)
         slipped = state.slipped + ratio(jnp.sum(relaxed + way - elastic, axis=0), jnp.sum(both, axis=0))
         force = jnp.concatenate([pressed[None], jnp.sum(elastic, axis=0)])
         return force.T, SliderState(u.T[1:], elastic, limits, springs, slipped)
+
+    def way(self, u: Array, v: Array, dt: Array | float, state: SliderState) -> Any:
+        if self.stiffness_ratio is not None:
+            return super().way(u, v, dt, state)
+        pressed, springs, limits = self.local(u.T[0])
+        left, _, both = self._met(u.T[0], springs, state)
+        way = both * (u.T[1:] - state.tangential)
+        return Stretch(pressed, springs, both, both, left, _each(way), state.limits * left, limits)
+
+    def drag(self, way: Any, memory: Array) -> tuple[Array, Array]:
+        if self.stiffness_ratio is not None:
+            return super().drag(way, memory)
+        elastic = dragged(_each(memory) * way.left, way.way, way.before, way.held)
+        return jnp.concatenate([way.pressed[None], jnp.sum(elastic, axis=1)]), _each(elastic)
 
     def memory(self, force: Array, state: SliderState) -> Array:
         return state.elastic
@@ -130,14 +143,19 @@ class Sliders(Law):
         return jnp.stack([springs, springs * self.stiffness_ratio], axis=1)
 
 
+def _each(forces: Array) -> Array:
+    """(2, m, n) from (m, 2, n), and the other way round."""
+    return jnp.swapaxes(forces, 0, 1)
+
+
 def _held_of_two(trial: Array, stiffness: Array, limits: Array) -> Array:
     """(m, 2, n) what friction holds of the trial forces behind unequal springs (m, 2, n): it opposes the slip
     (`point.weight`)."""
-    forces, springs = (jnp.moveaxis(part, 1, 0).reshape(2, -1) for part in (trial, stiffness))
+    forces, springs = (_each(part).reshape(2, -1) for part in (trial, stiffness))
     relative, flat = ratio(springs, jnp.max(springs, axis=0), 1.0), limits.reshape(-1)
     theta = slide(forces, springs, relative, Coulomb(jnp.ones(())), flat, 1.0, jnp.zeros(()))
     kept = (forces * weight(theta, relative)).reshape(2, *limits.shape)
-    return jnp.moveaxis(kept, 0, 1)
+    return _each(kept)
 
 
 @settings
