@@ -77,7 +77,7 @@ def linearised(
     def block(carried: tuple, rows: tuple[Array, ...]) -> tuple[tuple, None]:
         x, by_memory, *sums = carried
         *place, signal, before, weight = rows
-        steps = jax.vmap(lambda *row: _step(law, dt, *row))(*place)
+        steps = jax.lax.map(lambda row: _step(law, dt, *row), tuple(place))  # of all at once each would be found often
         (x, by_memory), each = jax.lax.scan(_recursion, (x, by_memory), (steps, signal, before))
 
         def more() -> list[Array]:
