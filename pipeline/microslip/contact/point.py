@@ -261,7 +261,14 @@ def dragged(force: Array, way: Array, before: Array, held: Array) -> Array:
     Returns:
         (2, ...) N, not longer than ``held``.
     """
-    return _dragged(force, way, before, held)[0]
+    slid = lambda: _dragged(force, way, before, held)[0]  # noqa: E731
+    return jax.lax.cond(_slides(force + way, held).any(), slid, lambda: force + way)
+
+
+def _slides(trial: Array, held: Array) -> Array:
+    """(...) whether a slider is dragged. Where all of many stick, as they do in half of a cycle, nothing else is asked:
+    their steps are then a tenth of the work."""
+    return _square(trial) > held**2
 
 
 class _Way(NamedTuple):
@@ -302,7 +309,7 @@ def _dragged(force: Array, way: Array, before: Array, held: Array) -> tuple[Arra
     x, y = (cosine**2 - sine**2) * over, 2 * cosine * sine * over
     straight = ratio(trial, root(tried))
     turned = jnp.where(size > 0, jnp.stack([e[0] * x - e[1] * y, e[1] * x + e[0] * y]), straight)
-    slides = tried > held**2
+    slides = _slides(trial, held)
     angles = left * (cosine**2 + first**2) * over
     told = _Way(slides, share, ratio(jnp.ones_like(found), found), on_cone, reached, length, e, softness, y, angles)
     return jnp.where(slides, held * turned, trial), told
@@ -337,6 +344,14 @@ _ALIKE = 1 - 1e-12  # of (last - first) / (last + first): from nothing, the angl
 
 @partial(dragged.defjvp, symbolic_zeros=True)
 def _dragged_jvp(given: tuple[Array, ...], moved: tuple[Any, ...]) -> tuple[Array, Array]:
+    known = [None if isinstance(one, SymbolicZero) else one for one in moved]
+    trial = given[0] + given[1]
+    straight = sum((one for one in known[:2] if one is not None), jnp.zeros_like(trial))
+    slides = _slides(trial, given[3])
+    return jax.lax.cond(slides.any(), lambda: _slid(given, known, straight), lambda: (trial, straight))
+
+
+def _slid(given: tuple[Array, ...], moved: list[Array | None], straight: Array) -> tuple[Array, Array]:
     """With the derivatives of the last angle by hand: two thirds of the work of a chain of derivatives, and less
     where nothing but the force before changes."""
     _, way, before, held = given
@@ -351,16 +366,16 @@ def _dragged_jvp(given: tuple[Array, ...], moved: tuple[Any, ...]) -> tuple[Arra
     by_way = (1 - w.angles) * across + s * by_force - w.sine * share_of * inverse * w.e
     by_before = share_of * (at_first + by_excess * w.reached)
     by_held = at_first * s + at_last + by_excess * w.reached * s
-    of_force, of_way, of_before, of_held = (None if isinstance(one, SymbolicZero) else one for one in moved)
-    straight, angle, size = jnp.zeros_like(out), jnp.zeros_like(held), jnp.zeros_like(held)
+    of_force, of_way, of_before, of_held = moved
+    angle, size = jnp.zeros_like(held), jnp.zeros_like(held)
     for by, of in ((by_force, of_force), (by_way, of_way)):
-        if of is not None:
-            straight, angle = straight + of, angle + _inner(by, of)
-    if of_before is not None:
-        angle = angle + by_before * of_before
+        angle = angle if of is None else angle + _inner(by, of)
+    for by, change in ((by_before, of_before), (by_held, of_held)):
+        angle = angle if change is None else angle + by * change
     if of_held is not None:
-        angle, size = angle + by_held * of_held, ratio(of_held, held)
-    return out, jnp.where(w.slides, jnp.stack([size * out[0] - angle * out[1], size * out[1] + angle * out[0]]), straight)
+        size = ratio(of_held, held)
+    turned = jnp.stack([size * out[0] - angle * out[1], size * out[1] + angle * out[0]])
+    return out, jnp.where(w.slides, turned, straight)
 
 
 def weight(theta: Array, relative: Array | None) -> Array:
