@@ -253,6 +253,23 @@ ALIKE = SISTERS | {"rough point", "Hertz point", "rough strips"}
 """Laws whose memory is that of a point with two stiffnesses, of a smooth point, of Iwan's sliders."""
 
 
+@LAWS
+def test_a_step_is_its_way_and_what_drags_along_it(example) -> None:
+    """`Law.way` and `Law.drag` against `Law.step` from random memories, of laws whose sliders are solved for."""
+    if not solved_for(example):
+        pytest.skip("its cycles are marched")
+    law, rng = example.law, np.random.default_rng(3)
+    u = jnp.asarray(rng.normal(size=(2, 7, 3)) * np.array([example.normal, example.tangential, example.tangential]))
+    dt = example.period / 32
+    force, state = law.step(u[0], u[0] / dt, dt, law.init(7))
+    memory = law.memory(force, state) * rng.uniform(0, 1, 7)
+    expected, after = law.step(u[1], (u[1] - u[0]) / dt, dt, law.recalled(state, memory))
+    told, kept = law.drag(law.way(u[1], (u[1] - u[0]) / dt, dt, state), memory)
+    np.testing.assert_allclose(told.T, expected, rtol=0, atol=1e-14 * float(jnp.abs(expected).max()))
+    own = law.memory(expected, after)
+    np.testing.assert_allclose(kept, own, rtol=0, atol=1e-14 * float(jnp.abs(own).max()))
+
+
 @laws(ALIKE)
 def test_the_derivative_of_a_periodic_cycle_matches_differences(example) -> None:
     """Of laws whose sliders are solved for: what `Law.recalled` promises of their state is used for it."""

@@ -217,7 +217,7 @@ class _Sliders:
         """Tangents of the first cycle, which sliders that stick keep, and of the periodic one."""
         both = jax.tree_util.tree_map(lambda *both: jnp.stack(both), self.first.begun, self.solution.last.begun)
         found = jax.lax.map(
-            lambda one: linearised(self.law, self.path, self.dt, self.ways, *one, signals, weights),
+            lambda one: linearised(self.law, self.path, self.dt, self.ways, one[0], one[1], signals, weights),
             (both, jnp.array([False, True])),
         )  # fmt: skip
         first, last = (Linearised(*(leaf[k] for leaf in found)) for k in (0, 1))
