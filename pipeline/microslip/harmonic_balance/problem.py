@@ -500,7 +500,7 @@ def of(
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
     groups = []
-    for same in _equal(assembly):
+    for same in _equal(assembly, marched=not models):
         patches = [contacts[i].patch for i in same]
         model = (models or {}).get(same[0]) or by_hand.model(patches, samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
@@ -549,11 +549,13 @@ def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict
     return tuple(int(b) for b in np.cumsum([0, *counts[:-1]])), where
 
 
-def _equal(assembly: Assembly) -> list[list[int]]:
-    """Contacts whose patches are alike (`by_hand.alike`), and that have a second side or none."""
+def _equal(assembly: Assembly, marched: bool) -> list[list[int]]:
+    """Contacts of one patch, or of patches that are alike where they are marched (`by_hand.alike`); and all with a
+    second side or none."""
     found: dict[Any, list[int]] = {}
     for i, c in enumerate(assembly.contacts):
-        found.setdefault((by_hand.alike(c.patch), c.second is None), []).append(i)
+        key = by_hand.alike(c.patch) if marched else id(c.patch)
+        found.setdefault((key, c.second is None), []).append(i)
     return list(found.values())
 
 

@@ -142,7 +142,9 @@ def _body(component: Component, s: Scatter, own: Array) -> Component:
 def _heavier(group: ModalGroup, s: Scatter, mass: float) -> ModalGroup:
     rows = group.monitors.get(s.at or "")
     if rows is None or rows.unit != "m":
-        raise UserError(f"added_mass: at: give a monitor of displacements, one of {', '.join(group.monitors) or 'none'}")
+        raise UserError(
+            f"added_mass: at: give a monitor of displacements, one of {', '.join(group.monitors) or 'none'}"
+        )
     return replace(group, M_r=group.M_r + mass * rows.rows.conj().T @ rows.rows)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..data import Array
 from ..harmonic_balance import problem as balance
 from ..harmonic_balance import reduced
+from ..harmonic_balance.forces import Forces
 from ..harmonic_balance.problem import Problem
 from ..harmonic_balance.solver import Point, solve, sweep
 from ..system.assembly import Assembly
@@ -26,19 +27,21 @@ class Asked:
 
     Attributes:
         tuned. scatter. frequency: (f,) Hz. seed. balance: of `harmonic_balance.problem.of`: harmonics, samples, ...
-        stuck: contacts stick, whatever their friction.
+        stuck: contacts stick, whatever their friction. models: of its contacts, from a ring; None: their laws, marched.
     """
 
     tuned: Tuned
     scatter: tuple[Scatter, ...]
     frequency: Array
     seed: int = 0
-    balance: Any = None
+    balance: Mapping[str, Any] = field(default_factory=dict)
     stuck: bool = False
+    models: Callable[[Assembly], Mapping[int, Forces]] | None = None
 
     def problem(self, ring: Assembly) -> Problem:
         """The balance of a whole ring, all in the same units."""
-        return balance.of(ring, **{"length": balance.moves_by(self.tuned.whole), **(self.balance or {})})
+        models = None if self.models is None else dict(self.models(ring))
+        return balance.of(ring, length=balance.moves_by(self.tuned.whole), models=models, **self.balance)
 
     @cached_property
     def tuned_points(self) -> list[Point]:
@@ -48,9 +51,7 @@ class Asked:
     def deviations(self, sample: int) -> Deviations:
         """Of a sample: the same, whoever asks."""
         N = self.tuned.sectors
-        return [
-            (s, s.drawn(N, self.tuned.modes(s), i, self.seed, sample)) for i, s in enumerate(self.scatter)
-        ]
+        return [(s, s.drawn(N, self.tuned.modes(s), i, self.seed, sample)) for i, s in enumerate(self.scatter)]
 
 
 @dataclass(frozen=True)
