@@ -22,7 +22,8 @@ PUBLIC = {
     "bodies": "modes assemble sample stability",
     "system.structure": "structure polynomial jenkins stop friction Element",
     "bifurcation.dynamics": "Dynamics",
-    "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate",
+    "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate mistune",
+    "mistuning.scatter": "Scatter",
 }
 """Module -> the names of it that are public."""
 

@@ -44,7 +44,7 @@ Alone = tuple[ComplexArray, ComplexArray]
 def alone(compliance: Sequence[ComplexArray], stiffness: Sequence[Array]) -> list[Alone] | None:
     """What the parts do without contacts, from (H + 1, c_i, c_i) D and (c_i, c_i) k of each; None where one is at
     resonance there."""
-    found = []
+    found = list[Alone]()
     for D, k in zip(compliance, stiffness, strict=True):
         try:
             inverse = np.linalg.inv(np.eye(len(k)) - D @ k)

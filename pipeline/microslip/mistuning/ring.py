@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.law import Law
 from ..data import Array, ModalGroup, UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, preloaded_contact
@@ -52,13 +51,13 @@ class Tuned:
         """Into how many modes deviations may differ in one sector."""
         if s.of not in ("frequency", "damping"):
             return 1
-        return len(self._body(s).groups[0].omega)
+        return len(self.body(s).groups[0].omega)
 
     def check(self, scatter: Sequence[Scatter]) -> None:
         """Raise `UserError` for what is not there, or on which nothing depends."""
         for s in scatter:
             if s.of in OF_BLADES:
-                self._body(s)
+                self.body(s)
             else:
                 self._contact(s)
         self.mistuned([(s, np.full((self.sectors, self.modes(s)), 1e-3)) for s in scatter])
@@ -74,18 +73,20 @@ class Tuned:
         for s, values in deviations:
             _positive(s, values)
             if s.of in OF_BLADES:
-                name = self._body(s).name
+                name = self.body(s).name
                 for j, own in enumerate(values):
-                    components[at] = _body(components[at := f"{name}_{j}"], s, own)
+                    at = f"{name}_{j}"
+                    components[at] = deviated(components[at], s, own)
                     for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
                         contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
             else:
                 name = self._contact(s).name
                 for j, own in enumerate(values):
-                    contacts[at] = _met(contacts[at := f"{name}_{j}"], s, float(own[0]))
+                    at = f"{name}_{j}"
+                    contacts[at] = _met(contacts[at], s, float(own[0]))
         return replace(self.whole, components=tuple(components.values()), contacts=tuple(contacts.values()))
 
-    def _body(self, s: Scatter) -> Component:
+    def body(self, s: Scatter) -> Component:
         names = {m.name: m for m in self.sector.components}
         if s.component is None and len(names) > 1:
             raise UserError(f"{s.of}: of which body? give one of {', '.join(names)}")
@@ -119,7 +120,7 @@ def _positive(s: Scatter, values: Array) -> None:
         )
 
 
-def _body(component: Component, s: Scatter, own: Array) -> Component:
+def deviated(component: Component, s: Scatter, own: Array) -> Component:
     group = component.groups[0]
     if s.of == "mass":
         return replace(component, groups={0: of_density(group, 1 + float(own[0]))})
@@ -176,14 +177,14 @@ def _pressed(contact: Contact, own: float) -> Contact:
     return replace(found, phase=contact.phase, length=contact.length)
 
 
-def _scaled(law: Law, names: tuple[str, ...], factor: float) -> tuple[Any, int]:
+def _scaled(law: Any, names: tuple[str, ...], factor: float) -> tuple[Any, int]:
     """The law with its numbers of these names, wherever they stand, times a factor; how many there are."""
     changed: dict[str, Any] = {}
     count = 0
-    for f in fields(law):  # type: ignore[arg-type]
+    for f in fields(law):
         value = getattr(law, f.name)
         if is_dataclass(value) and not isinstance(value, type):
-            changed[f.name], more = _scaled(value, names, factor)  # type: ignore[arg-type]
+            changed[f.name], more = _scaled(value, names, factor)
             count += more
         elif f.name in names and value is not None and not f.metadata.get("static"):
             changed[f.name], count = value * factor, count + 1

@@ -11,7 +11,9 @@ from ..data import Array
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import Ensemble
 from ..mistuning.samples import Sample, sample
+from ..mistuning.sensitivity import Approximation
 from ..mistuning.statistics import fits
+from .operating import numbers_within
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
 
 
@@ -35,14 +37,13 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
-def envelope_picture(found: Ensemble, path: Path, title: str) -> Path:
+def envelope_picture(found: Ensemble, near: Approximation | None, path: Path, title: str) -> Path:
     """Mean, 95 % envelope and the extremes of all blades over the frequency, above; the Weibull exponent, below (Sextro
-    Figs. 5.6-3 to 5.6-6)."""
-    figure = empty_figure(8.5, 6.6)
+    Figs. 5.6-3 to 5.6-6). near: the same by first order, dashed."""
+    figure = empty_figure(8.5, 7.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1.0])
     f, e = found.asked.frequency, found.envelope.columns()
-    quantity = measured(found.asked.tuned.whole)
-    by, unit = quantity.scale(float(found.tuned.top.amplitude))
+    by, unit = measured(found.asked.tuned.whole).scale(float(found.tuned.top.amplitude))
     for axes in (top, bottom):
         plain_axes(axes)
     low, high = (by * e[f"quantile_{p}_percent"] for p in ("2.5", "97.5"))
@@ -50,11 +51,35 @@ def envelope_picture(found: Ensemble, path: Path, title: str) -> Path:
     top.plot(f, by * e["highest"], color="0.55", linewidth=0.9, label="highest of all")
     top.plot(f, by * e["mean"], color=COLOURS[0], label="mean")
     top.plot(f, by * np.nanmax(found.tuned.grid, axis=1), color=COLOURS[1], linestyle="--", label="tuned ring")
+    bottom.plot(f, np.log(e["weibull_exponent"]), color=COLOURS[0], label="samples")
+    if near is not None:
+        for share, label in ((0.025, "95 % by first order"), (0.975, None)):
+            top.plot(near.frequency, by * near.envelope(share), ":", color=COLOURS[3], linewidth=1.4, label=label)
+        bottom.plot(near.frequency, np.log(near.weibull_exponent), ":", color=COLOURS[3], label="first order")
+        bottom.legend(fontsize=9)
     top.set(ylabel=f"amplitude in {unit}", yscale="log", title=title)
+    numbers_within(top.yaxis)
     top.legend(fontsize=9)
-    bottom.plot(f, np.log(e["weibull_exponent"]), color=COLOURS[3])
     bottom.axhline(0.0, color="0.5", linewidth=0.8)
     bottom.set(xlabel="excitation frequency in Hz", ylabel="ln k (Weibull)", xlim=(f[0], f[-1]))
+    return save_figure(figure, path)
+
+
+def sensitivity_picture(near: Approximation, path: Path, title: str) -> Path:
+    """By how many percent a blade's amplitude changes with one percent more frequency of a blade so many sectors
+    further, over the frequency."""
+    figure, axes = single_panel(8.5, 4.6)
+    share = (near.sensitivity.sum(axis=2) / near.mean[:, None]).T
+    N = len(share)
+    order = (np.arange(N) - N // 2) % N
+    most = float(np.abs(share).max())
+    image = axes.imshow(
+        share[order], aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
+        extent=(near.frequency[0], near.frequency[-1], -(N // 2) - 0.5, N - N // 2 - 0.5),
+    )  # fmt: skip
+    axes.grid(False)
+    axes.set(xlabel="excitation frequency in Hz", ylabel="sectors further", title=title)
+    figure.colorbar(image, label="% of amplitude by % of frequency")
     return save_figure(figure, path)
 
 

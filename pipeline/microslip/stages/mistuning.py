@@ -25,6 +25,7 @@ from ..mistuning.ensemble import COLUMNS, Ensemble, run
 from ..mistuning.ring import Tuned
 from ..mistuning.samples import Asked
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
+from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
 from ..report.mistuning import mistuning_html
 from ..system.assembly import Contact
@@ -75,9 +76,11 @@ def _work(
         text = str(error).removeprefix(f"{case_path}: ").removeprefix("mistuning: ")
         raise UserError(f"{case_path}: mistuning: {text}") from error
     stage.begin()
+    first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
+    near = approximation(what, first) if first and not what.stuck else None
     sentences = [*said(found), *built.messages]
-    made = _written(found, folder)
-    drawn = _pictures(found, folder / "pictures", settings.name) if pictures else []
+    made = _written(found, near, folder)
+    drawn = _pictures(found, near, folder / "pictures", settings.name) if pictures else []
     page = folder / "mistuning.html"
     store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
     made = [page, *made, *drawn]
@@ -130,7 +133,7 @@ def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
     given = built.settings.sweep.normal_forces
     if asked.normal_force is None and (not given or isinstance(given, str)):
         raise UserError("normal_force: is missing; give that of the contacts, in N")
-    return min(given) if asked.normal_force is None else asked.normal_force  # type: ignore[arg-type]
+    return asked.normal_force if asked.normal_force is not None else min(float(x) for x in given or ())
 
 
 def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path) -> Scatter:
@@ -198,7 +201,7 @@ def said(found: Ensemble) -> list[str]:
     return told
 
 
-def _written(found: Ensemble, folder: Path) -> list[Path]:
+def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:
     column = measured(found.asked.tuned.whole).column
     rows = found.rows
     head = ["sample", "amplification", *(column(n) if n == "amplitude" else n for n in COLUMNS)]
@@ -220,17 +223,28 @@ def _written(found: Ensemble, folder: Path) -> list[Path]:
     for fit in fits(found.amplification[found.solved]):
         quantiles[fit.name.replace(" ", "_")] = np.array([fit.quantiles[share] for share in SHARES])
     store.write_text(folder / "quantiles.csv", columns_csv(quantiles, 8))
-    return [folder / name for name in ("samples.csv", "quantiles.csv", "envelope.csv")]
+    names = ["samples.csv", "quantiles.csv", "envelope.csv"]
+    if near is not None:
+        told = {
+            "frequency_Hz": near.frequency, column("mean"): near.mean, column("deviation"): near.deviation,
+            "weibull_exponent": near.weibull_exponent, column("quantile_2.5_percent"): near.envelope(0.025),
+            column("quantile_97.5_percent"): near.envelope(0.975),
+        }  # fmt: skip
+        store.write_text(folder / "approximation.csv", columns_csv(told, 8))
+        names.append("approximation.csv")
+    return [folder / name for name in names]
 
 
-def _pictures(found: Ensemble, folder: Path, case: str) -> list[Path]:
-    from ..pictures.mistuning import amplification_picture, envelope_picture, worst_picture
+def _pictures(found: Ensemble, near: Approximation | None, folder: Path, case: str) -> list[Path]:
+    from ..pictures.mistuning import amplification_picture, envelope_picture, sensitivity_picture, worst_picture
 
     folder.mkdir(parents=True, exist_ok=True)
     if not found.solved.any():
         return []
+    drawn = [sensitivity_picture(near, folder / "sensitivity.png", f"{case}: sensitivities")] if near else []
     return [
         amplification_picture(found, folder / "amplification.png", f"{case}: highest blade over the tuned ring's"),
-        envelope_picture(found, folder / "mistuned.png", f"{case}: all blades of all samples"),
+        envelope_picture(found, near, folder / "mistuned.png", f"{case}: all blades of all samples"),
         worst_picture(found, folder / "worst.png", f"{case}: the highest of all samples"),
+        *drawn,
     ]
