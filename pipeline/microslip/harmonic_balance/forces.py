@@ -166,8 +166,8 @@ def beside(laws: Sequence[Law], n: int) -> Law:
         same = all(np.array_equal(x, values[0]) for x in values[1:])
         return values[0] if same else jnp.repeat(jnp.stack([jnp.asarray(x) for x in values]), n)
 
-    axes = point_axes(laws[0], n)
-    return jax.tree_util.tree_unflatten(tree, [joined(x, a) for x, a in zip(zip(*leaves, strict=True), axes, strict=True)])
+    each = zip(zip(*leaves, strict=True), point_axes(laws[0], n), strict=True)
+    return jax.tree_util.tree_unflatten(tree, [joined(values, axis) for values, axis in each])
 
 
 def _points(G: jax.Array, u: jax.Array) -> jax.Array:

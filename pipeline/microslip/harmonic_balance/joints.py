@@ -47,7 +47,7 @@ def alone(compliance: Sequence[ComplexArray], stiffness: Sequence[Array]) -> lis
     found = list[Alone]()
     for D, k in zip(compliance, stiffness, strict=True):
         try:
-            inverse = np.linalg.inv(np.eye(len(k)) - D @ k)
+            inverse = np.linalg.inv(np.eye(len(k)) - D @ k).astype(complex)
         except np.linalg.LinAlgError:
             return None
         found.append((inverse, inverse @ D))

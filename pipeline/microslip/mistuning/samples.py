@@ -41,7 +41,7 @@ class Asked:
     def problem(self, ring: Assembly) -> Problem:
         """The balance of a whole ring, all in the same units."""
         models = None if self.models is None else dict(self.models(ring))
-        return balance.of(ring, length=balance.moves_by(self.tuned.whole), models=models, **self.balance)
+        return balance.of(ring, form="sides", length=balance.moves_by(self.tuned.whole), models=models, **self.balance)
 
     @cached_property
     def tuned_points(self) -> list[Point]:

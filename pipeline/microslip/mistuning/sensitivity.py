@@ -126,7 +126,8 @@ def _forced(
         part, k, s, w = p.parts[h][body], p.stiffness[body], p.slices[body], h * at.Omega
         index = p.assembly.index(h)
         (M1, K1, C1), (M0, K0, C0) = more.at(index).matrices, less.at(index).matrices
-        H = 0.0 if more.at(index).loss is None or not h else more.at(index).loss - less.at(index).loss
+        H1, H0 = more.at(index).loss, less.at(index).loss
+        H = H1 - H0 if h and H1 is not None and H0 is not None else 0.0
         dS = ((K1 - K0 + 1j * H) - w**2 * (M1 - M0) + 1j * w * (C1 - C0)) / (2 * STEP)
         P = np.linalg.inv(np.eye(part.count) + part.yielding @ k)
         T = part.rows

@@ -13,8 +13,8 @@ from .page import Album, Piece, fold, number, page, say, table
 
 READ_AS = (
     "Amplification: the highest amplitude of any blade over the frequency, over that of the ring of equal sectors. "
-    "Intervals lie between order statistics and hold whatever the distribution is. The distance of a fit is the largest "
-    "difference between its distribution function and that of the samples; in the tail, of the highest tenth."
+    "Intervals lie between order statistics and hold whatever the distribution is. The distance of a fit is the "
+    "largest difference between its distribution function and that of the samples; in the tail, of the highest tenth."
 )
 WORST = 12
 """Samples in the table of the highest."""

@@ -77,7 +77,7 @@ def _work(
         raise UserError(f"{case_path}: mistuning: {text}") from error
     stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
-    near = approximation(what, first) if first and not what.stuck else None
+    near = approximation(what, first) if first and not what.stuck and settings.stuck_ratios is None else None
     sentences = [*said(found), *built.messages]
     made = _written(found, near, folder)
     drawn = _pictures(found, near, folder / "pictures", settings.name) if pictures else []
@@ -225,12 +225,12 @@ def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[
     store.write_text(folder / "quantiles.csv", columns_csv(quantiles, 8))
     names = ["samples.csv", "quantiles.csv", "envelope.csv"]
     if near is not None:
-        told = {
+        columns: dict[str, Array] = {
             "frequency_Hz": near.frequency, column("mean"): near.mean, column("deviation"): near.deviation,
             "weibull_exponent": near.weibull_exponent, column("quantile_2.5_percent"): near.envelope(0.025),
             column("quantile_97.5_percent"): near.envelope(0.975),
         }  # fmt: skip
-        store.write_text(folder / "approximation.csv", columns_csv(told, 8))
+        store.write_text(folder / "approximation.csv", columns_csv(columns, 8))
         names.append("approximation.csv")
     return [folder / name for name in names]
 
