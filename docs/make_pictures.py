@@ -1123,6 +1123,16 @@ def two_tones() -> None:
     fill("two_tones.md", "slider", table(*study.slider()))
 
 
+def mistuning() -> None:
+    """The mistuned ring with friction: amplification, envelopes beside first order, the worst sample, and a table."""
+    import mistuning_study as study
+
+    for name, file in study.pictures(BUILD / "ring-mistuned").items():
+        save(from_file(file), name)
+    fill("mistuning.md", "amplification", table(*study.amplification(BUILD / "ring-mistuned")))
+    fill("mistuning.md", "first_order", table(*study.first_order(BUILD / "spin-pit-mistuned")))
+
+
 # the stability page ------------------------------------------------------------------------------------------------
 
 
@@ -1513,6 +1523,7 @@ STUDIES = {
         reference,
         python,
         two_tones,
+        mistuning,
         stability,
         squeal,
         geometry,

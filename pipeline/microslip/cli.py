@@ -234,7 +234,7 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        marked = page.name if page.name == "two_tones.html" else "response.csv"
+        marked = page.name if page.name in ("two_tones.html", "mistuning.html") else "response.csv"
         raise NotConverged(f"some points of the response did not converge; they are marked in {marked}")
 
 
@@ -471,7 +471,7 @@ def mistune(
     with progress(f"mistuning of {case}", quiet) as report:
         settings, _ = load_case(case, asked)
         files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
-        made, sentences, fine = mistuning_stage(case, files, folder, asked, workers, force, report, not no_pictures)
+        made, sentences, fine = mistuning_stage(case, files, folder, asked, force, report, not no_pictures, workers)
     _say("\n".join([*sentences, *map(str, made)]), quiet)
     if not fine:
         raise NotConverged("some samples have no solution; samples.csv has no amplitude for them")

@@ -35,7 +35,7 @@ from .stage import Made, Report, Stage, hash_of_code
 
 def mistuning_stage(
     case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
-    workers: int | None = None, force: bool = False, report: Report = lambda _: None, pictures: bool = True,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True, workers: int | None = None,
 ) -> tuple[list[Path], list[str], bool]:  # fmt: skip
     """What a case asks for in [mistuning], in a folder.
 
