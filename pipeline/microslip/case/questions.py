@@ -233,9 +233,9 @@ class ScatterOfCase(Model):
 
     of: ``frequency`` or ``damping`` of a body's modes, its ``mass``, ``added_mass`` (kg) at a monitor;
     ``normal_force``, ``gap`` (m), ``friction`` or ``stiffness`` of a contact. deviation: standard deviation, a share of
-    the nominal value or in kg or m. distribution: of it; the median of ``lognormal`` is nominal. values: deviations that are known,
-    repeated round the ring; file: a .csv with the column ``deviation``, or ``frequency_Hz`` whose mean is nominal.
-    arrangement: of them, as ``given``, ``shuffled`` or ``drawn`` in every sample. body, contact: whose; contact: its
+    the nominal value or in kg or m. distribution: of it; the median of ``lognormal`` is nominal. values: deviations
+    that are known, repeated round the ring; file: a .csv with the column ``deviation``, or ``frequency_Hz`` whose mean
+    is nominal. arrangement: of them, as ``given``, ``shuffled`` or ``drawn`` in every sample. body, contact: whose, its
     interface. at: monitor of added_mass. together: correlation of the modes of a body, 0 each alone. neighbours:
     correlation from a sector to the next one.
     """
