@@ -1123,6 +1123,20 @@ def two_tones() -> None:
     fill("two_tones.md", "slider", table(*study.slider()))
 
 
+def identification() -> None:
+    """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
+    import identification_study as study
+
+    fig = figure(6.4, 4.6)
+    places = fig.subplots(2, 1, sharex=True)
+    for axes in places:
+        plain(axes)
+    study.picture(*places)
+    save(drawn(fig), "mistuning_identification")
+    for name in ("modes", "model", "gauges"):
+        fill("mistuning_identification.md", name, table(*getattr(study, name)()))
+
+
 # the stability page ------------------------------------------------------------------------------------------------
 
 
@@ -1513,6 +1527,7 @@ STUDIES = {
         reference,
         python,
         two_tones,
+        identification,
         stability,
         squeal,
         geometry,

@@ -13,7 +13,7 @@ from microslip.contact.normal import Penalty
 from microslip.contact.patch import Patch
 from microslip.contact.point import PointContact
 from microslip.data import UserError
-from microslip.mistuning.gauges import Stuck, of_gauges
+from microslip.mistuning.gauges import Stuck, blades_from_gauges
 from microslip.mistuning.ring import Tuned
 from microslip.mistuning.samples import Sticking
 from microslip.mistuning.scatter import Scatter
@@ -68,7 +68,7 @@ def test_derivatives_of_the_amplitudes(hertz):
 def test_amplitudes_without_noise_give_the_blades_back(find_level):
     stuck, d = ring(6), np.random.default_rng(3).normal(0, 0.01, 6)
     level = 1.3 if find_level else 1.0
-    found = of_gauges(stuck, HERTZ, level * measured(stuck, d), 0.01, find_level=find_level)
+    found = blades_from_gauges(stuck, HERTZ, level * measured(stuck, d), 0.01, find_level=find_level)
     assert np.allclose(found.deviation, d, atol=1e-7) and found.level == pytest.approx(level)
     assert found.misfit < 1e-3
 
@@ -79,15 +79,15 @@ def test_uniform_shifts_move_the_response():
     alone = Stuck(Tuned(Assembly(*(getattr(stuck.tuned.sector, k) for k in ("components",)), (),
                                  stuck.tuned.sector.loads, stuck.tuned.sector.outputs, Ring(4, 2)), {}))  # fmt: skip
     d = 0.013
-    found = of_gauges(alone, HERTZ, measured(alone, np.zeros(4), HERTZ / (1 + d)) / (1 + d) ** 2, 0.01)
+    found = blades_from_gauges(alone, HERTZ, measured(alone, np.zeros(4), HERTZ / (1 + d)) / (1 + d) ** 2, 0.01)
     assert np.allclose(found.deviation, d, atol=1e-9)
 
 
 def test_a_wrong_model_shows_in_the_misfit():
     stuck, rng = ring(6), np.random.default_rng(4)
     a = measured(stuck, rng.normal(0, 0.01, 6)) * (1 + 0.01 * rng.standard_normal((8, 6)))
-    assert of_gauges(stuck, HERTZ, a, 0.01).misfit < 1.4
-    assert of_gauges(stuck, HERTZ, 1.2 * a, 0.01).misfit > 3
+    assert blades_from_gauges(stuck, HERTZ, a, 0.01).misfit < 1.4
+    assert blades_from_gauges(stuck, HERTZ, 1.2 * a, 0.01).misfit > 3
 
 
 @pytest.mark.slow
@@ -97,7 +97,7 @@ def test_intervals_hold_as_often_as_they_say():
     for _ in range(150):
         d = rng.normal(0, 0.01, 6)
         a = measured(stuck, d) * (1 + 0.02 * rng.standard_normal((len(HERTZ), 6)))
-        low, high = of_gauges(stuck, HERTZ, a, 0.02).interval()
+        low, high = blades_from_gauges(stuck, HERTZ, a, 0.02).interval()
         inside.append((low < d) & (d < high))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
 
@@ -105,4 +105,4 @@ def test_intervals_hold_as_often_as_they_say():
 @pytest.mark.parametrize("a, noise", [(np.ones((8, 5)), 0.01), (-np.ones((8, 6)), 0.01), (np.ones((8, 6)), 0.0)])
 def test_amplitudes_that_are_none(a, noise):
     with pytest.raises(UserError):
-        of_gauges(ring(6), HERTZ, a, noise)
+        blades_from_gauges(ring(6), HERTZ, a, noise)

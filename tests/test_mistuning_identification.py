@@ -8,7 +8,7 @@ import scipy.linalg
 
 from microslip.data import UserError
 from microslip.mistuning import identification
-from microslip.mistuning.identification import of_modes
+from microslip.mistuning.identification import blades_from_modes
 
 NOISE = {"frequency_noise": 1e-5, "shape_noise": 0.01}
 
@@ -39,7 +39,7 @@ def test_masses_in_a_ring(N, find_tuned):
     d = np.sqrt(1 + 2 * (e - e.mean())) - 1
     f, shapes, tuned = masses_in_a_ring(d)
     guess = tuned * (1 + 0.003 * np.cos(np.arange(len(tuned)))) if find_tuned else tuned
-    found = of_modes(guess, f, 3 * shapes, **NOISE, share=(100 / tuned) ** 2, find_tuned=find_tuned)
+    found = blades_from_modes(guess, f, 3 * shapes, **NOISE, share=(100 / tuned) ** 2, find_tuned=find_tuned)
     # with tuned frequencies that are not known p follows their guesses, by 0.3 % of the coupling's part
     assert np.allclose(found.deviation, d, atol=1e-9 if not find_tuned else 3e-4)
     assert found.misfit < 1e-4 or find_tuned
@@ -55,7 +55,7 @@ def test_the_tuned_frequencies_are_found():
     F = np.exp(2j * np.pi * k * j / N) / np.sqrt(N)
     root = ((F * tuned[np.minimum(k, N - k)]) @ F.conj().T).real
     values, modes = np.linalg.eigh((root * (1 + d) ** 2) @ root)
-    found = of_modes(tuned + rng.normal(0, 0.5, 6), np.sqrt(values), modes.T, **NOISE, find_tuned=True)
+    found = blades_from_modes(tuned + rng.normal(0, 0.5, 6), np.sqrt(values), modes.T, **NOISE, find_tuned=True)
     assert np.allclose(found.deviation, d, atol=1e-9) and np.allclose(found.tuned, tuned, rtol=1e-9)
 
 
@@ -64,7 +64,7 @@ def test_uniform_shifts():
     tuned = 100 + 3 * np.arange(5.0)
     N, waves = 8, scipy.linalg.dft(8) / np.sqrt(8)
     shapes = np.array([np.real(w) + np.imag(w) for w in waves[[0, 1, 7, 2, 6, 3, 5, 4]]])
-    found = of_modes(tuned, 1.013 * tuned[[0, 1, 1, 2, 2, 3, 3, 4]], shapes, **NOISE)
+    found = blades_from_modes(tuned, 1.013 * tuned[[0, 1, 1, 2, 2, 3, 3, 4]], shapes, **NOISE)
     assert np.allclose(found.deviation, 0.013, atol=1e-10) and len(found.deviation) == N
 
 
@@ -89,7 +89,7 @@ def covered(repeats, N, find_tuned, **noise):
         d = np.sqrt(1 + 2 * (e - e.mean())) - 1
         f, shapes, tuned = masses_in_a_ring(d)
         share = (100 / tuned) ** 2
-        found = of_modes(tuned, *noisy(f, shapes, rng, **noise), **noise, share=share, find_tuned=find_tuned)
+        found = blades_from_modes(tuned, *noisy(f, shapes, rng, **noise), **noise, share=share, find_tuned=find_tuned)
         low, high = found.interval()
         inside.append((low < d) & (d < high))
         misfit.append(found.misfit)
@@ -115,8 +115,8 @@ def test_a_wrong_model_shows_in_the_misfit():
     f, shapes, tuned = masses_in_a_ring(rng.normal(0, 0.02, 12))
     wrong = tuned * (1 + 1e-3 * (-1.0) ** np.arange(7))
     measured = noisy(f, shapes, rng, **NOISE)
-    assert of_modes(wrong, *measured, **NOISE, share=(100 / tuned) ** 2).misfit > 3
-    assert of_modes(tuned, *measured, **NOISE, share=(100 / tuned) ** 2).misfit < 1.2
+    assert blades_from_modes(wrong, *measured, **NOISE, share=(100 / tuned) ** 2).misfit > 3
+    assert blades_from_modes(tuned, *measured, **NOISE, share=(100 / tuned) ** 2).misfit < 1.2
 
 
 @pytest.mark.parametrize(
@@ -134,4 +134,4 @@ def test_a_wrong_model_shows_in_the_misfit():
 def test_what_says_nothing_of_the_blades(change):
     f, shapes, tuned = masses_in_a_ring(np.random.default_rng(6).normal(0, 0.02, 8))
     with pytest.raises(UserError):
-        of_modes(**({"tuned": tuned, "frequency": f, "shapes": shapes, **NOISE} | change))
+        blades_from_modes(**({"tuned": tuned, "frequency": f, "shapes": shapes, **NOISE} | change))

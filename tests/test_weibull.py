@@ -38,7 +38,7 @@ def test_median_and_moments_by_quadrature(k):
 def test_interval_of_k_is_where_the_measured_spread_becomes_unlikely():
     """At its ends samples of as many gauges have the measured s or more, or less, with half of what is left."""
     measured = np.random.default_rng(3).weibull(2.0, 12)
-    found = weibull.fitted(measured, level=0.9)
+    found = weibull.amplitude_spread(measured, level=0.9)
     s, rng = found.deviation / found.mean, np.random.default_rng(4)
     for k, share in zip(found.interval, (0.05, 0.95), strict=True):
         w = rng.weibull(k, (40000, 12))
@@ -47,13 +47,13 @@ def test_interval_of_k_is_where_the_measured_spread_becomes_unlikely():
 
 def test_interval_of_k_has_no_unit():
     w = np.random.default_rng(5).weibull(1.3, 24)
-    assert np.allclose(weibull.fitted(w).interval, weibull.fitted(1e6 * w).interval, rtol=1e-7)
+    assert np.allclose(weibull.amplitude_spread(w).interval, weibull.amplitude_spread(1e6 * w).interval, rtol=1e-7)
 
 
 @pytest.mark.parametrize("bad", [[1.0, 2.0], [1.0, -1.0, 2.0], [1.0, np.nan, 2.0], [2.0, 2.0, 2.0]])
 def test_amplitudes_that_say_nothing_of_k(bad):
     with pytest.raises(UserError):
-        weibull.fitted(bad)
+        weibull.amplitude_spread(bad)
 
 
 @pytest.mark.slow
@@ -61,5 +61,5 @@ def test_amplitudes_that_say_nothing_of_k(bad):
 def test_interval_of_k_covers(gauges, k):
     """95 +- 2 % of a thousand repeats."""
     rng = np.random.default_rng(6)
-    ends = np.array([weibull.fitted(rng.weibull(k, gauges), draws=500, seed=i).interval for i in range(1000)])
+    ends = np.array([weibull.amplitude_spread(rng.weibull(k, gauges), draws=500, seed=i).interval for i in range(1000)])
     assert np.mean((ends[:, 0] < k) & (k < ends[:, 1])) == pytest.approx(0.95, abs=0.02)

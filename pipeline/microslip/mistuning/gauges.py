@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from ..data import Array, UserError
-from ..system.assembly import Linear
+from ..system.assembly import Assembly, Linear
 from .ring import Tuned
 from .scatter import Scatter
 
@@ -104,25 +104,28 @@ class Stuck:
         return part.output @ q + part.output_given, np.array(changes).T
 
 
-def of_gauges(
-    stuck: Stuck, frequency: ArrayLike, amplitude: ArrayLike, noise: ArrayLike, find_level: bool = False,
+def blades_from_gauges(
+    ring: Assembly | Stuck, frequency: ArrayLike, amplitude: ArrayLike, noise: ArrayLike, find_level: bool = False,
     spread: float = 0.01, seed: int = 0,
 ) -> Identified:  # fmt: skip
-    """Deviations of the blades from amplitudes of the read-outs of all sectors.
+    """Blade frequencies of a ring with sticking contacts, from amplitudes of the read-outs of all sectors.
 
     Amplitudes near a resonance turn over as deviations grow, beside it they do not. So the search begins with the
     frequencies at which they depend on the deviations least, and takes in the others from there; where what it ends at
     does not fit, it begins again from other deviations, drawn. The best is kept, and its misfit says whether it fits.
 
     Args:
-        frequency: (f,) Hz, two or more of them beside the band in which the blades resonate. amplitude: (f, w) 0-peak,
-            in the unit of the read-outs, in the order of the sectors. noise: standard deviation of an amplitude over
-            it, one or (f, w). find_level: the factor of all loads is found as well. spread: standard deviation of what
-            further starts are drawn from.
+        ring: the tuned one, by the sector that stands for it. frequency: (f,) Hz, two or more of them beside the band
+            in which the blades resonate. amplitude: (f, w) 0-peak, in the unit of the read-outs, in the order of the
+            sectors. noise: standard deviation of an amplitude over it, one or (f, w). find_level: the factor of all
+            loads is found as well. spread: standard deviation of what further starts are drawn from.
 
     Raises:
-        UserError: amplitudes that do not fit the read-outs, are not positive, or fewer than unknowns.
+        UserError: amplitudes that do not fit the read-outs, are not positive, or fewer than unknowns; no ring.
     """
+    if isinstance(ring, Assembly) and ring.ring is None:
+        raise UserError("ring: give the sector that stands for a ring, with its number of blades")
+    stuck = ring if isinstance(ring, Stuck) else Stuck(Tuned(ring, {}))
     readings = _Readings.of(stuck, frequency, amplitude, noise, find_level)
     parts = readings.calm_first()
     rng, best = np.random.default_rng(seed), None

@@ -54,11 +54,11 @@ class Identified:
         return self.deviation + np.outer([-1, 1], self.accuracy) * ndtri(0.5 + level / 2)
 
 
-def of_modes(
+def blades_from_modes(
     tuned: ArrayLike, frequency: ArrayLike, shapes: ArrayLike, frequency_noise: float, shape_noise: float,
     share: ArrayLike = 1.0, find_tuned: bool = False,
 ) -> Identified:  # fmt: skip
-    """Deviations of the blades from measured modes of one family.
+    """Blade frequencies of a disc from measured modes of one family, a kind of FMM ID.
 
     Args:
         tuned: (N//2 + 1,) Hz of the tuned ring at the nodal diameters 0, 1, ...; with `find_tuned` only guesses.
