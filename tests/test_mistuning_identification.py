@@ -104,8 +104,9 @@ def test_intervals_hold_as_often_as_they_say():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("find_tuned", [False, True])
-def test_intervals_hold_over_a_thousand_rings(find_tuned):
-    inside, misfit = covered(1000, 12, find_tuned, frequency_noise=5e-5, shape_noise=0.02)
+def test_intervals_hold_over_many_rings(find_tuned):
+    """95 +- 2 % of 4800 intervals."""
+    inside, misfit = covered(400, 12, find_tuned, frequency_noise=5e-5, shape_noise=0.02)
     assert inside == pytest.approx(0.95, abs=0.02) and misfit == pytest.approx(1.0, abs=0.02)
 
 
@@ -116,7 +117,8 @@ def test_a_wrong_model_shows_in_the_misfit():
     wrong = tuned * (1 + 1e-3 * (-1.0) ** np.arange(7))
     measured = noisy(f, shapes, rng, **NOISE)
     assert blades_from_modes(wrong, *measured, **NOISE, share=(100 / tuned) ** 2).misfit > 3
-    assert blades_from_modes(tuned, *measured, **NOISE, share=(100 / tuned) ** 2).misfit < 1.2
+    assert not blades_from_modes(wrong, *measured, **NOISE, share=(100 / tuned) ** 2).fits
+    assert blades_from_modes(tuned, *measured, **NOISE, share=(100 / tuned) ** 2).fits
 
 
 @pytest.mark.parametrize(

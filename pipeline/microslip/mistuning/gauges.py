@@ -17,39 +17,24 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
 from ..data import Array, UserError
 from ..system.assembly import Assembly, Linear
+from .estimate import Estimate, accepted, covariance, misfit
 from .ring import Tuned
 from .scatter import Scatter
 
 STARTS = 12
 """Starts of the search at most."""
 
-FITS = 1.3
-"""Misfit below which a further start is not tried."""
-
 
 @dataclass(frozen=True, eq=False)
-class Identified:
-    """Attributes:
-    deviation: (N,) of the frequencies of each blade, a share of the nominal ones. accuracy: (N,) its standard
-        deviation. level: factor of all loads, 1 where they are known. level_accuracy: its standard deviation.
-    covariance: of the deviations (N, N). misfit: root mean square of what the fit leaves, over the noise, per number
-        measured beyond those found; about 1 where model and noise are as they were said to be.
-    """
+class FromGauges(Estimate):
+    """Attributes: level: factor of all loads, 1 where they are known. level_accuracy: its standard deviation. The
+    others are those of `Estimate`."""
 
-    deviation: Array
-    accuracy: Array
     level: float
     level_accuracy: float
-    covariance: Array
-    misfit: float
-
-    def interval(self, level: float = 0.95) -> Array:
-        """(2, N) ends of the confidence intervals of the deviations, by the normal distribution."""
-        return self.deviation + np.outer([-1, 1], self.accuracy) * ndtri(0.5 + level / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +92,12 @@ class Stuck:
 def blades_from_gauges(
     ring: Assembly | Stuck, frequency: ArrayLike, amplitude: ArrayLike, noise: ArrayLike, find_level: bool = False,
     spread: float = 0.01, seed: int = 0,
-) -> Identified:  # fmt: skip
+) -> FromGauges:  # fmt: skip
     """Blade frequencies of a ring with sticking contacts, from amplitudes of the read-outs of all sectors.
 
     Amplitudes near a resonance turn over as deviations grow, beside it they do not. So the search begins with the
     frequencies at which they depend on the deviations least, and takes in the others from there; where what it ends at
-    does not fit, it begins again from other deviations, drawn. The best is kept, and its misfit says whether it fits.
+    does not fit, it begins again from other deviations, drawn. The best is kept, and says whether it fits.
 
     Args:
         ring: the tuned one, by the sector that stands for it. frequency: (f,) Hz, two or more of them beside the band
@@ -138,7 +123,7 @@ def blades_from_gauges(
             )
             x = found.x
         best = found if best is None or found.cost < best.cost else best
-        if np.sqrt(2 * best.cost / max(len(best.fun) - len(x), 1)) < FITS:
+        if accepted(misfit(best.fun, beyond := len(best.fun) - len(x)), beyond):
             break
     assert best is not None
     return _identified(best.x, readings.blades, best.fun, best.jac)
@@ -202,15 +187,11 @@ class _Readings:
         return self.last[1]
 
 
-def _identified(x: Array, N: int, left: Array, jacobian: Array) -> Identified:
-    _, size, turned = np.linalg.svd(jacobian, full_matrices=False)
-    if len(size) < len(x) or size[-1] <= 1e-9 * size[0]:
+def _identified(x: Array, N: int, left: Array, jacobian: Array) -> FromGauges:
+    every = covariance(jacobian)
+    if every is None:
         raise UserError("amplitude: these do not tell all blades apart; measure at more frequencies")
-    covariance = (turned.T / size**2) @ turned
     beyond = len(left) - len(x)
-    accuracy = np.sqrt(np.diag(covariance))
     level = float(np.exp(x[N])) if len(x) > N else 1.0
-    return Identified(
-        x[:N], accuracy[:N], level, level * float(accuracy[N]) if len(x) > N else 0.0, covariance[:N, :N],
-        float(np.sqrt(left @ left / beyond)) if beyond > 0 else np.nan,
-    )  # fmt: skip
+    accuracy = level * float(np.sqrt(every[N, N])) if len(x) > N else 0.0
+    return FromGauges(x[:N], every[:N, :N], misfit(left, beyond), beyond, level, accuracy)

@@ -24,45 +24,32 @@ from functools import cached_property
 import numpy as np
 import scipy.optimize
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
 from ..data import Array, UserError
+from .estimate import Estimate, covariance, misfit
 
 _ROUNDING = 1e-9
 """Share of the highest eigenvalue within which two are the same."""
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
-    """Attributes:
-    deviation: (N,) of each blade's frequency, a share of the nominal one. accuracy: (N,) its standard deviation.
-    tuned: (N//2 + 1,) Hz of the tuned ring at its nodal diameters, given or found. tuned_accuracy: Hz, 0 where given.
-    covariance: of the deviations (N, N). misfit: root mean square of what the fit leaves, over the stated noise, per
-        number measured beyond those found: about 1 where both model and noise are as they were said to be; NaN where
-        nothing is left over.
-    """
+class FromModes(Estimate):
+    """Attributes: tuned: (N//2 + 1,) Hz of the tuned ring at its nodal diameters, given or found. tuned_accuracy: Hz,
+    standard deviations, 0 where given. The others are those of `Estimate`."""
 
-    deviation: Array
-    accuracy: Array
     tuned: Array
     tuned_accuracy: Array
-    covariance: Array
-    misfit: float
-
-    def interval(self, level: float = 0.95) -> Array:
-        """(2, N) ends of the confidence intervals of the deviations, by the normal distribution."""
-        return self.deviation + np.outer([-1, 1], self.accuracy) * ndtri(0.5 + level / 2)
 
 
 def blades_from_modes(
     tuned: ArrayLike, frequency: ArrayLike, shapes: ArrayLike, frequency_noise: float, shape_noise: float,
     share: ArrayLike = 1.0, find_tuned: bool = False,
-) -> Identified:  # fmt: skip
+) -> FromModes:  # fmt: skip
     """Blade frequencies of a disc from measured modes of one family, a kind of FMM ID.
 
     Args:
         tuned: (N//2 + 1,) Hz of the tuned ring at the nodal diameters 0, 1, ...; with `find_tuned` only guesses.
-        frequency: (m,) Hz of the measured modes, rising. shapes: (m, N) amplitudes of one point of every blade, real,
+        frequency: (m,) Hz of the measured modes. shapes: (m, N) amplitudes of one point of every blade, real,
             any scale. frequency_noise: standard deviation of a frequency over it. shape_noise: of an amplitude over
             the highest one of its mode.
         share: of the strain energy in the blades, one number or (N//2 + 1,).
@@ -167,22 +154,19 @@ class _Family:
             y = y - np.linalg.lstsq(X[:, :-1], X[:, -1])[0]
         return y
 
-    def identified(self, y: Array, left: Array, jacobian: Array) -> Identified:
+    def identified(self, y: Array, left: Array, jacobian: Array) -> FromModes:
         """The deviations with their covariance, from the fit's residuals and their derivatives."""
         e, shift = self.split(y)
         count = self.basis.shape[1]
-        _, size, turned = np.linalg.svd(jacobian, full_matrices=False)
-        if size[-1] <= 1e-9 * size[0] or 1 + 2 * e.min() <= 0:
+        every = covariance(jacobian)
+        if every is None or 1 + 2 * e.min() <= 0:
             raise UserError("shapes: these modes do not tell all blades apart; measure more of them")
-        covariance = (turned.T / size**2) @ turned
         out = self.basis / np.sqrt(1 + 2 * e)[:, None]
-        own = out @ covariance[:count, :count] @ out.T
-        shifts = np.sqrt(np.diag(covariance)[count:]) if self.shifting else np.zeros(len(self.tuned))
+        own = out @ every[:count, :count] @ out.T
+        shifts = np.sqrt(np.diag(every)[count:]) if self.shifting else np.zeros(len(self.tuned))
         beyond = len(left) - len(left) // (self.blades + 1) - jacobian.shape[1]  # a shape's scale is found as well
-        misfit = float(np.sqrt(left @ left / beyond)) if beyond > 0 else np.nan
-        return Identified(
-            np.sqrt(1 + 2 * e) - 1, np.sqrt(np.diag(own)), self.tuned * (1 + shift), self.tuned * shifts, own, misfit
-        )
+        d = np.sqrt(1 + 2 * e) - 1
+        return FromModes(d, own, misfit(left, beyond), beyond, self.tuned * (1 + shift), self.tuned * shifts)
 
 
 @dataclass(frozen=True, eq=False)
