@@ -3,10 +3,11 @@
     python benchmarks/mistuning.py               # 12 to 96 blades, minutes
     python benchmarks/mistuning.py --quick       # 6 and 12
 
-CPU seconds of one thread, compiled programs warm. The ring: sample vanes (6 modes, H = 3, 64 samples, one point a gap),
-blade frequencies scattered by 1 %, 24 frequencies and what the search for the peak adds, through `mistuning.samples`,
-which `ms.mistune` calls for every sample. The peer solves the same balance at the same frequencies as one would by hand:
-the same compiled contact forces, the Jacobian of all coordinates as one dense matrix, LU, from the neighbouring point.
+CPU seconds of one thread, compiled programs warm. The ring: sample vanes (6 modes, H = 3, 64 samples, one point a
+gap), blade frequencies scattered by 1 %, 24 frequencies and what the search for the peak adds, through
+`mistuning.samples`, which `ms.mistune` calls for every sample. The peer solves the same balance at the same frequencies
+as one would by hand: the same compiled contact forces, the Jacobian of all coordinates as one dense matrix, LU, from
+the neighbouring point.
 """
 
 from __future__ import annotations
@@ -74,19 +75,20 @@ def main() -> None:
     print(f"{'blades':>7} {'s/sample':>9} {'ms/point/blade':>15} {'sticking, s':>12}")
     for N in (6, 12) if quick else (12, 24, 48, 96):
         what, linear = asked(N), asked(N, stuck=True)
-        what.tuned_points
-        sample(what, 0)
+        sample(what, 0)  # with the tuned ring's solutions, from which all begin
         each = [timed(sample, what, n) for n in (1, 2, 3)]
         points = np.mean([len(s.top.frequencies) for _, s in each])
         spent, stuck = np.mean([t for t, _ in each]), timed(sample, linear, 1)[0]
         print(f"{N:7d} {spent:9.2f} {1e3 * spent / points / N:15.2f} {stuck:12.3f}")
     N = 6 if quick else 24
     what = asked(N)
-    what.tuned_points
     sample(what, 0)
     (own, found), (other, (solved, top)) = timed(sample, what, 1), timed(dense, what, 1)
-    print(f"{N} blades, sample 1: {own:.2f} s with its peak ({found.top.amplitude:.6g} m); dense Newton on the grid alone "
-          f"{other:.2f} s, {solved} of {len(FREQUENCY)} points ({top:.6g} m): {other / own:.1f} times")  # fmt: skip
+    print(f"{N} blades, sample 1: {own:.2f} s with its peak ({found.top.amplitude:.6g} m)")
+    print(
+        f"dense Newton on the grid alone: {other:.2f} s, {solved} of {len(FREQUENCY)} points ({top:.6g} m), "
+        f"{other / own:.1f} times as long"
+    )
 
 
 if __name__ == "__main__":

@@ -1131,6 +1131,18 @@ def mistuning() -> None:
         save(from_file(file), name)
     fill("mistuning.md", "amplification", table(*study.amplification(BUILD / "ring-mistuned")))
     fill("mistuning.md", "first_order", table(*study.first_order(BUILD / "spin-pit-mistuned")))
+def identification() -> None:
+    """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
+    import identification_study as study
+
+    fig = figure(6.4, 4.6)
+    places = fig.subplots(2, 1, sharex=True)
+    for axes in places:
+        plain(axes)
+    study.picture(*places)
+    save(drawn(fig), "mistuning_identification")
+    for name in ("modes", "model", "gauges"):
+        fill("mistuning_identification.md", name, table(*getattr(study, name)()))
 
 
 # the stability page ------------------------------------------------------------------------------------------------
@@ -1524,6 +1536,7 @@ STUDIES = {
         python,
         two_tones,
         mistuning,
+        identification,
         stability,
         squeal,
         geometry,

@@ -19,8 +19,8 @@ FREQUENCY = 384.0
 def test_three_patterns_against_motions_in_time() -> None:
     """First harmonics of every blade, harmonics raised until they change by less than 3e-5: 1e-4 of the largest.
 
-    Motions begin on the balance: contacts that stick remember how they came to, which from rest is another way and gives
-    amplitudes that differ by up to 3e-3.
+    Motions begin on the balance: contacts that stick remember how they came to, which from rest is another way and
+    gives amplitudes that differ by up to 3e-3.
     """
     rub = {"interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
            "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1]}  # fmt: skip
