@@ -1123,6 +1123,28 @@ def two_tones() -> None:
     fill("two_tones.md", "slider", table(*study.slider()))
 
 
+def mistuning() -> None:
+    """The mistuned ring with friction: amplification, envelopes beside first order, the worst sample, and a table."""
+    import mistuning_study as study
+
+    for name, file in study.pictures(BUILD / "ring-mistuned").items():
+        save(from_file(file), name)
+    fill("mistuning.md", "amplification", table(*study.amplification(BUILD / "ring-mistuned")))
+    fill("mistuning.md", "first_order", table(*study.first_order(BUILD / "spin-pit-mistuned")))
+def identification() -> None:
+    """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
+    import identification_study as study
+
+    fig = figure(6.4, 4.6)
+    places = fig.subplots(2, 1, sharex=True)
+    for axes in places:
+        plain(axes)
+    study.picture(*places)
+    save(drawn(fig), "mistuning_identification")
+    for name in ("modes", "model", "gauges"):
+        fill("mistuning_identification.md", name, table(*getattr(study, name)()))
+
+
 # the stability page ------------------------------------------------------------------------------------------------
 
 
@@ -1513,6 +1535,8 @@ STUDIES = {
         reference,
         python,
         two_tones,
+        mistuning,
+        identification,
         stability,
         squeal,
         geometry,

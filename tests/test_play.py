@@ -28,7 +28,7 @@ def test_by_hand_and_marched_are_one(size: float) -> None:
     width = 0.6 / (2e4 * np.hypot(0.6, 1.6))
     u = size * width * np.random.default_rng(2).normal(size=(7, 1, 9))
     hand, marched = JenkinsPlay(patch(), 7, 96, 3, 1e-12), AFT(patch(), 7, 96, 3, 1e-12)
-    assert isinstance(model(patch(), 7, 96, 3, 1e-12), JenkinsPlay)
+    assert isinstance(model([patch()] * 7, 96, 3, 1e-12), JenkinsPlay)
     F, J = hand.forces(u, 0.1)
     expected = marched.forces(u, 0.1)
     for a, b in ((F, expected[0]), (J, expected[1]), (hand.force(u, 0.1), F)):
@@ -77,8 +77,8 @@ def test_other_contacts_are_marched() -> None:
         patch((0.1, 1.0, 0.0)), patch(normal=Penalty(value(1e5))), patch(stiffness_2=value(1e4)),
         patch(damping=value(1e-4)),
     ]  # fmt: skip
-    assert not any(isinstance(model(one, 1, 64, 2, 0.0), JenkinsPlay) for one in others)
-    assert not isinstance(model(patch(), 1, 64, 1, 0.0), JenkinsPlay)
+    assert not any(isinstance(model([one], 64, 2, 0.0), JenkinsPlay) for one in others)
+    assert not isinstance(model([patch()], 64, 1, 0.0), JenkinsPlay)
 
 
 def test_what_never_slides_is_a_spring() -> None:

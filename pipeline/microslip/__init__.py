@@ -22,7 +22,11 @@ PUBLIC = {
     "bodies": "modes assemble sample stability",
     "system.structure": "structure polynomial jenkins stop friction Element",
     "bifurcation.dynamics": "Dynamics",
-    "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate",
+    "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate mistune",
+    "mistuning.scatter": "Scatter",
+    "mistuning.identification": "blades_from_modes",
+    "mistuning.gauges": "blades_from_gauges",
+    "mistuning.weibull": "amplitude_spread",
 }
 """Module -> the names of it that are public."""
 

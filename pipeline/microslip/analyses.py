@@ -23,11 +23,15 @@ from .settings.mistakes import bounded, whole
 from .system.assembly import Assembly
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from numpy.typing import ArrayLike
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
     from .harmonic_balance.tones import Solved
+    from .mistuning.ensemble import Ensemble
+    from .mistuning.scatter import Scatter
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -510,3 +514,53 @@ def bifurcate(
         begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
     asked = diagram.Asked(start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts)
     return diagram.diagram(made, begin, asked, report=report)
+
+
+def mistune(
+    system: Assembly, scatter: Scatter | Sequence[Scatter], frequency: ArrayLike, *, samples: int = 100,
+    until: float | None = None, seed: int = 0, stuck: bool = False, harmonics: int = 3, points: int | None = None,
+    workers: int = 1, executor: Executor | None = None, report: Report = lambda _: None,
+) -> Ensemble:  # fmt: skip
+    """Whole rings whose sectors differ, sample by sample: how much higher the highest blade gets (Sextro section 5.6).
+
+    Args:
+        system: one sector that stands for its ring. scatter: what differs, see `Scatter`. frequency: (f,) Hz, rising, a
+            sweep that sees every resonance; peaks are searched for between. samples: at most. until: ends when half of
+            the interval of the 95 % quantile is that share of it. seed: of all random numbers; a sample depends on it
+            and its number alone. stuck: contacts stick. harmonics, points: of the balance, samples of a cycle.
+        workers: processes. executor: in their place, such as that of a cluster. report: is told what is under way.
+
+    Returns:
+        An `Ensemble`: ``amplification`` of each sample, ``quantile(0.95)`` with its interval, ``envelope``.
+
+    Raises:
+        UserError: no ring; a scatter of what is not there, or that leaves nothing of it.
+
+    Examples:
+        >>> import numpy as np, microslip as ms
+        >>> rub = {"interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
+        ...        "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1]}
+        >>> case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "modes": 2,
+        ...         "ring": {"blades": 4, "engine_order": 1}, "contacts": [rub]}
+        >>> ring = ms.assemble(case, vane=ms.sample()).assembly
+        >>> found = ms.mistune(ring, ms.Scatter("frequency", 0.01), np.linspace(270, 300, 31), samples=4, stuck=True)
+        >>> found.amplification.shape
+        (4,)
+    """
+    from .mistuning import ensemble
+    from .mistuning.ring import Tuned
+    from .mistuning.samples import Asked
+    from .mistuning.scatter import Scatter, check
+
+    if not isinstance(system, Assembly) or system.ring is None:
+        raise UserError("system: is no sector of a ring; assemble a case with [ring], and give its .assembly")
+    f = np.asarray(frequency, dtype=float)
+    if f.ndim != 1 or len(f) < 3 or not (np.diff(f) > 0).all() or not f[0] > 0:
+        raise UserError("frequency: give three or more, positive and rising, Hz")
+    every = (scatter,) if isinstance(scatter, Scatter) else tuple(scatter)
+    check(every)
+    tuned = Tuned(replace(system, outputs=system.outputs[:1]), {})
+    tuned.check(every)
+    balance = {"harmonics": harmonics, "samples": points or max(64, 16 * harmonics)}
+    asked = Asked(tuned, every, f, seed, balance, stuck)
+    return ensemble.run(asked, samples, until, workers, executor=executor, report=report)

@@ -234,7 +234,7 @@ def run(
             print("\n".join(frequency_lines(read_basis(job.basis_file))))
     _say(page, quiet)
     if not converged:
-        marked = page.name if page.name == "two_tones.html" else "response.csv"
+        marked = page.name if page.name in ("two_tones.html", "mistuning.html") else "response.csv"
         raise NotConverged(f"some points of the response did not converge; they are marked in {marked}")
 
 
@@ -446,6 +446,43 @@ def two_tones(
     _say("\n".join([*sentences, *map(str, made)]), quiet)
     if not fine:
         raise NotConverged(f"some points did not converge; {made[0]} says which and why")
+
+
+@app.command
+def mistune(
+    case: Path, /, *, samples: int | None = None, until: str | None = None, workers: int | None = None,
+    no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Samples of a ring whose blades or contacts differ, as [mistuning] says: how much higher the highest blade gets.
+
+    Args:
+        case: a case.toml, the folder that holds it, its name, or its products.
+        samples: at most, in the place of the case's number.
+        until: ends when half of the 95 % quantile's interval is that share of it, as 2%.
+        workers: processes; as many as there are cores if not given. Samples are the same for any number.
+    """
+    from .case import load_case
+    from .stages.mistuning import mistuning_stage
+    from .stages.places import modal_files
+
+    case = _case_file(case)
+    asked = [*set_] + [f"mistuning.samples={samples}"] * (samples is not None)
+    asked += [f"mistuning.until={_share(until)}"] if until is not None else []
+    with progress(f"mistuning of {case}", quiet) as report:
+        settings, _ = load_case(case, asked)
+        files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name
+        made, sentences, fine = mistuning_stage(case, files, folder, asked, force, report, not no_pictures, workers)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if not fine:
+        raise NotConverged("some samples have no solution; samples.csv has no amplitude for them")
+
+
+def _share(text: str) -> float:
+    """2% or 0.02."""
+    try:
+        return float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError as error:
+        raise UserError(f"--until {text}: is no share; write 2% or 0.02") from error
 
 
 @app.command

@@ -119,12 +119,17 @@ class Built:
         return self._pressed[normal]
 
     def _under(self, normal: float | None) -> Assembly:
+        one = self.one(normal)
+        return one.unrolled() if self.settings.ring and self.settings.ring.model == "full" else one
+
+    def one(self, normal: float | None) -> Assembly:
+        """`pressed`, of a ring one sector that stands for all."""
         whole = self.assembly
         if normal is not None:
             own = [self.fitted[i](normal) if i in self.fitted else c for i, c in enumerate(whole.contacts)]
             pairs = zip(own, self.contacts, strict=True)
             whole = replace(whole, contacts=tuple(c.pressed(normal) if swept(s) else c for c, s in pairs))
-        return whole.unrolled() if self.settings.ring and self.settings.ring.model == "full" else whole
+        return whole
 
 
 def swept(c: ContactSettings) -> bool:

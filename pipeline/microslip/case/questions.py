@@ -228,6 +228,53 @@ class TwoTonesOfCase(Model):
         return first, first * self.ratio if self.ratio is not None else np.full(self.points, self.second or 0.0)
 
 
+class ScatterOfCase(Model):
+    """What differs from sector to sector of a ring.
+
+    of: ``frequency`` or ``damping`` of a body's modes, its ``mass``, ``added_mass`` (kg) at a monitor;
+    ``normal_force``, ``gap`` (m), ``friction`` or ``stiffness`` of a contact. deviation: standard deviation, a share of
+    the nominal value or in kg or m. distribution: of it; the median of ``lognormal`` is nominal. values: deviations
+    that are known, repeated round the ring; file: a .csv with the column ``deviation``, or ``frequency_Hz`` whose mean
+    is nominal. arrangement: of them, as ``given``, ``shuffled`` or ``drawn`` in every sample. body, contact: whose, its
+    interface. at: monitor of added_mass. together: correlation of the modes of a body, 0 each alone. neighbours:
+    correlation from a sector to the next one.
+    """
+
+    of: Literal["frequency", "damping", "mass", "added_mass", "normal_force", "gap", "friction", "stiffness"]
+    deviation: NotNegative = 0.0
+    distribution: Literal["normal", "lognormal", "uniform"] = "normal"
+    values: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
+    file: str | None = None
+    arrangement: Literal["given", "shuffled", "drawn"] = "given"
+    body: str | None = None
+    contact: str | None = None
+    at: str | None = None
+    together: Annotated[Number, Field(ge=0, le=1)] = 1.0
+    neighbours: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+
+    @model_validator(mode="after")
+    def _one_of_three(self) -> ScatterOfCase:
+        if sum(map(bool, (self.deviation, self.values, self.file))) != 1:
+            raise ValueError("deviation: give one of deviation, values and file")
+        return self
+
+
+class MistuningOfCase(Model):
+    """Samples of the whole ring with sectors that differ, by `microslip mistune`.
+
+    scatter: what differs. samples: at most. until: a run ends when the interval of the 95 % quantile is as narrow, half
+    of it over the quantile. seed: of all random numbers. stuck: contacts stick, which is linear. normal_force: N, of
+    the contacts that the sweep presses; the smallest of the sweep if not given.
+    """
+
+    scatter: Annotated[tuple[ScatterOfCase, ...], BeforeValidator(_tuple)]
+    samples: Annotated[int, Field(ge=1, le=100000000)] = 100
+    until: Annotated[Positive, Field(le=1)] | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    stuck: bool = False
+    normal_force: NotNegative | None = None
+
+
 class Over(Model):
     """A parameter of a map: keys of this case, dotted, which follow it, each with the factor that makes its value.
 

@@ -39,6 +39,7 @@ from .questions import (
     BifurcationOfCase,
     CurveOfCase,
     IdentificationOfCase,
+    MistuningOfCase,
     OrbitOfCase,
     OrdersOfCase,
     RangesOfCase,
@@ -329,6 +330,7 @@ class CaseSettings(Model):
     stability: StabilityOfCase | None = None
     bifurcation: Annotated[tuple[BifurcationOfCase, ...], BeforeValidator(_tuple)] = ()
     two_tones: TwoTonesOfCase | None = None
+    mistuning: MistuningOfCase | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -457,6 +459,8 @@ class CaseSettings(Model):
             raise ValueError(
                 'bodies: aerodynamics belong to waves, which a full ring does not have; write model = "sector"'
             )
+        if self.mistuning is not None and self.ring is None:
+            raise ValueError("mistuning: is that of a ring; add [ring] with blades and engine_order")
         if self.two_tones is not None and self.ring is not None:
             raise ValueError("two_tones: one sector that stands for a ring follows one wave; leave [ring] out")
         if any(c.against_sector for c in self.contacts) and self.ring is None:
@@ -515,6 +519,7 @@ class CaseSettings(Model):
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
             + [b.aerodynamics for b in self.components]
+            + [s.file for s in (self.mistuning.scatter if self.mistuning else ())]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 

@@ -136,15 +136,22 @@ def _solved(A: Array, B: Array) -> Array:
         return np.full_like(B, np.nan)
 
 
-def one_plus(pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int) -> Matrix:
-    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten."""
+def one_plus(
+    pieces: dict[tuple[int, int], Array], sizes: list[int], coefficients: int, by_parts: bool = False
+) -> Matrix:
+    """1 + the blocks (i, j) -> (W s_i, W s_j), as what can be solved fastest. The blocks (i, i) are overwritten.
+
+    Args:
+        by_parts: whether vectors are ordered by parts, each by its harmonics.
+    """
     n = len(sizes)
     diagonal = [pieces[i, i] for i in range(n)]
     for block, s in zip(diagonal, sizes, strict=True):
         block.flat[:: coefficients * s + 1] += 1.0
     if n == 1:
         return Dense(diagonal[0])
-    whole = Cyclic(diagonal, [None] * n, [None] * n, _order(sizes, coefficients))
+    order = np.arange(coefficients * sum(sizes)) if by_parts else _order(sizes, coefficients)
+    whole = Cyclic(diagonal, [None] * n, [None] * n, order)
     if n > 2 and all((i - j) % n in (0, 1, n - 1) for i, j in pieces):
         whole.behind[:] = [pieces.get((i, (i + 1) % n)) for i in range(n)]
         whole.before[:] = [pieces.get((i, (i - 1) % n)) for i in range(n)]

@@ -9,9 +9,12 @@ first cycle.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -167,13 +170,26 @@ def play(path: list[float], width: float) -> tuple[list[int], list[int]]:
 
 
 def model(
-    patch: Patch, contacts: int, samples: int, cycles: int, periodicity: float, torus: Torus | None = None
-) -> Forces:  # fmt: skip
-    """Of the forces of equal contacts: by hand where that is possible, else marched."""
-    kind = AFT
-    if patch.kinematics.shape == (1, 3, 1):
-        kind = _by_hand(patch.law, patch.kinematics[0, :, 0], cycles)
-    return kind(patch, contacts, samples, cycles, periodicity, torus)
+    patches: Sequence[Patch], samples: int, cycles: int, periodicity: float, torus: Torus | None = None
+) -> Forces:
+    """Of the forces of contacts that are `alike`: by hand where that is possible, else marched."""
+    laws = None if all(p is patches[0] for p in patches) else tuple(p.law for p in patches)
+    return _kind(patches[0], cycles)(patches[0], len(patches), samples, cycles, periodicity, torus, laws=laws)
+
+
+def alike(patch: Patch) -> Any:
+    """Equal for patches that one model serves: of the same points, with laws that differ in numbers alone. Those whose
+    forces are found by hand are not alike, unless they are the same."""
+    if issubclass(_kind(patch, 2), OneCoordinate):
+        return id(patch)
+    leaves, tree = jax.tree_util.tree_flatten(patch.law)
+    return id(patch.points), id(patch.shapes), tree, tuple(np.shape(x) for x in leaves)
+
+
+def _kind(patch: Patch, cycles: int) -> type[AFT]:
+    if patch.kinematics.shape != (1, 3, 1):
+        return AFT
+    return _by_hand(patch.law, patch.kinematics[0, :, 0], cycles)
 
 
 def _by_hand(law: Law, along: Array, cycles: int) -> type[AFT]:

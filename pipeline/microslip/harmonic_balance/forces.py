@@ -7,6 +7,7 @@ displacements u (c, k, W).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol
@@ -57,6 +58,7 @@ class AFT:
         periodicity: they end when the sliders are periodic within this share of the largest force; 0 marches all.
         torus: of motions of two frequencies, W their coefficients and the cycle its closed line; None: of one.
         seldom: whether the forces are asked for some dozens of times only, as of an estimate of error.
+        laws: (c,) of contacts that differ in numbers alone; None: all have the patch's.
     """
 
     patch: Patch
@@ -66,6 +68,7 @@ class AFT:
     periodicity: float = 1e-10
     torus: Torus | None = None
     seldom: bool = False
+    laws: tuple[Law, ...] | None = None
 
     def waves(self, coefficients: int) -> tuple[Array, Array]:
         """(s, W) of the series at the samples of a cycle, and (W, s) its coefficients from samples."""
@@ -80,6 +83,8 @@ class AFT:
     @cached_property
     def law(self) -> Law:
         """The law for the points of all contacts."""
+        if self.laws is not None:
+            return beside(self.laws, len(self.patch.points))
         return repeated(self.patch.law, len(self.patch.points), self.contacts)
 
     @property
@@ -126,7 +131,8 @@ class AFT:
     def traced(self, u: Array, period: float) -> list[Traced]:
         G = self.kinematics
         given = self.samples, self.cycles, self.periodicity, (self.waves(u.shape[2])[0], self.ahead(u.shape[2]))
-        return [traced(self.patch.law, G, one, period, *given) for one in u]
+        laws = self.laws or (self.patch.law,) * len(u)
+        return [traced(law, G, one, period, *given) for law, one in zip(laws, u, strict=True)]
 
 
 @lru_cache(maxsize=8)
@@ -148,6 +154,20 @@ def repeated(law: Law, n: int, times: int) -> Law:
         return jnp.concatenate([jnp.asarray(leaf)] * times, axis=axis)
 
     return jax.tree_util.tree_unflatten(tree, [more(x, a) for x, a in zip(leaves, axes, strict=True)])
+
+
+def beside(laws: Sequence[Law], n: int) -> Law:
+    """One law for the n points of each of several that differ in numbers alone: what differs stands once a point."""
+    leaves, (tree, *_) = zip(*map(jax.tree_util.tree_flatten, laws), strict=True)
+
+    def joined(values: Sequence[Any], axis: int | None) -> Any:
+        if axis is not None:
+            return jnp.concatenate([jnp.asarray(x) for x in values], axis=axis)
+        same = all(np.array_equal(x, values[0]) for x in values[1:])
+        return values[0] if same else jnp.repeat(jnp.stack([jnp.asarray(x) for x in values]), n)
+
+    each = zip(zip(*leaves, strict=True), point_axes(laws[0], n), strict=True)
+    return jax.tree_util.tree_unflatten(tree, [joined(values, axis) for values, axis in each])
 
 
 def _points(G: jax.Array, u: jax.Array) -> jax.Array:

@@ -9,7 +9,7 @@ with the number of its blades, not with its cube.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import Forces
+from .joints import Alone, Joints, Side, alone
 from .point_cycles import Cycle, Traced
 from .reduced import Eliminated, Seen, View
 
@@ -185,6 +186,18 @@ class Problem:
         return [_places(g, np.array(self.begins)) for g in self.groups]
 
     @cached_property
+    def sides(self) -> list[Side]:
+        """Of all contacts."""
+        numbers, found, begins = sorted(i for g in self.groups for i in g.contacts), list[Side](), np.array(self.begins)
+        for g in self.groups:
+            for coordinates, sign in ((g.first, 1.0), (g.second, -1.0)):
+                for i, own in zip(g.contacts, coordinates if coordinates is not None else (), strict=False):
+                    part = int(np.searchsorted(begins, own[0], "right")) - 1
+                    at = slice(int(own[0]) - self.begins[part], int(own[-1]) + 1 - self.begins[part])
+                    found.append(Side(numbers.index(i), part, at, sign))
+        return found
+
+    @cached_property
     def without(self) -> list[Array]:
         """(W, c_i, W, c_i) of each part: what the stiffness taken into it takes off the derivative of the forces."""
         unit = np.eye(self.coefficients)
@@ -328,6 +341,18 @@ class AtFrequency:
 
     def jacobian(self, slopes: list[Array]) -> Matrix:
         """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
+        p = self.problem
+        if len(p.slices) == 1:
+            return self._of_sides(slopes)
+        each = {i: own for g, S in zip(p.groups, slopes, strict=True) for i, own in zip(g.contacts, S, strict=True)}
+        ordered = [each[i] for i in sorted(each)]
+        return Joints(self._alone, ordered, p.sides, p.slices, p.scale, partial(self._of_sides, slopes))
+
+    @cached_property
+    def _alone(self) -> list[Alone] | None:
+        return alone([view.compliance[0] for view in self.views], self.problem.stiffness)
+
+    def _of_sides(self, slopes: list[Array]) -> Matrix:
         p = self.problem
         pieces: dict[tuple[int, int], Array] = {}
         for i, without in enumerate(p.without):
@@ -475,9 +500,9 @@ def of(
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
     groups = []
-    for same in _equal(assembly):
-        patch = contacts[same[0]].patch
-        model = (models or {}).get(same[0]) or by_hand.model(patch, len(same), samples, cycles, periodicity)
+    for same in _equal(assembly, marched=not models):
+        patches = [contacts[i].patch for i in same]
+        model = (models or {}).get(same[0]) or by_hand.model(patches, samples, cycles, periodicity)
         first = np.array([where[i, 0] for i in same])
         second = None if together or contacts[same[0]].second is None else np.array([where[i, 1] for i in same])
         offset, preload = (np.array([getattr(contacts[i], key) for i in same]) for key in ("offset", "preload"))
@@ -524,11 +549,13 @@ def _numbered(assembly: Assembly, together: bool) -> tuple[tuple[int, ...], dict
     return tuple(int(b) for b in np.cumsum([0, *counts[:-1]])), where
 
 
-def _equal(assembly: Assembly) -> list[list[int]]:
-    """Contacts of one patch object, and alike in having a second side or none."""
-    found: dict[tuple[int, bool], list[int]] = {}
+def _equal(assembly: Assembly, marched: bool) -> list[list[int]]:
+    """Contacts of one patch, or of patches that are alike where they are marched (`by_hand.alike`); and all with a
+    second side or none."""
+    found: dict[Any, list[int]] = {}
     for i, c in enumerate(assembly.contacts):
-        found.setdefault((id(c.patch), c.second is None), []).append(i)
+        key = by_hand.alike(c.patch) if marched else id(c.patch)
+        found.setdefault((key, c.second is None), []).append(i)
     return list(found.values())
 
 

@@ -176,7 +176,8 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
-    yield from (partial(newton, at, x, slope=slope) for x in starts)
+    rises = RISES if len(problem.slices) == 1 else 0  # of many bodies some contact always leads the wrong way
+    yield from (partial(newton, at, x, slope=slope, rises=rises) for x in starts)
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
     yield partial(_raised, problem, at.Omega)

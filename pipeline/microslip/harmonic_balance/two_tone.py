@@ -27,7 +27,7 @@ from ..data import Array, ComplexArray, UserError
 from ..system.assembly import Assembly, Linear
 from . import problem as balance
 from . import reduced
-from .by_hand import ElasticSpring, model
+from .by_hand import ElasticSpring
 from .forces import AFT
 from .problem import Group, Problem
 from .torus import Torus, closed, commensurate
@@ -344,8 +344,7 @@ def _contacts(g: Group, grounds: Sequence[Any], torus: Torus) -> Contacts:
             if moves.waves:
                 raise UserError("ground: wavy ground has frequencies of its own; leave waviness out")
             ground[i, :, 1:] = moves.velocity * np.array([np.cos(moves.angle), np.sin(moves.angle)])
-    made = model(patch, n, torus.count, CYCLES, PERIODICITY, torus)
-    assert isinstance(made, AFT)
+    made = replace(g.model, samples=torus.count, cycles=CYCLES, periodicity=PERIODICITY, torus=torus)
     found = Contacts(g, made, ground.reshape(-1, 3))
     if found.remember and ground.any():
         raise UserError("ground: moves under a contact that remembers; take friction by the velocity alone")

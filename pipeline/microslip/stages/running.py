@@ -19,6 +19,7 @@ from ..results.series import unit_of
 from ..units import Quantity, amplitude_of
 from .bifurcation import bifurcation_stage
 from .job import Job, open_job
+from .mistuning import mistuning_stage
 from .modal import modes_stage, system_stage
 from .orbit import orbit_stage
 from .page import report_stage
@@ -61,11 +62,11 @@ def _answered(
 ) -> tuple[dict[str, Any] | None, bool]:  # fmt: skip
     """The response of a case, None if it asks for none, and what else it asks for; whether all converged."""
     response, converged = None, True
-    if not case.is_only_in_time and not case.is_only_followed:
+    if not case.is_only_in_time and not case.is_only_followed and not case.mistuning:
         response, converged = response_stage(path, files, folder, assignments, force, report, wanted=wanted)
     answers = (
         (case.orbit, orbit_stage), (case.stability, squeal_stage), (case.bifurcation, bifurcation_stage),
-        (case.two_tones, tones_stage),
+        (case.two_tones, tones_stage), (case.mistuning, mistuning_stage),
     )  # fmt: skip
     for asked, stage in answers:
         if asked:
@@ -92,7 +93,9 @@ def run_case_file(
     folder = Path(".") / "build" / case.name
     _, converged = _answered(path, case, files, folder, assignments, force, report, wanted)
     page = "orbit.html" if case.is_only_in_time else "response.csv"
-    if case.is_only_followed:
+    if case.mistuning:
+        page = "mistuning.html"
+    elif case.is_only_followed:
         pages = {"stability": case.stability, "bifurcation": case.bifurcation, "two_tones": case.two_tones}
         page = next(f"{name}.html" for name, asked in pages.items() if asked)
     return folder / page, converged

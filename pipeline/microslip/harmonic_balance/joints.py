@@ -1,0 +1,170 @@
+"""Newton steps of many bodies by the relative motions of their contacts, whose number is half that of the sides.
+
+With the motions v of both sides of every contact (`problem.Problem`, form ``sides``) a step is
+
+    dv + D (E^T S E dv - k dv) = -R,    d = E v
+
+where S, the derivative of the forces, feels the relative motions d alone. With A = 1 - D k of each body by itself
+
+    dv = -A^-1 R - A^-1 D E^T S dd,    (1 + E A^-1 D E^T S) dd = -E A^-1 R
+
+and of d only what S feels: three coordinates of a patch with one point. A is what the body does without contacts, and
+singular where that is at resonance without damping: then the sides are solved for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..data import Array, ComplexArray, Indices
+from .blocks import Matrix, one_plus
+
+LEFT = 1e-6
+"""Share of the right side that a step may leave: of Newton's method, which sees the rest in the next one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A side of a contact: number of the contact, of the body, its coordinates among the body's, and its sign."""
+
+    contact: int
+    part: int
+    at: slice
+    sign: float
+
+
+Alone = tuple[ComplexArray, ComplexArray]
+"""(H + 1, c_i, c_i) A^-1 and A^-1 D of a part."""
+
+
+def alone(compliance: Sequence[ComplexArray], stiffness: Sequence[Array]) -> list[Alone] | None:
+    """What the parts do without contacts, from (H + 1, c_i, c_i) D and (c_i, c_i) k of each; None where one is at
+    resonance there."""
+    found = list[Alone]()
+    for D, k in zip(compliance, stiffness, strict=True):
+        try:
+            inverse = np.linalg.inv(np.eye(len(k)) - D @ k).astype(complex)
+        except np.linalg.LinAlgError:
+            return None
+        found.append((inverse, inverse @ D))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """1 + D (E^T S E - k), see above.
+
+    Attributes:
+        alone: of each part, see `alone`; None: of one there is nothing. slopes: of each contact (k, W, k, W) S.
+        sides: of all contacts. slices: coordinates of each part. scale: (c,) of a unit of x. blocks: the same matrix,
+            of the sides.
+    """
+
+    alone: list[Alone] | None
+    slopes: list[Array]
+    sides: list[Side]
+    slices: list[slice]
+    scale: Array
+    blocks: Callable[[], Matrix]
+
+    @property
+    def coefficients(self) -> int:
+        return self.slopes[0].shape[1]
+
+    def dense(self) -> Array:
+        return self._of_sides.dense()
+
+    @cached_property
+    def _of_sides(self) -> Matrix:
+        return self.blocks()
+
+    def solve(self, right: Array) -> Array:
+        """See `blocks.Matrix`."""
+        R = right.reshape(self.coefficients, -1) * self.scale
+        with np.errstate(all="ignore"):
+            dv = self._step(R)
+        if dv is None or not np.isfinite(dv).all():
+            return self._of_sides.solve(right)
+        return (dv / self.scale).ravel()
+
+    def _step(self, R: Array) -> Array | None:
+        """(W, c) dv of (W, c) A dv + D E^T S E dv = R; None where it is not found this way."""
+        if self.alone is None:
+            return None
+        free = np.empty_like(R)
+        for (inverse, _), s in zip(self.alone, self.slices, strict=True):
+            free[:, s] = applied(inverse, R[:, s])
+        force = self._across(self._relative.solve(_flat(self._felt(free))))
+        dv = free - self._answered(force)
+        again = self._across(_flat(self._felt(dv)))
+        off, size = _flat([f - g for f, g in zip(force, again, strict=True)]), _flat(force)
+        return dv if np.abs(off).max(initial=0.0) <= LEFT * np.abs(size).max(initial=0.0) else None
+
+    @cached_property
+    def _active(self) -> list[Indices]:
+        """Of each contact the coordinates that its forces feel."""
+        return [np.flatnonzero(np.abs(S).max(axis=(0, 1, 3)) > 0) for S in self.slopes]
+
+    def _felt(self, v: Array) -> list[Array]:
+        """Of each contact (W, a) relative motions that it feels, from (W, c)."""
+        out = [np.zeros((self.coefficients, len(a))) for a in self._active]
+        for one in self.sides:
+            out[one.contact] += one.sign * v[:, self.slices[one.part]][:, one.at][:, self._active[one.contact]]
+        return out
+
+    def _across(self, d: Array) -> list[Array]:
+        """Of each contact (W, k) forces S d."""
+        out, begin, W = [], 0, self.coefficients
+        for S, a in zip(self.slopes, self._active, strict=True):
+            own = d[begin : begin + W * len(a)].reshape(W, -1)
+            out.append(np.tensordot(S[:, :, a], own, axes=((2, 3), (1, 0))).T)
+            begin += own.size
+        return out
+
+    def _answered(self, force: list[Array]) -> Array:
+        """(W, c) A^-1 D E^T of forces."""
+        out = np.zeros((self.coefficients, self.slices[-1].stop))
+        for one in self.sides:
+            out[:, self.slices[one.part]][:, one.at] += one.sign * force[one.contact]
+        for (_, loose), s in zip(self.alone or [], self.slices, strict=True):
+            out[:, s] = applied(loose, out[:, s])
+        return out
+
+    @cached_property
+    def _relative(self) -> Matrix:
+        """1 + E A^-1 D E^T S, contact by contact."""
+        pieces: dict[tuple[int, int], Array] = {}
+        by_part: dict[int, list[Side]] = {}
+        for one in self.sides:
+            by_part.setdefault(one.part, []).append(one)
+        W, alone = self.coefficients, self.alone or []
+        for i, own in by_part.items():
+            loose = alone[i][1]
+            for to in own:
+                rows = loose[:, to.at][:, self._active[to.contact]]
+                for by in own:
+                    S, a = self.slopes[by.contact], self._active[by.contact]
+                    key = to.contact, by.contact
+                    felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
+                    block = (to.sign * by.sign) * applied(rows[..., by.at], felt)
+                    block = block.reshape(W * len(self._active[to.contact]), -1)
+                    pieces[key] = pieces[key] + block if key in pieces else block
+        return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
+
+
+def _flat(values: list[Array]) -> Array:
+    return np.concatenate([v.ravel() for v in values])
+
+
+def applied(D: ComplexArray, V: Array) -> Array:
+    """(W, c[, m]) matrices (H + 1, c, k) of the harmonics applied to (W, k[, m])."""
+    flat = V[..., None] if V.ndim == 2 else V
+    out = np.empty((len(V), D.shape[1], flat.shape[2]))
+    out[0] = D[0].real @ flat[0]
+    amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])
+    out[1::2], out[2::2] = amplitude.real, -amplitude.imag
+    return out[..., 0] if V.ndim == 2 else out

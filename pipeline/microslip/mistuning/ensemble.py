@@ -1,0 +1,173 @@
+"""Many samples, side by side and in order, kept so that a killed run goes on with the same bits."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data import Array, UserError
+from ..files import store
+from .samples import Asked, Sample, of_ring, sample
+from .statistics import Envelope, Quantile, quantile
+
+Report = Callable[[str], None]
+
+COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end"
+"""Of a sample, after its number."""
+
+EACH = 16
+"""Samples a worker gets before what is known is written."""
+
+WATCHED = 0.95
+"""Share of the samples below the quantile that progress shows, and that ends a run."""
+
+
+@dataclass
+class Ensemble:
+    """Samples of a mistuned ring.
+
+    Attributes:
+        asked. tuned: the ring of equal sectors. rows: (n, len(COLUMNS)) of the samples. envelope: see `Envelope`.
+    """
+
+    asked: Asked
+    tuned: Sample
+    rows: Array
+    envelope: Envelope
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def column(self, name: str) -> Array:
+        """(n,) one of `COLUMNS`."""
+        return self.rows[:, COLUMNS.index(name)]
+
+    @property
+    def solved(self) -> Array:
+        """(n,) bool, samples whose highest peak is known."""
+        return np.isfinite(self.column("amplitude"))
+
+    @property
+    def amplification(self) -> Array:
+        """(n,) highest amplitude of any blade over that of the tuned ring; NaN where it is not known."""
+        return self.column("amplitude") / self.tuned.top.amplitude
+
+    def quantile(self, share: float, confidence: float = 0.95) -> Quantile:
+        """Of the amplification."""
+        return quantile(self.amplification[self.solved], share, confidence)
+
+
+def run(
+    asked: Asked, samples: int, until: float | None = None, workers: int | None = None, file: Path | None = None,
+    inputs: str = "", executor: Executor | None = None, report: Report = lambda _: None,
+) -> Ensemble:  # fmt: skip
+    """Samples until there are so many, or the interval of the 95 % quantile is narrow enough.
+
+    Args:
+        until: half of that interval over the quantile. workers: processes; as many as there are cores, and one for a
+            few samples, if None. file: where the run is kept (.npz); with the same inputs it goes on. executor: in the
+            place of own processes, such as that of a cluster.
+    """
+    if samples < 1:
+        raise UserError(f"samples: {samples} are none; give 1 or more")
+    report("the tuned ring")
+    tuned = of_ring(asked, asked.tuned.whole, -1)
+    if not np.isfinite(tuned.top.amplitude):
+        raise UserError("mistuning: the tuned ring has no solution in the band; see what microslip respond says of it")
+    found = Ensemble(
+        asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
+    )
+    known = _kept(file, inputs, found) if file is not None else found
+    found = known if len(known) <= samples else found
+    workers = workers or min(_cores(), -(-samples // EACH))
+    with _computed(asked, workers, executor) as of:
+        while len(found) < samples and not _narrow(found, until):
+            numbers = range(len(found), min(samples, len(found) + EACH * workers))
+            made = []
+            for one in of(numbers):
+                found.envelope.add(one.grid)
+                made.append(_row(one))
+                report(_said(found, len(found) + len(made), samples))
+            found.rows = np.vstack([found.rows, made])
+            if file is not None:
+                _keep(file, inputs, found)
+    return found
+
+
+def _row(one: Sample) -> list[float]:
+    top = one.top
+    solved = np.isfinite(top.amplitude)
+    return [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
+            len(top.failed), top.at_end]  # fmt: skip
+
+
+def _narrow(found: Ensemble, until: float | None) -> bool:
+    return until is not None and len(found) >= EACH and found.quantile(WATCHED).width <= until
+
+
+def _said(found: Ensemble, done: int, samples: int) -> str:
+    said = f"{done} of {samples} samples"
+    if len(found) >= EACH:
+        said += f": {100 * WATCHED:g} % quantile of the amplification {found.quantile(WATCHED)}"
+    return said
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def _computed(
+    asked: Asked, workers: int, executor: Executor | None
+) -> Iterator[Callable[[range], Iterator[Sample]]]:  # fmt: skip
+    if executor is not None:
+        yield lambda numbers: executor.map(sample, [asked] * len(numbers), numbers)
+        return
+    if workers == 1:
+        yield lambda numbers: (sample(asked, n) for n in numbers)
+        return
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin, (asked,)) as pool:
+        yield lambda numbers: pool.map(_one, numbers)
+
+
+_own: Any = None
+
+
+def _begin(asked: Asked) -> None:
+    global _own
+    _own = asked
+
+
+def _one(number: int) -> Sample:
+    return sample(_own, number)
+
+
+def _keep(file: Path, inputs: str, found: Ensemble) -> None:
+    e = found.envelope
+    with store.complete_or_absent(file) as temporary:
+        with io.BytesIO() as whole:
+            np.savez(whole, rows=found.rows, sums=e.sums, bins=e.bins, inputs=np.array(inputs))
+            Path(temporary).write_bytes(whole.getvalue())
+
+
+def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:
+    """What a run with the same inputs has left, or what was given."""
+    if not file.is_file():
+        return found
+    try:
+        with np.load(store.ordinary(file), allow_pickle=False) as known:
+            if str(known["inputs"]) == inputs and len(known["rows"].shape) == 2:
+                envelope = Envelope(found.envelope.unit, known["sums"].copy(), known["bins"].copy())
+                return Ensemble(found.asked, found.tuned, known["rows"].copy(), envelope)
+    except (OSError, ValueError, KeyError):
+        return found
+    return found

@@ -1,0 +1,191 @@
+"""A whole ring whose sectors differ, from the one that stands for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..data import Array, ModalGroup, UserError
+from ..reduced.coordinates import of_density
+from ..system.assembly import Assembly, Contact, preloaded_contact
+from ..system.component import Component
+from .scatter import OF_BLADES, Scatter
+
+Deviations = Sequence[tuple[Scatter, Array]]
+"""What differs, and its (sectors, modes) deviations."""
+
+OF_LAWS = {
+    "friction": ("mu", "static", "sliding", "held"),
+    "stiffness": ("stiffness_0", "stiffness_1", "stiffness_2", "normal", "along", "across"),
+    "normal_force": ("constant", "held"),
+}
+"""What of a contact law's numbers follows each of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """A ring of equal sectors, and the whole rings that deviations make of it.
+
+    Attributes:
+        sector: one that stands for all, with its ring. pressed_by: body -> its own contacts' names whose normal forces
+            follow its mass.
+    """
+
+    sector: Assembly
+    pressed_by: dict[str, tuple[str, ...]]
+
+    @property
+    def sectors(self) -> int:
+        assert self.sector.ring is not None
+        return self.sector.ring.blades
+
+    @cached_property
+    def whole(self) -> Assembly:
+        return self.sector.unrolled()
+
+    def modes(self, s: Scatter) -> int:
+        """Into how many modes deviations may differ in one sector."""
+        if s.of not in ("frequency", "damping"):
+            return 1
+        return len(self.body(s).groups[0].omega)
+
+    def check(self, scatter: Sequence[Scatter]) -> None:
+        """Raise `UserError` for what is not there, or on which nothing depends."""
+        for s in scatter:
+            if s.of in OF_BLADES:
+                self.body(s)
+            else:
+                self._contact(s)
+        self.mistuned([(s, np.full((self.sectors, self.modes(s)), 1e-3)) for s in scatter])
+
+    def mistuned(self, deviations: Deviations) -> Assembly:
+        """The whole ring.
+
+        Raises:
+            UserError: a deviation that leaves nothing of a stiffness, a mass, a normal force or a coefficient.
+        """
+        components = {m.name: m for m in self.whole.components}
+        contacts = {c.name: c for c in self.whole.contacts}
+        for s, values in deviations:
+            _positive(s, values)
+            if s.of in OF_BLADES:
+                name = self.body(s).name
+                for j, own in enumerate(values):
+                    at = f"{name}_{j}"
+                    components[at] = deviated(components[at], s, own)
+                    for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
+                        contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
+            else:
+                name = self._contact(s).name
+                for j, own in enumerate(values):
+                    at = f"{name}_{j}"
+                    contacts[at] = _met(contacts[at], s, float(own[0]))
+        return replace(self.whole, components=tuple(components.values()), contacts=tuple(contacts.values()))
+
+    def body(self, s: Scatter) -> Component:
+        names = {m.name: m for m in self.sector.components}
+        if s.component is None and len(names) > 1:
+            raise UserError(f"{s.of}: of which body? give one of {', '.join(names)}")
+        if s.component is not None and s.component not in names:
+            raise UserError(f"{s.of}: there is no body '{s.component}', but {', '.join(names)}")
+        body = names[s.component or next(iter(names))]
+        if body.sectors > 1:
+            raise UserError(
+                f"{s.of}: '{body.name}' is a sector of a disc, whose blades have no modes of their own; scatter what "
+                "is in the contacts"
+            )
+        return body
+
+    def _contact(self, s: Scatter) -> Contact:
+        names = {c.name: c for c in self.sector.contacts}
+        if not names or s.contact is None and len(names) > 1:
+            has = ", ".join(names) or "none"
+            raise UserError(f"{s.of}: of which contact? the ring has {has}")
+        if s.contact is not None and s.contact not in names:
+            raise UserError(f"{s.of}: there is no contact '{s.contact}', but {', '.join(names)}")
+        return names[s.contact or next(iter(names))]
+
+
+def _positive(s: Scatter, values: Array) -> None:
+    least = 0.0 if s.of == "added_mass" else -1.0
+    if s.of != "gap" and not values.min() > least - (s.of == "added_mass") * 1e-300:
+        sector = int(values.min(axis=1).argmin())
+        raise UserError(
+            f"{s.of}: a deviation of {values.min():.3g} in sector {sector} leaves nothing of it; take a smaller "
+            'deviation, or distribution = "lognormal"'
+        )
+
+
+def deviated(component: Component, s: Scatter, own: Array) -> Component:
+    group = component.groups[0]
+    if s.of == "mass":
+        return replace(component, groups={0: of_density(group, 1 + float(own[0]))})
+    if s.of == "added_mass":
+        return replace(component, groups={0: _heavier(group, s, float(own[0]))})
+    V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
+    P, omega, D = group.M_r @ V, group.omega, group.damping_ratio
+    if s.of == "damping":
+        C = (P * (2 * D * omega * own)) @ P.conj().T
+        loss = {0: component.loss[0] + (P * (2 * D * omega**2 * own)) @ P.conj().T} if component.loss else {}
+        changed = replace(group, C_r=group.C_r + C if not loss else group.C_r, damping_ratio=D * (1 + own))
+        return replace(component, groups={0: changed}, loss=loss)
+    stiffer, faster = (1 + own) ** 2 - 1, own
+    K = group.K_r + (P * (omega**2 * stiffer)) @ P.conj().T
+    loss = {0: component.loss[0] + (P * (2 * D * omega**2 * stiffer)) @ P.conj().T} if component.loss else {}
+    C = group.C_r if loss else group.C_r + (P * (2 * D * omega * faster)) @ P.conj().T
+    return replace(component, groups={0: replace(group, omega=omega * (1 + own), K_r=K, C_r=C)}, loss=loss)
+
+
+def _heavier(group: ModalGroup, s: Scatter, mass: float) -> ModalGroup:
+    rows = group.monitors.get(s.at or "")
+    if rows is None or rows.unit != "m":
+        raise UserError(
+            f"added_mass: at: give a monitor of displacements, one of {', '.join(group.monitors) or 'none'}"
+        )
+    return replace(group, M_r=group.M_r + mass * rows.rows.conj().T @ rows.rows)
+
+
+def _met(contact: Contact, s: Scatter, own: float) -> Contact:
+    if s.of == "gap":
+        away = np.zeros_like(contact.offset)
+        away[0] = own
+        return replace(contact, offset=contact.offset - away)
+    if s.of == "normal_force":
+        return _pressed(contact, own)
+    law, count = _scaled(contact.patch.law, OF_LAWS[s.of], 1 + own)
+    if not count:
+        raise UserError(f"{s.of}: no number of contact '{contact.name}' follows it, by its law {type(law).__name__}")
+    changed = replace(contact, patch=replace(contact.patch, law=law))
+    force = float(contact.preload[0])
+    return changed if not force else changed.pressed(force)
+
+
+def _pressed(contact: Contact, own: float) -> Contact:
+    force = float(contact.preload[0])
+    law, count = _scaled(contact.patch.law, OF_LAWS["normal_force"], 1 + own)
+    if not force and not count:
+        raise UserError(f"normal_force: contact '{contact.name}' has none; give it one, or scatter its gap")
+    changed = replace(contact, patch=replace(contact.patch, law=law))
+    found = preloaded_contact(
+        contact.name, changed.patch, contact.first, contact.second, normal=force * (1 + own),
+        compliance=contact.compliance,
+    )  # fmt: skip
+    return replace(found, phase=contact.phase, length=contact.length)
+
+
+def _scaled(law: Any, names: tuple[str, ...], factor: float) -> tuple[Any, int]:
+    """The law with its numbers of these names, wherever they stand, times a factor; how many there are."""
+    changed: dict[str, Any] = {}
+    count = 0
+    for f in fields(law):
+        value = getattr(law, f.name)
+        if is_dataclass(value) and not isinstance(value, type):
+            changed[f.name], more = _scaled(value, names, factor)
+            count += more
+        elif f.name in names and value is not None and not f.metadata.get("static"):
+            changed[f.name], count = value * factor, count + 1
+    return replace(law, **changed), count

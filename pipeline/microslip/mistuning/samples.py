@@ -1,0 +1,151 @@
+"""One mistuned ring after the other: what of its blades is highest, and all of them on the frequencies of the sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..data import Array
+from ..harmonic_balance import problem as balance
+from ..harmonic_balance import reduced
+from ..harmonic_balance.forces import Forces
+from ..harmonic_balance.problem import Problem
+from ..harmonic_balance.solver import Point, solve, sweep
+from ..system.assembly import Assembly
+from .peaks import Highest, highest
+from .ring import Deviations, Tuned
+from .scatter import Scatter
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of every sample.
+
+    Attributes:
+        tuned. scatter. frequency: (f,) Hz. seed. balance: of `harmonic_balance.problem.of`: harmonics, samples, ...
+        stuck: contacts stick, whatever their friction. models: of its contacts, from a ring; None: their laws, marched.
+    """
+
+    tuned: Tuned
+    scatter: tuple[Scatter, ...]
+    frequency: Array
+    seed: int = 0
+    balance: Mapping[str, Any] = field(default_factory=dict)
+    stuck: bool = False
+    models: Callable[[Assembly], Mapping[int, Forces]] | None = None
+
+    def problem(self, ring: Assembly) -> Problem:
+        """The balance of a whole ring, all in the same units."""
+        models = None if self.models is None else dict(self.models(ring))
+        return balance.of(ring, form="sides", length=balance.moves_by(self.tuned.whole), models=models, **self.balance)
+
+    @cached_property
+    def tuned_points(self) -> list[Point]:
+        """Solutions of the ring of equal sectors on the frequencies: what samples start from."""
+        return [] if self.stuck else [p for p in sweep(self.problem(self.tuned.whole), self.frequency) if p.converged]
+
+    def deviations(self, sample: int) -> Deviations:
+        """Of a sample: the same, whoever asks."""
+        N = self.tuned.sectors
+        return [(s, s.drawn(N, self.tuned.modes(s), i, self.seed, sample)) for i, s in enumerate(self.scatter)]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Attributes:
+    number. top: see `Highest`; its read-outs are those of the sectors, one each. grid: (f, sectors) amplitudes on the
+        frequencies asked for, NaN where there is no solution.
+    """
+
+    number: int
+    top: Highest
+    grid: Array
+
+    @property
+    def localisation(self) -> float:
+        """Share of the sum of squares that is the highest blade's, at its peak: 1/N of blades that move alike, 1 of
+        one that moves alone."""
+        at = int(np.abs(self.top.frequencies - self.top.frequency).argmin())
+        y = self.top.amplitudes[at] ** 2
+        return float(y.max() / y.sum())
+
+
+def sample(asked: Asked, number: int) -> Sample:
+    """One ring of the ensemble."""
+    return of_ring(asked, asked.tuned.mistuned(asked.deviations(number)), number)
+
+
+def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
+    """A whole ring: its highest blade over the frequency."""
+    respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
+    top = highest(respond, asked.frequency)
+    grid = np.full((len(asked.frequency), asked.tuned.sectors), np.nan)
+    places = {f: i for i, f in enumerate(top.frequencies)}
+    for row, f in enumerate(asked.frequency):
+        if float(f) in places:
+            grid[row] = top.amplitudes[places[float(f)]]
+    return Sample(number, top, grid)
+
+
+class Sliding:
+    """Amplitudes of a ring with friction at any frequency, each started from what is known nearby.
+
+    Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units. known: of this one.
+    """
+
+    def __init__(self, problem: Problem, tuned: Sequence[Point] = ()) -> None:
+        self.problem, self.tuned = problem, tuned
+        self.known: list[Point] = []
+        self.slope: Any = None
+
+    def __call__(self, frequency: float) -> Array | None:
+        """(w,) m."""
+        Omega = 2 * np.pi * frequency
+        point = solve(self.problem, Omega, self._starts(Omega), self.slope)
+        self.slope = point.slope
+        if not point.converged:
+            return None
+        self.known.append(replace(point, slope=None))
+        return np.abs(amplitudes(self.problem, point))
+
+    def _starts(self, Omega: float) -> list[Array]:
+        """Where Newton's method may begin: the two that leave least, of those carried on and the tuned ring's."""
+        starts = [_carried(points, Omega) for points in (self._near(Omega, 2), self._near(Omega, 4)) if points]
+        starts += [_carried(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3], Omega)] if self.tuned else []
+        at = self.problem.at(Omega)
+        return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
+
+    def _near(self, Omega: float, most: int) -> list[Point]:
+        return sorted(self.known, key=lambda p: abs(p.Omega - Omega))[:most]
+
+
+def _carried(points: Sequence[Point], Omega: float) -> Array:
+    """Solutions at other frequencies carried on to this one by the polynomial through them."""
+    at = np.array([p.Omega for p in points])
+    return sum(p.x * np.prod((Omega - np.delete(at, i)) / (at[i] - np.delete(at, i))) for i, p in enumerate(points))
+
+
+def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> Array:
+    """(w,) complex 0-peak amplitudes of all read-outs at a solution, m."""
+    at = problem.at(point.Omega)
+    force = at.force(point.x)
+    q, F = at.modal(point.x, force)[harmonic], at.amplitudes(force)[harmonic]
+    parts = zip(problem.parts[harmonic], q, problem.slices, strict=True)
+    return np.sum([reduced.monitored(part, own, F[s], problem.share) for part, own, s in parts], axis=0)
+
+
+class Sticking:
+    """Amplitudes of a ring whose contacts stick, from the matrices of the whole of it."""
+
+    def __init__(self, ring: Assembly) -> None:
+        self.part, self.k = ring.joined(1), ring.stiffness
+
+    def __call__(self, frequency: float) -> Array:
+        """(w,) m."""
+        found = reduced.seen(self.part, self.k, 2 * np.pi * frequency, 1)
+        force = self.k @ found.reference
+        return np.abs(reduced.monitored(self.part, found.modal, force))

@@ -1,0 +1,134 @@
+"""What differs from sector to sector: drawn from a distribution, or given; the same for a seed, whoever computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from ..data import Array, UserError
+
+OF_BLADES = {
+    "frequency": "eigenfrequencies of a body's modes",
+    "damping": "damping ratios of a body's modes",
+    "mass": "mass of a body, and what it presses by its centrifugal load",
+    "added_mass": "kg that sit at a monitor of a body, as screws at the tips of the blades of section 5.4",
+}
+"""What may differ in the bodies."""
+
+OF_CONTACTS = {
+    "normal_force": "normal force of a contact",
+    "gap": "m by which the faces of a contact stand apart, more than drawn",
+    "friction": "friction coefficient of a contact",
+    "stiffness": "normal and tangential contact stiffness",
+}
+"""What may differ in the contacts."""
+
+ABSOLUTE = "added_mass", "gap"
+"""Those whose deviations are values in kg or m; of all others they are shares of the nominal value."""
+
+Distribution = str
+DISTRIBUTIONS = "normal", "lognormal", "uniform"
+ARRANGEMENTS = "given", "shuffled", "drawn"
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """One thing that differs from sector to sector of a ring.
+
+    Attributes:
+        of: a key of `OF_BLADES` or `OF_CONTACTS`. deviation: standard deviation, a share of the nominal value (of
+            `ABSOLUTE` in kg or m). distribution: ``normal``, ``lognormal`` (median nominal) or ``uniform``.
+        values: deviations that are known, sector by sector; fewer than there are sectors are repeated round the ring.
+            arrangement: of them, as ``given``, ``shuffled`` from sample to sample, or ``drawn`` one by one.
+        component, contact: name, of an assembly with one the only one if None. at: monitor of ``added_mass``.
+        together: correlation between the modes of a body: 1 all alike, 0 each alone. neighbours: correlation between a
+            sector and the next one, its powers those farther away.
+    """
+
+    of: str
+    deviation: float = 0.0
+    distribution: Distribution = "normal"
+    values: tuple[float, ...] = ()
+    arrangement: str = "given"
+    component: str | None = None
+    contact: str | None = None
+    at: str | None = None
+    together: float = 1.0
+    neighbours: float = 0.0
+
+    def __post_init__(self) -> None:
+        known = {**OF_BLADES, **OF_CONTACTS}
+        if self.of not in known:
+            raise UserError(f"of: '{self.of}' is none of {', '.join(known)}")
+        if not np.isfinite([self.deviation, *self.values]).all() or self.deviation < 0:
+            raise UserError(f"deviation of {self.of}: must be a number that is not negative")
+        if (self.deviation > 0) == bool(self.values):
+            raise UserError(f"{self.of}: give deviation, or values that are known, and not both")
+        for key, choices in (("distribution", DISTRIBUTIONS), ("arrangement", ARRANGEMENTS)):
+            if getattr(self, key) not in choices:
+                raise UserError(f"{key}: '{getattr(self, key)}' is none of {', '.join(choices)}")
+        for key, least in (("together", 0.0), ("neighbours", -1.0)):
+            if not least <= getattr(self, key) <= 1.0:
+                raise UserError(f"{key}: {getattr(self, key):g} is no correlation between {least:g} and 1")
+
+    @property
+    def in_bodies(self) -> bool:
+        return self.of in OF_BLADES
+
+    @property
+    def words(self) -> str:
+        return {**OF_BLADES, **OF_CONTACTS}[self.of]
+
+    def drawn(self, sectors: int, modes: int, number: int, seed: int, sample: int) -> Array:
+        """(sectors, modes) deviations of one sample.
+
+        Args:
+            modes: 1 of what has none. number: of this scatter among those of a ring: each has random numbers of its
+                own, which depend on it, seed and sample alone.
+
+        Raises:
+            UserError: values that do not go round the ring.
+        """
+        rng = np.random.default_rng([seed, sample, number])
+        if self.values:
+            return np.repeat(self._known(sectors, rng)[:, None], modes, axis=1)
+        return self._of(self._normal(rng, sectors, modes))
+
+    def _known(self, sectors: int, rng: np.random.Generator) -> Array:
+        known = np.array(self.values)
+        if self.arrangement == "drawn":
+            return rng.choice(known, sectors)
+        if sectors % len(known):
+            raise UserError(
+                f"values of {self.of}: {len(known)} do not go round a ring of {sectors} sectors; give {sectors}, or a "
+                "pattern that divides it"
+            )
+        whole = np.tile(known, sectors // len(known))
+        return rng.permutation(whole) if self.arrangement == "shuffled" else whole
+
+    def _normal(self, rng: np.random.Generator, sectors: int, modes: int) -> Array:
+        """(sectors, modes) correlated numbers of variance 1."""
+        alone, common = rng.standard_normal((sectors, modes)), rng.standard_normal((sectors, 1))
+        z = np.sqrt(self.together) * common + np.sqrt(1 - self.together) * alone
+        if not self.neighbours:
+            return z
+        apart = np.minimum(np.arange(sectors), sectors - np.arange(sectors))
+        power = np.fft.fft(self.neighbours**apart).real  # the eigenvalues of a circulant covariance
+        return np.fft.ifft(np.sqrt(np.maximum(power, 0.0))[:, None] * np.fft.fft(z, axis=0), axis=0).real
+
+    def _of(self, z: Array) -> Array:
+        if self.distribution == "uniform":
+            return self.deviation * np.sqrt(12) * (ndtr(z) - 0.5)
+        if self.distribution == "lognormal":
+            return np.expm1(np.sqrt(np.log(0.5 + np.sqrt(0.25 + self.deviation**2))) * z)
+        return self.deviation * z
+
+
+def check(scatter: Sequence[Scatter], least: float = -1.0) -> None:
+    """Raise `UserError` where known values alone make something negative."""
+    for s in scatter:
+        if s.of not in ABSOLUTE and s.values and min(s.values) <= least:
+            raise UserError(f"values of {s.of}: {min(s.values):g} leaves nothing of it; deviations are shares of 1")

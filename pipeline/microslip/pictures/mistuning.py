@@ -1,0 +1,112 @@
+"""Mistuned rings: histogram of the amplification, envelopes over the frequency, the worst pattern on its ring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.stats
+
+from ..data import Array
+from ..harmonic_balance.readout import measured
+from ..mistuning.ensemble import Ensemble
+from ..mistuning.samples import Sample, sample
+from ..mistuning.sensitivity import Approximation
+from ..mistuning.statistics import fits
+from .operating import numbers_within
+from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
+
+
+def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
+    """Histogram of the highest blade, its 95 % quantile with the interval, and the extreme-value fit."""
+    figure, axes = single_panel(8.0, 4.8)
+    a = found.amplification[found.solved]
+    _, edges, _ = axes.hist(a, bins=min(max(10, int(np.sqrt(len(a)))), 80), color="#9ec5e8", edgecolor="white")
+    q = found.quantile(0.95)
+    if np.isfinite(q.high) and q.low > 0:
+        axes.axvspan(q.low, q.high, color=COLOURS[1], alpha=0.15, linewidth=0)
+    axes.axvline(q.value, color=COLOURS[1], label=f"95 % quantile: {q}")
+    axes.axvline(1.0, color="0.3", linestyle="--", linewidth=1.0, label="tuned ring")
+    for fit in fits(a)[:1]:
+        p = fit.parameters
+        x = np.linspace(edges[0], edges[-1], 300)
+        y = scipy.stats.genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
+        axes.plot(x, y, color=COLOURS[0], label=f"{fit.name}, misfit {fit.distance:.2g}")
+    axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title)
+    axes.legend(fontsize=9)
+    return save_figure(figure, path)
+
+
+def envelope_picture(found: Ensemble, near: Approximation | None, path: Path, title: str) -> Path:
+    """Mean, 95 % envelope and the extremes of all blades over the frequency, above; the Weibull exponent, below (Sextro
+    Figs. 5.6-3 to 5.6-6). near: the same by first order, dashed."""
+    figure = empty_figure(8.5, 7.0)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1.0])
+    f, e = found.asked.frequency, found.envelope.columns()
+    by, unit = measured(found.asked.tuned.whole).scale(float(found.tuned.top.amplitude))
+    for axes in (top, bottom):
+        plain_axes(axes)
+    low, high = (by * e[f"quantile_{p}_percent"] for p in ("2.5", "97.5"))
+    top.fill_between(f, low, high, color="#9ec5e8", alpha=0.6, linewidth=0, label="95 % of all blades")
+    top.plot(f, by * e["highest"], color="0.55", linewidth=0.9, label="highest of all")
+    top.plot(f, by * e["mean"], color=COLOURS[0], label="mean")
+    top.plot(f, by * np.nanmax(found.tuned.grid, axis=1), color=COLOURS[1], linestyle="--", label="tuned ring")
+    bottom.plot(f, np.log(e["weibull_exponent"]), color=COLOURS[0], label="samples")
+    if near is not None:
+        for share, label in ((0.025, "95 % by first order"), (0.975, None)):
+            top.plot(near.frequency, by * near.envelope(share), ":", color=COLOURS[3], linewidth=1.4, label=label)
+        bottom.plot(near.frequency, np.log(near.weibull_exponent), ":", color=COLOURS[3], label="first order")
+        bottom.legend(fontsize=9)
+    top.set(ylabel=f"amplitude in {unit}", yscale="log", title=title)
+    numbers_within(top.yaxis)
+    top.legend(fontsize=9)
+    bottom.axhline(0.0, color="0.5", linewidth=0.8)
+    bottom.set(xlabel="excitation frequency in Hz", ylabel="ln k (Weibull)", xlim=(f[0], f[-1]))
+    return save_figure(figure, path)
+
+
+def sensitivity_picture(near: Approximation, path: Path, title: str) -> Path:
+    """By how many percent a blade's amplitude changes with one percent more frequency of a blade so many sectors
+    further, over the frequency."""
+    figure, axes = single_panel(8.5, 4.6)
+    share = (near.sensitivity.sum(axis=2) / near.mean[:, None]).T
+    N = len(share)
+    order = (np.arange(N) - N // 2) % N
+    most = float(np.abs(share).max())
+    image = axes.imshow(
+        share[order], aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
+        extent=(near.frequency[0], near.frequency[-1], -(N // 2) - 0.5, N - N // 2 - 0.5),
+    )  # fmt: skip
+    axes.grid(False)
+    axes.set(xlabel="excitation frequency in Hz", ylabel="sectors further", title=title)
+    figure.colorbar(image, label="% of amplitude by % of frequency")
+    return save_figure(figure, path)
+
+
+def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
+    """The sample with the highest blade: amplitudes round the ring at its peak, and what differs."""
+    at = int(np.nanargmax(found.amplification))
+    one: Sample = sample(found.asked, at)
+    figure = empty_figure(9.0, 4.8)
+    ring = figure.add_subplot(1, 2, 1, projection="polar")
+    N = found.asked.tuned.sectors
+    place = int(np.abs(one.top.frequencies - one.top.frequency).argmin())
+    y = one.top.amplitudes[place] / found.tuned.top.amplitude
+    turn = 2 * np.pi * np.arange(N) / N
+    ring.bar(
+        turn, y, width=2 * np.pi / N * 0.85, color=[COLOURS[1] if i == one.top.output else COLOURS[0] for i in range(N)]
+    )
+    ring.plot(np.linspace(0, 2 * np.pi, 200), np.ones(200), "--", color="0.4", linewidth=1.0)
+    ring.set(xticks=turn, xticklabels=[str(i) for i in range(N)], theta_zero_location="N", theta_direction=-1)
+    ring.tick_params(labelsize=8)
+    ring.set_title(f"amplification at {one.top.frequency:.6g} Hz", fontsize=10)
+    axes = figure.add_subplot(1, 2, 2)
+    plain_axes(axes)
+    drawn: list[tuple[str, Array]] = [(s.of.replace("_", " "), v[:, 0]) for s, v in found.asked.deviations(at)]
+    for i, (name, v) in enumerate(drawn):
+        width = 0.8 / len(drawn)
+        axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, 100 * v, width, color=COLOURS[i % 10], label=name)
+    axes.set(xlabel="blade", ylabel="deviation in %")
+    axes.legend(fontsize=9)
+    figure.suptitle(f"{title}: sample {at}, blade {one.top.output}")
+    return save_figure(figure, path)

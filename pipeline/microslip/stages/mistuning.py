@@ -1,0 +1,250 @@
+"""Samples of a case's ring with sectors that differ: all of them as a table, envelopes, pictures and a page."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..basis import read_basis
+from ..case import CaseSettings, load_case
+from ..case.assemble import Built, build, swept
+from ..case.problem import book_models
+from ..case.questions import MistuningOfCase, ScatterOfCase
+from ..data import Array, UserError
+from ..files import store
+from ..files.tables import columns_csv, rows_csv
+from ..harmonic_balance.readout import measured
+from ..mistuning.ensemble import COLUMNS, Ensemble, run
+from ..mistuning.ring import Tuned
+from ..mistuning.samples import Asked
+from ..mistuning.scatter import OF_CONTACTS, Scatter, check
+from ..mistuning.sensitivity import Approximation, approximation
+from ..mistuning.statistics import SHARES, fits
+from ..report.mistuning import mistuning_html
+from ..system.assembly import Contact
+from .checkpoint import inputs_of
+from .stage import Made, Report, Stage, hash_of_code
+
+
+def mistuning_stage(
+    case_path: Path, files: Mapping[str, Path], folder: Path, assignments: list[str] | None = None,
+    force: bool = False, report: Report = lambda _: None, pictures: bool = True, workers: int | None = None,
+) -> tuple[list[Path], list[str], bool]:  # fmt: skip
+    """What a case asks for in [mistuning], in a folder.
+
+    Args:
+        files: body of the case -> its modal file. workers: see `mistuning.ensemble.run`.
+
+    Returns:
+        The files, sentences, and whether every sample has a solution.
+
+    Raises:
+        UserError: the case asks for none; a scatter of what is not there, or that leaves nothing of it.
+    """
+    settings, raw = load_case(case_path, assignments)
+    if settings.mistuning is None:
+        raise UserError(f"{case_path}: mistuning: is missing; add [[mistuning.scatter]] with of and deviation")
+    stage = Stage(folder / "mistuning.json", ("stages.mistuning",), force, report)
+    inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
+    stage.make(inputs, lambda: _work(stage, settings, inputs, case_path, files, workers, pictures))
+    told = json.loads(stage.product.read_text())
+    return [folder / name for name in told["files"]], told["sentences"], told["solved"]
+
+
+def _work(
+    stage: Stage, settings: CaseSettings, inputs: Mapping[str, Any], case_path: Path, files: Mapping[str, Path],
+    workers: int | None, pictures: bool,
+) -> Made:  # fmt: skip
+    folder, asked = stage.product.parent, settings.mistuning
+    assert asked is not None
+    built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
+    kept = folder / "mistuning.npz"
+    if stage.force:
+        kept.unlink(missing_ok=True)
+    known = _of_samples(inputs)
+    try:
+        what = asked_of(built, asked, case_path)
+        found = run(what, asked.samples, asked.until, workers, kept, known, report=stage.report)
+    except UserError as error:
+        text = str(error).removeprefix(f"{case_path}: ").removeprefix("mistuning: ")
+        raise UserError(f"{case_path}: mistuning: {text}") from error
+    stage.begin()
+    first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
+    near = approximation(what, first) if first and not what.stuck and settings.stuck_ratios is None else None
+    sentences = [*said(found), *built.messages]
+    made = _written(found, near, folder)
+    drawn = _pictures(found, near, folder / "pictures", settings.name) if pictures else []
+    page = folder / "mistuning.html"
+    store.write_text(page, mistuning_html(f"{settings.name}: mistuned", found, sentences, drawn))
+    made = [page, *made, *drawn]
+    told = {
+        "files": [str(path.relative_to(folder)) for path in made],
+        "sentences": sentences,
+        "solved": bool(found.solved.all()),
+    }
+    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    return Made(made)
+
+
+def _of_samples(inputs: Mapping[str, Any]) -> str:
+    """Hash of what one sample depends on: not how many there are."""
+    case = dict(inputs["case"])
+    case["mistuning"] = {k: v for k, v in case["mistuning"].items() if k not in ("samples", "until")}
+    return store.fingerprint({**inputs, "case": case, "pictures": None}, hash_of_code(("mistuning.samples",)))
+
+
+def asked_of(built: Built, asked: MistuningOfCase, path: Path) -> Asked:
+    """What is asked of every sample of a case.
+
+    Raises:
+        UserError: a scatter of what is not there, or that leaves nothing of it.
+    """
+    settings = built.settings
+    sector = built.one(_normal_force(built, asked))
+    sector = replace(sector, outputs=sector.outputs[:1])
+    scatter = tuple(_scatter(s, i, built, path) for i, s in enumerate(asked.scatter))
+    check(scatter)
+    thrown = {b.name for b in settings.components if b.pressed_at_rpm is not None}
+    pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
+    tuned = Tuned(sector, pressed)
+    tuned.check(scatter)
+    sweep = settings.sweep
+    frequency = np.linspace(sweep.start, sweep.stop, sweep.points)
+    balance = {"harmonics": settings.balanced, **settings.marching}
+    models = partial(book_models, strips=settings.strips) if settings.mode == "book" else None
+    return Asked(tuned, scatter, frequency, asked.seed, balance, asked.stuck, models)
+
+
+def _ends(contact: Contact) -> set[str]:
+    return {side.component for side in (contact.first, contact.second) if side is not None}
+
+
+def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
+    """N, of the contacts that the sweep presses; None where there are none."""
+    if not any(swept(c) for c in built.contacts):
+        return None
+    given = built.settings.sweep.normal_forces
+    if asked.normal_force is None and (not given or isinstance(given, str)):
+        raise UserError("normal_force: is missing; give that of the contacts, in N")
+    return asked.normal_force if asked.normal_force is not None else min(float(x) for x in given or ())
+
+
+def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path) -> Scatter:
+    where = f"scatter.{number} ({s.of})"
+    values = _measured(path.parent / s.file, s.of) if s.file else s.values
+    contact = s.contact
+    if contact is not None and s.of in OF_CONTACTS:
+        named = {c.interface: x.name for c, x in zip(built.contacts, built.assembly.contacts, strict=True)}
+        contact = named.get(contact, contact)
+    try:
+        return Scatter(s.of, s.deviation, s.distribution, values, s.arrangement, s.body, contact, s.at, s.together,
+                       s.neighbours)  # fmt: skip
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from error
+
+
+def _measured(file: Path, of: str) -> tuple[float, ...]:
+    """Deviations in a table: its column ``deviation``, or ``frequency_Hz`` over its mean, less 1."""
+    try:
+        with store.ordinary(file).open(newline="", encoding="utf-8-sig") as text:
+            rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f"file: {file}: cannot be read as comma-separated values ({error})") from error
+    for name in ("deviation", "frequency_Hz"):
+        if rows and name in rows[0]:
+            try:
+                found = np.array([float(row[name]) for row in rows])
+            except (TypeError, ValueError) as error:
+                raise UserError(f"file: {file}: column {name}: {error}; every row needs a number") from error
+            if not np.isfinite(found).all():
+                raise UserError(f"file: {file}: column {name}: holds what is not a finite number; correct it")
+            return tuple(found if name == "deviation" else found / found.mean() - 1)
+    raise UserError(f"file: {file}: has no row, or neither a column deviation nor frequency_Hz; add one for {of}")
+
+
+def said(found: Ensemble) -> list[str]:
+    """What a reader came for, in sentences."""
+    top, assembly = found.tuned.top, found.asked.tuned.whole
+    sized, N = measured(assembly).sized, found.asked.tuned.sectors
+    count = int(found.solved.sum())
+    told = [
+        f"The tuned ring of {N} sectors reaches {sized(top.amplitude)} at {top.frequency:.6g} Hz.",
+    ]
+    if not count:
+        return [*told, "No sample has a solution."]
+    a, at = found.amplification, int(np.nanargmax(found.amplification))
+    told.append(
+        f"Amplification of the highest blade in {count} samples: mean {np.nanmean(a):.4g}, 95 % quantile "
+        f"{found.quantile(0.95)}, 99 % quantile {found.quantile(0.99)}; the intervals hold with 95 %."
+    )
+    told.append(
+        f"The highest of all is {a[at]:.4g}, sample {at}: blade {int(found.column('sector')[at])} at "
+        f"{found.column('frequency_Hz')[at]:.6g} Hz."
+    )
+    if found.asked.stuck:
+        whitehead = 0.5 * (1 + np.sqrt(N))
+        told.append(f"Contacts stick. Whitehead's bound for one family of modes and equal damping is {whitehead:.4g}.")
+    ends, unsolved = int(np.nansum(found.column("at_end"))), int((found.column("unsolved") > 0).sum())
+    if ends:
+        told.append(f"warning: in {ends} samples the highest amplitude is at an end of the band; widen the sweep.")
+    if unsolved:
+        told.append(
+            f"warning: {unsolved} samples have frequencies without a solution; they are counted in samples.csv."
+        )
+    return told
+
+
+def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:
+    column = measured(found.asked.tuned.whole).column
+    rows = found.rows
+    head = ["sample", "amplification", *(column(n) if n == "amplitude" else n for n in COLUMNS)]
+    cells = (
+        [str(i), f"{a:.12g}", *(f"{v:.12g}" for v in row)]
+        for i, (a, row) in enumerate(zip(found.amplification, rows, strict=True))
+    )
+    store.write_text(folder / "samples.csv", rows_csv(head, cells))
+    tuned = np.nanmax(found.tuned.grid, axis=1)
+    envelope = {"frequency_Hz": found.asked.frequency, column("tuned"): tuned} | {
+        n if n == "weibull_exponent" else column(n): v for n, v in found.envelope.columns().items()
+    }
+    store.write_text(folder / "envelope.csv", columns_csv(envelope, 8))
+    told = [found.quantile(share) for share in SHARES]
+    quantiles: dict[str, Array] = {
+        "share": np.array(SHARES),
+        **{name: np.array([getattr(q, name) for q in told]) for name in ("value", "low", "high")},
+    }
+    for fit in fits(found.amplification[found.solved]):
+        quantiles[fit.name.replace(" ", "_")] = np.array([fit.quantiles[share] for share in SHARES])
+    store.write_text(folder / "quantiles.csv", columns_csv(quantiles, 8))
+    names = ["samples.csv", "quantiles.csv", "envelope.csv"]
+    if near is not None:
+        columns: dict[str, Array] = {
+            "frequency_Hz": near.frequency, column("mean"): near.mean, column("deviation"): near.deviation,
+            "weibull_exponent": near.weibull_exponent, column("quantile_2.5_percent"): near.envelope(0.025),
+            column("quantile_97.5_percent"): near.envelope(0.975),
+        }  # fmt: skip
+        store.write_text(folder / "approximation.csv", columns_csv(columns, 8))
+        names.append("approximation.csv")
+    return [folder / name for name in names]
+
+
+def _pictures(found: Ensemble, near: Approximation | None, folder: Path, case: str) -> list[Path]:
+    from ..pictures.mistuning import amplification_picture, envelope_picture, sensitivity_picture, worst_picture
+
+    folder.mkdir(parents=True, exist_ok=True)
+    if not found.solved.any():
+        return []
+    drawn = [sensitivity_picture(near, folder / "sensitivity.png", f"{case}: sensitivities")] if near else []
+    return [
+        amplification_picture(found, folder / "amplification.png", f"{case}: highest blade over the tuned ring's"),
+        envelope_picture(found, near, folder / "mistuned.png", f"{case}: all blades of all samples"),
+        worst_picture(found, folder / "worst.png", f"{case}: the highest of all samples"),
+        *drawn,
+    ]

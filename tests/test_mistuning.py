@@ -1,0 +1,225 @@
+"""Rings whose sectors differ: against the sector, closed forms and bounds; the same samples whoever computes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.stats
+
+import microslip as ms
+from microslip.data import UserError
+from microslip.harmonic_balance import problem as balance
+from microslip.harmonic_balance.solver import newton, solve
+from microslip.mistuning import ensemble
+from microslip.mistuning.peaks import highest
+from microslip.mistuning.ring import Tuned
+from microslip.mistuning.samples import Asked, Sticking, amplitudes, sample
+from microslip.mistuning.scatter import Scatter
+from microslip.mistuning.sensitivity import sensitivities
+from microslip.mistuning.statistics import Envelope, fits, quantile
+from microslip.mistuning.weibull import exponent
+from microslip.system.assembly import Assembly
+
+RUB = {
+    "interface": "right", "against": "left", "against_sector": 1, "law": "smooth", "normal_force": 20.0,
+    "normal_stiffness": 2e5, "tangential_stiffness": 4e5, "friction": 0.2, "points": [1, 1],
+}  # fmt: skip
+FINE = {"harmonics": 1, "samples": 32}
+
+
+def sector(blades: int = 6, order: int = 1, modes: int = 2, **contact: object) -> Assembly:
+    """One of the sample's vanes that stands for a ring, its tip rubbing on the next one's."""
+    case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "modes": modes,
+            "ring": {"blades": blades, "engine_order": order}, "contacts": [{**RUB, **contact}]}  # fmt: skip
+    return ms.assemble(case, vane=ms.sample()).assembly
+
+
+@pytest.fixture(scope="module")
+def tuned() -> Tuned:
+    return Tuned(sector(), {})
+
+
+@pytest.mark.parametrize("of", ["frequency", "damping", "normal_force", "gap", "friction", "stiffness", "added_mass"])
+def test_no_scatter_is_the_sector(tuned: Tuned, of: str) -> None:
+    """As deviations vanish the whole ring moves as the sector that stands for it: 1e-9."""
+    s = Scatter(of, 1e-3, at="probe" if of == "added_mass" else None)
+    ring = tuned.mistuned([(s, np.full((6, tuned.modes(s)), 1e-13))])
+    lone, whole = balance.of(tuned.sector, **FINE), balance.of(ring, form="sides", **FINE)
+    Omega = 2 * np.pi * 287.0
+    a, b = (np.abs(amplitudes(p, solve(p, Omega, []))) for p in (lone, whole))
+    assert b == pytest.approx(a[0], rel=1e-9)
+
+
+def test_uniform_deviations_move_the_ring_as_one(tuned: Tuned) -> None:
+    """All blades stiffer by (1 + d)^2 are a sector of such blades: the sum rule of first order holds with it."""
+    s = Scatter("frequency", 1e-3)
+    ring = tuned.mistuned([(s, np.full((6, 2), 0.02))])
+    y = Sticking(ring)(290.0)
+    other = Tuned(replace(tuned.sector, components=_stiffer(tuned.sector, 0.02)), {})
+    assert y == pytest.approx(Sticking(other.whole)(290.0)[0], rel=1e-10)
+
+
+def _stiffer(one: Assembly, by: float) -> tuple[object, ...]:
+    blade = one.components[0]
+    g = blade.groups[0]
+    assert g.to_diagonal is None
+    stiffer = replace(g, K_r=(1 + by) ** 2 * g.K_r, omega=(1 + by) * g.omega, C_r=(1 + by) * g.C_r)
+    return (replace(blade, groups={0: stiffer}),)
+
+
+def test_each_contact_counts_its_own_numbers(tuned: Tuned) -> None:
+    """Contacts that differ in numbers are marched together; each gives what it gives alone."""
+    s = [Scatter("friction", 0.1), Scatter("stiffness", 0.1), Scatter("normal_force", 0.1)]
+    rng = np.random.default_rng(1)
+    ring = tuned.mistuned([(x, rng.uniform(-0.2, 0.2, (6, 1))) for x in s])
+    together = balance.of(ring, form="relative", **FINE)
+    assert len(together.groups) == 1
+    Omega, x = 2 * np.pi * 287.0, rng.normal(size=together.size)
+    force, v = together.at(Omega).force(x), together.displacement(x)
+    for contact, own in zip(ring.contacts, together.groups[0].first, strict=True):
+        alone = balance.of(replace(ring, contacts=(contact,)), form="relative", **FINE)
+        found = alone.at(Omega).force((v[:, own] / alone.scale).ravel())
+        assert found == pytest.approx(force[:, own], rel=1e-12, abs=1e-12 * np.abs(force).max())
+
+
+def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
+    """The step of Newton's method by the relative motions solves the system of the sides: 1e-9."""
+    ring = tuned.mistuned([(Scatter("frequency", 0.01), np.random.default_rng(0).normal(0, 0.01, (6, 2)))])
+    p = balance.of(ring, form="sides", **FINE)
+    rng, at = np.random.default_rng(2), p.at(2 * np.pi * 287.0)
+    J = at.jacobian(at.forces(2 * rng.normal(size=p.size))[1])
+    right = rng.normal(size=p.size)
+    assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
+
+
+@pytest.mark.parametrize("blade", [0, 1, 5])
+def test_sensitivities_are_differences(tuned: Tuned, blade: int) -> None:
+    """Central differences of Newton solutions with friction: 1e-6 (no contact switches between them)."""
+    s = Scatter("frequency", 0.003, together=0.0)
+    asked = Asked(tuned, (s,), np.array([287.3]), balance=FINE)
+    point = asked.tuned_points[0]
+    _, found = sensitivities(asked, s, point)
+    h, moved = 1e-6, []
+    for sign in (1, -1):
+        d = np.zeros((6, 2))
+        d[blade, 0] = sign * h
+        p = asked.problem(tuned.mistuned([(s, d)]))
+        moved.append(np.abs(amplitudes(p, newton(p.at(point.Omega), point.x, 1e-13)))[0])
+    assert found[blade, 0] == pytest.approx((moved[0] - moved[1]) / (2 * h), rel=1e-6)
+
+
+def test_whitehead_is_never_exceeded() -> None:
+    """One family of modes, equal damping, scattered frequencies: the highest blade is at most (1 + sqrt N) / 2 times
+    the tuned ring's, and some patterns come near (Whitehead 1966)."""
+    ring = Tuned(sector(blades=5, modes=1, normal_stiffness=300.0, tangential_stiffness=600.0), {})
+    asked = Asked(ring, (Scatter("frequency", 0.004),), np.linspace(266, 277, 45), stuck=True)
+    found = ensemble.run(asked, 60, workers=1)
+    bound = 0.5 * (1 + np.sqrt(5))
+    assert 1.15 < found.amplification.max() < bound
+
+
+def test_peaks_are_between_points() -> None:
+    """Resonances of two read-outs, seen on a coarse sweep: the higher one to the tolerance."""
+
+    def respond(f: float) -> np.ndarray:
+        w = np.array([100.31, 103.77])
+        return np.abs(np.array([1.0, 1.01]) / (w**2 - f**2 + 2j * 0.004 * w * f)) * w**2
+
+    found = highest(respond, np.linspace(95, 110, 16))
+    assert (found.output, found.frequency) == (1, pytest.approx(103.77, rel=1e-4))
+    assert found.amplitude == pytest.approx(1.01 / 0.008, rel=1e-4)
+
+
+def test_samples_do_not_depend_on_workers(tuned: Tuned, tmp_path: Path) -> None:
+    """One process and two, and a run that goes on after its first samples: the same bits."""
+    asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(275, 300, 12), seed=3, stuck=True)
+    one = ensemble.run(asked, 20, workers=1)
+    two = ensemble.run(asked, 20, workers=2)
+    ensemble.run(asked, 16, workers=1, file=tmp_path / "m.npz", inputs="a")
+    going = ensemble.run(asked, 20, workers=1, file=tmp_path / "m.npz", inputs="a")
+    for other in (two, going):
+        assert one.rows.tobytes() == other.rows.tobytes()
+        assert one.envelope.sums.tobytes() == other.envelope.sums.tobytes()
+        assert (one.envelope.bins == other.envelope.bins).all()
+
+
+def test_a_sample_is_what_its_number_says(tuned: Tuned) -> None:
+    """Deviations depend on seed, sample and place alone."""
+    s = (Scatter("frequency", 0.01), Scatter("friction", 0.1))
+    asked = Asked(tuned, s, np.linspace(275, 300, 4), seed=3, stuck=True)
+    first, again = asked.deviations(7), replace(asked, scatter=s).deviations(7)
+    assert all((a[1] == b[1]).all() for a, b in zip(first, again, strict=True))
+    assert not np.allclose(first[0][1][:, 0], asked.deviations(8)[0][1][:, 0])
+    assert sample(asked, 7).top.amplitude == sample(asked, 7).top.amplitude
+
+
+@pytest.mark.parametrize("share, n", [(0.5, 60), (0.95, 400)])
+def test_intervals_hold_the_truth(share: float, n: int) -> None:
+    """Of a thousand repeats 95 +- 2 % of the intervals hold the quantile they are of."""
+    truth = scipy.stats.gumbel_r.ppf(share)
+    hit = 0
+    for i in range(1000):
+        q = quantile(5 + scipy.stats.gumbel_r.rvs(size=n, random_state=i), share)
+        hit += q.low <= 5 + truth <= q.high
+    assert 930 <= hit <= 970
+
+
+def test_envelopes_are_those_of_all_samples() -> None:
+    """Mean, deviation, k and quantiles that need no memory are those of all numbers together."""
+    y = np.random.default_rng(0).weibull(3.0, (400, 2, 10))
+    e = Envelope.empty(2, 1.0)
+    for one in y:
+        e.add(one)
+    every = y.transpose(1, 0, 2).reshape(2, -1)
+    told = e.columns()
+    assert told["mean"] == pytest.approx(every.mean(axis=1), rel=1e-12)
+    assert told["deviation"] == pytest.approx(every.std(axis=1, ddof=1), rel=1e-9)
+    assert told["weibull_exponent"] == pytest.approx(3.0, rel=0.05)
+    assert told["quantile_97.5_percent"] == pytest.approx(np.quantile(every, 0.975, axis=1), rel=0.01)
+
+
+def test_weibull_is_inverted() -> None:
+    """k = 1 at s = 1, and k = 2, Rayleigh's distribution, at sqrt(4/pi - 1) (Sextro Eq. (5.6-17))."""
+    assert exponent([1.0, np.sqrt(4 / np.pi - 1)]) == pytest.approx([1.0, 2.0], rel=1e-12)
+
+
+def test_fits_find_their_own_distribution() -> None:
+    """Samples of an extreme-value distribution: its tail quantile, and a misfit smaller than Weibull's."""
+    x = scipy.stats.genextreme.rvs(0.1, 1.3, 0.05, size=4000, random_state=1)
+    extreme, weibull = fits(x)
+    assert extreme.quantiles[0.999] == pytest.approx(scipy.stats.genextreme.ppf(0.999, 0.1, 1.3, 0.05), rel=0.01)
+    assert extreme.distance < weibull.distance
+
+
+def test_correlations_are_as_asked() -> None:
+    """Between modes and from sector to sector, over many samples: 0.02."""
+    s = Scatter("frequency", 0.01, together=0.3, neighbours=0.6)
+    z = np.array([s.drawn(24, 2, 0, 1, i) for i in range(4000)]) / 0.01
+    assert z.std() == pytest.approx(1.0, abs=0.02)
+    assert (z[:, :, 0] * z[:, :, 1]).mean() == pytest.approx(0.3, abs=0.02)
+    assert (z[:, :, 0] * np.roll(z[:, :, 0], 1, axis=1)).mean() == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        ({"of": "colour", "deviation": 0.1}, "colour"),
+        ({"of": "frequency"}, "deviation"),
+        ({"of": "frequency", "values": (0.1, 0.2, 0.3, 0.4)}, "6 sectors"),
+        ({"of": "frequency", "deviation": 0.9}, "leaves nothing"),
+        ({"of": "frequency", "deviation": 0.1, "component": "rotor"}, "rotor"),
+        ({"of": "friction", "deviation": 0.1, "contact": "root"}, "root"),
+        ({"of": "added_mass", "values": (0.001,), "at": "nose"}, "monitor"),
+        ({"of": "frequency", "deviation": 0.1, "together": 2.0}, "correlation"),
+    ],
+)
+def test_bad_scatter(tuned: Tuned, given: dict[str, object], words: str) -> None:
+    """Each is told in a sentence."""
+    with pytest.raises(UserError, match=words):
+        s = Scatter(**given)  # type: ignore[arg-type]
+        tuned.check((s,))
+        for i in range(40):
+            tuned.mistuned([(s, s.drawn(6, tuned.modes(s), 0, 0, i))])
