@@ -589,6 +589,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                                "orbits that coexist"),
     "bifurcation.starts": ("", "how many"),
     "bifurcation.seed": ("", "from which they are drawn"),
+    "bifurcation.deflate": ("", "values of the parameter at which orbits, stable or not, are looked for beside all "
+                            "that is known"),
     "bifurcation.nodes": ("", "of an orbit, from which it is shot; doubled with its period"),
     "bifurcation.step": ("", "the longest along a branch, a share of start to stop"),
     "bifurcation.points": ("", "of a branch at most"),

@@ -463,8 +463,8 @@ def run_up(
 def bifurcate(
     system: Dynamics | Callable[[float], Assembly], start: float, stop: float, *, x: Any = None,
     frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
-    attractors: Sequence[float] = (), starts: int = 64, nodes: int = 32, step: float = 0.08, points: int = 400,
-    report: Report = lambda _: None,
+    attractors: Sequence[float] = (), starts: int = 64, deflate: Sequence[float] = (), nodes: int = 32,
+    step: float = 0.08, points: int = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
 
@@ -474,12 +474,13 @@ def bifurcate(
             at the start; at rest if not given. frequency: of an assembly's loads, in the unit.
         orbits: whether they are followed. doublings: how often from an orbit on to the one of twice its period.
         attractors: values of the parameter at which `starts` motions are left alone, to find what they come to.
+        deflate: values at which orbits, stable or not, are looked for beside those by deflation of what is known.
         nodes: of an orbit. step: the longest, a share of start to stop. points: of a branch. report: is told what is
             under way.
 
     Returns:
-        A `Diagram`: ``branches``, ``hopf``, ``at("fold")``, ``plot(axes)``, ``to_dataframe()``, ``to_xarray()``. A
-        branch that could not be followed to its end says why in ``ended``.
+        A `Diagram`: ``branches``, ``hopf``, ``deflated``, ``at("fold")``, ``plot(axes)``, ``to_dataframe()``,
+        ``to_xarray()``. A branch that could not be followed to its end says why in ``ended``.
 
     Raises:
         UserError: no equilibrium near the start; contacts that remember; a parameter that does not act smoothly.
@@ -508,5 +509,7 @@ def bifurcate(
         Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
         made = mechanics.dynamics(system, min(start, stop), max(start, stop), Omega)
         begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
-    asked = diagram.Asked(start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts)
+    asked = diagram.Asked(
+        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
+    )
     return diagram.diagram(made, begin, asked, report=report)

@@ -172,5 +172,3 @@ def kept(path: Path, inputs: str) -> Branch | None:
         return None
     with h5py.File(store.ordinary(path), "r") as file:
         return get(file) if str(file.attrs.get("inputs")) == inputs else None
-
-

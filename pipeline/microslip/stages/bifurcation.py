@@ -21,6 +21,7 @@ from ..files import hdf5, store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
 from ..system.assembly import Assembly
+from ..units import counted
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, hash_of_code
 from .varied import Varied
@@ -173,4 +174,13 @@ def told(asked: BifurcationOfCase, found: Diagram) -> list[str]:
         passed = [WORDS[str(k)](f"{p:.6g}{unit}") for k, p in zip(b.kind, b.parameter, strict=True) if str(k) in WORDS]
         if not b.still or passed:
             said.append(f"{asked.name}, {b.name}: born at the {b.born}; {', '.join(passed) or 'nothing on the way'}.")
+    said += [f"{asked.name}, deflation at {p:.6g}{unit}: {beside(found, p)}." for p in asked.deflate]
     return [*said, *(f"{asked.name}, {words}" for words in found.messages)]
+
+
+def beside(found: Diagram, p: float) -> str:
+    """Orbits that deflation found at a value of the parameter."""
+    there = [one for one in found.deflated if one.orbit.p == p]
+    words = [f"{'stable' if one.stable else 'unstable'}, period {one.orbit.period:.6g} s, multiplier of the size "
+             f"{np.abs(one.multipliers).max(initial=0.0):.3g}" for one in there]  # fmt: skip
+    return f"{counted(len(there), 'orbit')} beside what was known" + (f": {'; '.join(words)}" if words else "")
