@@ -574,7 +574,9 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "stability.cycle.start": ("", "of the parameter"),
     "stability.cycle.stop": ("", "above it"),
     "stability.cycle.points": ("", "of a branch at most"),
-    "stability.cycle.harmonics": ("", "of the balance"),
+    "stability.cycle.harmonics": ("", "of the balance along a branch"),
+    "stability.cycle.accuracy": ("", "share of the amplitude to which three orbits of a branch get harmonics, that are "
+                                 "compared with a motion in time and judged by their Floquet multipliers"),
     "bifurcation.name": ("", "of the diagram's files"),
     "bifurcation.parameter": ("", "what its axis says"),
     "bifurcation.unit": ("", "of the parameter, on the axis"),

@@ -10,13 +10,14 @@ import meshio
 import numpy as np
 import pytest
 import small
+from closed_forms.oscillators import brusselator
 from PIL import Image
 from test_bifurcation import normal_form
 from test_sliding import masses
 
 from microslip import sliding
 from microslip.basis import read_basis
-from microslip.bifurcation.cycles import cycles, drift
+from microslip.bifurcation.cycles import checked, cycles, drift, refined
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.linalg.quadratic import Window, every_root, every_value
@@ -94,6 +95,25 @@ def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -
         assert np.hypot(*o.at(np.zeros(1))[0]) == pytest.approx(np.sqrt(o.p), abs=1e-8)
         assert o.omega == pytest.approx(1.0, abs=1e-9)
     assert drift(found.system, found.orbits[-1]) < 1e-7
+
+
+@pytest.mark.slow
+def test_harmonics_of_a_limit_cycle_are_as_many_as_its_accuracy_takes() -> None:
+    """The Brusselator's at 2.3 from 3 harmonics on: the estimate covers what a motion in time leaves the orbit by, and
+    is met; its multiplier is that of Liouville's formula, exp(integral of 2 x y - x^2 - p - 1)."""
+    (found,) = cycles(brusselator(1.8, 2.3), np.array([1.0, 1.8]), 1.8, 2.3, 3, (0.5, 2.0), 12)
+    coarse = found.orbits[-1]
+    assert coarse.p == pytest.approx(2.3) and coarse.count == 3 and drift(found.system, coarse) > 1e-2
+    counts = []
+    for accuracy in (1e-2, 1e-5):
+        one = checked(found.system, coarse, accuracy)
+        assert one.drift < one.error + 1e-7 < accuracy + 1e-7 and one.stable
+        counts.append(one.orbit.count)
+    assert counts == sorted(set(counts))
+    x, y = one.orbit.at(np.arange(4096) / 4096).T
+    grown = 2 * np.pi / one.orbit.omega * np.mean(2 * x * y - x**2 - one.orbit.p - 1)
+    assert np.log(one.multipliers[0].real) == pytest.approx(grown, rel=1e-5)
+    assert refined(found.system, coarse, 1e-12, most=6)[1] > 1e-12
 
 
 @pytest.fixture

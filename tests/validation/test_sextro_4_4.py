@@ -93,7 +93,7 @@ def test_deflation_finds_the_orbits_of_the_window_without_any_motion() -> None:
     assert [stable for _, stable in own] == [False, True, False, True]
     crossed = []
     for b in velocity().branches[1:]:
-        for i in np.flatnonzero((b.parameter[:-1] - 3.8) * (b.parameter[1:] - 3.8) <= 0):
+        for i in np.flatnonzero(np.diff((b.parameter < 3.8).astype(int))):
             u = (3.8 - b.parameter[i]) / (b.parameter[i + 1] - b.parameter[i])
             crossed.append((float((1 - u) * b.period[i] + u * b.period[i + 1]), bool(b.stable[i])))
     assert [stable for _, stable in sorted(crossed)] == [stable for _, stable in own]

@@ -253,10 +253,12 @@ class Over(Model):
 class Cycle(Over):
     """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
 
-    points: of a branch at most.
+    points: of a branch at most. accuracy: share of the amplitude to which three of its orbits are refined, that are
+    compared with a motion in time.
     """
 
     harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+    accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
 
 
 class StabilityOfCase(Model):
