@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
-    from .harmonic_balance.tones import Solved
+    from .harmonic_balance.tones import Kept, Solved
     from .time_domain.many import Reached
     from .time_domain.orbit import Orbit
 
@@ -130,7 +130,7 @@ def harmonic_response(
 def two_tones(
     system: Assembly | Built, first: Any, second: Any, *, free: bool = False, harmonics: int = 5,
     samples: int | None = None, turns: int | None = None, start: Orbit | None = None,
-    unit: Literal["Hz", "rad/s"] = "Hz", report: Report = lambda _: None,
+    unit: Literal["Hz", "rad/s"] = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
 ) -> Solved:  # fmt: skip
     """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
 
@@ -142,7 +142,7 @@ def two_tones(
             periods of the first tone from rest, and a hundred that are kept.
         harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
             32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
-        report: is told what is under way.
+        kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:
         A `Solved`: ``of(k1, k2)``, ``plot()``, ``plot_torus()``, ``motion(time)``, ``to_dataframe()``,
@@ -186,7 +186,7 @@ def two_tones(
         at = float(one[0]) / (2 * np.pi)
         seen = start or integrate(assembly, at, settle=200, keep=100, samples=32)
         b, begin = tones.from_time(b, seen.time, seen.d, float(one[0]), float(two[0]))
-    return tones.swept(b, one, two, begin, report)
+    return tones.swept(b, one, two, begin, report, kept)
 
 
 def _check_tones(assembly: Assembly, first: np.ndarray, second: np.ndarray, free: bool) -> None:
