@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -117,6 +117,19 @@ def joined(back: Branch, forth: Branch) -> Branch:
     said = [one.ended for one in (back, forth)]
     ended = next((words for words in said if words.startswith(LOST)), f"{said[0]}; {said[1]}")
     return replace(forth, ended=ended, **both)
+
+
+def values_at(found: Sequence[Branch], kind: str) -> dict[str, Array]:
+    """Branch -> values of the parameter at its points of a kind, see `SPECIAL`."""
+    values = {b.name: b.parameter[b.of_kind(kind)] for b in found}
+    return {name: at for name, at in values.items() if len(at)}
+
+
+def table(found: Sequence[Branch]) -> pandas.DataFrame:
+    """A row a point, branch by branch."""
+    import pandas
+
+    return pandas.concat([b.to_dataframe() for b in found], ignore_index=True)
 
 
 def columns(branch: Branch) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from ..continuation.curve import State
 from ..data import Array, UserError
 from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
-from .branches import EQUILIBRIA, Branch, joined, of_orbits
+from .branches import EQUILIBRIA, Branch, joined, of_orbits, table, values_at
 from .drawn import draw
 from .dynamics import Dynamics
 from .equilibria import Hopf
@@ -77,8 +77,7 @@ class Diagram:
 
     def at(self, kind: str) -> dict[str, Array]:
         """Branch -> values of the parameter at its points of a kind, see `branches.SPECIAL`."""
-        found = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
-        return {name: values for name, values in found.items() if len(values)}
+        return values_at(self.branches, kind)
 
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
@@ -87,9 +86,7 @@ class Diagram:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A row a point, branch by branch."""
-        import pandas
-
-        return pandas.concat([b.to_dataframe() for b in self.branches], ignore_index=True)
+        return table(self.branches)
 
     def to_xarray(self) -> xarray.Dataset:
         """The same by points."""

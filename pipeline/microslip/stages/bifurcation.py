@@ -14,10 +14,11 @@ from .. import sliding
 from ..basis import read_basis
 from ..bifurcation import branches, mechanics
 from ..bifurcation.diagram import Asked, Diagram, diagram
+from ..bifurcation.recorded import Branches, write_bifurcation
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.questions import BifurcationOfCase
 from ..data import NotConverged, UserError
-from ..files import hdf5, store
+from ..files import store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
 from ..system.assembly import Assembly
@@ -83,7 +84,9 @@ def _work(
     stage.begin()
     found = [_diagram(one, folder / "branches", inputs, stage) for one in changed]
     made = [_table(folder, one.asked, drawn) for one, drawn in zip(changed, found, strict=True)]
-    made.append(_file(folder / "bifurcation.h5", settings.bifurcation, found))
+    both = zip(settings.bifurcation, found, strict=True)
+    whole = [Branches(one.name, one.parameter, one.unit, drawn.branches) for one, drawn in both]
+    made.append(write_bifurcation(folder / "bifurcation.h5", whole))
     drawn = _pictures(folder / "pictures", settings, found) if pictures else []
     sentences = [s for asked, one in zip(settings.bifurcation, found, strict=True) for s in told(asked, one)]
     page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
@@ -127,19 +130,6 @@ def _table(folder: Path, asked: BifurcationOfCase, found: Diagram) -> Path:
     cells = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in rows)
     store.write_text(folder / f"bifurcation_{asked.name}.csv", rows_csv(keys, cells))
     return folder / f"bifurcation_{asked.name}.csv"
-
-
-def _file(path: Path, asked: Sequence[BifurcationOfCase], found: Sequence[Diagram]) -> Path:
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs["format"], file.attrs["version"] = "microslip-bifurcation", "0.1"
-            for one, drawn in zip(asked, found, strict=True):
-                group = file.create_group(one.name)
-                group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
-                for i, branch in enumerate(drawn.branches):
-                    branches.put(group.create_group(f"branch_{i}"), branch)
-        hdf5.seal(temporary)
-    return path
 
 
 def _pictures(folder: Path, settings: CaseSettings, found: Sequence[Diagram]) -> list[Path]:
