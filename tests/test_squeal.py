@@ -205,6 +205,7 @@ points = 3
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_border_of_a_map_is_where_two_modes_meet(
     way: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
