@@ -6,10 +6,9 @@ import csv
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import h5py
 from matplotlib.axes import Axes
 
-from microslip.bifurcation import branches
+import microslip as ms
 from microslip.bifurcation.drawn import draw
 from microslip.case import load_case
 from microslip.stages.bifurcation import bifurcation_stage
@@ -33,12 +32,11 @@ def followed(folder: Path, report: Callable[[str], None]) -> list[Path]:
 
 def panels(folder: Path, places: Iterable[Axes]) -> None:
     """The diagrams of the case, without the names of their branches."""
-    with h5py.File(folder / "bifurcation.h5") as file:
-        for axes, (name, words) in zip(places, SHOWN.items(), strict=True):
-            found = [branches.get(file[name][f"branch_{i}"]) for i in range(len(file[name]))]
-            draw(found, [], axes, words, "amplitude of the second mass", "m")
-            axes.get_legend().remove()
-            axes.set_ylabel("amplitude in m")
+    found = ms.read_bifurcation(folder / "bifurcation.h5")
+    for axes, (name, words) in zip(places, SHOWN.items(), strict=True):
+        draw(found[name].branches, [], axes, words, "amplitude of the second mass", "m")
+        axes.get_legend().remove()
+        axes.set_ylabel("amplitude in m")
 
 
 def rows(folder: Path, name: str) -> list[Row]:

@@ -592,7 +592,9 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "stability.cycle.start": ("", "of the parameter"),
     "stability.cycle.stop": ("", "above it"),
     "stability.cycle.points": ("", "of a branch at most"),
-    "stability.cycle.harmonics": ("", "of the balance"),
+    "stability.cycle.harmonics": ("", "of the balance along a branch"),
+    "stability.cycle.accuracy": ("", "share of the amplitude to which three orbits of a branch get harmonics, that are "
+                                 "compared with a motion in time and judged by their Floquet multipliers"),
     "bifurcation.name": ("", "of the diagram's files"),
     "bifurcation.parameter": ("", "what its axis says"),
     "bifurcation.unit": ("", "of the parameter, on the axis"),
@@ -607,6 +609,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                                "orbits that coexist"),
     "bifurcation.starts": ("", "how many"),
     "bifurcation.seed": ("", "from which they are drawn"),
+    "bifurcation.deflate": ("", "values of the parameter at which orbits, stable or not, are looked for beside all "
+                            "that is known"),
     "bifurcation.nodes": ("", "of an orbit, from which it is shot; doubled with its period"),
     "bifurcation.step": ("", "the longest along a branch, a share of start to stop"),
     "bifurcation.points": ("", "of a branch at most"),

@@ -14,7 +14,7 @@ from closed_forms.oscillators import brusselator
 from scipy.integrate import solve_ivp
 
 import microslip as ms
-from microslip.bifurcation import balance, branches, equilibria, floquet
+from microslip.bifurcation import balance, branches, deflation, equilibria, floquet
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 from microslip.bifurcation.dynamics import Dynamics
 from microslip.bifurcation.shooting import Orbit, Shooting
@@ -308,3 +308,72 @@ def test_motions_find_the_orbit_that_no_branch_leads_to() -> None:
     assert one.share == np.mean(np.linalg.norm(begun, axis=1) > 1.0)  # the unstable circle of radius 1 divides them
     branch = found["attractor 1 at 0.5"]
     assert branch.parameter.min() == 0.0 and branch.parameter.max() == 1.0 and branch.stable.all()
+
+
+def test_deflation_finds_every_circle_from_the_equilibrium_alone() -> None:
+    """r' = r g(r^2), g = -(1 - r^2) (4 - r^2) (9 - r^2) / 80, turned by 1 + r^2 / 20: circles of the radius 1, 2 and 3,
+    the middle one stable, each once, with its period and the multiplier exp(2 r^2 g'(r^2) T)."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        r2 = z[0] ** 2 + z[1] ** 2
+        grows, turns = -(1 - r2) * (4 - r2) * (9 - r2) / 80, 1 + r2 / 20
+        return jnp.stack([grows * z[0] - turns * z[1], grows * z[1] + turns * z[0]])
+
+    system = Dynamics(rate, ("x", "y"), np.ones(2), 1.0)
+    found = deflation.coexisting(system, 0.5, [np.zeros(2)], [], 8)
+    found.sort(key=lambda one: float(one.orbit.x[0] @ one.orbit.x[0]))
+    assert [one.stable for one in found] == [False, True, False]
+    for one, r2, slope in zip(found, (1.0, 4.0, 9.0), (24 / 80, -15 / 80, 40 / 80), strict=True):
+        np.testing.assert_allclose((one.orbit.x**2).sum(axis=1), r2, rtol=1e-9)
+        assert one.orbit.period == pytest.approx(2 * np.pi / (1 + r2 / 20), rel=1e-9)
+        grown = np.exp(2 * r2 * slope * one.orbit.period)
+        assert one.multipliers[0].real == pytest.approx(grown, rel=1e-5, abs=1e-9) or grown > 1e10
+
+
+@pytest.mark.slow
+def test_deflation_finds_the_three_motions_of_a_driven_oscillator() -> None:
+    """Between the folds of Duffing's resonance, the unstable one in the middle, each as harmonic balance has it; known
+    ones are not found again."""
+    system = duffing()
+    found = deflation.coexisting(system, 1.3, [np.zeros(2)], [], 8)
+    found.sort(key=lambda one: float(np.ptp(one.orbit.sampled()[:, 0])))
+    assert [one.stable for one in found] == [True, False, True]
+    for one in found:
+        harmonic, solution = balance.balanced(one.orbit, 15)
+        assert solution.converged and balance.distance(harmonic, one.orbit) < 1e-9
+    assert not deflation.coexisting(system, 1.3, [np.zeros(2)], [one.orbit for one in found], 8)
+
+
+def test_deflated_equations_have_the_derivatives_of_differences() -> None:
+    """Beside a known circle, shifted and run through twice as well, and beside an equilibrium."""
+    orbit = circles().branches[1].orbit(circles().system, -1)
+    places = [deflation.Place(orbit.system, orbit=orbit), deflation.Place(orbit.system, still=np.zeros(2))]
+    turned = Orbit(orbit.system, np.roll(orbit.x, 3, axis=0), orbit.period, orbit.p)
+    assert places[0].distance(turned.x, turned.period)[0] < 1e-14
+    assert places[0].distance(np.tile(orbit.x[::2], (2, 1)), 2 * orbit.period)[0] < 1e-14
+    problem = Shooting(orbit.system, turned, orbit.period)
+    deflated = deflation.Deflated(problem, places)
+    random, h = np.random.default_rng(2), 1e-6
+    x = problem.unknowns(turned) + 0.2 * random.normal(size=17)
+    way = random.normal(size=17)
+    ends = [deflated.evaluate(x + s * h * way, orbit.p)[0] for s in (1, -1)]
+    np.testing.assert_allclose(deflated.evaluate(x, orbit.p)[1] @ way, (ends[0] - ends[1]) / (2 * h), rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_deflation_of_a_diagram_follows_what_is_on_no_branch() -> None:
+    """r' = -r (1 - r^2) (4 - r^2) again: no motion stays on the inner circle, and no Hopf point leads to either."""
+
+    def rate(z: Any, p: Any, _: Any) -> Any:
+        r2 = z[0] ** 2 + z[1] ** 2
+        grows = -(1 - r2) * (4 - r2) / 8
+        return jnp.stack([grows * z[0] - z[1], grows * z[1] + z[0]])
+
+    system = ms.Dynamics(rate, ("x", "y"), np.ones(2), 1.0)
+    found = ms.bifurcate(system, 0.0, 1.0, deflate=(0.5,), nodes=8, doublings=0, step=0.5)
+    assert sorted(one.stable for one in found.deflated) == [False, True]
+    for branch in found.branches[1:]:
+        assert branch.parameter.min() == 0.0 and branch.parameter.max() == 1.0
+        radius = np.linalg.norm(branch.x, axis=2)
+        assert np.ptp(radius) < 1e-9 and branch.stable.all() == (radius[0, 0] > 1.5)
+    assert len(found.branches) == 3

@@ -9,7 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
+import microslip as ms
 from microslip.cli import main
+from microslip.data import UserError
 
 CASES = Path(__file__).parents[1] / "pipeline" / "cases"
 
@@ -36,6 +38,9 @@ def test_hopf_points_in_files_and_words(case: Path, capsys: pytest.CaptureFixtur
     with h5py.File(folder / "bifurcation.h5") as file:
         kinds = file["load/branch_0/kind"][()].astype(str)
         np.testing.assert_allclose(file["load/branch_0/parameter"][()][kinds == "Hopf"], hopf, rtol=1e-9)
+    again = ms.read_bifurcation(folder / "bifurcation.h5")["load"]
+    np.testing.assert_allclose(again.at("Hopf")["equilibria"], hopf, rtol=1e-9)
+    assert len(again.to_dataframe()) == len(rows) - 1 and "load parameter B" in repr(again)
     page = (folder / "bifurcation.html").read_text()
     assert page.index("<img") < page.index("Hopf point at")  # it begins with the diagram
     kept = folder / "branches" / "load_equilibria.h5"
@@ -79,3 +84,98 @@ def test_a_case_that_asks_for_none(case: Path, capsys: pytest.CaptureFixture[str
     case.write_text(case.read_text().replace('body = "masses-on-belt"', 'body = "masses-on-belt"\nexcitation = "none"'))
     assert main(["bifurcate", str(case), "--quiet"]) == 2
     assert "[[bifurcation]]" in capsys.readouterr().err
+
+
+SHAKEN = """
+name = "shaken"
+[[masses]]
+name = "block"
+mass = 1.0
+free = "x"
+[[springs]]
+between = ["ground", "block"]
+stiffness = 1.0
+[[dampers]]
+between = ["ground", "block"]
+damping = 0.1
+[[contacts]]
+name = "sole"
+on = "block"
+normal = [0.0, 0.0, -1.0]
+t2 = [0.0, -1.0, 0.0]
+[[forces]]
+name = "push"
+on = "block"
+direction = [1.0, 0.0, 0.0]
+[[monitors]]
+name = "block"
+on = "block"
+"""
+
+DRIVEN = """
+name = "driven"
+body = "shaken"
+[[monitors]]
+monitor = "block"
+direction = "x"
+[[excitations]]
+row = "push"
+amplitude = 0.3
+[[contacts]]
+interface = "sole"
+normal_force = 0.5
+points = [1, 1]
+normal_stiffness = 1e3
+tangential_stiffness = 1e3
+friction = 0.3
+law = { kind = "rate", slope = 3.0 }
+[[bifurcation]]
+name = "force"
+parameter = "normal force"
+unit = "N"
+keys = { "contacts.sole.normal_force" = 1.0 }
+start = 0.1
+stop = 0.6
+frequency = 0.2
+nodes = 8
+step = 0.5
+doublings = 0
+"""
+
+
+@pytest.mark.slow
+def test_a_driven_case_is_followed_at_its_frequency(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mass shaken at 0.2 Hz over the normal force of its friction: the period of the load, the amplitude of a
+    motion in time at the end; without the frequency, or with a value outside the diagram, one sentence."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shaken").mkdir()
+    (tmp_path / "shaken" / "system.toml").write_text(SHAKEN)
+    (tmp_path / "driven.toml").write_text(DRIVEN)
+    assert main(["bifurcate", "driven.toml", "--quiet"]) == 0
+    (branch,) = ms.read_bifurcation("build/driven/bifurcation.h5")["force"].branches
+    np.testing.assert_allclose(branch.period, 5.0, rtol=1e-12)
+    assert branch.stable.all() and (branch.parameter.min(), branch.parameter.max()) == (0.1, 0.6)
+    one = DRIVEN.replace("normal_force = 0.5", f"normal_force = {float(branch.parameter[-1])!r}")
+    (tmp_path / "one.toml").write_text(one)
+    orbit = ms.integrate(ms.assemble("one.toml"), 0.2, settle=30, keep=2, steps=512)
+    assert branch.swing[-1, 0] == pytest.approx(np.ptp(orbit.y[0]) / 2, rel=1e-3)
+    for text, key in (("", "frequency"), ("frequency = 0.2\ndeflate = [7.0]", "deflate")):
+        (tmp_path / "driven.toml").write_text(DRIVEN.replace("frequency = 0.2", text))
+        assert main(["bifurcate", "driven.toml", "--quiet"]) == 2
+        said = capsys.readouterr().err.strip()
+        assert key in said and len(said.splitlines()) == 1
+
+
+def test_a_file_that_holds_no_diagrams_is_refused(tmp_path: Path) -> None:
+    """Missing, damaged, or another program's."""
+    for name, data in (("none", None), ("bad", b"no HDF5 at all")):
+        if data is not None:
+            (tmp_path / f"{name}.h5").write_bytes(data)
+        with pytest.raises(UserError, match=f"{name}.h5"):
+            ms.read_bifurcation(tmp_path / f"{name}.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file.attrs["format"] = "another"
+    with pytest.raises(UserError, match="microslip-bifurcation"):
+        ms.read_bifurcation(tmp_path / "other.h5")

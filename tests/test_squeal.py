@@ -10,13 +10,14 @@ import meshio
 import numpy as np
 import pytest
 import small
+from closed_forms.oscillators import brusselator
 from PIL import Image
 from test_bifurcation import normal_form
 from test_sliding import masses
 
 from microslip import sliding
 from microslip.basis import read_basis
-from microslip.bifurcation.cycles import cycles, drift
+from microslip.bifurcation.cycles import checked, cycles, drift, refined
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.linalg.quadratic import Window, every_root, every_value
@@ -96,6 +97,25 @@ def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -
     assert drift(found.system, found.orbits[-1]) < 1e-7
 
 
+@pytest.mark.slow
+def test_harmonics_of_a_limit_cycle_are_as_many_as_its_accuracy_takes() -> None:
+    """The Brusselator's at 2.3 from 3 harmonics on: the estimate covers what a motion in time leaves the orbit by, and
+    is met; its multiplier is that of Liouville's formula, exp(integral of 2 x y - x^2 - p - 1)."""
+    (found,) = cycles(brusselator(1.8, 2.3), np.array([1.0, 1.8]), 1.8, 2.3, 3, (0.5, 2.0), 12)
+    coarse = found.orbits[-1]
+    assert coarse.p == pytest.approx(2.3) and coarse.count == 3 and drift(found.system, coarse) > 1e-2
+    counts = []
+    for accuracy in (1e-2, 1e-5):
+        one = checked(found.system, coarse, accuracy)
+        assert one.drift < one.error + 1e-7 < accuracy + 1e-7 and one.stable
+        counts.append(one.orbit.count)
+    assert counts == sorted(set(counts))
+    x, y = one.orbit.at(np.arange(4096) / 4096).T
+    grown = 2 * np.pi / one.orbit.omega * np.mean(2 * x * y - x**2 - one.orbit.p - 1)
+    assert np.log(one.multipliers[0].real) == pytest.approx(grown, rel=1e-5)
+    assert refined(found.system, coarse, 1e-12, most=6)[1] > 1e-12
+
+
 @pytest.fixture
 def belt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None) -> Path:
     """The two masses on a belt, asked for their roots."""
@@ -127,6 +147,91 @@ def test_map_of_two_masses_has_as_many_roots_as_each_state_alone(
         values = np.linalg.eigvals(sliding.state_matrix(s, sliding.equilibrium(s)))
         assert (values.real[values.imag > 0] > 0).sum() == count
         assert values.real[values.imag > 0].max() == pytest.approx(growth, abs=1e-8)
+
+
+COUPLED = """
+name = "coupled"
+[[masses]]
+name = "block"
+mass = 1.0
+free = "x z"
+[[springs]]
+between = ["ground", "block"]
+stiffness = 3.0
+axis = [0.8, 0.0, 0.6]
+[[springs]]
+between = ["ground", "block"]
+stiffness = 1.5
+axis = [0.6, 0.0, -0.8]
+[[contacts]]
+name = "sole"
+on = "block"
+normal = [0.0, 0.0, -1.0]
+t2 = [0.0, -1.0, 0.0]
+[[monitors]]
+name = "block"
+on = "block"
+"""
+
+SLIDES = """
+name = "coupling"
+body = "coupled"
+[[monitors]]
+monitor = "block"
+[[contacts]]
+interface = "sole"
+normal_force = 1.0
+points = [1, 1]
+normal_stiffness = 1.0
+tangential_stiffness = 1.0
+friction = 0.3
+law = { kind = "rate", slope = 1e7 }
+ground = { velocity = 1.0 }
+[stability]
+frequency = [0.0, 1.0]
+neutral = 1e-4
+[[stability.over]]
+parameter = "friction coefficient"
+keys = { "contacts.sole.friction" = 1.0 }
+start = 0.1
+stop = 1.9
+points = 7
+[[stability.over]]
+parameter = "normal stiffness"
+keys = { "contacts.sole.normal_stiffness" = 1.0 }
+start = 0.5
+stop = 1.5
+points = 3
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_border_of_a_map_is_where_two_modes_meet(
+    way: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
+) -> None:
+    """Flutter by mode coupling (N. Hoffmann and others, Acta Mech. 154, 2002): a block on leaning springs and a belt,
+    K = [[a, b + way mu k], [b, d + k]] with the normal stiffness k. The roots meet at s^2 = -(a + d + k) / 2 where
+    ((a - d - k) / 2)^2 + b (b + way mu k) = 0, and part from there; with the belt the other way they never do."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "coupled").mkdir()
+    (tmp_path / "coupled" / "system.toml").write_text(COUPLED)
+    (tmp_path / "case.toml").write_text(SLIDES.replace("velocity = 1.0", f"velocity = {way}"))
+    assert main(["stability", "case.toml", "--quiet"]) == 0
+    axes = np.array([[0.8, 0.6], [0.6, -0.8]])
+    K = axes.T @ np.diag([3.0, 1.5]) @ axes
+    rows = Path("build/coupling/stability_map.csv").read_text().splitlines()[1:]
+    seen = {0: 0, 1: 0}
+    for mu, k, count, growth, frequency in [[float(v) for v in row.split(",")] for row in rows]:
+        a, b, d = K[0, 0], K[0, 1], K[1, 1] + k
+        apart = ((a - d) / 2) ** 2 + b * (b + way * mu * k)
+        s = np.sqrt(-(a + d) / 2 - np.array([1, -1]) * np.sqrt(complex(apart)))
+        assert count == (apart < 0)
+        assert growth == pytest.approx(np.abs(s.real).max(), abs=1e-5)
+        if count:
+            assert 2 * np.pi * frequency == pytest.approx(np.abs(s.imag).max(), rel=1e-6)
+        seen[int(count)] += 1
+    assert seen[0] and bool(seen[1]) == (way < 0)
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 import microslip as ms
+from microslip.case import load_case
 from microslip.contact.law import Law, number, settings
 from microslip.data import UserError
-from microslip.harmonic_balance import two_tone
+from microslip.harmonic_balance import tones, two_tone
 from microslip.harmonic_balance.torus import closed, commensurate, pairs_of, with_mean
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -181,6 +182,35 @@ def test_self_excited() -> None:
     np.testing.assert_allclose(b.evaluate(x, first)[1] @ d, difference, atol=1e-6 * np.abs(difference).max())
 
 
+@settings
+class Falling(VanDerPol):
+    """Friction on a belt of 1 m/s that falls with the velocity between them, mu (N), smoothed within 1 / slope."""
+
+    slope: Any = number()
+
+    def rates(self, u: Any, v: Any, x: Any, time: Any, lag: float) -> Any:
+        w = v[:, 1] - 1.0
+        force = self.mu * (0.2 + 0.2 * jnp.exp(-jnp.sqrt(w**2 + 1e-4))) * 2 / jnp.pi * jnp.arctan(self.slope * w)
+        return jnp.stack([0 * force, force, 0 * force], axis=1), x
+
+
+@pytest.mark.slow
+def test_stick_slip_beside_a_load() -> None:
+    """A mass that sticks to its belt and is let go, shaken by a load: frequency and both tones come nearer to the
+    motion in time with the harmonics."""
+    first, element = 1.8, ms.Element(Falling(np.array(1.0), np.array(30.0)), 0, length=1.0)
+    system = ms.structure(1.0, 1.0, 0.02, force={0: 0.2}, elements=[element])
+    orbit = ms.integrate(system, first, unit="rad/s", settle=150, keep=60, samples=32, steps=512)
+    assert np.abs(np.diff(orbit.y[0])).max() / np.diff(orbit.time[:2])[0] > 0.99  # it does stick
+    apart = []
+    for harmonics in (5, 9):
+        found = ms.two_tones(system, first, 1.0, free=True, harmonics=harmonics, start=orbit, unit="rad/s")
+        assert found.converged.all()
+        seen = fitted(orbit.time, orbit.y[0], first, 2 * np.pi * found.second[0], 11)
+        apart.append(np.abs(seen[1:3] - np.abs(found.amplitude[0, 0, 1:3])).max() / seen[1:3].max())
+    assert apart[1] < 5e-3 and apart[1] < apart[0]
+
+
 def test_line() -> None:
     """Turns of a closed line are coprime, near the ratio, whichever tone is faster; a common period is known."""
     for first, second in ((1.0, GOLDEN), (1.0, 13.7), (3.2, 3.1)):
@@ -340,9 +370,49 @@ def test_case(tmp_path: Path) -> None:
     assert refused.returncode == 2 and "two_tones: second" in refused.stderr and "Traceback" not in refused.stderr
 
 
+@pytest.mark.slow
+def test_a_killed_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None) -> None:
+    """What was found before is not solved for again, and the table is that of a run without a break; another case
+    begins anew; a refused one leaves nothing."""
+    from microslip.stages.places import modal_files
+    from microslip.stages.tones import tones_stage
+
+    (tmp_path / "pair").mkdir()
+    (tmp_path / "pair" / "system.toml").write_text(SYSTEM)
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("points = 2", "points = 3").replace("harmonics = 3", "harmonics = 1"))
+    files = modal_files(load_case(case)[0], case, tmp_path, lambda _: None)
+    solved, solve = [], tones.solve
+
+    def counted(b: Any, first: float, *rest: Any) -> Any:
+        solved.append(first / (2 * np.pi))
+        return solve(b, first, *rest)
+
+    def killed(said: str) -> None:
+        if said.startswith("point 2"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(tones, "solve", counted)
+    with pytest.raises(KeyboardInterrupt):
+        tones_stage(case, files, tmp_path / "a", report=killed, pictures=False)
+    assert solved == pytest.approx([0.14, 0.145]) and not (tmp_path / "a" / "two_tones.csv").exists()
+    solved.clear()
+    assert tones_stage(case, files, tmp_path / "a", pictures=False)[2]
+    assert solved[0] == pytest.approx(0.15) and not (tmp_path / "a" / "two_tones.points").exists()
+    tones_stage(case, files, tmp_path / "b", pictures=False)
+    assert (tmp_path / "a" / "two_tones.csv").read_bytes() == (tmp_path / "b" / "two_tones.csv").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        tones_stage(case, files, tmp_path / "a", ["excitations.0.amplitude=0.4"], report=killed, pictures=False)
+    solved.clear()
+    tones_stage(case, files, tmp_path / "a", ["excitations.0.amplitude=0.45"], pictures=False)
+    assert solved[0] == pytest.approx(0.14)
+    with pytest.raises(UserError, match="two_tones"):
+        tones_stage(case, files, tmp_path / "c", ["excitations.1.tone=1"], pictures=False)
+    assert not list((tmp_path / "c").glob("two_tones*"))
+
+
 def test_moving_ground(tmp_path: Path) -> None:
     """A mass on a belt that slides under it all the time, pushed with two frequencies: as in time."""
-    from microslip.case import load_case
     from microslip.case.assemble import build
     from microslip.system.lumped import load_system
 

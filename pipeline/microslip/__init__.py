@@ -22,6 +22,7 @@ PUBLIC = {
     "bodies": "modes assemble sample stability",
     "system.structure": "structure polynomial jenkins stop friction Element",
     "bifurcation.dynamics": "Dynamics",
+    "bifurcation.recorded": "read_bifurcation",
     "analyses": "harmonic_response two_tones follow backbone integrate integrate_many run_up bifurcate mistune",
     "mistuning.scatter": "Scatter",
     "mistuning.identification": "blades_from_modes",

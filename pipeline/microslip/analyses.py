@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from .bifurcation.diagram import Diagram
     from .bifurcation.dynamics import Dynamics
-    from .harmonic_balance.tones import Solved
+    from .harmonic_balance.tones import Kept, Solved
     from .mistuning.ensemble import Ensemble
     from .mistuning.scatter import Scatter
     from .time_domain.many import Reached
@@ -134,7 +134,7 @@ def harmonic_response(
 def two_tones(
     system: Assembly | Built, first: Any, second: Any, *, free: bool = False, harmonics: int = 5,
     samples: int | None = None, turns: int | None = None, start: Orbit | None = None,
-    unit: Literal["Hz", "rad/s"] = "Hz", report: Report = lambda _: None,
+    unit: Literal["Hz", "rad/s"] = "Hz", kept: Kept | None = None, report: Report = lambda _: None,
 ) -> Solved:  # fmt: skip
     """Quasi-periodic vibration of two frequencies without a common period, by harmonic balance over both.
 
@@ -146,7 +146,7 @@ def two_tones(
             periods of the first tone from rest, and a hundred that are kept.
         harmonics: H: pairs (k1, k2) with |k1| + |k2| <= H are balanced. samples: of a turn of the faster angle, 8 H and
             32 at least if not given. turns: of it in the line along which contacts that remember are marched; as many.
-        report: is told what is under way.
+        kept: finished points of a run that did not end. report: is told what is under way.
 
     Returns:
         A `Solved`: ``of(k1, k2)``, ``plot()``, ``plot_torus()``, ``motion(time)``, ``to_dataframe()``,
@@ -190,7 +190,7 @@ def two_tones(
         at = float(one[0]) / (2 * np.pi)
         seen = start or integrate(assembly, at, settle=200, keep=100, samples=32)
         b, begin = tones.from_time(b, seen.time, seen.d, float(one[0]), float(two[0]))
-    return tones.swept(b, one, two, begin, report)
+    return tones.swept(b, one, two, begin, report, kept)
 
 
 def _check_tones(assembly: Assembly, first: np.ndarray, second: np.ndarray, free: bool) -> None:
@@ -467,8 +467,8 @@ def run_up(
 def bifurcate(
     system: Dynamics | Callable[[float], Assembly], start: float, stop: float, *, x: Any = None,
     frequency: float | None = None, unit: Literal["Hz", "rad/s"] = "Hz", orbits: bool = True, doublings: int = 1,
-    attractors: Sequence[float] = (), starts: int = 64, nodes: int = 32, step: float = 0.08, points: int = 400,
-    report: Report = lambda _: None,
+    attractors: Sequence[float] = (), starts: int = 64, deflate: Sequence[float] = (), nodes: int = 32,
+    step: float = 0.08, points: int = 400, report: Report = lambda _: None,
 ) -> Diagram:  # fmt: skip
     """Equilibria over a parameter, their Hopf points, and the periodic orbits that are born there, stable or not.
 
@@ -478,12 +478,13 @@ def bifurcate(
             at the start; at rest if not given. frequency: of an assembly's loads, in the unit.
         orbits: whether they are followed. doublings: how often from an orbit on to the one of twice its period.
         attractors: values of the parameter at which `starts` motions are left alone, to find what they come to.
+        deflate: values at which orbits, stable or not, are looked for beside those by deflation of what is known.
         nodes: of an orbit. step: the longest, a share of start to stop. points: of a branch. report: is told what is
             under way.
 
     Returns:
-        A `Diagram`: ``branches``, ``hopf``, ``at("fold")``, ``plot(axes)``, ``to_dataframe()``, ``to_xarray()``. A
-        branch that could not be followed to its end says why in ``ended``.
+        A `Diagram`: ``branches``, ``hopf``, ``deflated``, ``at("fold")``, ``plot(axes)``, ``to_dataframe()``,
+        ``to_xarray()``. A branch that could not be followed to its end says why in ``ended``.
 
     Raises:
         UserError: no equilibrium near the start; contacts that remember; a parameter that does not act smoothly.
@@ -512,7 +513,9 @@ def bifurcate(
         Omega = None if frequency is None else 2 * np.pi * frequency * _hertz(unit)
         made = mechanics.dynamics(system, min(start, stop), max(start, stop), Omega)
         begin = equilibrium(of(system(start))) if x is None else np.asarray(x, dtype=float)
-    asked = diagram.Asked(start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts)
+    asked = diagram.Asked(
+        start, stop, orbits, doublings, nodes, step, points, tuple(attractors), starts, deflate=tuple(deflate)
+    )
     return diagram.diagram(made, begin, asked, report=report)
 
 

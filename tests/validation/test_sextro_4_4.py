@@ -15,7 +15,7 @@ import pytest
 from closed_forms.oscillators import belt
 from scipy.integrate import solve_ivp
 
-from microslip.bifurcation import balance, floquet
+from microslip.bifurcation import balance, deflation, floquet
 from microslip.bifurcation.branches import SPECIAL, Branch
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
 
@@ -84,6 +84,20 @@ def window(found: Diagram) -> tuple[float, float]:
 def test_window_of_three_attractors_of_the_velocity() -> None:
     """Printed: 3.57 to 4.09 m/s."""
     assert window(velocity()) == pytest.approx((3.57, 4.09), rel=2e-3)
+
+
+def test_deflation_finds_the_orbits_of_the_window_without_any_motion() -> None:
+    """At 3.8 m/s, from the equilibrium alone: the two stable ones, and the unstable ones of both branches."""
+    found = deflation.coexisting(velocity().system, 3.8, [np.zeros(4)], [], 32)
+    own = [(one.orbit.period, one.stable) for one in sorted(found, key=lambda one: one.orbit.period)]
+    assert [stable for _, stable in own] == [False, True, False, True]
+    crossed = []
+    for b in velocity().branches[1:]:
+        for i in np.flatnonzero(np.diff((b.parameter < 3.8).astype(int))):
+            u = (3.8 - b.parameter[i]) / (b.parameter[i + 1] - b.parameter[i])
+            crossed.append((float((1 - u) * b.period[i] + u * b.period[i + 1]), bool(b.stable[i])))
+    assert [stable for _, stable in sorted(crossed)] == [stable for _, stable in own]
+    assert [period for period, _ in own] == pytest.approx([period for period, _ in sorted(crossed)], rel=1e-3)
 
 
 def in_time(found: Diagram, p: float, x: np.ndarray, time: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,6 +119,19 @@ def joined(back: Branch, forth: Branch) -> Branch:
     return replace(forth, ended=ended, **both)
 
 
+def values_at(found: Sequence[Branch], kind: str) -> dict[str, Array]:
+    """Branch -> values of the parameter at its points of a kind, see `SPECIAL`."""
+    values = {b.name: b.parameter[b.of_kind(kind)] for b in found}
+    return {name: at for name, at in values.items() if len(at)}
+
+
+def table(found: Sequence[Branch]) -> pandas.DataFrame:
+    """A row a point, branch by branch."""
+    import pandas
+
+    return pandas.concat([b.to_dataframe() for b in found], ignore_index=True)
+
+
 def columns(branch: Branch) -> dict[str, Any]:
     """Column -> values of a table."""
     found: dict[str, Any] = {"branch": np.array([branch.name] * len(branch)), "kind": branch.kind,
@@ -172,5 +185,3 @@ def kept(path: Path, inputs: str) -> Branch | None:
         return None
     with h5py.File(store.ordinary(path), "r") as file:
         return get(file) if str(file.attrs.get("inputs")) == inputs else None
-
-

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -11,12 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.integrate
 
-from ..continuation import Settings, branch_off, follow
-from ..data import Array
-from .balance import Balance, Harmonics
+from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
+from ..data import Array, ComplexArray
+from . import equilibria, floquet, flow
+from .balance import Balance, Harmonics, summed
 from .diagram import Asked, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
+from .shooting import Orbit
 from .switching import OFF
 
 Report = Callable[[str], None]
@@ -26,6 +28,15 @@ PERIODS = 5
 
 FINE = 1e-9
 """Relative tolerance of that motion."""
+
+MOST = 60
+"""Harmonics up to which an orbit is refined."""
+
+FASTEST = 4.0
+"""Step times the fastest root up to which the method of order 8 is stable, with room."""
+
+SAFETY = 3.0
+"""By which the estimated error is multiplied, as in `harmonic_balance.accuracy`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +131,68 @@ def drift(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> float:
     if not run.success:
         return float("inf")
     return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2))
+
+
+def refined(
+    system: Dynamics, orbit: Harmonics, accuracy: float, most: int = MOST, report: Report = lambda _: None
+) -> tuple[Harmonics, float]:  # fmt: skip
+    """An orbit with as many harmonics as its accuracy takes, and its estimated error: shares of its amplitude.
+
+    Harmonics grow by half. What they change falls from one time to the next by a factor, by which what they still miss
+    is estimated, as `harmonic_balance.accuracy` does with its `SAFETY`. With `most` of them it may still be too large;
+    it is infinite where the balance was not found again.
+    """
+    size, before, error = np.asarray(system.scale), 0.0, np.inf
+    while error > accuracy and (H := orbit.count + max(orbit.count // 2, 2)) <= most:
+        c = np.zeros((2 * H + 1, system.count))
+        c[: len(orbit.c)] = orbit.c
+        problem = Balance(system, replace(orbit, c=c))
+        found = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
+        if not found.converged:
+            return orbit, np.inf
+        orbit = problem.orbit(found.x, orbit.p)
+        turns = np.arange(4 * H) / (4 * H)
+        y = orbit.at(turns) / size
+        change = np.abs(summed(H, turns) @ (orbit.c - c) / size).max() / (np.ptp(y, axis=0).max() / 2)
+        error = float(SAFETY * change * (min(1.0, change / before) if before else 1.0))
+        before = change
+        report(f"{H} harmonics at {orbit.p:.6g}: estimated error {error:.1e}")
+    return orbit, error
+
+
+def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
+    """Floquet multipliers of an orbit, the largest first, see `floquet.multipliers`.
+
+    Steps of the flow follow the motion, which may be small, and not what leaves it: nodes are so many that a step from
+    one to the next is short enough for the fastest root.
+    """
+    period = 2 * np.pi / orbit.omega
+    fastest = np.abs(equilibria.eigenvalues(system, orbit.at(np.zeros(1))[0], orbit.p)).max()
+    nodes = flow.BLOCK * int(np.ceil(max(period * fastest / (FASTEST * flow.BLOCK), 1)))
+    return floquet.multipliers(Orbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p))
+
+
+@dataclass(frozen=True)
+class Checked:
+    """An orbit with the harmonics that an accuracy takes.
+
+    Attributes: orbit. error: see `refined`. drift: of a motion in time, see `drift`. multipliers: of Floquet.
+    """
+
+    orbit: Harmonics
+    error: float
+    drift: float
+    multipliers: ComplexArray
+
+    @property
+    def stable(self) -> bool:
+        return floquet.is_stable(self.multipliers)
+
+
+def checked(system: Dynamics, orbit: Harmonics, accuracy: float, report: Report = lambda _: None) -> Checked:
+    """An orbit refined to an accuracy, and what time says of it."""
+    fine, error = refined(system, orbit, accuracy, report=report)
+    return Checked(fine, error, drift(system, fine), multipliers(system, fine))
 
 
 def _rate(system: Dynamics) -> Any:

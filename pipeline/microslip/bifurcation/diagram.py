@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..continuation import Lost, Scaled, Settings, start
+from ..continuation import Lost, Scaled, Settings, newton, start
 from ..continuation.curve import State
 from ..data import Array, UserError
-from . import equilibria, floquet, flow, orbits, switching
+from . import deflation, equilibria, floquet, flow, orbits, switching
 from .basin import Attractor, attractors
-from .branches import EQUILIBRIA, Branch, joined, of_orbits
+from .branches import EQUILIBRIA, Branch, joined, of_orbits, table, values_at
 from .drawn import draw
 from .dynamics import Dynamics
 from .equilibria import Hopf
@@ -44,6 +44,7 @@ class Asked:
     attractors: tuple[float, ...] = ()
     starts: int = 64
     seed: int = 0
+    deflate: tuple[float, ...] = ()
 
     @property
     def settings(self) -> Settings:
@@ -60,14 +61,15 @@ class Diagram:
     """Branches over a parameter.
 
     Attributes:
-        system. branches. hopf: the Hopf points. attractors: what motions from many starts came to. messages: what a
-            reader must know.
+        system. branches. hopf: the Hopf points. attractors: what motions from many starts came to. deflated: periodic
+            orbits that deflation found beside these. messages: what a reader must know.
     """
 
     system: Dynamics
     branches: tuple[Branch, ...]
     hopf: tuple[Hopf, ...]
     attractors: tuple[Attractor, ...] = ()
+    deflated: tuple[orbits.Found, ...] = ()
     messages: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Branch:
@@ -75,8 +77,7 @@ class Diagram:
 
     def at(self, kind: str) -> dict[str, Array]:
         """Branch -> values of the parameter at its points of a kind, see `branches.SPECIAL`."""
-        found = {b.name: b.parameter[b.of_kind(kind)] for b in self.branches}
-        return {name: values for name, values in found.items() if len(values)}
+        return values_at(self.branches, kind)
 
     def plot(self, axes: Axes, label: str = "parameter", read_out: int = 0) -> None:
         """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
@@ -85,9 +86,7 @@ class Diagram:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A row a point, branch by branch."""
-        import pandas
-
-        return pandas.concat([b.to_dataframe() for b in self.branches], ignore_index=True)
+        return table(self.branches)
 
     def to_xarray(self) -> xarray.Dataset:
         """The same by points."""
@@ -105,6 +104,7 @@ class _Work:
     report: Report
     found: list[Branch] = field(default_factory=list)
     seen: list[Attractor] = field(default_factory=list)
+    deflated: list[orbits.Found] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
 
     def add(self, name: str, make: Callable[[], Branch]) -> Branch:
@@ -139,7 +139,9 @@ def diagram(
     work = _Work(system, asked, kept, keep, report)
     if system.frequency is not None:
         _doublings(work, work.add(DRIVEN, lambda: _driven(work, x)), asked.doublings)
-        return Diagram(system, tuple(work.found), (), (), tuple(work.messages))
+        for p in asked.deflate:
+            _beside(work, p, [np.asarray(x, dtype=float)])
+        return Diagram(system, tuple(work.found), (), (), tuple(work.deflated), tuple(work.messages))
     still = work.add(EQUILIBRIA, lambda: _equilibria(system, x, asked))
     points = tuple(_hopf(system, still, i) for i in still.of_kind("Hopf"))
     if asked.orbits:
@@ -148,7 +150,11 @@ def diagram(
                 _born_at(work, f"orbits {i}", point)
         for p in asked.attractors:
             _coexisting(work, still, p)
-    return Diagram(system, tuple(work.found), points, tuple(work.seen), tuple(work.messages))
+        for p in asked.deflate:
+            _beside(work, p, _resting(work, still, p))
+    return Diagram(
+        system, tuple(work.found), points, tuple(work.seen), tuple(work.deflated), tuple(work.messages)
+    )  # fmt: skip
 
 
 DRIVEN = "driven"
@@ -188,11 +194,37 @@ def _coexisting(work: _Work, still: Branch, p: float) -> None:
     centre = still.x[int(np.argmin(np.abs(still.parameter - p))), 0]
     found = attractors(system, centre, p, asked.starts, asked.seed, asked.nodes)
     work.seen += found
-    for number, one in enumerate((a.orbit for a in found), 1):
+    _new_ones(work, "attractor", [a.orbit for a in found])
+
+
+def _beside(work: _Work, p: float, still: Sequence[Array]) -> None:
+    """The branches of orbits that deflation finds at p beside equilibria and attractors, and that are on none which is
+    known."""
+    known = [a.orbit for a in work.seen if a.orbit.p == p]
+    found = deflation.coexisting(work.system, p, still, known, work.asked.nodes, work.report)
+    work.deflated += found
+    _new_ones(work, "orbit", [one.orbit for one in found])
+
+
+def _resting(work: _Work, still: Branch, p: float) -> list[Array]:
+    """The equilibria (n,) at p."""
+    x, away = still.x[:, 0], still.parameter - p
+    near = np.flatnonzero(away[:-1] * away[1:] <= 0)
+    found = [newton(equilibria.Still(work.system), x[i], p) for i in near]
+    unlike: list[Array] = []
+    for one in (s.x for s in found if s.converged):
+        if all(np.abs((one - y) / work.system.scale).max() > deflation.NEAR for y in unlike):
+            unlike.append(one)
+    return unlike
+
+
+def _new_ones(work: _Work, what: str, found: Sequence[Orbit]) -> None:
+    """Branches through orbits that are on none which is known."""
+    for number, one in enumerate(found, 1):
         if not any(_passes(b, one) for b in work.found):
-            name = f"attractor {number} at {p:.6g}"
-            branch = work.add(name, partial(_both_ways, name, one, asked, work.report))
-            _doublings(work, branch, asked.doublings)
+            name = f"{what} {number} at {one.p:.6g}"
+            branch = work.add(name, partial(_both_ways, name, f"{what} at {one.p:.6g}", one, work.asked, work.report))
+            _doublings(work, branch, work.asked.doublings)
 
 
 def _passes(branch: Branch, orbit: Orbit) -> bool:
@@ -217,14 +249,14 @@ CLOSE = 0.02
 """Difference of periods and extremes, over their sizes, up to which an orbit is on a branch."""
 
 
-def _both_ways(name: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
+def _both_ways(name: str, born: str, orbit: Orbit, asked: Asked, report: Report) -> Branch:
     """The branch through an orbit, to both sides."""
     problem = Shooting(orbit.system, orbit, orbit.period)
     parts = []
     for way in (-1, 1):
         settings = replace(asked.settings, direction=way)
         state = start(problem, problem.unknowns(orbit), orbit.p, settings)
-        parts.append(followed(name, f"attractor at {orbit.p:.6g}", problem, state, settings, report))
+        parts.append(followed(name, born, problem, state, settings, report))
     return joined(*parts)
 
 

@@ -106,14 +106,15 @@ class Shooting:
         m, n = self.reference.x.shape
         nodes = x[: m * n].reshape(m, n)
         T, dT = (float(x[-1]), 0.0) if self.free else self._driven(lam)
+        lost = np.full(len(x), np.inf), np.full((len(x), len(x)), np.inf), np.full(len(x), np.inf)
         if not (np.isfinite(x).all() and T > 0):
-            bad = np.full(len(x), np.inf)
-            return bad, np.full((len(x), len(x)), np.inf), bad
+            return lost
         ends, dx, _, fine = flow.pieces(self.system, nodes, lam, T, self.reference.turns)
+        if not fine.all():
+            return lost
         R, J, slope = np.zeros(len(x)), np.zeros((len(x), len(x))), np.zeros(len(x))
         following = np.roll(np.arange(m), -1)
         R[: m * n] = (ends - nodes[following]).ravel()
-        R[0] = R[0] if fine.all() else np.inf
         blocks = J[: m * n, : m * n].reshape(m, n, m, n)
         blocks[np.arange(m), :, following, :] -= np.eye(n)
         blocks[np.arange(m), :, np.arange(m), :] += dx[:, :, :n]

@@ -300,10 +300,12 @@ class Over(Model):
 class Cycle(Over):
     """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
 
-    points: of a branch at most.
+    points: of a branch at most. accuracy: share of the amplitude to which three of its orbits are refined, that are
+    compared with a motion in time.
     """
 
     harmonics: Annotated[int, Field(ge=1, le=200)] = 7
+    accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
 
 
 class StabilityOfCase(Model):
@@ -341,7 +343,8 @@ class BifurcationOfCase(Model):
     fixed: other keys and their values, of this diagram alone. start, stop: of the parameter. orbits: whether those born
     at Hopf points are followed, doublings: how often from an orbit to the one of twice its period. attractors: values
     of the parameter at which `starts` motions, drawn from `seed`, are left to themselves, to find what they lead to.
-    nodes: of an orbit, doubled with its period. step: the longest, a share of start to stop. points: of a branch.
+    deflate: values at which orbits are looked for beside what is known. nodes: of an orbit, doubled with its period.
+    step: the longest, a share of start to stop. points: of a branch.
     frequency: Hz of the first harmonic of the excitations, where there are any.
     """
 
@@ -357,6 +360,7 @@ class BifurcationOfCase(Model):
     attractors: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
     starts: Annotated[int, Field(ge=1, le=10000)] = 64
     seed: Annotated[int, Field(ge=0)] = 0
+    deflate: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
     nodes: Annotated[int, Field(ge=4, le=1024)] = 32
     step: Annotated[Positive, Field(le=0.5)] = 0.08
     points: Annotated[int, Field(ge=2, le=100000)] = 400
@@ -368,4 +372,9 @@ class BifurcationOfCase(Model):
             raise ValueError("stop: is the start; give two different values of the parameter")
         if not self.keys:
             raise ValueError("keys: name one or more keys of the case that follow the parameter, with a factor each")
+        low, high = sorted((self.start, self.stop))
+        for key in ("attractors", "deflate"):
+            for value in getattr(self, key):
+                if not low <= value <= high:
+                    raise ValueError(f"{key}: {value:g} is not between start and stop; take values of the diagram")
         return self

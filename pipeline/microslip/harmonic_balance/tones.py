@@ -11,6 +11,7 @@ import scipy.optimize
 
 from ..continuation import CONVERGED, newton
 from ..data import Array, UserError
+from ..results.journal import Journal
 from ..results.tones import TwoTones
 from . import reduced
 from .readout import measured
@@ -138,12 +139,40 @@ def _led(b: TwoTone, first: float) -> Any:
     return found
 
 
-def swept(b: TwoTone, first: Array, second: Array, start: Array | None, report: Report) -> Solved:
-    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one."""
+@dataclass(frozen=True)
+class Kept:
+    """Finished points of a sweep, by their number, in an open journal; none without one."""
+
+    journal: Journal | None = None
+
+    def of(self, i: int) -> Point | None:
+        one = None if self.journal is None else self.journal.of(SERIES).get(float(i))
+        if one is None:
+            return None
+        return Point(float(one["first"]), float(one["second"]), one["x"], str(one["status"]), float(one["error"]))
+
+    def keep(self, i: int, point: Point) -> None:
+        if self.journal is not None:
+            self.journal.keep(SERIES, i, point._asdict())
+
+
+SERIES = "two tones"
+"""Of the journal."""
+
+
+def swept(
+    b: TwoTone, first: Array, second: Array, start: Array | None, report: Report, kept: Kept | None = None
+) -> Solved:  # fmt: skip
+    """Motions at frequencies (f,), rad/s, each from its neighbours. start: (n,) unknowns of the first one. kept: those
+    that are known from a run that did not end, and where each is kept the moment it is found."""
+    kept = kept or Kept()
     points, balances, known = list[Point](), list[TwoTone](), [] if start is None else [start]
     for i, (one, two) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
         here = b.at(one, known[-1][-1] if b.free else two)
-        found = solve(here, one, two, [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])])
+        found = kept.of(i)
+        if found is None:
+            found = solve(here, one, two, [*known[::-1][:1], *([] if b.free else [np.zeros(b.size)])])
+            kept.keep(i, found)
         points.append(found)
         balances.append(here)
         if found.status == CONVERGED:

@@ -14,13 +14,15 @@ from .. import sliding
 from ..basis import read_basis
 from ..bifurcation import branches, mechanics
 from ..bifurcation.diagram import Asked, Diagram, diagram
+from ..bifurcation.recorded import Branches, write_bifurcation
 from ..case import CaseSettings, checkpoint, load_case
 from ..case.questions import BifurcationOfCase
 from ..data import NotConverged, UserError
-from ..files import hdf5, store
+from ..files import store
 from ..files.tables import rows_csv
 from ..report.bifurcation import bifurcation_html
 from ..system.assembly import Assembly
+from ..units import counted
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, hash_of_code
 from .varied import Varied
@@ -82,7 +84,9 @@ def _work(
     stage.begin()
     found = [_diagram(one, folder / "branches", inputs, stage) for one in changed]
     made = [_table(folder, one.asked, drawn) for one, drawn in zip(changed, found, strict=True)]
-    made.append(_file(folder / "bifurcation.h5", settings.bifurcation, found))
+    both = zip(settings.bifurcation, found, strict=True)
+    whole = [Branches(one.name, one.parameter, one.unit, drawn.branches) for one, drawn in both]
+    made.append(write_bifurcation(folder / "bifurcation.h5", whole))
     drawn = _pictures(folder / "pictures", settings, found) if pictures else []
     sentences = [s for asked, one in zip(settings.bifurcation, found, strict=True) for s in told(asked, one)]
     page = bifurcation_html(f"{settings.name}: bifurcations", settings.bifurcation, found, sentences, drawn)
@@ -128,19 +132,6 @@ def _table(folder: Path, asked: BifurcationOfCase, found: Diagram) -> Path:
     return folder / f"bifurcation_{asked.name}.csv"
 
 
-def _file(path: Path, asked: Sequence[BifurcationOfCase], found: Sequence[Diagram]) -> Path:
-    with store.complete_or_absent(path) as temporary:
-        with hdf5.create(temporary) as file:
-            file.attrs["format"], file.attrs["version"] = "microslip-bifurcation", "0.1"
-            for one, drawn in zip(asked, found, strict=True):
-                group = file.create_group(one.name)
-                group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
-                for i, branch in enumerate(drawn.branches):
-                    branches.put(group.create_group(f"branch_{i}"), branch)
-        hdf5.seal(temporary)
-    return path
-
-
 def _pictures(folder: Path, settings: CaseSettings, found: Sequence[Diagram]) -> list[Path]:
     from ..pictures.bifurcation import diagram_picture, portraits_picture
 
@@ -173,4 +164,13 @@ def told(asked: BifurcationOfCase, found: Diagram) -> list[str]:
         passed = [WORDS[str(k)](f"{p:.6g}{unit}") for k, p in zip(b.kind, b.parameter, strict=True) if str(k) in WORDS]
         if not b.still or passed:
             said.append(f"{asked.name}, {b.name}: born at the {b.born}; {', '.join(passed) or 'nothing on the way'}.")
+    said += [f"{asked.name}, deflation at {p:.6g}{unit}: {beside(found, p)}." for p in asked.deflate]
     return [*said, *(f"{asked.name}, {words}" for words in found.messages)]
+
+
+def beside(found: Diagram, p: float) -> str:
+    """Orbits that deflation found at a value of the parameter."""
+    there = [one for one in found.deflated if one.orbit.p == p]
+    words = [f"{'stable' if one.stable else 'unstable'}, period {one.orbit.period:.6g} s, multiplier of the size "
+             f"{np.abs(one.multipliers).max(initial=0.0):.3g}" for one in there]  # fmt: skip
+    return f"{counted(len(there), 'orbit')} beside what was known" + (f": {'; '.join(words)}" if words else "")

@@ -14,7 +14,7 @@ import numpy as np
 from .. import sliding
 from ..basis import read_basis
 from ..bifurcation import mechanics
-from ..bifurcation.cycles import PERIODS, Cycles, cycles, drift
+from ..bifurcation.cycles import PERIODS, Cycles, checked, cycles
 from ..case import CaseSettings, load_case
 from ..case.questions import Cycle, StabilityOfCase
 from ..case.settings import GROUND
@@ -121,7 +121,7 @@ def _work(
     folder.mkdir(parents=True, exist_ok=True)
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
     said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
-    said += [sentence_of(c, asked.cycle) for c in born if asked.cycle]
+    said += [words for c in born if asked.cycle for words in sentences_of(c, asked.cycle, stage.report)]
     moves = moving(state, found, varied.bases, settings, folder) if pictures else []
     names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full)
@@ -256,17 +256,24 @@ def _cycles(varied: Varied, asked: StabilityOfCase, path: Path, report: Report) 
         raise UserError(f"{path}: stability.cycle: {over.parameter}: {error}") from error
 
 
-def sentence_of(c: Cycles, over: Cycle) -> str:
-    """Where a limit cycle is born, of which kind, how far it was followed, and how a motion in time keeps to it."""
+def sentences_of(c: Cycles, over: Cycle, report: Report) -> list[str]:
+    """Where a limit cycle is born, of which kind, how far it was followed; of three of its orbits their harmonics, how
+    a motion in time keeps to them, and whether they are stable."""
     unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
     kind = "supercritical" if c.supercritical else "subcritical"
-    tried = [c.orbits[(len(c.orbits) - 1) * k // 3] for k in (1, 2, 3)]
-    off = ", ".join(f"{drift(c.system, o):.1e} at {o.p:.4g}{unit}" for o in tried)
-    return (
+    said = [
         f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {kind}: its limit "
-        f"cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz; in {PERIODS} "
-        f"periods a motion in time leaves it by {off} of its amplitude"
-    )
+        f"cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz"
+    ]
+    for k in (1, 2, 3):
+        one = checked(c.system, c.orbits[(len(c.orbits) - 1) * k // 3], over.accuracy, report)
+        wide = "" if one.error <= over.accuracy else f", more than the {over.accuracy:.1e} asked for"
+        said.append(
+            f"limit cycle at {one.orbit.p:.4g}{unit}: {one.orbit.count} harmonics, estimated error {one.error:.1e}"
+            f"{wide}; in {PERIODS} periods a motion in time leaves it by {one.drift:.1e} of its amplitude; "
+            f"{'stable' if one.stable else 'unstable'}, largest Floquet multiplier {abs(one.multipliers[0]):.4g}"
+        )
+    return said
 
 
 def unreduced_body(name: str, path: Path) -> Unreduced:

@@ -16,10 +16,12 @@ from ..case.assemble import build
 from ..data import UserError
 from ..files import store
 from ..files.tables import rows_csv
+from ..harmonic_balance.tones import Kept
 from ..report.tones import tones_html
+from ..results import open_journal
 from ..units import Quantity
 from .checkpoint import inputs_of
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, hash_of_code
 
 if TYPE_CHECKING:
     from ..results.tones import TwoTones
@@ -45,25 +47,32 @@ def tones_stage(
         raise UserError(f"{case_path}: two_tones: is missing; add [two_tones] with start and second (Hz), or ratio")
     stage = Stage(folder / "two_tones.json", ("stages.tones",), force, report)
     inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures))
+    depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
+    stage.make(inputs, lambda: _work(stage, settings, case_path, files, pictures, depends))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["sentences"], told["converged"]
 
 
 def _work(
-    stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], pictures: bool
+    stage: Stage, settings: CaseSettings, case_path: Path, files: Mapping[str, Path], pictures: bool, inputs: str
 ) -> Made:  # fmt: skip
+    """Finished points stay in a journal until all that is made of them is there."""
     folder, asked = stage.product.parent, settings.two_tones
     assert asked is not None
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
     first, second = asked.hertz
-    try:
-        found = two_tones(
-            built, first, second, free=asked.free, harmonics=asked.harmonics, samples=asked.samples, turns=asked.turns,
-            report=stage.report,
-        )  # fmt: skip
-    except UserError as error:
-        raise UserError(f"{case_path}: two_tones: {error}") from error
+    points = folder / "two_tones.points"
+    folder.mkdir(parents=True, exist_ok=True)
+    with open_journal(points, inputs, {"case": settings.name}, stage.force) as journal:
+        try:
+            found = two_tones(
+                built, first, second, free=asked.free, harmonics=asked.harmonics, samples=asked.samples,
+                turns=asked.turns, kept=Kept(journal), report=stage.report,
+            )  # fmt: skip
+        except UserError as error:
+            if not journal.series:
+                points.unlink()
+            raise UserError(f"{case_path}: two_tones: {error}") from error
     stage.begin()
     best = int(np.argmax(np.where(found.converged, np.abs(found.of(1, 0)), -1.0)))
     left_out = found.error_estimate(best) if found.converged[best] else np.inf
@@ -83,6 +92,7 @@ def _work(
         "converged": bool(found.converged.all()),
     }
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    points.unlink()
     return Made(made)
 
 

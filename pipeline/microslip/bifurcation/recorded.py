@@ -1,0 +1,115 @@
+"""Diagrams of a case in their file: written whole, read again as branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+
+from ..data import Array, UserError
+from ..files import hdf5, store
+from ..files.hostile import DAMAGE, inspect, refuse_damaged, short
+from . import branches
+from .branches import Branch
+from .drawn import draw
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
+
+FORMAT, VERSION = "microslip-bifurcation", "0.1"
+
+_TRIAL = "from microslip.bifurcation.recorded import _read; _read(path)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Branches:
+    """A diagram as its file has it. Attributes: name. parameter, unit: of its axis. branches."""
+
+    name: str
+    parameter: str
+    unit: str
+    branches: tuple[Branch, ...]
+
+    def __getitem__(self, name: str) -> Branch:
+        return next(b for b in self.branches if b.name == name)
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def at(self, kind: str) -> dict[str, Array]:
+        """Branch -> values of the parameter at its points of a kind: ``Hopf``, ``fold``, ``period doubling``,
+        ``torus``, ``branch point``."""
+        return branches.values_at(self.branches, kind)
+
+    def plot(self, axes: Axes, read_out: int = 0, unit: str = "m") -> None:
+        """Half of the way from the smallest to the largest value of a read-out, in matplotlib's axes."""
+        axis = f"{self.parameter} in {self.unit}".removesuffix(" in ")
+        draw(self.branches, [], axes, axis, self.branches[0].outputs[read_out], unit, read_out)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A row a point, branch by branch."""
+        return branches.table(self.branches)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same by points."""
+        return self.to_dataframe().rename_axis("point").to_xarray()
+
+    def __repr__(self) -> str:
+        return f"<Branches: {self.name}, over {self.parameter}: {', '.join(b.name for b in self.branches)}>"
+
+
+def write_bifurcation(path: Path, diagrams: Sequence[Branches]) -> Path:
+    """All diagrams of a case, complete or not at all."""
+    with store.complete_or_absent(path) as temporary:
+        with hdf5.create(temporary) as file:
+            file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+            for one in diagrams:
+                group = file.create_group(one.name)
+                group.attrs["parameter"], group.attrs["unit"] = one.parameter, one.unit
+                for i, branch in enumerate(one.branches):
+                    branches.put(group.create_group(f"branch_{i}"), branch)
+        hdf5.seal(temporary)
+    return path
+
+
+def read_bifurcation(path: Path | str) -> Mapping[str, Branches]:
+    """Read ``bifurcation.h5``: name of a diagram -> its branches, with every orbit and its multipliers.
+
+    Raises:
+        UserError: missing, damaged, foreign or of another version.
+    """
+    path = Path(path)
+    if not store.ordinary(path).is_file():
+        raise UserError(f"{path}: no such file of bifurcations; run microslip bifurcate first or correct the path")
+    refuse_damaged(path, _TRIAL, "run the case again")
+    return _read(path)
+
+
+def _read(path: Path) -> dict[str, Branches]:
+    with _opened(path) as file:
+        return {
+            name: Branches(
+                name, str(group.attrs["parameter"]), str(group.attrs["unit"]),
+                tuple(branches.get(group[f"branch_{i}"]) for i in range(len(group))),
+            )
+            for name, group in file.items()
+        }  # fmt: skip
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[h5py.File]:
+    try:
+        with h5py.File(path, "r") as file:
+            form, version = file.attrs.get("format"), str(file.attrs.get("version"))
+            if (form, version) != (FORMAT, VERSION):
+                raise UserError(f"{path}: is '{form}' {version} and not '{FORMAT}' {VERSION}; run the case again")
+            inspect(file)
+            yield file
+    except DAMAGE as error:
+        raise UserError(f"{path}: is damaged or incomplete ({short(error)}); run the case again") from error
