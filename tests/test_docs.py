@@ -43,7 +43,7 @@ def number(text: str) -> float:
 
 def made(tmp_path: Path, body: str, *changes: str):
     """A modal file made now, in a folder of its own."""
-    light = ["output.gauss=false", "output.nodal_stress=false", "output.shapes=false", "modes.solver=superlu"]
+    light = ["output.gauss=false", "output.nodal_stress=false", "output.shapes=false"]
     return read_basis(modes_stage(open_job(ROOT / "geometry" / body, [*light, *changes], tmp_path))[0])
 
 
@@ -351,6 +351,7 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quickly")
 def test_own_model_page(tmp_path: Path) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows."""
     shown = pages.play("your_own_model.md", tmp_path)
