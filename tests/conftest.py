@@ -89,21 +89,18 @@ PIXEL = bytes.fromhex(
 """A picture of one white pixel."""
 
 
-@pytest.fixture
-def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _undrawn(request: pytest.FixtureRequest) -> Iterator[None]:
     """Figures of a quick test are composed, but a pixel is saved of them, unless it is marked `drawn`: half a second
     each. The slow tests draw as a user does."""
-    if request.config.getoption("markexpr") != "not slow" or request.node.get_closest_marker("drawn"):
-        return
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-    except ImportError:
-        return
 
     def save(_: Any, to: Any, **how: Any) -> None:
         to.write(PIXEL) if hasattr(to, "write") else Path(to).write_bytes(PIXEL)
 
-    monkeypatch.setattr(FigureCanvasAgg, "print_png", save)
+    with pytest.MonkeyPatch.context() as patched:
+        quick = request.config.getoption("markexpr") == "not slow" and not request.node.get_closest_marker("drawn")
+        if quick and find_spec("matplotlib"):
+            patched.setattr("matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", save)
+        yield
 
 
 def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
@@ -119,7 +116,9 @@ def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+undrawn = pytest.fixture(_undrawn, name="undrawn")
 unjudged = pytest.fixture(_unjudged, name="unjudged")
+undrawn_file = pytest.fixture(_undrawn, scope="module", name="undrawn_file")
 unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
 """In every test of a file, and in what they share."""
 
