@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -88,37 +89,45 @@ PIXEL = bytes.fromhex(
 """A picture of one white pixel."""
 
 
-@pytest.fixture
-def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _undrawn(request: pytest.FixtureRequest) -> Iterator[None]:
     """Figures of a quick test are composed, but a pixel is saved of them, unless it is marked `drawn`: half a second
     each. The slow tests draw as a user does."""
-    if request.config.getoption("markexpr") != "not slow" or request.node.get_closest_marker("drawn"):
-        return
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        return
 
     def save(_: Any, to: Any, **how: Any) -> None:
-        assert how["format"] == "png"
         to.write(PIXEL) if hasattr(to, "write") else Path(to).write_bytes(PIXEL)
 
-    monkeypatch.setattr(Figure, "savefig", save)
+    with pytest.MonkeyPatch.context() as patched:
+        quick = request.config.getoption("markexpr") == "not slow" and not request.node.get_closest_marker("drawn")
+        if quick and find_spec("matplotlib"):
+            patched.setattr("matplotlib.backends.backend_agg.FigureCanvasAgg.print_png", save)
+        yield
 
 
-@pytest.fixture
-def unjudged(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _unjudged(request: pytest.FixtureRequest) -> Iterator[None]:
     """The error that the harmonics of a case leave is not estimated in a quick test that does not look at it: it takes
     three balances more, whose programs take longer to compile than the answer's. The slow tests estimate as a user
     does."""
-    if request.config.getoption("markexpr") != "not slow":
-        return
-    try:
-        from microslip.case import run
-    except ImportError:
-        return
-    judged = run._Left.out
-    monkeypatch.setattr(run._Left, "out", lambda of, *given: [] if of.tolerance is None else judged(of, *given))
+    with pytest.MonkeyPatch.context() as patched:
+        if request.config.getoption("markexpr") == "not slow" and find_spec("jax"):
+            from microslip.case import run
+
+            judged = run._Left.out
+            patched.setattr(run._Left, "out", lambda of, *given: [] if of.tolerance is None else judged(of, *given))
+        yield
+
+
+undrawn = pytest.fixture(_undrawn, name="undrawn")
+unjudged = pytest.fixture(_unjudged, name="unjudged")
+undrawn_file = pytest.fixture(_undrawn, scope="module", name="undrawn_file")
+unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
+"""In every test of a file, and in what they share."""
+
+
+@pytest.fixture
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that a slow test starts compile as the quick tests do, where the compiler is not what is tested."""
+    if locked("jaxlib"):
+        monkeypatch.setenv("XLA_FLAGS", QUICK)
 
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")

@@ -67,6 +67,25 @@ def test_without_a_place_for_the_cache_nothing_is_said() -> None:
     assert python(program, XDG_CACHE_HOME="/proc/none").strip() == "None"
 
 
+def test_programs_that_were_not_used_for_longest_are_forgotten(tmp_path: Path) -> None:
+    """Of ten kilobytes, all but what half of five allow; nothing before an hour has passed, or while there is room."""
+    from microslip.contact.law import forget
+
+    for age in range(10):
+        (tmp_path / f"{age}-cache").write_bytes(bytes(1000))
+        os.utime(tmp_path / f"{age}-cache", (2e9 - age, 1e9))
+
+    def kept() -> list[str]:
+        return sorted(p.name for p in tmp_path.glob("*-cache"))
+
+    forget(tmp_path, most=10_000)
+    forget(tmp_path, most=5_000)
+    assert len(kept()) == 10
+    forget(tmp_path, most=5_000, every=0.0)
+    assert kept() == ["0-cache", "1-cache"]
+    forget(tmp_path / "none")
+
+
 # what it does -----------------------------------------------------------------------------------------------------
 
 SMALL = """

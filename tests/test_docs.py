@@ -8,6 +8,7 @@ import importlib
 import inspect
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def number(text: str) -> float:
 
 def made(tmp_path: Path, body: str, *changes: str):
     """A modal file made now, in a folder of its own."""
-    light = ["output.gauss=false", "output.nodal_stress=false", "output.shapes=false", "modes.solver=superlu"]
+    light = ["output.gauss=false", "output.nodal_stress=false", "output.shapes=false"]
     return read_basis(modes_stage(open_job(ROOT / "geometry" / body, [*light, *changes], tmp_path))[0])
 
 
@@ -116,15 +117,22 @@ def room_order() -> list[str]:
     return [m.removesuffix("/").removesuffix(".py") for m in re.findall(r"^\| `([^`]+)` \|", table, flags=re.M)]
 
 
+@cache
+def imports(file: Path) -> list[tuple[ast.ImportFrom, bool]]:
+    """What a file imports from others, at its top or inside a function, and whether types alone need it."""
+    nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+    ifs = [node for node in nodes if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+    typed = {inner for node in ifs for line in node.body for inner in ast.walk(line)}
+    return [(node, node in typed) for node in nodes if isinstance(node, ast.ImportFrom)]
+
+
 def room_imports(room: str) -> set[str]:
     """Other rooms that a room imports, at the top of a file or inside a function."""
     folder = PACKAGE / room
     found = set()
     for file in sorted(folder.rglob("*.py")) if folder.is_dir() else [PACKAGE / f"{room}.py"]:
         package = ["microslip", *file.relative_to(PACKAGE).parts[:-1]]
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.ImportFrom):
-                continue
+        for node, _ in imports(file):
             base = package[: len(package) - node.level + 1] if node.level else []
             names = [[*base, *(node.module or "").split(".")]] if node.module else [[*base, a.name] for a in node.names]
             found |= {n[1] for n in names if n[0] == "microslip" and len(n) > 1}
@@ -141,13 +149,9 @@ def test_rooms_import_only_from_rooms_above() -> None:
 
 def needed(file: Path) -> set[Path]:
     """Files of the package that a file imports to run; what types alone need is left out."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            node.body = []
     found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.level:
+    for node, types_alone in imports(file):
+        if node.level and not types_alone:
             place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
             found |= {p.with_suffix(".py") for p in (place, *(place / a.name for a in node.names))}
     return {f for f in found if f.is_file()} - {file}
@@ -351,6 +355,7 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quickly")
 def test_own_model_page(tmp_path: Path) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows."""
     shown = pages.play("your_own_model.md", tmp_path)

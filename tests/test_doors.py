@@ -27,7 +27,7 @@ from microslip.stages import response as making
 
 pytest.importorskip("matplotlib")
 POSIX = pytest.mark.skipif(os.name != "posix", reason="pipes, links and locks of POSIX systems")
-pytestmark = POSIX
+pytestmark = [POSIX, pytest.mark.usefixtures("unjudged")]
 BUILD = "build/vane"
 
 

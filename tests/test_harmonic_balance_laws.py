@@ -476,7 +476,7 @@ FEW = ("start = 35.0\nstop = 200.0\npoints = 25", "start = 45.0\nstop = 136.0\np
 
 
 @pytest.fixture(scope="module")
-def answered(tmp_path_factory: pytest.TempPathFactory) -> CaseResult:
+def answered(tmp_path_factory: pytest.TempPathFactory, unjudged_file: None) -> CaseResult:
     return run_case(asked(tmp_path_factory.mktemp("sled"), FEW), sled(), "case.toml")
 
 

@@ -186,6 +186,7 @@ def test_settings_that_contradict_each_other_are_refused(wrong):
 STIFF = {"normal_stiffness": 1e8, "tangential_stiffness": 1e8}  # N/m
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_case_uses_the_rigid_coordinates_of_a_patch_that_has_more():
     """The friction response with six springs a patch is the same with and without further coordinates on the patch."""
     case = CaseSettings.model_validate({

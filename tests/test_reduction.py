@@ -359,6 +359,7 @@ def test_hermitian_problems_reduce_as_their_real_twins(method):
     np.testing.assert_allclose(back, np.eye(len(back)), atol=1e-9)
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_friction_response_is_the_same_through_every_method_that_is_statically_exact():
     """Peaks of a stuck block between rigid neighbours: MacNeal's residual, and coordinates without mass or of force."""
     case = CaseSettings.model_validate({

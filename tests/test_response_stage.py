@@ -578,18 +578,19 @@ def test_a_strain_gauge_is_strain_everywhere(folder: Path) -> None:
 @pytest.mark.slow
 def test_the_axis_of_a_strain_gauge_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The response's picture and the comparison with the book's mode."""
-    from matplotlib.figure import Figure
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     said: list[str] = []
-    saved = Figure.savefig
+    saved = FigureCanvasAgg.print_png
 
-    def look(figure: Figure, *more: Any, **how: Any) -> None:
+    def look(canvas: FigureCanvasAgg, *more: Any, **how: Any) -> None:
+        figure = canvas.figure
         said.extend(axes.get_ylabel() for axes in figure.axes)
         said.append(getattr(figure, "_supylabel", None) and figure._supylabel.get_text() or "")
-        saved(figure, *more, **how)
+        saved(canvas, *more, **how)
 
     (folder / "case.toml").write_text(CASE.replace('monitor = "probe"', 'monitor = "root"'))
-    monkeypatch.setattr(Figure, "savefig", look)
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", look)
     table, pairs, _ = running.compare_book(folder / "case.toml", None, ["sweep.points=5"])
     strains = [text for text in said if "amplitude of root" in text or "read-out" in text]
     assert len(strains) == 3 and all("µm/m" in text for text in strains)

@@ -514,6 +514,7 @@ normal_forces = [50.0]
 """
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_case_responds_at_any_speed_of_the_range(tmp_path) -> None:
     """The free peak stands where the body solved for at that speed has its mode; a stored speed needs no range."""
     from microslip.case import load_case, run_case

@@ -54,7 +54,7 @@ normal_forces = [10000.0]
 
 
 @pytest.fixture
-def ring(tmp_path, monkeypatch) -> Path:
+def ring(tmp_path, monkeypatch, unjudged) -> Path:
     """A case of six blades that stick."""
     monkeypatch.chdir(tmp_path)
     write_basis(tmp_path / "basis.h5", blade())

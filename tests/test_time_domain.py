@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import jax
 import jax.numpy as jnp
 import meshio
 import numpy as np
@@ -115,10 +116,12 @@ def test_an_impact_oscillator_of_the_book_in_its_order(order: int, steps: int, m
     size, errors = np.abs(exact).max(), []
     for each in steps * 2 ** np.arange(many) // samples:
         s = Stepper(e, 2 * np.pi / Omega / (each * samples), order=order)
-        seen = s.run(s.start(np.zeros(3), np.zeros(3)), np.full(3 * samples, each))[1]
+        begun = s.start(np.zeros(3), np.zeros(3))
+        now, seen, *_ = s.run(begun, np.full(3 * samples, each))
         errors.append(np.abs(seen.q @ e.output[0] - exact).max() / size)
     found = -np.polyfit(np.arange(many), np.log2(errors), 1)[0]
     assert errors[-1] < 10 ** (-1 - 2 * order) and 0.85 < found / order < 1.2
+    assert jax.tree.map(jax.typeof, begun) == jax.tree.map(jax.typeof, now)  # or the loop would be compiled twice
 
 
 def test_leaps_over_flights_change_nothing() -> None:

@@ -387,22 +387,29 @@ def test_what_a_path_means(tmp_path, monkeypatch):
         places.meant(Path("geometry"), case=True)
 
 
+FEW = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=15", "sweep.normal_forces=[100.0]", "harmonics=1"]
+
+
+def resonance(at: Path, how: response.Wanted) -> dict[str, float]:
+    """Of the packaged sample, with what is wanted of it and nothing else in a folder."""
+    case, basis = (PACKAGE / "samples" / name for name in ("case.toml", "basis.h5"))
+    found, _ = response.response_stage(case, {"vane-eigenmodes": basis}, at, FEW, wanted=how)
+    assert bool(list(at.rglob("*.png"))) == how.pictures
+    assert (at / "pictures" / "stress_over_frequency.png").is_file() == (how.stresses == "all" and how.pictures)
+    return found["resonances"][0]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, undrawn_file: None, unjudged_file: None) -> dict[str, float]:
+    return resonance(tmp_path_factory.mktemp("whole"), response.ALL)
+
+
 @pytest.mark.parametrize(
     "wanted", [response.Wanted("resonances"), response.Wanted("none"), response.Wanted("all", False)]
 )
-def test_stresses_and_pictures_can_be_left_out(wanted, tmp_path):
+def test_stresses_and_pictures_can_be_left_out(wanted, whole, tmp_path):
     """The stress of a resonance does not depend on whether it is drawn over the whole sweep."""
-    folder = PACKAGE / "samples"
-    few = ["sweep.start=350.0", "sweep.stop=420.0", "sweep.points=15", "sweep.normal_forces=[100.0]", "harmonics=1"]
-    found = {}
-    for how in (response.ALL, wanted):
-        at = tmp_path / f"{how.stresses}-{how.pictures}"
-        found[how], _ = response.response_stage(
-            folder / "case.toml", {"vane-eigenmodes": folder / "basis.h5"}, at, few, wanted=how
-        )
-        assert bool(list(at.rglob("*.png"))) == how.pictures
-        assert (at / "pictures" / "stress_over_frequency.png").is_file() == (how.stresses == "all" and how.pictures)
-    whole, part = (one["resonances"][0] for one in found.values())
+    part = resonance(tmp_path, wanted)
     assert part["amplitude_m"] == pytest.approx(whole["amplitude_m"], rel=1e-12)
     stress = None if wanted.stresses == "none" else pytest.approx(whole["stress_amplitude_Pa"], rel=1e-12)
     assert part.get("stress_amplitude_Pa") == stress

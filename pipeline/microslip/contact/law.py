@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import time
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -29,7 +30,7 @@ def keep_compiled() -> Path | None:
 
     `$XDG_CACHE_HOME/microslip/jax`, or `~/.cache/microslip/jax`. A folder that jax was told already
     (JAX_COMPILATION_CACHE_DIR) is left; without a place to write to, nothing is kept and nothing is said, and a
-    damaged entry (a process killed while it wrote) is compiled again.
+    damaged entry (a process killed while it wrote) is compiled again. It stays below half a gigabyte (`forget`).
     """
     told = getattr(jax.config, "jax_compilation_cache_dir", None)
     if told is not None:
@@ -47,7 +48,31 @@ def keep_compiled() -> Path | None:
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     jax.config.update("jax_raise_persistent_cache_errors", False)
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
+    forget(folder)
     return folder
+
+
+def forget(folder: Path, most: float = 2**29, every: float = 3600.0) -> None:
+    """Programs that were not used for longest go where all take more than `most` bytes, until they take half of that.
+
+    Looked at when it is some time (``every``, s) since the last look, which a file says: it takes 0.1 s.
+    """
+    looked, now = folder / "looked-through", time.time()
+    try:
+        if looked.exists() and 0 <= now - looked.stat().st_mtime < every:
+            return
+        looked.touch()
+        entries = [(one.stat(), one.path) for one in os.scandir(folder) if one.path != str(looked)]
+        left = sum(kept.st_size for kept, _ in entries)
+        if left <= most:
+            return
+        for kept, path in sorted(entries, key=lambda one: max(one[0].st_atime, one[0].st_mtime)):
+            if left <= most / 2:
+                return
+            Path(path).unlink(missing_ok=True)
+            left -= kept.st_size
+    except OSError:  # another process looks through it
+        return
 
 
 keep_compiled()

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -44,8 +44,16 @@ def single_panel(width: float, height: float) -> tuple[Figure, Axes]:
 def save_figure(figure: Figure, path: Path) -> Path:
     """As PNG, complete or absent, without a date in it."""
     with complete_or_absent(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None}, facecolor="white")
+        write_png(figure, temporary)
     return path
+
+
+def write_png(figure: Figure, to: Path | IO[bytes]) -> None:
+    """Arranged while it is drawn; `savefig` draws once more before, for formats that are cut to size."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_facecolor("white")
+    FigureCanvasAgg(figure).print_png(to, metadata={"Software": None})
 
 
 def plain_axes(axes: Axes) -> None:

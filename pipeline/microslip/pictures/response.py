@@ -19,7 +19,7 @@ from ..harmonic_balance.sweeps import overhanging
 from ..results.names import apart
 from ..units import METRES, Quantity
 from .operating import shades
-from .plots import plain_numbers, said_beside, through
+from .plots import plain_numbers, said_beside, through, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +72,7 @@ def response_picture(
     columns = LEGEND if len(shown) == 1 else 3
     handles, labels = _by_rows(*axes.get_legend_handles_labels(), columns)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9, title=told, title_fontsize=8)
-    figure.savefig(path, format="png")
+    write_png(figure, path)
 
 
 def _curves(
@@ -164,7 +164,7 @@ def comparison_picture(
     figure.suptitle(f"{case.name}: the book's mode beside the marched laws", fontsize=11)
     figure.supxlabel("excitation frequency in Hz", fontsize=10)
     figure.supylabel(f"first harmonic of the read-out in {of.micro} (0-peak)", fontsize=10)
-    figure.savefig(path, format="png")
+    write_png(figure, path)
 
 
 def _with_peaks(r: FrequencyResponse, peaks: list[tuple[float, float]]) -> tuple[Array, Array]:

@@ -125,7 +125,8 @@ def between(now: Now, other: Now, share: float) -> Now:
     """A motion apart by a share of what the other is, memory of contacts included."""
 
     def one(a: Any, b: Any) -> Any:
-        return a + share * (b - a) if jnp.issubdtype(a.dtype, jnp.floating) else a
+        a, b = np.asarray(a), np.asarray(b)
+        return a + share * (b - a) if np.issubdtype(a.dtype, np.floating) else a
 
     return now._replace(
         **{

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 import scipy.linalg
 
@@ -61,7 +61,7 @@ def flow(equations: Equations, tau: float, doublings: int = DOUBLINGS) -> Flow:
         turns.append(scipy.linalg.expm(e.turning * tau * 2.0 ** len(turns)))
     assert moves[0].shape == (b, 2 * p, 2 * p + n)
     stack = np.concatenate([np.array(x) for x in (moves, S, L)], axis=2)
-    return Flow(jnp.asarray(stack), jnp.asarray(np.array(turns)), jnp.asarray(tau * 2.0 ** np.arange(len(turns))))
+    return Flow(*jax.device_put((stack, np.array(turns), tau * 2.0 ** np.arange(len(turns)))))
 
 
 def _whole(move: Array, turn: Array) -> Array:

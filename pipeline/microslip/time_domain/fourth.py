@@ -55,7 +55,7 @@ def begun(groups: tuple[Group, ...], B: Bodies, now: Now) -> Now:
     )
     first = _answer(groups, B, now.y, now.o, x, now.time)
     held = now.held._replace(force=joined(groups, first.points), forces=first.points)
-    return now._replace(push=first.push, held=held, memory=(x, first.rates, 0 * first.push), level=jnp.full((), 1))
+    return now._replace(push=first.push, held=held, memory=(x, first.rates, 0 * first.push), level=jnp.full((), 1, int))
 
 
 def _answer(groups: tuple[Group, ...], B: Bodies, y: Any, o: Any, x: tuple[Any, ...], time: Any) -> Answer:

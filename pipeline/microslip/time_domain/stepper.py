@@ -62,7 +62,7 @@ class Stepper:
                     raise UserError(f"{contacts[same[0]].name}: ground: set-valued contacts stand on ground at rest")
                 law = moving(law, ground, np.tile(patch.points, (len(same), 1)))
             G = np.broadcast_to(patch.kinematics, (len(same), *patch.kinematics.shape))
-            found.append(Group(law, jnp.asarray(G), jnp.asarray(offset)))
+            found.append(Group(law, *jax.device_put((G, offset))))
         return tuple(found)
 
     @cached_property
@@ -109,14 +109,14 @@ class Stepper:
         moved, given = self._points
         reach = np.linalg.norm(moved, axis=(1, 2))
         drift = np.linalg.norm(np.abs((moved @ still + given) @ e.turning).sum(axis=2), axis=1)
-        D, D_o, F_0 = e.D[rows], e.D_o[rows], jnp.asarray(e.F_0[rows])
-        R, share = (jnp.asarray(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
+        D, D_o, F_0 = e.D[rows], e.D_o[rows], jax.device_put(e.F_0[rows])
+        R, share = (jax.device_put(x[np.ix_(rows, rows)]) for x in (e.R, e.yields))
         loads = (np.zeros((b * p, n)) if e.push is None else e.push).reshape(b, p, n)
         arrays = (D, D_o, e.turning, e.omega2.reshape(b, p), steady, reach, drift, loads, -D.T)
         halvings = self.options.halvings
         flows = flow(e, self.tau / 2**halvings, halvings + (DOUBLINGS if self.options.leaps else 0))
         yielding = Yielding(R, share, F_0) if e.R.any() else None
-        more = (*map(jnp.asarray, arrays), jnp.asarray(fourth.MISSED * (self.tau * e.fastest) ** 4))
+        more = jax.device_put((*arrays, np.array(fourth.MISSED * (self.tau * e.fastest) ** 4)))
         return Bodies._make((flows, yielding, self._meets(flows), self._braking, F_0, *more))
 
     @property
@@ -126,7 +126,7 @@ class Stepper:
         D, moved = self.equations.D[self.rows], self._points[0][:, 1:].reshape(-1, len(self.equations.omega2))
         most = 0.5 * self.tau * np.abs(moved @ moved.T).sum(axis=1).reshape(-1, 2).max(axis=1, initial=0.0)
         ends = np.cumsum([g.G.shape[0] * g.G.shape[1] for g in self.groups])[:-1]
-        return Braking(jnp.asarray(0.5 * self.tau * D @ D.T), tuple(map(jnp.asarray, np.split(most, ends))))
+        return Braking(*jax.device_put((0.5 * self.tau * D @ D.T, tuple(np.split(most, ends)))))
 
     def _meets(self, flows: Flow) -> Meets | None:
         """Of set-valued points, see `inclusion`.
@@ -186,12 +186,12 @@ class Stepper:
         what they held, from u = 0 if it is not given."""
         e = self.equations
         b, p = blocks(e)
-        y = jnp.concatenate([jnp.asarray(q).reshape(b, p), jnp.asarray(v).reshape(b, p)], axis=1)
-        none = jnp.zeros((4, len(e.contacts)))
+        y = np.concatenate([np.reshape(q, (b, p)), np.reshape(v, (b, p))], axis=1)
+        none = np.zeros((4, len(e.contacts)))
         now = Now(
-            y, jnp.asarray(e.oscillators(time)), jnp.asarray(float(time)), jnp.zeros((b, p)),
-            held or untouched(self.groups), jnp.zeros(6), jnp.zeros(()), none.astype(bool), none, (),
-            jnp.zeros((), int),
+            y, e.oscillators(time), np.array(float(time)), np.zeros((b, p)),
+            held or untouched(self.groups), np.zeros(6), np.zeros(()), none.astype(bool), none, (),
+            np.zeros((), int),
         )  # fmt: skip
         return loop.begun(self.options, self.groups, self.bodies, now)
 
