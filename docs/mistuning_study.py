@@ -48,7 +48,7 @@ def first_order(folder: Path) -> tuple[list[str], list[list[str]]]:
     """The book's approximation beside samples, at three frequencies and both scatters."""
     rows = []
     for scatter in SCATTERS:
-        made = answered("spin-pit-mistuned", f"mistuning.scatter.0.deviation={scatter}")
+        made = answered("spin-pit-mistuned", f"mistuning.scatter.0.deviation={scatter}", "mistuning.samples=12")
         samples, near = columns(made / "envelope.csv"), columns(made / "approximation.csv")
         tuned = samples["tuned_m"]
         peak = int(tuned.argmax())
