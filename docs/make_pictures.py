@@ -1127,10 +1127,10 @@ def mistuning() -> None:
     """The mistuned ring with friction: amplification, envelopes beside first order, the worst sample, and a table."""
     import mistuning_study as study
 
-    for name, file in study.pictures(BUILD / "ring-mistuned").items():
+    for name, file in study.pictures().items():
         save(from_file(file), name)
-    fill("mistuning.md", "amplification", table(*study.amplification(BUILD / "ring-mistuned")))
-    fill("mistuning.md", "first_order", table(*study.first_order(BUILD / "spin-pit-mistuned")))
+    fill("mistuning.md", "amplification", table(*study.amplification()))
+    fill("mistuning.md", "first_order", table(*study.first_order()))
 def identification() -> None:
     """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
     import identification_study as study

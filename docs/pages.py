@@ -560,7 +560,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "mistuning.samples": ("", "whole rings that are solved, at most"),
     "mistuning.until": ("", "ends when half of the interval of the 95 % quantile is that share of it"),
     "mistuning.seed": ("", "of all random numbers; a sample depends on it and its number alone"),
-    "mistuning.stuck": ("", "whether contacts stick, which is linear and a hundred times faster"),
+    "mistuning.stuck": ("", "whether contacts stick, which is linear"),
     "mistuning.normal_force": ("N", "of the contacts that the sweep presses; its smallest if not given"),
     "mistuning.scatter.of": ("", "what differs from sector to sector"),
     "mistuning.scatter.deviation": ("", "standard deviation, a share of the nominal value; of `added_mass` kg, of "

@@ -156,6 +156,56 @@ def test_a_sample_is_what_its_number_says(tuned: Tuned) -> None:
     assert sample(asked, 7).top.amplitude == sample(asked, 7).top.amplitude
 
 
+CASE = """
+name = "ring"
+excitations = [{{ row = "vane:magnet", amplitude = 2.0 }}]
+monitors = [{{ monitor = "vane:probe" }}]
+ring = {{ blades = 4, engine_order = 1 }}
+sweep = {{ start = 270.0, stop = 300.0, points = 13 }}
+
+[[bodies]]
+name = "vane"
+file = "{file}"
+modes = 2
+
+[[contacts]]
+interface = "vane:right"
+against = "vane:left"
+against_sector = 1
+law = "smooth"
+normal_force = 20.0
+normal_stiffness = 2e5
+tangential_stiffness = 4e5
+friction = 0.2
+points = [1, 1]
+
+[mistuning]
+samples = {samples}
+stuck = true
+scatter = [{{ of = "frequency", file = "blades.csv", arrangement = "shuffled" }}, {{ of = "stiffness", deviation = 0.1 }}]
+"""
+
+
+def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
+    """The table holds the samples of the ring, more of them go on, and measured frequencies are shuffled."""
+    from microslip.stages.mistuning import mistuning_stage
+
+    path, files, told = tmp_path / "case.toml", {"vane": ms.sample()}, list[str]()
+    (tmp_path / "blades.csv").write_text("blade,frequency_Hz\n0,99\n1,100\n2,101\n3,100\n")
+    rows = {}
+    for samples in (4, 8):
+        path.write_text(CASE.format(file=ms.sample(), samples=samples))
+        made, sentences, fine = mistuning_stage(path, files, tmp_path, report=told.append, pictures=False, workers=1)
+        rows[samples] = (tmp_path / "samples.csv").read_text().splitlines()
+    assert fine
+    assert rows[8][:5] == rows[4]
+    assert len(rows[8]) == 9
+    assert not any(line.startswith("1 of 8") for line in told)
+    found = np.genfromtxt(tmp_path / "samples.csv", delimiter=",", names=True)
+    assert f"{found['amplification'].max():.4g}" in " ".join(sentences)
+    assert all(p.is_file() for p in made)
+
+
 @pytest.mark.parametrize("share, n", [(0.5, 60), (0.95, 400)])
 def test_intervals_hold_the_truth(share: float, n: int) -> None:
     """Of a thousand repeats 95 +- 2 % of the intervals hold the quantile they are of."""

@@ -267,7 +267,7 @@ class MistuningOfCase(Model):
     the contacts that the sweep presses; the smallest of the sweep if not given.
     """
 
-    scatter: Annotated[tuple[ScatterOfCase, ...], BeforeValidator(_tuple)]
+    scatter: Annotated[tuple[ScatterOfCase, ...], BeforeValidator(_tuple), Field(min_length=1)]
     samples: Annotated[int, Field(ge=1, le=100000000)] = 100
     until: Annotated[Positive, Field(le=1)] | None = None
     seed: Annotated[int, Field(ge=0)] = 0

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..data import Array, UserError
 from ..files import store
+from ..settings.mistakes import whole
 from .samples import Asked, Sample, of_ring, sample
 from .statistics import Envelope, Quantile, quantile
 
@@ -24,7 +25,7 @@ Report = Callable[[str], None]
 COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end"
 """Of a sample, after its number."""
 
-EACH = 16
+EACH = 4
 """Samples a worker gets before what is known is written."""
 
 WATCHED = 0.95
@@ -77,8 +78,8 @@ def run(
             few samples, if None. file: where the run is kept (.npz); with the same inputs it goes on. executor: in the
             place of own processes, such as that of a cluster.
     """
-    if samples < 1:
-        raise UserError(f"samples: {samples} are none; give 1 or more")
+    for name, value in (("samples", samples), ("workers", 1 if workers is None else workers)):
+        whole(name, value, ge=1)
     report("the tuned ring")
     tuned = of_ring(asked, asked.tuned.whole, -1)
     if not np.isfinite(tuned.top.amplitude):

@@ -155,6 +155,8 @@ def _measured(file: Path, of: str) -> tuple[float, ...]:
     try:
         with store.ordinary(file).open(newline="", encoding="utf-8-sig") as text:
             rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
+    except FileNotFoundError as error:
+        raise UserError(f"file: {file}: there is no such table; correct the name") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"file: {file}: cannot be read as comma-separated values ({error})") from error
     for name in ("deviation", "frequency_Hz"):
