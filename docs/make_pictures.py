@@ -73,13 +73,17 @@ def made(name: str, body: str, *changes: str) -> ModalBasis:
     return read_basis(modes_stage(job)[0])
 
 
-def save(image: Any, name: str, smooth: bool = False) -> None:
-    """A PNG of 256 colours whose palette covers rare ones too, or with all its colours where they blend (smooth)."""
+LINES = 64
+"""Colours that drawings of lines need."""
+
+
+def save(image: Any, name: str, smooth: bool = False, colours: int = 256) -> None:
+    """A PNG of so many colours whose palette covers rare ones too, or with all its colours where they blend (smooth)."""
     from PIL import Image
 
     flat = image.convert("RGB")
     if not smooth:
-        flat = flat.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.NONE)
+        flat = flat.quantize(colours, Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.NONE)
     flat.save(PICTURES / f"{name}.png", optimize=True)
 
 
@@ -1128,7 +1132,7 @@ def mistuning() -> None:
     import mistuning_study as study
 
     for name, file in study.pictures().items():
-        save(from_file(file), name)
+        save(from_file(file), name, colours=LINES)
     fill("mistuning.md", "amplification", table(*study.amplification()))
     fill("mistuning.md", "first_order", table(*study.first_order()))
 def identification() -> None:
@@ -1140,7 +1144,7 @@ def identification() -> None:
     for axes in places:
         plain(axes)
     study.picture(*places)
-    save(drawn(fig), "mistuning_identification")
+    save(drawn(fig), "mistuning_identification", colours=LINES)
     for name in ("modes", "model", "gauges"):
         fill("mistuning_identification.md", name, table(*getattr(study, name)()))
 
@@ -1177,7 +1181,7 @@ def squeal() -> None:
     for i in range(3):  # the other half of the period is its mirror
         moving.seek(i * moving.n_frames // 6)
         frames.append(moving.convert("RGB"))
-    save(lettering.side_by_side(frames), "squeal_wave")
+    save(lettering.side_by_side(frames), "squeal_wave", colours=LINES)
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------
@@ -1333,10 +1337,10 @@ def time_domain() -> None:
     fill("time_domain.md", "pendulum", table(*study.rows(found)))
     fill("time_domain.md", "balanced", table(*study.against_balance()))
     path = BUILD / "phase_portraits.png"
-    save(from_file(study.drawn(found, path)), "phase_portraits")
+    save(from_file(study.drawn(found, path)), "phase_portraits", colours=LINES)
     slides = study.sliding(made("pendulum-sliding", "pendulum/sliding.toml"))
     fill("time_domain.md", "sliding", table(*study.slips(slides)))
-    save(from_file(study.drawn_sliding(slides, BUILD / "sliding_portraits.png")), "sliding_portraits")
+    save(from_file(study.drawn_sliding(slides, BUILD / "sliding_portraits.png")), "sliding_portraits", colours=LINES)
 
 
 def continuation() -> None:
