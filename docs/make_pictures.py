@@ -78,7 +78,7 @@ LINES = 64
 
 
 def save(image: Any, name: str, smooth: bool = False, colours: int = 256) -> None:
-    """A PNG of so many colours whose palette covers rare ones too, or with all its colours where they blend (smooth)."""
+    """A PNG of so many colours whose palette covers rare ones too, or of all where they blend (smooth)."""
     from PIL import Image
 
     flat = image.convert("RGB")

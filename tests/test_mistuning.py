@@ -182,7 +182,9 @@ points = [1, 1]
 [mistuning]
 samples = {samples}
 stuck = true
-scatter = [{{ of = "frequency", file = "blades.csv", arrangement = "shuffled" }}, {{ of = "stiffness", deviation = 0.1 }}]
+scatter = [
+  {{ of = "frequency", file = "blades.csv", arrangement = "shuffled" }}, {{ of = "stiffness", deviation = 0.1 }},
+]
 """
 
 
