@@ -146,10 +146,8 @@ class Balance:
         found[:, range(n), :, range(n)] += omega * D
         mean = J.mean(axis=0)
         found[range(k), :, range(k), :] -= mean
-        i, j = np.nonzero(np.ptp(J, axis=0) > 1e-13 * np.abs(J).max())
-        products = (P[:, :, None] * E[:, None]).reshape(len(E), k * k)
-        swinging = products.T @ (J - mean)[:, i, j]
-        found[:, i, :, j] -= swinging.reshape(k, k, len(i)).transpose(2, 0, 1)
+        for i, j in zip(*np.nonzero(np.ptp(J, axis=0) > 1e-13 * np.abs(J).max()), strict=True):
+            found[:, i, :, j] -= (P * (J - mean)[:, i, j, None]).T @ E
         size = len(x)
         R, A, over = np.zeros(size), np.zeros((size, size)), np.zeros(size)
         R[: k * n], A[: k * n, : k * n] = (omega * moving - P.T @ f).ravel(), found.reshape(k * n, k * n)

@@ -16,15 +16,15 @@ BASE = 0.5 * GIB
 def aft_bytes(points: int, coordinates: int, harmonics: int, samples: int, contacts: int = 1) -> float:
     """Peak of the memory that a response with the law of a patch takes; measured it is within a factor of 2.
 
-    At the peak stand either the derivatives, W = 2 H + 1: twice the tangents of the force along 3 W harmonics in every
-    sample of `CHUNK` points, then (3, W, 3, W) of every point, twice, and half contracted (k, W, 3, W); or ten
+    At the peak stand either the derivatives, W = 2 H + 1: the tangents of the force along 3 W harmonics in every sample
+    of `CHUNK` points, then (3, W, 3, W) of every point, twice, and half contracted (k, W, 3, W); or ten
     histories (3 a sample and point) of one cycle that is looked at in time.
 
     Args:
         points: of a patch. coordinates: k of it. contacts: equal ones, evaluated together.
     """
     W, n = 2 * harmonics + 1, points * contacts
-    derivatives = 2 * samples * 3 * W * min(n, CHUNK) * 3 + n * W * W * (2 * 9 + 3 * coordinates)
+    derivatives = samples * 3 * W * min(n, CHUNK) * 3 + n * W * W * (2 * 9 + 3 * coordinates)
     return BASE + 8.0 * max(derivatives, 10 * samples * points * 3)
 
 
