@@ -12,9 +12,12 @@ from meshes import body
 from scipy.sparse.linalg import eigsh
 
 from microslip.data import UserError
+from microslip.mistuning.ring import Tuned
+from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.subset import mistuned
 from microslip.modal.compute import modal_basis
-from microslip.system.component import Component
+from microslip.system.assembly import Assembly
+from microslip.system.component import Component, Ring
 
 N = 5
 PATTERN = np.array([0.3, -1.2, 0.8, 1.1, -0.9])
@@ -55,6 +58,18 @@ def test_uniform_shifts():
     """All sectors alike: every frequency of the ring by d, whatever couples them."""
     tuned = mistuned(disc(4), np.zeros(N)).groups[0].omega
     assert np.allclose(mistuned(disc(4), np.full(N, 0.02)).groups[0].omega, 1.02 * tuned, rtol=1e-11)
+
+
+def test_a_ring_takes_its_disc_in_one_piece():
+    """Two scatters of one disc multiply, and other things of it do not scatter."""
+    ring = Tuned(Assembly((disc(4),), (), (), (), Ring(N, 1)), {})
+    one, two = Scatter("frequency", values=tuple(0.01 * PATTERN)), Scatter("frequency", 0.01)
+    drawn = [(s, s.drawn(N, ring.modes(s), i, 0, 0)) for i, s in enumerate((one, two))]
+    found = ring.mistuned(drawn).components[0].groups[0].omega
+    both = (1 + drawn[0][1][:, 0]) * (1 + drawn[1][1][:, 0]) - 1
+    assert np.allclose(found, mistuned(disc(4), both).groups[0].omega, rtol=1e-12)
+    with pytest.raises(UserError):
+        ring.check((Scatter("damping", 0.1),))
 
 
 def test_frequencies_of_the_whole_ring():

@@ -97,7 +97,7 @@ class Joints:
             return None
         free = np.empty_like(R)
         for (inverse, _), s in zip(self.alone, self.slices, strict=True):
-            free[:, s] = applied(inverse, R[:, s])
+            free[:, s] = _once(inverse, R[:, s])
         force = self._across(self._relative.solve(_flat(self._felt(free))))
         dv = free - self._answered(force)
         again = self._across(_flat(self._felt(dv)))
@@ -131,7 +131,7 @@ class Joints:
         for one in self.sides:
             out[:, self.slices[one.part]][:, one.at] += one.sign * force[one.contact]
         for (_, loose), s in zip(self.alone or [], self.slices, strict=True):
-            out[:, s] = applied(loose, out[:, s])
+            out[:, s] = _once(loose, out[:, s])
         return out
 
     @cached_property
@@ -161,10 +161,14 @@ def _flat(values: list[Array]) -> Array:
 
 
 def applied(D: ComplexArray, V: Array) -> Array:
-    """(W, c[, m]) matrices (H + 1, c, k) of the harmonics applied to (W, k[, m])."""
-    flat = V[..., None] if V.ndim == 2 else V
-    out = np.empty((len(V), D.shape[1], flat.shape[2]))
-    out[0] = D[0].real @ flat[0]
-    amplitude = D[1:] @ (flat[1::2] - 1j * flat[2::2])
-    out[1::2], out[2::2] = amplitude.real, -amplitude.imag
-    return out[..., 0] if V.ndim == 2 else out
+    """(..., W, c, m) matrices (..., H + 1, c, k) of the harmonics applied to (W, k, m)."""
+    out = np.empty((*D.shape[:-3], len(V), D.shape[-2], V.shape[-1]))
+    out[..., 0, :, :] = D[..., 0, :, :].real @ V[0]
+    amplitude = D[..., 1:, :, :] @ (V[1::2] - 1j * V[2::2])
+    out[..., 1::2, :, :], out[..., 2::2, :, :] = amplitude.real, -amplitude.imag
+    return out
+
+
+def _once(D: ComplexArray, v: Array) -> Array:
+    """(W, c) of (W, k)."""
+    return applied(D, v[..., None])[..., 0]

@@ -22,7 +22,7 @@ from ..system.assembly import Assembly, Linear
 from . import blocks, by_hand, reduced
 from .blocks import Matrix
 from .forces import Forces
-from .joints import Alone, Joints, Side, alone
+from .joints import Alone, Joints, Side, alone, applied
 from .point_cycles import Cycle, Traced
 from .reduced import Eliminated, Seen, View
 
@@ -366,8 +366,8 @@ class AtFrequency:
         where = p.slices
         D = {}
         for (i, j), P in pieces.items():
-            applied = _harmonics(self.views[i].compliance[0], P.reshape(*P.shape[:2], P.shape[2] * P.shape[3]))
-            D[i, j] = self._scaled(applied.reshape(P.shape), where[i], where[j])
+            moved = applied(self.views[i].compliance[0], P.reshape(*P.shape[:2], P.shape[2] * P.shape[3]))
+            D[i, j] = self._scaled(moved.reshape(P.shape), where[i], where[j])
         return blocks.one_plus(D, [s.stop - s.start for s in where], p.coefficients)
 
     def rate(self, x: Array, force: Array) -> Array:
@@ -438,7 +438,7 @@ class AtFrequency:
         for view, s in zip(self.views, p.slices, strict=True):
             both = np.zeros((len(force), 1 + s.stop - s.start, 1))
             both[0, 0], both[1::2, 0], both[:, 1:, 0] = -driven, -driven * p.share, force[:, s]
-            out[:, :, s] = _harmonics(view.both[which], both)[..., 0]
+            out[:, :, s] = applied(view.both[which], both)[..., 0]
         return out
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
@@ -446,15 +446,6 @@ class AtFrequency:
         unit, W = self.problem.scale, len(block)
         block = block * unit[columns] / unit[rows][:, None, None]
         return block.reshape(W * block.shape[1], W * block.shape[3])
-
-
-def _harmonics(D: ComplexArray, V: Array) -> Array:
-    """(..., W, c, m) matrices (..., H + 1, c, k) of the harmonics applied to (W, k, m)."""
-    out = np.empty((*D.shape[:-3], len(V), D.shape[-2], V.shape[-1]))
-    out[..., 0, :, :] = D[..., 0, :, :].real @ V[0]
-    amplitude = D[..., 1:, :, :] @ (V[1::2] - 1j * V[2::2])
-    out[..., 1::2, :, :], out[..., 2::2, :, :] = amplitude.real, -amplitude.imag
-    return out
 
 
 def _places(g: Group, begins: Indices) -> list[tuple[int, tuple[int, int], slice, slice, float]]:

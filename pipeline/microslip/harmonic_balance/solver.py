@@ -371,11 +371,11 @@ def _ahead(points: list[Point], Omega: float) -> Array:
     """Solutions carried on to another frequency by the polynomial, of first order or more, that tells the last best."""
     *known, last = points
     orders = range(2, len(points))
-    missed = [np.abs(_carried(known[-n:], last.Omega) - last.x).max(initial=0.0) for n in orders]
-    return _carried(points[-orders[int(np.argmin(missed))] :] if missed else points, Omega)
+    missed = [np.abs(carried(known[-n:], last.Omega) - last.x).max(initial=0.0) for n in orders]
+    return carried(points[-orders[int(np.argmin(missed))] :] if missed else points, Omega)
 
 
-def _carried(points: list[Point], Omega: float) -> Array:
+def carried(points: list[Point], Omega: float) -> Array:
     """Lagrange's polynomial through all of them."""
     at = np.array([p.Omega for p in points])
     return sum(p.x * np.prod((Omega - np.delete(at, i)) / (at[i] - np.delete(at, i))) for i, p in enumerate(points))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -155,9 +154,7 @@ def _one(number: int) -> Sample:
 def _keep(file: Path, inputs: str, found: Ensemble) -> None:
     e = found.envelope
     with store.complete_or_absent(file) as temporary:
-        with io.BytesIO() as whole:
-            np.savez(whole, rows=found.rows, sums=e.sums, bins=e.bins, inputs=np.array(inputs))
-            Path(temporary).write_bytes(whole.getvalue())
+        np.savez(temporary, rows=found.rows, sums=e.sums, bins=e.bins, inputs=np.array(inputs))
 
 
 def _kept(file: Path, inputs: str, found: Ensemble) -> Ensemble:

@@ -45,6 +45,8 @@ class Stuck:
     component: str | None = None
 
     def __post_init__(self) -> None:
+        if self.tuned.body(Scatter("frequency", deviation=1.0, component=self.component)).sectors > 1:
+            raise UserError("ring: is a disc in one piece, whose blades have no frequencies of their own")
         if self.tuned.whole.stuck_damping is not None:
             raise UserError(
                 "damping: of the modes of the stuck ring changes with the blades; give the blades damping of their own"

@@ -13,6 +13,7 @@ from ..data import Array, ModalGroup, UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, preloaded_contact
 from ..system.component import Component
+from . import subset
 from .scatter import OF_BLADES, Scatter
 
 Deviations = Sequence[tuple[Scatter, Array]]
@@ -51,7 +52,8 @@ class Tuned:
         """Into how many modes deviations may differ in one sector."""
         if s.of not in ("frequency", "damping"):
             return 1
-        return len(self.body(s).groups[0].omega)
+        body = self.body(s)
+        return len(body.groups[0].omega) if body.sectors == 1 else 1
 
     def check(self, scatter: Sequence[Scatter]) -> None:
         """Raise `UserError` for what is not there, or on which nothing depends."""
@@ -70,20 +72,24 @@ class Tuned:
         """
         components = {m.name: m for m in self.whole.components}
         contacts = {c.name: c for c in self.whole.contacts}
+        discs: dict[str, Array] = {}
         for s, values in deviations:
             _positive(s, values)
-            if s.of in OF_BLADES:
-                name = self.body(s).name
-                for j, own in enumerate(values):
-                    at = f"{name}_{j}"
+            name = self.body(s).name if s.of in OF_BLADES else self._contact(s).name
+            if name in components:  # a disc in one piece
+                discs[name] = (1 + discs.get(name, 0.0)) * (1 + values[:, 0]) - 1
+                continue
+            for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
+                if s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
-                    for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
-                        contacts[f"{c}_{j}"] = _pressed(contacts[f"{c}_{j}"], float(own[0]))
-            else:
-                name = self._contact(s).name
-                for j, own in enumerate(values):
-                    at = f"{name}_{j}"
+                else:
                     contacts[at] = _met(contacts[at], s, float(own[0]))
+            for c in self.pressed_by.get(name, ()) if s.of == "mass" else ():
+                for at, own in ((f"{c}_{j}", own) for j, own in enumerate(values)):
+                    contacts[at] = _pressed(contacts[at], float(own[0]))
+        for m in self.sector.components:
+            if m.name in discs:
+                components[m.name] = subset.mistuned(m, discs[m.name])
         return replace(self.whole, components=tuple(components.values()), contacts=tuple(contacts.values()))
 
     def body(self, s: Scatter) -> Component:
@@ -93,10 +99,10 @@ class Tuned:
         if s.component is not None and s.component not in names:
             raise UserError(f"{s.of}: there is no body '{s.component}', but {', '.join(names)}")
         body = names[s.component or next(iter(names))]
-        if body.sectors > 1:
+        if body.sectors > 1 and s.of != "frequency":
             raise UserError(
-                f"{s.of}: '{body.name}' is a sector of a disc, whose blades have no modes of their own; scatter what "
-                "is in the contacts"
+                f"{s.of}: '{body.name}' is a sector of a disc in one piece, of which only the frequency scatters, by "
+                "the stiffness of whole sectors; scatter that, or what is in the contacts"
             )
         return body
 
@@ -111,8 +117,8 @@ class Tuned:
 
 
 def _positive(s: Scatter, values: Array) -> None:
-    least = 0.0 if s.of == "added_mass" else -1.0
-    if s.of != "gap" and not values.min() > least - (s.of == "added_mass") * 1e-300:
+    nothing = values.min() < 0 if s.of == "added_mass" else values.min() <= -1
+    if s.of != "gap" and nothing:
         sector = int(values.min(axis=1).argmin())
         raise UserError(
             f"{s.of}: a deviation of {values.min():.3g} in sector {sector} leaves nothing of it; take a smaller "

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, ComplexArray
 from ..harmonic_balance import problem as balance
 from ..harmonic_balance import reduced
 from ..harmonic_balance.forces import Forces
-from ..harmonic_balance.problem import Problem
-from ..harmonic_balance.solver import Point, solve, sweep
+from ..harmonic_balance.problem import AtFrequency, Problem
+from ..harmonic_balance.solver import Point, carried, solve, sweep
 from ..system.assembly import Assembly
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
@@ -114,8 +114,8 @@ class Sliding:
 
     def _starts(self, Omega: float) -> list[Array]:
         """Where Newton's method may begin: the two that leave least, of those carried on and the tuned ring's."""
-        starts = [_carried(points, Omega) for points in (self._near(Omega, 2), self._near(Omega, 4)) if points]
-        starts += [_carried(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3], Omega)] if self.tuned else []
+        starts = [carried(points, Omega) for points in (self._near(Omega, 2), self._near(Omega, 4)) if points]
+        starts += [carried(sorted(self.tuned, key=lambda p: abs(p.Omega - Omega))[:3], Omega)] if self.tuned else []
         at = self.problem.at(Omega)
         return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
 
@@ -123,19 +123,18 @@ class Sliding:
         return sorted(self.known, key=lambda p: abs(p.Omega - Omega))[:most]
 
 
-def _carried(points: Sequence[Point], Omega: float) -> Array:
-    """Solutions at other frequencies carried on to this one by the polynomial through them."""
-    at = np.array([p.Omega for p in points])
-    return sum(p.x * np.prod((Omega - np.delete(at, i)) / (at[i] - np.delete(at, i))) for i, p in enumerate(points))
-
-
 def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> Array:
     """(w,) complex 0-peak amplitudes of all read-outs at a solution, m."""
     at = problem.at(point.Omega)
     force = at.force(point.x)
-    q, F = at.modal(point.x, force)[harmonic], at.amplitudes(force)[harmonic]
-    parts = zip(problem.parts[harmonic], q, problem.slices, strict=True)
-    return np.sum([reduced.monitored(part, own, F[s], problem.share) for part, own, s in parts], axis=0)
+    return read(at, at.modal(point.x, force)[harmonic], force, problem.share, harmonic)
+
+
+def read(at: AtFrequency, q: list[ComplexArray], force: Array, share: float, harmonic: int = 1) -> ComplexArray:
+    """(w,) read-outs in a harmonic, from the parts' coordinates, (W, c) forces and a share of the loads."""
+    p, F = at.problem, at.amplitudes(force)[harmonic]
+    parts = zip(p.parts[harmonic], q, p.slices, strict=True)
+    return np.sum([reduced.monitored(part, own, F[s], share) for part, own, s in parts], axis=0)
 
 
 class Sticking:

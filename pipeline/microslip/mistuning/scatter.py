@@ -29,7 +29,6 @@ OF_CONTACTS = {
 ABSOLUTE = "added_mass", "gap"
 """Those whose deviations are values in kg or m; of all others they are shares of the nominal value."""
 
-Distribution = str
 DISTRIBUTIONS = "normal", "lognormal", "uniform"
 ARRANGEMENTS = "given", "shuffled", "drawn"
 
@@ -50,7 +49,7 @@ class Scatter:
 
     of: str
     deviation: float = 0.0
-    distribution: Distribution = "normal"
+    distribution: str = "normal"
     values: tuple[float, ...] = ()
     arrangement: str = "given"
     component: str | None = None
@@ -73,14 +72,6 @@ class Scatter:
         for key, least in (("together", 0.0), ("neighbours", -1.0)):
             if not least <= getattr(self, key) <= 1.0:
                 raise UserError(f"{key}: {getattr(self, key):g} is no correlation between {least:g} and 1")
-
-    @property
-    def in_bodies(self) -> bool:
-        return self.of in OF_BLADES
-
-    @property
-    def words(self) -> str:
-        return {**OF_BLADES, **OF_CONTACTS}[self.of]
 
     def drawn(self, sectors: int, modes: int, number: int, seed: int, sample: int) -> Array:
         """(sectors, modes) deviations of one sample.

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Array, ComplexArray
-from ..harmonic_balance import reduced
 from ..harmonic_balance.problem import AtFrequency
 from ..harmonic_balance.solver import Point
 from .ring import Tuned, deviated
-from .samples import Asked
+from .samples import Asked, read
 from .scatter import Scatter
 from .weibull import exponent, median, quantile
 
@@ -68,7 +67,7 @@ def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, 
     at = problem.at(point.Omega)
     force, slopes = at.forces(point.x)
     q = at.modal(point.x, force)
-    y = _amplitudes(at, q[1], force, problem.share)
+    y = read(at, q[1], force, problem.share)
     matrix, modes = at.jacobian(slopes), asked.tuned.modes(scatter)
     out = np.empty((asked.tuned.sectors, modes))
     for j in range(modes):
@@ -79,7 +78,7 @@ def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, 
         )
         dq = _moved(at, dx, dforce)
         dq[moved[0]] = dq[moved[0]] + moved[1]
-        dy = _amplitudes(at, dq, dforce, 0.0)
+        dy = read(at, dq, dforce, 0.0)
         change = (np.conj(y) * dy).real / np.abs(y)
         out[:, j] = np.roll(change[::-1], 1)  # of blade 0 by blade i is that of blade -i by blade 0
     return float(np.abs(y[0])), out
@@ -103,13 +102,6 @@ def _held(at: AtFrequency, dx: Array) -> Array:
     """(W, c) what the stiffness taken into the parts makes of a change of the unknowns."""
     p, v = at.problem, at.problem.displacement(dx)
     return np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
-
-
-def _amplitudes(at: AtFrequency, q: list[ComplexArray], force: Array, share: float) -> ComplexArray:
-    """(w,) read-outs in the first harmonic."""
-    p, F = at.problem, at.amplitudes(force)[1]
-    parts = zip(p.parts[1], q, p.slices, strict=True)
-    return np.sum([reduced.monitored(part, own, F[s], share) for part, own, s in parts], axis=0)
 
 
 def _forced(

@@ -77,7 +77,8 @@ def _work(
         raise UserError(f"{case_path}: mistuning: {text}") from error
     stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
-    near = approximation(what, first) if first and not what.stuck and settings.stuck_ratios is None else None
+    lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
+    near = approximation(what, first) if first and lone and not what.stuck else None
     sentences = [*said(found), *built.messages]
     made = _written(found, near, folder)
     drawn = _pictures(found, near, folder / "pictures", settings.name) if pictures else []
