@@ -29,8 +29,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a shell's backgro
 QUICK = (
     "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1"
 )
-"""Compile in a quarter of the time: a quick test runs a program once or twice, and each piece that a program is split
-into costs a compiler of its own. The slow tests compile as a user does."""
+"""Compile in a quarter of the time: a test runs a program once or twice, and each piece that a program is split into
+costs a compiler of its own. That a user's compiler gives the same numbers: test_conformance, the sample from a wheel."""
 
 
 def locked(package: str) -> bool:
@@ -42,9 +42,9 @@ def locked(package: str) -> bool:
         return False
 
 
-def pytest_configure(config: pytest.Config) -> None:
+def pytest_configure() -> None:
     """Before jax is loaded, and for the processes that tests start."""
-    if config.getoption("markexpr") == "not slow" and locked("jaxlib"):
+    if locked("jaxlib"):
         os.environ.setdefault("XLA_FLAGS", QUICK)
 
 
@@ -126,10 +126,10 @@ unjudged_file = pytest.fixture(_unjudged, scope="module", name="unjudged_file")
 
 
 @pytest.fixture
-def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Processes that a slow test starts compile as the quick tests do, where the compiler is not what is tested."""
-    if locked("jaxlib"):
-        monkeypatch.setenv("XLA_FLAGS", QUICK)
+def compiled_for_users(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that a test starts compile as a user's do, where time or memory is what is tested."""
+    if os.environ.get("XLA_FLAGS") == QUICK:
+        monkeypatch.delenv("XLA_FLAGS")
 
 
 ABSENT = re.compile(r"is not installed|needs CalculiX|could not import|make peers|cannot draw|cannot be drawn")

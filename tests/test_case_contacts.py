@@ -459,6 +459,7 @@ print(code, own[1] if own else resource.getrusage(resource.RUSAGE_SELF).ru_maxrs
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled_for_users")
 @pytest.mark.parametrize(
     "keys", [{"harmonics": 6, "samples": 96, "contacts.right.points": [60, 60]}, {"harmonics": 24, "samples": 500}]
 )

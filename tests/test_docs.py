@@ -355,7 +355,6 @@ def test_platforms_page() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("quickly")
 def test_own_model_page(tmp_path: Path) -> None:
     """Everything the page says to type, pictures and friction response as well; the frequency it shows."""
     shown = pages.play("your_own_model.md", tmp_path)

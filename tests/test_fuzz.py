@@ -490,7 +490,7 @@ def settings_of(kind: str, folder: Path) -> tuple[Path, list[str]]:
 
 FACES = ("clamp", "tip", "contact_left", "contact_right")
 SEEDS = [("case", 0, 6), ("system", 0, 40), ("body", 0, 20)]
-MORE = [("case", 6, 150), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 150)]
+MORE = [("case", 6, 150), ("system", 40, 400), ("body", 20, 400), ("contact", 0, 60)]
 """Kind of a settings file, and which ones are drawn."""
 
 

@@ -3,17 +3,13 @@ with mistakes put back on purpose, each of which has to be seen."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from multiprocessing import get_context
 from typing import Any
 
 import dense
 import numpy as np
 import pytest
-from conftest import QUICK, locked
 from random_systems import HARD, Verdict, compared, drawn, integrated, right, totalled, verdict
 
 from microslip.harmonic_balance import accuracy, reduced, response
@@ -35,18 +31,6 @@ BETWEEN = 49
 error was 2.7 times the estimate when samples were doubled only."""
 
 
-@pytest.fixture(scope="module")
-def apart() -> Iterator[ProcessPoolExecutor]:
-    """A process that compiles as quick tests do: the series spends most of its time on that."""
-    before = os.environ.get("XLA_FLAGS")
-    os.environ["XLA_FLAGS"] = QUICK if locked("jaxlib") else before or ""
-    try:
-        with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-            yield pool
-    finally:
-        os.environ.pop("XLA_FLAGS") if before is None else os.environ.update(XLA_FLAGS=before)
-
-
 # the program against others ----------------------------------------------------------------------------------------
 
 
@@ -56,9 +40,9 @@ def test_sliders_on_a_line_are_within_their_estimate_of_a_dense_balance(seed: in
 
 
 @pytest.mark.slow
-def test_random_systems_are_within_their_estimate_of_a_dense_balance(apart: ProcessPoolExecutor) -> None:
+def test_random_systems_are_within_their_estimate_of_a_dense_balance() -> None:
     """Every one; and the estimate is of the size of the error: three times that, in the median."""
-    found = list(apart.map(compared, range(COUNT)))
+    found = [compared(seed) for seed in range(COUNT)]
     for one in found:
         agree(one)
     shares = [one.off / one.estimate for one in found if one.off > 1e-6]
@@ -72,9 +56,9 @@ def agree(one: Verdict) -> None:
 
 
 @pytest.mark.slow
-def test_systems_that_are_hard_to_solve_are_brought_from_rest(apart: ProcessPoolExecutor) -> None:
+def test_systems_that_are_hard_to_solve_are_brought_from_rest() -> None:
     """All are solutions within their estimates; of three the program says that they need more samples (`counted`)."""
-    found = list(apart.map(compared, HARD))
+    found = [compared(seed) for seed in HARD]
     assert all(one.missing <= dense.TOLERANCE and one.status == "converged" for one in found)
     assert not {"amplitude", "balance", "motion"} & {flag for one in found for flag in one.flags}
     assert sum("counted" in one.flags for one in found) <= 3
@@ -87,10 +71,10 @@ def test_sliders_on_a_line_are_within_their_estimate_of_integration_in_time(seed
 
 
 @pytest.mark.slow
-def test_random_systems_are_within_their_estimate_of_integration_in_time(apart: ProcessPoolExecutor) -> None:
+def test_random_systems_are_within_their_estimate_of_integration_in_time() -> None:
     """Two bodies, four modes, points that lift off among them; second order in the step, as the sliders allow."""
     assert sorted(sorted(range(COUNT), key=lambda seed: -drawn(seed).ratio)[: len(DAMPED)]) == list(DAMPED)
-    for seed, (off, estimate, own) in zip(DAMPED, apart.map(integrated, DAMPED), strict=True):
+    for seed, (off, estimate, own) in zip(DAMPED, map(integrated, DAMPED), strict=True):
         assert off <= estimate + own and own < 2e-3, seed
 
 
@@ -196,7 +180,7 @@ def test_an_estimate_that_only_doubles_samples_is_seen(monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
-def test_a_tangential_stiffness_in_its_total_form_is_seen(apart: ProcessPoolExecutor) -> None:
+def test_a_tangential_stiffness_in_its_total_form_is_seen() -> None:
     """A rough point that sticks while its normal force swings, by what it takes."""
-    honest, printed = (apart.submit(totalled, 19, total).result() for total in (False, True))
+    honest, printed = (totalled(19, total) for total in (False, True))
     assert not honest.failure and printed.failure and abs(printed.counted) > COUNTED
