@@ -595,6 +595,12 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "stability.cycle.harmonics": ("", "of the balance along a branch"),
     "stability.cycle.accuracy": ("", "share of the amplitude to which three orbits of a branch get harmonics, that are "
                                  "compared with a motion in time and judged by their Floquet multipliers"),
+    "stability.cycle.across.parameter": ("", "a second one, at whose values they are followed as well"),
+    "stability.cycle.across.unit": ("", "of it"),
+    "stability.cycle.across.keys": ("", "as above"),
+    "stability.cycle.across.start": ("", "of it"),
+    "stability.cycle.across.stop": ("", "above it"),
+    "stability.cycle.across.points": ("", "values of it, evenly spaced"),
     "bifurcation.name": ("", "of the diagram's files"),
     "bifurcation.parameter": ("", "what its axis says"),
     "bifurcation.unit": ("", "of the parameter, on the axis"),

@@ -58,6 +58,8 @@ def test_hopf_points_in_files_and_words(case: Path, capsys: pytest.CaptureFixtur
         ('"contacts.sole-1.normal_force" = 1.0', '"contacts.sole-9.normal_force" = 1.0', "sole-9"),
         ('"contacts.sole-1.normal_force" = 1.0', '"contacts.sole-1.normal_farce" = 1.0', "normal_farce"),
         ('"contacts.sole-1.normal_force" = 1.0', '"system.dumpers.0.damping" = 1.0', "dumpers"),
+        ('= 1.0, "contacts.sole-2.normal_force" = 1.0 }\nstart = 0.2\nstop = 9.8\nattractors = [1.0, 8.5]',
+         '= 0.0, "system.dampers.0.damping" = 1.0 }\nstart = 0.2\nstop = -0.1', "not negative"),
         ("stop = 9.8", "stop = 0.2", "stop"),
         ('law = { kind = "rate", slope = 100.0 }   # b_2', 'law = "smooth"', "rate"),
         ("ground = { velocity = 1.0 }              # v_0", "ground = { velocity = 1.0, waviness = [{ amplitude = 1e-6, "

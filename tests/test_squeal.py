@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shutil
 from pathlib import Path
@@ -17,7 +18,7 @@ from test_sliding import masses
 
 from microslip import sliding
 from microslip.basis import read_basis
-from microslip.bifurcation.cycles import checked, cycles, drift, refined
+from microslip.bifurcation.cycles import checked, cycles, in_time, refined
 from microslip.case import load_case
 from microslip.cli import main
 from microslip.linalg.quadratic import Window, every_root, every_value
@@ -25,7 +26,7 @@ from microslip.roots.spectrum import spectrum
 from microslip.roots.waves import waves
 from microslip.stages.moving import moving_shape
 from microslip.stages.places import modal_files
-from microslip.stages.squeal import State, moving, shapes, state_of
+from microslip.stages.squeal import State, moving, shapes, squeal_stage, state_of
 from microslip.stages.varied import Varied
 from microslip.system.ground import turning
 
@@ -94,7 +95,7 @@ def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -
     for o in found.orbits:
         assert np.hypot(*o.at(np.zeros(1))[0]) == pytest.approx(np.sqrt(o.p), abs=1e-8)
         assert o.omega == pytest.approx(1.0, abs=1e-9)
-    assert drift(found.system, found.orbits[-1]) < 1e-7
+    assert in_time(found.system, found.orbits[-1])[0] < 1e-7
 
 
 @pytest.mark.slow
@@ -103,7 +104,7 @@ def test_harmonics_of_a_limit_cycle_are_as_many_as_its_accuracy_takes() -> None:
     is met; its multiplier is that of Liouville's formula, exp(integral of 2 x y - x^2 - p - 1)."""
     (found,) = cycles(brusselator(1.8, 2.3), np.array([1.0, 1.8]), 1.8, 2.3, 3, (0.5, 2.0), 12)
     coarse = found.orbits[-1]
-    assert coarse.p == pytest.approx(2.3) and coarse.count == 3 and drift(found.system, coarse) > 1e-2
+    assert coarse.p == pytest.approx(2.3) and coarse.count == 3 and in_time(found.system, coarse)[0] > 1e-2
     counts = []
     for accuracy in (1e-2, 1e-5):
         one = checked(found.system, coarse, accuracy)
@@ -147,6 +148,61 @@ def test_map_of_two_masses_has_as_many_roots_as_each_state_alone(
         values = np.linalg.eigvals(sliding.state_matrix(s, sliding.equilibrium(s)))
         assert (values.real[values.imag > 0] > 0).sum() == count
         assert values.real[values.imag > 0].max() == pytest.approx(growth, abs=1e-8)
+
+
+CYCLE = """
+[stability.cycle]
+parameter = "load"
+keys = { "contacts.sole-1.normal_force" = 1.0, "contacts.sole-2.normal_force" = 1.0 }
+start = 6.5
+stop = 7.5
+harmonics = 3
+points = 4
+[stability.cycle.across]
+parameter = "speed"
+keys = { "contacts.sole-1.ground.velocity" = 1.0, "contacts.sole-2.ground.velocity" = 1.0 }
+start = 0.98
+stop = 1.02
+points = 2
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Path) -> None:
+    """Rows of the map, limit cycles and checked orbits that were found before are not sought again; the map is that of
+    a run without a break. Where a motion in time was made it swings as the orbit beside it, by what is told."""
+    short = belt.read_text()
+    belt.write_text(short + CYCLE)
+    files = modal_files(load_case(belt)[0], belt, Path(), lambda _: None)
+
+    def run(folder: str, until: str = "to its end") -> list[str]:
+        said = list[str]()
+
+        def report(words: str) -> None:
+            said.append(words)
+            if until in words:
+                raise KeyboardInterrupt
+
+        with contextlib.suppress(KeyboardInterrupt):
+            squeal_stage(belt, files, Path(folder), report=report, pictures=False)
+        return said
+
+    assert len(run("a", "3 of 5")) == 3
+    again = run("a", "speed 1.02, 2 of 2")
+    assert sum("of 5" in words for words in again) == 3 and not Path("a/stability.csv").exists()
+    assert {words.split(",")[0] for words in run("a")} == {
+        "equations over load", "speed 0.98", "speed 1.02", *(f"limit cycle {i} of 4" for i in (1, 2, 3, 4))
+    }  # fmt: skip
+    assert not Path("a/stability.points").exists()
+    for table, checks in (("stability_cycle_1.csv", 3), ("stability_relief.csv", 4)):
+        rows = np.genfromtxt(Path("a", table), delimiter=",", names=True)
+        rows = rows[np.isfinite(rows["in_time_leaves_by"])]
+        assert len(rows) == checks and (rows["largest_multiplier"] > 1).all()
+        apart = np.abs(rows["in_time_second_u_x"] / rows["amplitude_second_u_x"] - 1)
+        assert (apart < 1e-4).all() and (rows["in_time_leaves_by"] < 1e-4).all()
+    belt.write_text(short)
+    run("b")
+    assert Path("a/stability_map.csv").read_bytes() == Path("b/stability_map.csv").read_bytes()
 
 
 COUPLED = """

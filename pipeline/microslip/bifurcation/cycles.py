@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import jax
@@ -13,6 +13,7 @@ import scipy.integrate
 
 from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
+from ..harmonic_balance.accuracy import SAFETY
 from . import equilibria, floquet, flow
 from .balance import Balance, Harmonics, summed
 from .diagram import Asked, diagram
@@ -35,8 +36,26 @@ MOST = 60
 FASTEST = 4.0
 """Step times the fastest root up to which the method of order 8 is stable, with room."""
 
-SAFETY = 3.0
-"""By which the estimated error is multiplied, as in `harmonic_balance.accuracy`."""
+TURNS = np.arange(256) / 256
+"""Times in periods at which a swing is read."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """An orbit with the harmonics that an accuracy takes, and what time says of it.
+
+    Attributes: orbit. error: see `refined`. drift, swing: of a motion, see `in_time`. multipliers: of Floquet.
+    """
+
+    orbit: Harmonics
+    error: float
+    drift: float
+    swing: Array
+    multipliers: ComplexArray
+
+    @property
+    def stable(self) -> bool:
+        return floquet.is_stable(self.multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +63,14 @@ class Cycles:
     """The orbits born at a Hopf point, from the smallest on.
 
     Attributes:
-        hopf. orbits. ended: why there are no more. system.
+        hopf. orbits. ended: why there are no more. system. checked: some of the orbits, by their numbers.
     """
 
     hopf: Hopf
     orbits: tuple[Harmonics, ...]
     ended: str
     system: Dynamics
+    checked: Mapping[int, Checked] = field(default_factory=dict)
 
     @property
     def supercritical(self) -> bool:
@@ -58,18 +78,30 @@ class Cycles:
         return self.hopf.criticality < 0
 
     @property
+    def kind(self) -> str:
+        return "supercritical" if self.supercritical else "subcritical"
+
+    @property
     def columns(self) -> dict[str, Array]:
         """Column -> (o,) values: parameter, frequency, half of the way from the smallest to the largest read-out, and
-        the share of the highest harmonic in the first."""
-        turns = np.arange(256) / 256
-        swing = [np.ptp(self.system.seen(o.at(turns), o.p), axis=0) / 2 for o in self.orbits]
-        named = {f"amplitude {name}": np.array([s[i] for s in swing]) for i, name in enumerate(self.system.named)}
+        the share of the highest harmonic in the first; of checked orbits also what time says of them, else NaN."""
+        swing = [np.ptp(self.system.seen(o.at(TURNS), o.p), axis=0) / 2 for o in self.orbits]
+        in_time = self._told(lambda c: c.swing, len(self.system.named))
         return {
             "parameter": np.array([o.p for o in self.orbits]),
             "frequency_Hz": np.array([o.omega / (2 * np.pi) for o in self.orbits]),
-            **named,
+            **{f"amplitude {name}": np.array([s[i] for s in swing]) for i, name in enumerate(self.system.named)},
             "highest_harmonic": np.array([self._tail(o) for o in self.orbits]),
+            **{f"in time {name}": swing for name, swing in zip(self.system.named, in_time.T, strict=True)},
+            "in_time_leaves_by": self._told(lambda c: c.drift),
+            "harmonics": self._told(lambda c: c.orbit.count),
+            "estimated_error": self._told(lambda c: c.error),
+            "largest_multiplier": self._told(lambda c: np.abs(c.multipliers).max()),
         }
+
+    def _told(self, of: Callable[[Checked], Any], *shape: int) -> Array:
+        none = np.full(shape, np.nan)
+        return np.array([of(self.checked[i]) if i in self.checked else none for i in range(len(self.orbits))])
 
     def _tail(self, o: Harmonics) -> float:
         size = np.asarray(self.system.scale)
@@ -115,22 +147,24 @@ def _born_at(
     return Cycles(hopf, tuple(orbits), ended, system)
 
 
-def drift(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> float:
-    """How far a motion in time that begins on an orbit leaves it in some periods, over its largest swing in scales."""
+def in_time(system: Dynamics, orbit: Harmonics, periods: int = PERIODS) -> tuple[float, Array]:
+    """How far a motion in time that begins on an orbit leaves it in some periods, over its largest swing in scales, and
+    (w,) half of the way from the smallest to the largest read-out in the last of them."""
     size = np.asarray(system.scale)
 
     def rate(t: float, y: Array) -> Array:
         return np.asarray(_rate(system)(y * size, orbit.p)) / size
 
-    turns = np.linspace(0.0, periods, 16 * periods + 1)
+    turns = np.append((np.arange(periods)[:, None] + TURNS).ravel(), periods)
     times = turns * 2 * np.pi / orbit.omega
     own = orbit.at(turns) / size
     run = scipy.integrate.solve_ivp(
         rate, (0.0, times[-1]), own[0], method="DOP853", t_eval=times, rtol=FINE, atol=FINE * np.ptp(own, axis=0).max()
     )
     if not run.success:
-        return float("inf")
-    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2))
+        return float("inf"), np.full(len(system.named), np.nan)
+    seen = system.seen(run.y.T[-len(TURNS) :] * size, orbit.p)
+    return float(np.abs(run.y.T - own).max() / (np.ptp(own, axis=0).max() / 2)), np.ptp(seen, axis=0) / 2
 
 
 def refined(
@@ -139,7 +173,7 @@ def refined(
     """An orbit with as many harmonics as its accuracy takes, and its estimated error: shares of its amplitude.
 
     Harmonics grow by half. What they change falls from one time to the next by a factor, by which what they still miss
-    is estimated, as `harmonic_balance.accuracy` does with its `SAFETY`. With `most` of them it may still be too large;
+    is estimated, times `SAFETY`. With `most` of them it may still be too large;
     it is infinite where the balance was not found again.
     """
     size, before, error = np.asarray(system.scale), 0.0, np.inf
@@ -172,27 +206,10 @@ def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
     return floquet.multipliers(Orbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p))
 
 
-@dataclass(frozen=True)
-class Checked:
-    """An orbit with the harmonics that an accuracy takes.
-
-    Attributes: orbit. error: see `refined`. drift: of a motion in time, see `drift`. multipliers: of Floquet.
-    """
-
-    orbit: Harmonics
-    error: float
-    drift: float
-    multipliers: ComplexArray
-
-    @property
-    def stable(self) -> bool:
-        return floquet.is_stable(self.multipliers)
-
-
 def checked(system: Dynamics, orbit: Harmonics, accuracy: float, report: Report = lambda _: None) -> Checked:
     """An orbit refined to an accuracy, and what time says of it."""
     fine, error = refined(system, orbit, accuracy, report=report)
-    return Checked(fine, error, drift(system, fine), multipliers(system, fine))
+    return Checked(fine, error, *in_time(system, fine), multipliers(system, fine))
 
 
 def _rate(system: Dynamics) -> Any:

@@ -301,11 +301,12 @@ class Cycle(Over):
     """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
 
     points: of a branch at most. accuracy: share of the amplitude to which three of its orbits are refined, that are
-    compared with a motion in time.
+    compared with a motion in time. across: a second parameter, at whose values they are followed as well.
     """
 
     harmonics: Annotated[int, Field(ge=1, le=200)] = 7
     accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
+    across: Over | None = None
 
 
 class StabilityOfCase(Model):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,17 +47,58 @@ def map_picture(found: Map, full: Sequence[tuple[float, float, int]], path: Path
     return save_figure(figure, path)
 
 
+KINDS = {"supercritical": ("#0b4f9c", "-"), "subcritical": ("#c8382c", "--")}
+IN_TIME = "#e8a013"
+TOLD_IN_TIME = "motions in time"
+
+
 def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
-    """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, dashed red from others."""
+    """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, dashed red from others;
+    dots are motions in time."""
     figure, axes = single_panel(7.0, 4.4)
+    name = found[0].system.named[0]
     for number, c in enumerate(found):
-        columns = c.columns
-        name = next(key for key in columns if key.startswith("amplitude"))
-        kind, colour, line = ("super", "#0b4f9c", "-") if c.supercritical else ("sub", "#c8382c", "--")
-        label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {kind}critical"
-        axes.plot(columns["parameter"], 1e6 * columns[name], line, color=colour, marker=".", label=label)
+        columns, (colour, line) = c.columns, KINDS[c.kind]
+        label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {c.kind}"
+        axes.plot(columns["parameter"], 1e6 * columns[f"amplitude {name}"], line, color=colour, marker=".", label=label)
         axes.plot(c.hopf.p, 0.0, "o", color="white", markeredgecolor=colour, zorder=3)
-        if number == 0:
-            axes.set(xlabel=title, ylabel=f"{name} in um")
+        axes.plot(
+            columns["parameter"], 1e6 * columns[f"in time {name}"], "o", color=IN_TIME, markeredgecolor="black",
+            markersize=8, zorder=4, label="" if number else TOLD_IN_TIME,
+        )  # fmt: skip
+    axes.set(xlabel=title, ylabel=f"amplitude {name} in um")
     axes.legend(frameon=False, fontsize=9)
     return save_figure(figure, path)
+
+
+def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str], path: Path) -> Path:
+    """Amplitude of limit cycles upwards over two parameters, Hopf points on the ground, motions in time as dots.
+
+    Args:
+        found: (value of the second parameter, cycles there). titles: of the two parameters.
+    """
+    figure = empty_figure(8.0, 6.2)
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    for depth, (value, c) in enumerate(reversed(found)):  # the nearest is drawn last
+        _wall(axes, value, c, 3 * depth)
+    axes.set(xlabel=titles[0], ylabel=titles[1], zlabel=f"amplitude {found[0][1].system.named[0]} in um")
+    axes.set_zlim(0.0)
+    axes.view_init(24, -62)
+    axes.set_box_aspect((1.3, 1.3, 0.8), zoom=0.88)
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend(handles.values(), handles, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    return save_figure(figure, path)
+
+
+def _wall(axes: Any, value: float, c: Cycles, order: int) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    columns, (colour, line), name = c.columns, KINDS[c.kind], c.system.named[0]
+    x, z = np.append(c.hopf.p, columns["parameter"]), 1e6 * np.append(0.0, columns[f"amplitude {name}"])
+    y, dots = np.full(len(x), value), 1e6 * columns[f"in time {name}"]
+    wall = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, 0 * z])[::-1]])
+    axes.add_collection3d(Poly3DCollection([wall], facecolor=colour, alpha=0.18, zorder=order))
+    axes.plot(x, y, z, line, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)
+    dot = {"ls": "", "marker": "o", "markeredgecolor": "black", "markersize": 6, "zorder": order + 2}
+    axes.plot(x[:1], y[:1], z[:1], **dot, color="white", label="Hopf points")
+    axes.plot(x[1:], y[1:], dots, **dot, color=IN_TIME, label=TOLD_IN_TIME)

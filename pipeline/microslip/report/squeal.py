@@ -21,8 +21,11 @@ OF_FULL = " Dots: states counted in the unreduced matrices as well."
 
 OF_CYCLES = (
     "Half of the way from the smallest to the largest value of the first read-out in a period, from the Hopf point on. "
-    "Supercritical: the limit cycle grows out of the equilibrium softly; subcritical: it is reached by a jump."
+    "Supercritical: the limit cycle grows out of the equilibrium softly; subcritical: it is reached by a jump. Dots: "
+    "the same of a motion in time that began on the orbit, in its last period."
 )
+
+OF_RELIEF = "The same over a second parameter: each wall stands at one of its values and begins at the Hopf point."
 
 
 OF_WAVES = "One period of a root that grows, without its growth. Its size is chosen; motion/ holds it for ParaView."
@@ -35,7 +38,7 @@ def squeal_html(
     """The page, which begins with the answer.
 
     Args:
-        said: sentences. pictures: ``map``, ``cycles``, ``plane``, and motions of roots, ``root_...``.
+        said: sentences. pictures: ``map``, ``cycles``, ``relief``, ``plane``, and motions of roots, ``root_...``.
     """
     album = Album(pictures)
     words = OF_MAP + OF_FULL * bool(full)
@@ -45,6 +48,6 @@ def squeal_html(
         head = [over.x.title, over.y.title, "grow, reduced", "grow, unreduced", "relative difference"]
         pieces.append(fold("States in unreduced matrices", table(head, rows)))
     pieces += [album.take(name, OF_WAVES) for name in pictures if name.startswith("root_")]
-    pieces.append(album.take("cycles", OF_CYCLES))
+    pieces += [album.take("cycles", OF_CYCLES), album.take("relief", OF_RELIEF)]
     pieces += [album.take("plane", CAPTIONS["plane"]), root_table(found), say(READ_AS, tone="note")]
     return page(title, pieces)

@@ -13,6 +13,7 @@ from ..bifurcation import mechanics
 from ..data import Array, NotConverged, UserError
 from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
+from ..results.journal import Journal
 from ..system.assembly import Assembly
 
 if TYPE_CHECKING:
@@ -109,40 +110,56 @@ class Map:
         return f"<Map: {self.sentence}>"
 
 
+KEPT = "rows of the map"
+"""Series of the journal."""
+
+
 def over_map(
     make: Callable[[dict[str, float]], Assembly], x: Axis, y: Axis, window: Window, neutral: float = 0.0,
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, journal: Journal | None = None,
 ) -> Map:  # fmt: skip
     """The roots of an assembly about sliding at every pair of values of two parameters.
 
     Args:
-        make: the assembly with values of keys. window: of the roots that count. neutral: 1/s.
+        make: the assembly with values of keys. window: of the roots that count. neutral: 1/s. journal: where finished
+            rows are kept, and known ones found.
 
     Raises:
         UserError: what `sliding.of` refuses; contacts that remember.
     """
-    shape = len(y.values), len(x.values)
-    unstable, growth, frequency = np.full(shape, -1), np.full(shape, np.nan), np.full(shape, np.nan)
-    count = 0
+    rows = {} if journal is None else journal.of(KEPT)
     for i, value in enumerate(y.values):
-        report(f"{y.label} {value:.4g}, {i + 1} of {len(y.values)}")
-        row, z = _row(make, x, y.at(value)), None
-        for j, p in enumerate(x.values):
-            s = row(float(p))
-            count = len(s.push)
-            try:
-                z = sliding.equilibrium(s, z)
-            except NotConverged:
-                z = None
-                continue
-            roots = _roots(s, z)
-            roots = roots[window.holds(roots)]
-            tolerance = np.maximum(neutral, quadratic.ROUNDING * np.abs(roots).max(initial=0.0))
-            unstable[i, j] = (roots.real > tolerance).sum()
-            if len(roots):
-                top = roots[np.argmax(roots.real)]
-                growth[i, j], frequency[i, j] = top.real, top.imag / (2 * np.pi)
-    return Map(x, y, unstable, growth, frequency, neutral, window, count)
+        if i not in rows:
+            report(f"{y.label} {value:.4g}, {i + 1} of {len(y.values)}")
+            rows[i] = _solved(_row(make, x, y.at(value)), x, window, neutral)
+            if journal is not None:
+                journal.keep(KEPT, i, rows[i])
+    unstable, growth, frequency = (
+        np.array([rows[i][key] for i in range(len(y.values))]) for key in ("unstable", "growth", "frequency")
+    )
+    return Map(x, y, unstable, growth, frequency, neutral, window, int(rows[0]["coordinates"]))
+
+
+def _solved(row: Callable[[float], sliding.Sliding], x: Axis, window: Window, neutral: float) -> dict[str, Any]:
+    """A row of a map, by the names of `Map`."""
+    n, z, count = len(x.values), None, 0
+    unstable, growth, frequency = np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan)
+    for j, p in enumerate(x.values):
+        s = row(float(p))
+        count = len(s.push)
+        try:
+            z = sliding.equilibrium(s, z)
+        except NotConverged:
+            z = None
+            continue
+        roots = _roots(s, z)
+        roots = roots[window.holds(roots)]
+        tolerance = np.maximum(neutral, quadratic.ROUNDING * np.abs(roots).max(initial=0.0))
+        unstable[j] = (roots.real > tolerance).sum()
+        if len(roots):
+            top = roots[np.argmax(roots.real)]
+            growth[j], frequency[j] = top.real, top.imag / (2 * np.pi)
+    return {"unstable": unstable, "growth": growth, "frequency": frequency, "coordinates": count}
 
 
 def _roots(s: sliding.Sliding, z: Array) -> Any:

@@ -79,8 +79,9 @@ def _work(
     folder = stage.product.parent
     bases = {name: read_basis(file) for name, file in files.items()}
     changed = [Changed(Varied(case_path, raw, bases), asked) for asked in settings.bifurcation]
-    for one in changed:
-        one.at(one.asked.start)  # what is wrong in a later diagram is said before the first one is made
+    for one in changed:  # what is wrong in a later diagram is said before the first one is made
+        one.at(one.asked.start)
+        one.at(one.asked.stop)
     stage.begin()
     found = [_diagram(one, folder / "branches", inputs, stage) for one in changed]
     made = [_table(folder, one.asked, drawn) for one, drawn in zip(changed, found, strict=True)]

@@ -13,10 +13,8 @@ import numpy as np
 
 from .. import sliding
 from ..basis import read_basis
-from ..bifurcation import mechanics
-from ..bifurcation.cycles import PERIODS, Cycles, checked, cycles
 from ..case import CaseSettings, load_case
-from ..case.questions import Cycle, StabilityOfCase
+from ..case.questions import Cycle, Over, StabilityOfCase
 from ..case.settings import GROUND
 from ..data import Array, ComplexArray, ModalBasis, NotConverged, UserError
 from ..files import store
@@ -25,6 +23,7 @@ from ..linalg import quadratic
 from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced, unreduced
 from ..report.squeal import squeal_html
+from ..results import Journal, open_journal
 from ..roots.full import Compared, compared, full_matrices, growing
 from ..roots.map import Axis, Map, over_map
 from ..roots.spectrum import Spectrum, spectrum
@@ -32,12 +31,13 @@ from ..roots.waves import waves
 from ..sliding import Sliding, Tangent
 from ..system.assembly import Assembly
 from .checkpoint import inputs_of
+from .cycles import Born, born, sentence_of_relief, sentences_of
 from .job import open_job
 from .meshing import load_mesh, mesh_stage
 from .moving import moving_shape
 from .places import find_body, lumped
 from .stability import table_csv, table_lines, window_of, write_roots
-from .stage import Made, Report, Stage
+from .stage import Made, Report, Stage, hash_of_code
 from .varied import Varied
 
 
@@ -99,34 +99,44 @@ def squeal_stage(
         raise UserError(f"{case_path}: stability: is missing; add [stability] with frequency = [0.0, HIGHEST] in Hz")
     stage = Stage(folder / "stability.json", ("stages.squeal",), force, report)
     inputs = {**inputs_of(raw, settings, case_path, files), "pictures": pictures}
-    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures))
+    depends = store.hash_settings({**inputs, "pictures": None, "code": hash_of_code(stage.code)})
+    stage.make(inputs, lambda: _work(stage, settings, raw, case_path, files, pictures, depends))
     told = json.loads(stage.product.read_text())
     return [folder / name for name in told["files"]], told["lines"], told["complete"]
 
 
 def _work(
-    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], path: Path, files: Mapping[str, Path], pictures: bool
-) -> Made:
+    stage: Stage, settings: CaseSettings, raw: Mapping[str, Any], path: Path, files: Mapping[str, Path],
+    pictures: bool, inputs: str,
+) -> Made:  # fmt: skip
+    """What is finished stays in a journal until all that is made of it is there."""
     asked, folder = settings.stability, stage.product.parent
     assert asked is not None
     varied = Varied(path, raw, {name: read_basis(file) for name, file in files.items()})
     state = state_of(varied, {}, path)
     found = spectrum(state.matrices, window_of(asked), accuracy=asked.accuracy, neutral=asked.neutral)
-    over, full = None, list[Compared]()
-    if asked.over:
-        over = over_map(*_map_of(varied, asked), window_of(asked), asked.neutral, stage.report)
-        full = _in_full(varied, asked, over, settings, path, stage.report) if asked.full else []
-    born = _cycles(varied, asked, path, stage.report) if asked.cycle else []
-    stage.begin()
+    axes = _map_of(varied, asked) if asked.over else None
+    points = folder / "stability.points"
     folder.mkdir(parents=True, exist_ok=True)
+    over, full, cycles = None, list[Compared](), Born((), ())
+    with open_journal(points, inputs, {"case": settings.name}, stage.force) as journal:
+        if axes is not None:
+            over = over_map(*axes, window_of(asked), asked.neutral, stage.report, journal)
+            full = _in_full(varied, asked, over, settings, path, stage.report, journal) if asked.full else []
+        if asked.cycle:
+            cycles = born(varied, asked.cycle, window_of(asked).omega, journal, stage.report)
+    stage.begin()
     told = [*shapes(state, found, varied.bases, settings), *pressed(state)]
     said = [found.sentence, *told, *([over.sentence] if over else []), *_told(full)]
-    said += [words for c in born if asked.cycle for words in sentences_of(c, asked.cycle, stage.report)]
+    if asked.cycle:
+        said += [words for c in cycles.own for words in sentences_of(c, asked.cycle)]
+        said += sentence_of_relief(cycles, asked.cycle)
     moves = moving(state, found, varied.bases, settings, folder) if pictures else []
-    names = _written(folder, settings.name, found, over, full, said, pictures, (born, asked.cycle), moves)
+    names = _written(folder, settings.name, found, over, full, said, pictures, (cycles, asked.cycle), moves)
     complete = found.complete and all(one.complete for one in full)
     answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
     store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
+    points.unlink()
     return Made([folder / name for name in names])
 
 
@@ -218,62 +228,36 @@ def _map_of(varied: Varied, asked: StabilityOfCase) -> tuple[Any, Axis, Axis]:
     return make, x, y
 
 
+FULL = "states in unreduced matrices"
+"""Series of the journal."""
+
+
 def _in_full(
-    varied: Varied, asked: StabilityOfCase, over: Map, settings: CaseSettings, path: Path, report: Report
+    varied: Varied, asked: StabilityOfCase, over: Map, settings: CaseSettings, path: Path, report: Report,
+    journal: Journal,
 ) -> list[Compared]:  # fmt: skip
     """States of the map, evenly spread over it, in unreduced matrices."""
     bodies = {b.name: unreduced_body(b.body or b.name, path) for b in settings.components}
+    for n in range(asked.full):
+        if n not in journal.of(FULL):
+            report(f"unreduced, state {n + 1} of {asked.full}")
+            journal.keep(FULL, n, vars(_one_in_full(n, varied, asked, over, bodies, path)))
+    return [Compared(**known) for known in journal.of(FULL).values()]
+
+
+def _one_in_full(
+    n: int, varied: Varied, asked: StabilityOfCase, over: Map, bodies: Mapping[str, Unreduced], path: Path
+) -> Compared:  # fmt: skip
     window, (ny, nx) = window_of(asked), over.unstable.shape
     grows = Window((max(asked.neutral, 0.0), window.growth[1]), window.omega)
-    found = []
-    for n in range(asked.full):
-        share = (n + 0.5) / asked.full
-        i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
-        x, y = float(over.x.values[j]), float(over.y.values[i])
-        state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
-        own = quadratic.every_value(state.matrices)
-        report(f"unreduced, state {n + 1} of {asked.full}")
-        full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
-        mine = own[grows.holds(own)]
-        found.append(Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete))
-    return found
-
-
-def _cycles(varied: Varied, asked: StabilityOfCase, path: Path, report: Report) -> list[Cycles]:
-    over = asked.cycle
-    assert over is not None
-
-    def make(p: float) -> Assembly:
-        return varied.under({key: factor * p for key, factor in over.keys.items()}, "stability.cycle.keys")
-
-    report(f"equations over {over.parameter}")
-    system = mechanics.dynamics(make, over.start, over.stop)
-    begin = sliding.equilibrium(sliding.of(make(over.start)))
-    band = window_of(asked).omega
-    try:
-        return cycles(system, begin, over.start, over.stop, over.harmonics, band, over.points, report)
-    except UserError as error:
-        raise UserError(f"{path}: stability.cycle: {over.parameter}: {error}") from error
-
-
-def sentences_of(c: Cycles, over: Cycle, report: Report) -> list[str]:
-    """Where a limit cycle is born, of which kind, how far it was followed; of three of its orbits their harmonics, how
-    a motion in time keeps to them, and whether they are stable."""
-    unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
-    kind = "supercritical" if c.supercritical else "subcritical"
-    said = [
-        f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {kind}: its limit "
-        f"cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz"
-    ]
-    for k in (1, 2, 3):
-        one = checked(c.system, c.orbits[(len(c.orbits) - 1) * k // 3], over.accuracy, report)
-        wide = "" if one.error <= over.accuracy else f", more than the {over.accuracy:.1e} asked for"
-        said.append(
-            f"limit cycle at {one.orbit.p:.4g}{unit}: {one.orbit.count} harmonics, estimated error {one.error:.1e}"
-            f"{wide}; in {PERIODS} periods a motion in time leaves it by {one.drift:.1e} of its amplitude; "
-            f"{'stable' if one.stable else 'unstable'}, largest Floquet multiplier {abs(one.multipliers[0]):.4g}"
-        )
-    return said
+    share = (n + 0.5) / asked.full
+    i, j = int(share * ny), int((7 * n + 3) % asked.full / max(asked.full - 1, 1) * (nx - 1))
+    x, y = float(over.x.values[j]), float(over.y.values[i])
+    state = state_of(varied, {**over.x.at(x), **over.y.at(y)}, path, "stability.over.keys")
+    own = quadratic.every_value(state.matrices)
+    full = growing(full_matrices(bodies, state.assembly, state.contacts), grows, own)
+    mine = own[grows.holds(own)]
+    return Compared(x, y, len(mine), len(full.roots), compared(mine, full.roots.s), full.complete)
 
 
 def unreduced_body(name: str, path: Path) -> Unreduced:
@@ -301,10 +285,10 @@ def _told(full: Sequence[Compared]) -> list[str]:
 
 def _written(
     folder: Path, name: str, found: Spectrum, over: Map | None, full: Sequence[Compared], said: Sequence[str],
-    pictures: bool, born: tuple[Sequence[Cycles], Cycle | None], moves: Sequence[Path],
+    pictures: bool, cycles: tuple[Born, Cycle | None], moves: Sequence[Path],
 ) -> list[str]:  # fmt: skip
     """Names of the files, the page first. moves: of `moving`."""
-    drawn = _pictures(found, over, full, folder / "pictures", born) if pictures else {}
+    drawn = _pictures(found, over, full, folder / "pictures", cycles) if pictures else {}
     drawn |= {path.stem: path for path in moves if path.suffix == ".gif"}
     texts = {
         "stability.html": squeal_html(f"{name}: stability of sliding", said, found, over, full, drawn),
@@ -315,8 +299,10 @@ def _written(
     if full:
         columns = {key: np.array([getattr(one, key) for one in full], dtype=float) for key in Compared.__annotations__}
         texts["stability_full.csv"] = columns_csv(columns, 12)
-    for number, c in enumerate(born[0], 1):
+    for number, c in enumerate(cycles[0].own, 1):
         texts[f"stability_cycle_{number}.csv"] = columns_csv(c.columns, 12)
+    if cycles[0].relief and cycles[1] and cycles[1].across:
+        texts["stability_relief.csv"] = columns_csv(cycles[0].columns(cycles[1].across.parameter), 12)
     for file, text in texts.items():
         store.write_text(folder / file, text)
     write_roots(folder / "stability.h5", found, None, {})
@@ -325,15 +311,22 @@ def _written(
 
 def _pictures(
     found: Spectrum, over: Map | None, full: Sequence[Compared], folder: Path,
-    born: tuple[Sequence[Cycles], Cycle | None],
+    cycles: tuple[Born, Cycle | None],
 ) -> dict[str, Path]:  # fmt: skip
-    from ..pictures.roots import cycles_picture, map_picture, plane_picture
+    from ..pictures.roots import cycles_picture, map_picture, plane_picture, relief_picture
 
     folder.mkdir(exist_ok=True)
     drawn = {"plane": plane_picture(found, folder / "roots.png")}
     if over is not None:
         drawn["map"] = map_picture(over, [(one.x, one.y, one.full) for one in full], folder / "roots_map.png")
-    if born[0] and (asked := born[1]) is not None:
-        title = f"{asked.parameter} in {asked.unit}".removesuffix(" in ")
-        drawn["cycles"] = cycles_picture(born[0], title, folder / "roots_cycles.png")
+    seen, asked = cycles
+    if asked is not None and seen.own:
+        drawn["cycles"] = cycles_picture(seen.own, _axis(asked), folder / "roots_cycles.png")
+    if asked is not None and asked.across is not None and seen.relief:
+        axes = _axis(asked), _axis(asked.across)
+        drawn["relief"] = relief_picture(seen.relief, axes, folder / "roots_relief.png")
     return drawn
+
+
+def _axis(over: Over) -> str:
+    return f"{over.parameter} in {over.unit}" if over.unit else over.parameter

@@ -1,0 +1,160 @@
+"""Limit cycles of a case that slides, over one parameter and in relief over a second: followed, checked in time, told.
+
+What is finished stays in a journal: the cycles of one value of the second parameter, and each orbit that was checked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from .. import sliding
+from ..bifurcation import mechanics
+from ..bifurcation.balance import Harmonics
+from ..bifurcation.cycles import PERIODS, Checked, Cycles, checked, cycles
+from ..bifurcation.dynamics import Dynamics
+from ..bifurcation.equilibria import Hopf
+from ..case.questions import Cycle
+from ..data import Array, UserError
+from ..results import Journal
+from ..system.assembly import Assembly
+from .stage import Report
+from .varied import Varied
+
+KEPT = "limit cycles"
+"""Series of the journal: by the number of the second parameter's value, -1 at the case's own state."""
+
+
+@dataclass(frozen=True)
+class Born:
+    """Limit cycles of a case. Attributes: own: at its own state. relief: (value of the second parameter, cycles)."""
+
+    own: Sequence[Cycles]
+    relief: Sequence[tuple[float, Cycles]]
+
+    def columns(self, across: str) -> dict[str, Array]:
+        """Of the relief, a row an orbit. across: name of the second parameter."""
+        parts = [{across: np.full(len(c.orbits), value)} | c.columns for value, c in self.relief]
+        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
+def born(varied: Varied, asked: Cycle, band: tuple[float, float], journal: Journal, report: Report) -> Born:
+    """The limit cycles that a case asks for. band: rad/s, of their Hopf points.
+
+    Raises:
+        UserError: no equilibrium to begin with; equations that do not change smoothly.
+    """
+    work = _Work(varied, asked, band, journal, report)
+    own = [work.judged(c, f"{i}", (1, 2, 3), asked.accuracy) for i, c in enumerate(work.followed(-1, {}))]
+    over, relief = asked.across, list[tuple[float, Cycles]]()
+    for number, value in enumerate(np.linspace(over.start, over.stop, over.points).tolist() if over else []):
+        assert over is not None
+        report(f"{over.parameter} {value:.4g}, {number + 1} of {over.points}")
+        found = work.followed(number, {key: factor * value for key, factor in over.keys.items()})
+        relief += [(value, work.judged(c, f"{number}.{i}", (2, 3), np.inf)) for i, c in enumerate(found)]
+    return Born(own, relief)
+
+
+@dataclass(frozen=True)
+class _Work:
+    varied: Varied
+    asked: Cycle
+    band: tuple[float, float]
+    journal: Journal
+    report: Report
+
+    def followed(self, number: int, fixed: Mapping[str, float]) -> list[Cycles]:
+        """The limit cycles with other values of keys; from the journal, if they are there."""
+        asked, where = self.asked, "stability.cycle.keys" if number < 0 else "stability.cycle.across.keys"
+
+        def make(p: float) -> Assembly:
+            return self.varied.under({**fixed, **{key: factor * p for key, factor in asked.keys.items()}}, where)
+
+        self.report(f"equations over {asked.parameter}")
+        system = mechanics.dynamics(make, asked.start, asked.stop)
+        known = self.journal.of(KEPT).get(number)
+        if known is not None:
+            return [_unpacked(known, f"{i}/", system) for i in range(int(known["count"]))]
+        begin = sliding.equilibrium(sliding.of(make(asked.start)))
+        try:
+            found = cycles(
+                system, begin, asked.start, asked.stop, asked.harmonics, self.band, asked.points, self.report
+            )
+        except UserError as error:
+            raise UserError(f"{self.varied.path}: stability.cycle: {asked.parameter}: {error}") from error
+        point: dict[str, Any] = {"count": len(found)}
+        for i, c in enumerate(found):
+            point |= _packed(c, f"{i}/")
+        self.journal.keep(KEPT, number, point)
+        return found
+
+    def judged(self, c: Cycles, name: str, thirds: Sequence[int], accuracy: float) -> Cycles:
+        """The cycles with orbits at so many thirds of the branch checked; with an infinite accuracy as they are."""
+        series = f"orbits checked {name}"
+        for number in dict.fromkeys((len(c.orbits) - 1) * k // 3 for k in thirds):
+            known = self.journal.of(series).get(number)
+            orbit = c.orbits[number]
+            if known is not None:
+                one = Checked(
+                    Harmonics(known["c"], float(known["omega"]), orbit.p), float(known["error"]),
+                    float(known["drift"]), known["swing"], known["multipliers"],
+                )  # fmt: skip
+            else:
+                one = checked(c.system, orbit, accuracy, self.report)
+                rest = {"error": one.error, "drift": one.drift, "swing": one.swing, "multipliers": one.multipliers}
+                self.journal.keep(series, number, {"c": one.orbit.c, "omega": one.orbit.omega, **rest})
+            c = replace(c, checked={**c.checked, number: one})
+        return c
+
+
+def _packed(c: Cycles, begin: str) -> dict[str, Any]:
+    """What a journal keeps of the cycles of a Hopf point."""
+    orbits = {key: np.array([getattr(o, key) for o in c.orbits]) for key in ("c", "omega", "p")}
+    hopf = {f"hopf/{f.name}": getattr(c.hopf, f.name) for f in fields(Hopf)}
+    return {begin + key: value for key, value in {**hopf, **orbits, "ended": c.ended}.items()}
+
+
+def _unpacked(point: Mapping[str, Any], begin: str, system: Dynamics) -> Cycles:
+    own = {key.removeprefix(begin): value for key, value in point.items() if key.startswith(begin)}
+    at = {f.name: own[f"hopf/{f.name}"] for f in fields(Hopf)}
+    hopf = Hopf(at["x"], float(at["p"]), float(at["omega"]), at["shape"], float(at["criticality"]))
+    orbits = zip(own["c"], own["omega"].tolist(), own["p"].tolist(), strict=True)
+    return Cycles(hopf, tuple(Harmonics(*one) for one in orbits), own["ended"], system)
+
+
+def sentences_of(c: Cycles, over: Cycle) -> list[str]:
+    """Where a limit cycle is born, of which kind, how far it was followed; of its checked orbits their harmonics, how
+    a motion in time keeps to them, and whether they are stable."""
+    unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
+    said = [
+        f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {c.kind}: its "
+        f"limit cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz"
+    ]
+    for one in c.checked.values():
+        wide = "" if one.error <= over.accuracy else f", more than the {over.accuracy:.1e} asked for"
+        said.append(
+            f"limit cycle at {one.orbit.p:.4g}{unit}: {one.orbit.count} harmonics, estimated error {one.error:.1e}"
+            f"{wide}; in {PERIODS} periods a motion in time leaves it by {one.drift:.1e} of its amplitude; "
+            f"{'stable' if one.stable else 'unstable'}, largest Floquet multiplier {abs(one.multipliers[0]):.4g}"
+        )
+    return said
+
+
+def sentence_of_relief(found: Born, over: Cycle) -> list[str]:
+    """How many limit cycles of which kind there are over the second parameter, and what time says of them."""
+    if over.across is None:
+        return []
+    unit = f" {over.across.unit}" if over.across.unit else ""
+    range_ = f"{over.across.parameter} {over.across.start:.4g} to {over.across.stop:.4g}{unit}"
+    kinds = [c.kind for _, c in found.relief]
+    counts = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)) or "none"
+    every = [one for _, c in found.relief for one in c.checked.values()]
+    worst = max((one.drift for one in every), default=np.nan)
+    return [
+        f"limit cycles at {over.across.points} values of {range_}: {counts}; motions in time leave {len(every)} of "
+        f"their orbits, by {over.harmonics} harmonics, by {worst:.1e} of the amplitude at most in {PERIODS} periods; "
+        f"{sum(one.stable for one in every)} of these are stable"
+    ]
