@@ -519,7 +519,7 @@ class CaseSettings(Model):
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
             + [b.aerodynamics for b in self.components]
-            + [s.file for s in (self.mistuning.scatter if self.mistuning else ())]
+            + [f for s in (self.mistuning.scatter if self.mistuning else ()) for f in (s.file, *s.others.values())]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 
