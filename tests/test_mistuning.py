@@ -161,9 +161,52 @@ def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
     assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
 
 
-@pytest.mark.parametrize("blade", [0, 1, 5])
-def test_sensitivities_are_differences(tuned: Tuned, blade: int) -> None:
+FLOW = {0: 0.002j, 1: 0.004 + 0.01j, 2: -0.01 + 0.003j, 3: 0.002 + 0.004j, 4: 0.012j, 5: 0.01 - 0.001j}
+
+
+def flown() -> Tuned:
+    """The ring in a flow that tells all six waves apart."""
+    one = sector()
+    return Tuned(replace(one, components=(replace(one.components[0], aerodynamic=FLOW),)), {})
+
+
+def test_a_mistuned_ring_in_a_flow() -> None:
+    """Contacts that stick, blades that differ, each wave damped by its own coefficient: the dense complex matrices of
+    the whole ring, put together here wave by wave, 1e-10."""
+    ring, d = flown(), np.random.default_rng(4).normal(0, 0.01, 6)
+    one, k, w = ring.sector, ring.sector.contacts[0].stiffness, 2 * np.pi * 287.0
+    g = one.components[0].groups[0]
+    sides = (one.contacts[0].first, one.contacts[0].second)
+    right, left = (side.frame @ g.interfaces[side.interface].rows for side in sides)
+    D = np.kron(np.eye(6), right) - np.kron(np.roll(np.eye(6), 1, axis=1), left)
+    A = D.T @ np.kron(np.eye(6), k) @ D + 0j
+    for j, s in enumerate(1 + d):
+        at = slice(2 * j, 2 * j + 2)
+        A[at, at] += np.diag((s * g.omega) ** 2 - w**2 + 2j * w * g.damping_ratio * s * g.omega)
+    for n, a in FLOW.items():
+        E = np.kron(np.exp(2j * np.pi * n * np.arange(6) / 6)[:, None] / np.sqrt(6), np.eye(2))
+        A += E @ np.diag(2 * a.real * g.omega**2 + 2j * w * a.imag * g.omega) @ E.conj().T
+    force = np.kron(np.exp(2j * np.pi * np.arange(6) / 6), g.excitations["magnet"].rows[0] * 2.0)
+    probe = g.monitors["probe"].rows[g.monitors["probe"].labels.index(one.outputs[0].label)]
+    expected = np.abs(np.kron(np.eye(6), probe) @ np.linalg.solve(A, force))
+    s = Scatter("frequency", 0.01)
+    found = Sticking(ring.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))(287.0)
+    assert found == pytest.approx(expected, rel=1e-10)
+    assert np.abs(Sticking(ring.whole)(287.0) / expected - 1).max() > 0.01
+
+
+def test_modal_files_of_single_blades_in_a_flow() -> None:
+    """The same file again is the same ring."""
+    ring = flown()
+    same = Scatter("modal_file", others={4: ring.sector})
+    found = Sticking(ring.mistuned([(same, same.drawn(6, 1, 0, 0, 0))]))(287.0)
+    assert found == pytest.approx(Sticking(ring.whole)(287.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("blade, flowing", [(0, False), (1, False), (5, False), (1, True)])
+def test_sensitivities_are_differences(tuned: Tuned, blade: int, flowing: bool) -> None:
     """Central differences of Newton solutions with friction: 1e-6 (no contact switches between them)."""
+    tuned = flown() if flowing else tuned
     s = Scatter("frequency", 0.003, together=0.0)
     asked = Asked(tuned, (s,), np.array([287.3]), balance=FINE)
     point = asked.tuned_points[0]

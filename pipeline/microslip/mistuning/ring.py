@@ -13,6 +13,7 @@ from ..data import Array, ModalGroup, UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
+from ..system.flow import Flow, through
 from . import subset
 from .scatter import OF_BLADES, Scatter
 
@@ -87,7 +88,7 @@ class Tuned:
                 continue
             for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
                 if s.of == "modal_file":
-                    components[at] = replace(self._made(s, own), name=at)
+                    components[at] = replace(self._made(s, own), name=at, aerodynamic=components[at].aerodynamic)
                 elif s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
                 else:
@@ -98,7 +99,8 @@ class Tuned:
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
-        return replace(self.whole, components=tuple(components.values()), contacts=tuple(contacts.values()))
+        parts, met = tuple(components.values()), tuple(contacts.values())
+        return replace(self.whole, components=parts, contacts=met, flow=self._flow(deviations))
 
     def body(self, s: Scatter) -> Component:
         names = {m.name: m for m in self.sector.components}
@@ -117,6 +119,16 @@ class Tuned:
     def _made(self, s: Scatter, number: Array) -> Component:
         """The body of a modal file: 0 of the nominal one, 1 of the first of the others."""
         return _named([self.sector, *s.others.values()][int(number[0])], self.body(s).name)
+
+    def _flow(self, deviations: Deviations) -> tuple[Flow, ...]:
+        """What the flow adds to the tuned ring, or to the one of other modal files; it knows of no deviations."""
+        found = {f.components: f for f in self.whole.flow}
+        for s, values in (one for one in deviations if one[0].others):
+            body = self.body(s)
+            blades = [replace(self._made(s, own), name=f"{body.name}_{j}") for j, own in enumerate(values)]
+            if (names := tuple(b.name for b in blades)) in found:
+                found[names] = through(blades, body.aerodynamic)
+        return tuple(found.values())
 
     def _alike(self, s: Scatter, sector: int, other: Assembly) -> None:
         """Raise `UserError` where a body of another modal file does not fit into the place of the nominal one."""
