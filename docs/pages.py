@@ -568,6 +568,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "mistuning.scatter.distribution": ("", "the median of a lognormal one is nominal"),
     "mistuning.scatter.values": ("", "or deviations that are known, sector by sector; a shorter pattern is repeated"),
     "mistuning.scatter.file": ("", "or a table with the column `deviation`, or `frequency_Hz`, whose mean is nominal"),
+    "mistuning.scatter.others": ("", "or sectors, from 0, that have another modal file, and the file (`{ 3 = "
+                                 "\"repaired.h5\" }`), of `modal_file`"),
     "mistuning.scatter.arrangement": ("", "of the known values: as given, in another order in every sample, or each "
                                       "drawn from them"),
     "mistuning.scatter.body": ("", "whose; may be left out where there is one"),

@@ -90,12 +90,16 @@ def test_a_cyclic_sector_stands_for_the_whole_disc(basis: ModalBasis, order: int
     assert x.cycles["gap"].slipping.mean() > 0.01 or order == 0
 
 
-@pytest.mark.parametrize("kind", ["structural", "stuck"])
+@pytest.mark.parametrize("kind", ["structural", "stuck", "flow"])
 def test_loss_factors_and_stuck_damping_of_a_cyclic_sector(basis: ModalBasis, kind: str) -> None:
-    """As above, for a wave against the numbers; with loss factors the sector alone has 2 D K, and its own D."""
+    """As above, for a wave against the numbers; with loss factors the sector alone has 2 D K, and its own D; with a
+    flow that tells the two directions of a nodal diameter apart."""
     one = sector(basis, -1, 50.0, 3e3)
     if kind == "stuck":
         one = replace(one, stuck_damping=(0.003,))
+    elif kind == "flow":
+        flow = {0: 0.01j, 1: 0.004 + 0.02j, 2: -0.01 + 0.005j, 3: 0.002 + 0.01j, 4: 0.03j}
+        one = replace(one, components=(replace(one.components[0], aerodynamic=flow),))
     else:
         one = replace(one, components=(structural(one.components[0]),))
         part = one.part(one.components[0], 1)

@@ -10,7 +10,8 @@ import pytest
 import scipy.stats
 
 import microslip as ms
-from microslip.data import UserError
+from microslip.basis import read_basis, write_basis
+from microslip.data import ModalBasis, UserError
 from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.mistuning import ensemble
@@ -30,11 +31,13 @@ RUB = {
 FINE = {"harmonics": 1, "samples": 32}
 
 
-def sector(blades: int = 6, order: int = 1, modes: int = 2, **contact: object) -> Assembly:
+def sector(
+    blades: int = 6, order: int = 1, modes: int = 2, vane: ModalBasis | Path | None = None, **contact: object
+) -> Assembly:  # fmt: skip
     """One of the sample's vanes that stands for a ring, its tip rubbing on the next one's."""
     case = {"body": "vane", "excitation": "magnet", "amplitude": 2.0, "monitor": "probe", "modes": modes,
             "ring": {"blades": blades, "engine_order": order}, "contacts": [{**RUB, **contact}]}  # fmt: skip
-    return ms.assemble(case, vane=ms.sample()).assembly
+    return ms.assemble(case, vane=vane or ms.sample()).assembly
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +73,69 @@ def _stiffer(one: Assembly, by: float) -> tuple[object, ...]:
     return (replace(blade, groups={0: stiffer}),)
 
 
+def stiffer_vane(by: float) -> ModalBasis:
+    """The sample's vane with a modulus (1 + by)^2 times its own."""
+    basis, s = read_basis(ms.sample()), (1 + by) ** 2
+    g = basis.groups[0, 0]
+    soft = replace(g.compliance, static=g.compliance.static / s, modal=g.compliance.modal / s)
+    stiff = replace(g, omega=(1 + by) * g.omega, K_r=s * g.K_r, C_r=(1 + by) * g.C_r, compliance=soft)
+    return replace(basis, groups={(0, 0): stiff})
+
+
+def test_modal_files_of_single_blades(tuned: Tuned, tmp_path: Path) -> None:
+    """The same file again changes nothing (1e-12); a stiffer blade's file is its frequencies' scatter (1e-12), and
+    what scatters besides scatters about it."""
+    write_basis(tmp_path / "stiffer.h5", stiffer_vane(0.03))
+    same, stiffer = (Scatter("modal_file", others={4: sector(vane=v)}) for v in (ms.sample(), tmp_path / "stiffer.h5"))
+    known = Scatter("frequency", values=(0.0, 0.0, 0.0, 0.0, 0.03, 0.0))
+    drawn, both = Scatter("frequency", 0.01), np.random.default_rng(0).normal(0, 0.01, (6, 2))
+
+    def amplitudes_of(*scatter: Scatter) -> np.ndarray:
+        given = [(s, both if s is drawn else s.drawn(6, tuned.modes(s), 0, 0, 0)) for s in scatter]
+        p = balance.of(tuned.mistuned(given), form="sides", **FINE)
+        return np.abs(amplitudes(p, solve(p, 2 * np.pi * 287.0, [])))
+
+    alike = amplitudes_of()
+    assert amplitudes_of(same) == pytest.approx(alike, rel=1e-12)
+    assert amplitudes_of(stiffer) == pytest.approx(amplitudes_of(known), rel=1e-12)
+    assert amplitudes_of(drawn, stiffer) == pytest.approx(amplitudes_of(known, drawn), rel=1e-12)
+    assert np.abs(amplitudes_of(stiffer) / alike - 1).max() > 0.01
+
+
+def test_a_blade_of_its_own_is_shuffled() -> None:
+    """Where it stands is drawn for every sample, and it is there once."""
+    s = Scatter("modal_file", others={4: sector()}, arrangement="shuffled")
+    places = [s.drawn(6, 1, 0, 0, i)[:, 0] for i in range(40)]
+    assert {int(p.argmax()) for p in places} == set(range(6)) and {p.sum() for p in places} == {1.0}
+
+
+def _other(**changed: object) -> Assembly:
+    """The sector with another body in it."""
+    one = sector()
+    g = one.components[0].groups[0]
+    face = replace(g.interfaces["right"], origin=g.interfaces["right"].origin + [0, 0, 0.01])
+    rows = {"interfaces": {**g.interfaces, "right": face}} if changed.pop("moved", False) else {}
+    rows |= {"excitations": {}} if changed.pop("undriven", False) else {}
+    return replace(one, components=(replace(one.components[0], groups={0: replace(g, **rows)}, **changed),))
+
+
+@pytest.mark.parametrize(
+    "of, words",
+    [
+        (lambda: sector(modes=3), "has 3 coordinates"),
+        (lambda: _other(moved=True), "0.01 m off"),
+        (lambda: _other(undriven=True), "load 'magnet'"),
+        (lambda: _other(name="bucket"), "no body 'vane'"),
+    ],
+)
+def test_modal_files_that_do_not_fit(tuned: Tuned, of, words: str) -> None:
+    """A body in whose place there is none."""
+    with pytest.raises(UserError, match=words):
+        tuned.check((Scatter("modal_file", others={4: of()}),))
+    with pytest.raises(UserError, match="sectors 0 to 5"):
+        tuned.check((Scatter("modal_file", others={6: sector()}),))
+
+
 def test_each_contact_counts_its_own_numbers(tuned: Tuned) -> None:
     """Contacts that differ in numbers are marched together; each gives what it gives alone."""
     s = [Scatter("friction", 0.1), Scatter("stiffness", 0.1), Scatter("normal_force", 0.1)]
@@ -95,9 +161,52 @@ def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
     assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
 
 
-@pytest.mark.parametrize("blade", [0, 1, 5])
-def test_sensitivities_are_differences(tuned: Tuned, blade: int) -> None:
+FLOW = {0: 0.002j, 1: 0.004 + 0.01j, 2: -0.01 + 0.003j, 3: 0.002 + 0.004j, 4: 0.012j, 5: 0.01 - 0.001j}
+
+
+def flown() -> Tuned:
+    """The ring in a flow that tells all six waves apart."""
+    one = sector()
+    return Tuned(replace(one, components=(replace(one.components[0], aerodynamic=FLOW),)), {})
+
+
+def test_a_mistuned_ring_in_a_flow() -> None:
+    """Contacts that stick, blades that differ, each wave damped by its own coefficient: the dense complex matrices of
+    the whole ring, put together here wave by wave, 1e-10."""
+    ring, d = flown(), np.random.default_rng(4).normal(0, 0.01, 6)
+    one, k, w = ring.sector, ring.sector.contacts[0].stiffness, 2 * np.pi * 287.0
+    g = one.components[0].groups[0]
+    sides = (one.contacts[0].first, one.contacts[0].second)
+    right, left = (side.frame @ g.interfaces[side.interface].rows for side in sides)
+    D = np.kron(np.eye(6), right) - np.kron(np.roll(np.eye(6), 1, axis=1), left)
+    A = D.T @ np.kron(np.eye(6), k) @ D + 0j
+    for j, s in enumerate(1 + d):
+        at = slice(2 * j, 2 * j + 2)
+        A[at, at] += np.diag((s * g.omega) ** 2 - w**2 + 2j * w * g.damping_ratio * s * g.omega)
+    for n, a in FLOW.items():
+        E = np.kron(np.exp(2j * np.pi * n * np.arange(6) / 6)[:, None] / np.sqrt(6), np.eye(2))
+        A += E @ np.diag(2 * a.real * g.omega**2 + 2j * w * a.imag * g.omega) @ E.conj().T
+    force = np.kron(np.exp(2j * np.pi * np.arange(6) / 6), g.excitations["magnet"].rows[0] * 2.0)
+    probe = g.monitors["probe"].rows[g.monitors["probe"].labels.index(one.outputs[0].label)]
+    expected = np.abs(np.kron(np.eye(6), probe) @ np.linalg.solve(A, force))
+    s = Scatter("frequency", 0.01)
+    found = Sticking(ring.mistuned([(s, np.repeat(d[:, None], 2, axis=1))]))(287.0)
+    assert found == pytest.approx(expected, rel=1e-10)
+    assert np.abs(Sticking(ring.whole)(287.0) / expected - 1).max() > 0.01
+
+
+def test_modal_files_of_single_blades_in_a_flow() -> None:
+    """The same file again is the same ring."""
+    ring = flown()
+    same = Scatter("modal_file", others={4: ring.sector})
+    found = Sticking(ring.mistuned([(same, same.drawn(6, 1, 0, 0, 0))]))(287.0)
+    assert found == pytest.approx(Sticking(ring.whole)(287.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("blade, flowing", [(0, False), (1, False), (5, False), (1, True)])
+def test_sensitivities_are_differences(tuned: Tuned, blade: int, flowing: bool) -> None:
     """Central differences of Newton solutions with friction: 1e-6 (no contact switches between them)."""
+    tuned = flown() if flowing else tuned
     s = Scatter("frequency", 0.003, together=0.0)
     asked = Asked(tuned, (s,), np.array([287.3]), balance=FINE)
     point = asked.tuned_points[0]
@@ -184,6 +293,7 @@ samples = {samples}
 stuck = true
 scatter = [
   {{ of = "frequency", file = "blades.csv", arrangement = "shuffled" }}, {{ of = "stiffness", deviation = 0.1 }},
+  {{ of = "modal_file", others = {{ {sector} = "other.h5" }} }},
 ]
 """
 
@@ -194,9 +304,10 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
 
     path, files, told = tmp_path / "case.toml", {"vane": ms.sample()}, list[str]()
     (tmp_path / "blades.csv").write_text("blade,frequency_Hz\n0,99\n1,100\n2,101\n3,100\n")
+    write_basis(tmp_path / "other.h5", stiffer_vane(0.01))
     rows = {}
     for samples in (4, 8):
-        path.write_text(CASE.format(file=ms.sample(), samples=samples))
+        path.write_text(CASE.format(file=ms.sample(), samples=samples, sector=2))
         made, sentences, fine = mistuning_stage(path, files, tmp_path, report=told.append, pictures=False, workers=1)
         rows[samples] = (tmp_path / "samples.csv").read_text().splitlines()
     assert fine
@@ -206,6 +317,13 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     found = np.genfromtxt(tmp_path / "samples.csv", delimiter=",", names=True)
     assert f"{found['amplification'].max():.4g}" in " ".join(sentences)
     assert all(p.is_file() for p in made)
+    for sector, words in (("7", "sectors 0 to 3"), ("two", "no sector"), ("3", "other.h5")):
+        path.write_text(CASE.format(file=ms.sample(), samples=4, sector=sector))
+        if words == "other.h5":
+            (tmp_path / "other.h5").unlink()
+        with pytest.raises(UserError, match=words):
+            mistuning_stage(path, files, tmp_path, pictures=False, workers=1)
+    assert (tmp_path / "samples.csv").read_text().splitlines() == rows[8]
 
 
 @pytest.mark.parametrize("share, n", [(0.5, 60), (0.95, 400)])

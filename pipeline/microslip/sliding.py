@@ -83,14 +83,15 @@ def of(assembly: Assembly, like: Array | None = None) -> Sliding:
             "sliding: the modes leave compliance out beside the contacts, which has no equation of its own; take a "
             "modal file without residual compliance"
         )
-    if (loss := assembly.joined(1).loss) is not None and np.any(loss):
+    vibrating = assembly.joined(1)
+    if (loss := vibrating.loss) is not None and np.any(loss):
         raise UserError('damping: loss factors have no equation in time; write damping = "modal", or give dampers')
     T = _turn(points_moved(assembly), like)
     T = T @ np.linalg.inv(np.linalg.cholesky(T.T @ _real(mean.M) @ T)).T
     D = _real(mean.rows) @ T
     preload = np.concatenate([np.zeros(0), *(c.preload for c in assembly.contacts)])
     loads = np.array([p.load for p in driven], dtype=complex).reshape(len(harmonics), len(T)) @ T
-    first = T.T @ _real(mean.C) @ T, T.T @ _real(mean.K) @ T, _real(mean.load) @ T + preload @ D
+    first = T.T @ _real(vibrating.C) @ T, T.T @ _real(vibrating.K) @ T, _real(mean.load) @ T + preload @ D
     rest = _real(mean.output) @ T, np.array(harmonics, dtype=float), loads.real, -loads.imag, T
     C, K, push = map(jnp.asarray, first)
     return Sliding(C, K, push, _points(assembly.contacts, D), *map(jnp.asarray, rest))

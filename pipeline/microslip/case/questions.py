@@ -231,20 +231,23 @@ class TwoTonesOfCase(Model):
 class ScatterOfCase(Model):
     """What differs from sector to sector of a ring.
 
-    of: ``frequency`` or ``damping`` of a body's modes, its ``mass``, ``added_mass`` (kg) at a monitor;
+    of: ``frequency`` or ``damping`` of a body's modes, its ``mass``, ``added_mass`` (kg) at a monitor, ``modal_file``;
     ``normal_force``, ``gap`` (m), ``friction`` or ``stiffness`` of a contact. deviation: standard deviation, a share of
     the nominal value or in kg or m. distribution: of it; the median of ``lognormal`` is nominal. values: deviations
     that are known, repeated round the ring; file: a .csv with the column ``deviation``, or ``frequency_Hz`` whose mean
-    is nominal. arrangement: of them, as ``given``, ``shuffled`` or ``drawn`` in every sample. body, contact: whose, its
-    interface. at: monitor of added_mass. together: correlation of the modes of a body, 0 each alone. neighbours:
-    correlation from a sector to the next one.
+    is nominal; others: sector -> modal file beside the case. arrangement: of them, as ``given``, ``shuffled`` or
+    ``drawn`` in every sample. body, contact: whose, its interface. at: monitor of added_mass. together: correlation of
+    the modes of a body, 0 each alone. neighbours: correlation from a sector to the next one.
     """
 
-    of: Literal["frequency", "damping", "mass", "added_mass", "normal_force", "gap", "friction", "stiffness"]
+    of: Literal[
+        "frequency", "damping", "mass", "added_mass", "modal_file", "normal_force", "gap", "friction", "stiffness"
+    ]
     deviation: NotNegative = 0.0
     distribution: Literal["normal", "lognormal", "uniform"] = "normal"
     values: Annotated[tuple[Number, ...], BeforeValidator(_finite_vector)] = ()
     file: str | None = None
+    others: dict[str, str] = {}
     arrangement: Literal["given", "shuffled", "drawn"] = "given"
     body: str | None = None
     contact: str | None = None
@@ -254,8 +257,12 @@ class ScatterOfCase(Model):
 
     @model_validator(mode="after")
     def _one_of_three(self) -> ScatterOfCase:
-        if sum(map(bool, (self.deviation, self.values, self.file))) != 1:
-            raise ValueError("deviation: give one of deviation, values and file")
+        if (self.of == "modal_file") != bool(self.others):
+            raise ValueError("others: belong to modal_file, which needs them; give { 3 = 'repaired.h5' }")
+        if sum(map(bool, (self.deviation, self.values, self.file, self.others))) != 1:
+            raise ValueError("deviation: give one of deviation, values, file and others")
+        if bad := [key for key in self.others if not key.isdecimal()]:
+            raise ValueError(f"others.{bad[0]}: is no sector; count them from 0")
         return self
 
 

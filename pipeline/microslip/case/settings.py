@@ -455,10 +455,6 @@ class CaseSettings(Model):
             )
         if any(b.aerodynamics for b in self.bodies) and self.ring is None:
             raise ValueError("bodies: aerodynamics belong to the waves of a ring; add [ring] with its blades")
-        if any(b.aerodynamics for b in self.bodies) and self.ring and self.ring.model == "full":
-            raise ValueError(
-                'bodies: aerodynamics belong to waves, which a full ring does not have; write model = "sector"'
-            )
         if self.mistuning is not None and self.ring is None:
             raise ValueError("mistuning: is that of a ring; add [ring] with blades and engine_order")
         if self.two_tones is not None and self.ring is not None:
@@ -519,7 +515,7 @@ class CaseSettings(Model):
             [f for c in self.contacts for f in c.files]
             + [x.field for x in self.loads]
             + [b.aerodynamics for b in self.components]
-            + [s.file for s in (self.mistuning.scatter if self.mistuning else ())]
+            + [f for s in (self.mistuning.scatter if self.mistuning else ()) for f in (s.file, *s.others.values())]
         )
         return tuple(dict.fromkeys(f for f in named if f is not None))
 

@@ -469,8 +469,8 @@ def of(
     Args:
         harmonics: H. samples: of a cycle. cycles: marched at most. periodicity: see `forces.AFT`. length: m, see
             `Problem`; from the contacts' limits of sliding if not given. form: ``relative`` or ``sides``; chosen by
-            the number of components if not given; always relative where damping couples them. models: first contact of
-            a group of equal ones -> its force model, if it is not the marched law.
+            the number of components if not given; always relative where damping or flow couple them. models: first
+            contact of a group of equal ones -> its force model, if it is not the marched law.
 
     Raises:
         UserError: no harmonic or cycle, a length or a share that is none, a name that no component has.
@@ -487,7 +487,7 @@ def of(
         if value is not None:
             bounded(name, value, **bounds)
     together = len(assembly.components) <= RELATIVE_AT_MOST if form is None else form == "relative"
-    together = together or assembly.stuck_damping is not None
+    together = together or assembly.stuck_damping is not None or bool(assembly.flow)
     contacts = assembly.contacts
     begins, where = _numbered(assembly, together)
     groups = []

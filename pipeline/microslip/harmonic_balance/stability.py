@@ -77,12 +77,18 @@ def orbit(problem: Problem, x: Array, Omega: float) -> Orbit:
     """The motion in time that unknowns x (k,) of a problem stand for at Omega (rad/s).
 
     Raises:
-        UserError: a sector that stands for a ring: its sectors need not stay alike. Unroll the assembly.
+        UserError: a sector that stands for a ring: its sectors need not stay alike, unroll the assembly; a flow that
+            tells the directions of a wave apart.
     """
     if problem.assembly.ring is not None:
         raise UserError("stability: a sector cannot tell whether the sectors of its ring stay alike; take all of them")
     contacts, relative = problem.assembly.contacts, problem.relative(x)
     part = problem.parts[1][0] if len(problem.parts[1]) == 1 else problem.assembly.joined(1)
+    if any(np.iscomplexobj(f.K) or np.iscomplexobj(f.C) for f in problem.assembly.flow):
+        raise UserError(
+            "stability: the flow tells the two directions of a wave apart, which has no equation in time; give both "
+            "the same coefficients"
+        )
     models = {i: g.model for g in problem.groups for i in g.contacts}
     return Orbit(
         part.M, part.viscous(Omega), part.K, part.rows, part.residual, tuple(c.patch.law for c in contacts),

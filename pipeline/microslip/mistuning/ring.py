@@ -11,10 +11,14 @@ import numpy as np
 
 from ..data import Array, ModalGroup, UserError
 from ..reduced.coordinates import of_density
-from ..system.assembly import Assembly, Contact, preloaded_contact
+from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
+from ..system.flow import Flow, through
 from . import subset
 from .scatter import OF_BLADES, Scatter
+
+ELSEWHERE = 0.1
+"""rad, and share of its size, by which an interface of another modal file may stand off the nominal one's."""
 
 Deviations = Sequence[tuple[Scatter, Array]]
 """What differs, and its (sectors, modes) deviations."""
@@ -62,7 +66,10 @@ class Tuned:
                 self.body(s)
             else:
                 self._contact(s)
-        self.mistuned([(s, np.full((self.sectors, self.modes(s)), 1e-3)) for s in scatter])
+            for sector, other in s.others.items():
+                self._alike(s, sector, other)
+        some = [(s, np.full((self.sectors, self.modes(s)), 1e-3)) for s in scatter if not s.others]
+        self.mistuned(some + [(s, s.drawn(self.sectors, 1, 0, 0, 0)) for s in scatter if s.others]).check_names()
 
     def mistuned(self, deviations: Deviations) -> Assembly:
         """The whole ring.
@@ -73,14 +80,16 @@ class Tuned:
         components = {m.name: m for m in self.whole.components}
         contacts = {c.name: c for c in self.whole.contacts}
         discs: dict[str, Array] = {}
-        for s, values in deviations:
+        for s, values in sorted(deviations, key=lambda one: one[0].of != "modal_file"):  # then what differs in them
             _positive(s, values)
             name = self.body(s).name if s.of in OF_BLADES else self._contact(s).name
             if name in components:  # a disc in one piece
                 discs[name] = (1 + discs.get(name, 0.0)) * (1 + values[:, 0]) - 1
                 continue
             for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
-                if s.of in OF_BLADES:
+                if s.of == "modal_file":
+                    components[at] = replace(self._made(s, own), name=at, aerodynamic=components[at].aerodynamic)
+                elif s.of in OF_BLADES:
                     components[at] = deviated(components[at], s, own)
                 else:
                     contacts[at] = _met(contacts[at], s, float(own[0]))
@@ -90,7 +99,8 @@ class Tuned:
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
-        return replace(self.whole, components=tuple(components.values()), contacts=tuple(contacts.values()))
+        parts, met = tuple(components.values()), tuple(contacts.values())
+        return replace(self.whole, components=parts, contacts=met, flow=self._flow(deviations))
 
     def body(self, s: Scatter) -> Component:
         names = {m.name: m for m in self.sector.components}
@@ -106,6 +116,34 @@ class Tuned:
             )
         return body
 
+    def _made(self, s: Scatter, number: Array) -> Component:
+        """The body of a modal file: 0 of the nominal one, 1 of the first of the others."""
+        return _named([self.sector, *s.others.values()][int(number[0])], self.body(s).name)
+
+    def _flow(self, deviations: Deviations) -> tuple[Flow, ...]:
+        """What the flow adds to the tuned ring, or to the one of other modal files; it knows of no deviations."""
+        found = {f.components: f for f in self.whole.flow}
+        for s, values in (one for one in deviations if one[0].others):
+            body = self.body(s)
+            blades = [replace(self._made(s, own), name=f"{body.name}_{j}") for j, own in enumerate(values)]
+            if (names := tuple(b.name for b in blades)) in found:
+                found[names] = through(blades, body.aerodynamic)
+        return tuple(found.values())
+
+    def _alike(self, s: Scatter, sector: int, other: Assembly) -> None:
+        """Raise `UserError` where a body of another modal file does not fit into the place of the nominal one."""
+        name, where = self.body(s).name, f"others.{sector}"
+        if name in self.pressed_by:
+            raise UserError(f"{where}: '{name}' is pressed by its centrifugal load; scatter its mass instead")
+        a, b = (_named(x, name).groups[0] for x in (self.sector, other))
+        if len(a.M_r) != len(b.M_r):
+            raise UserError(
+                f"{where}: has {len(b.M_r)} coordinates, and the nominal file {len(a.M_r)}; compute both bodies with "
+                "the same number of modes, or take as many of both by modes"
+            )
+        for _, _, side in self.sector.sides(name):
+            _in_place(where, side, a, b)
+
     def _contact(self, s: Scatter) -> Contact:
         names = {c.name: c for c in self.sector.contacts}
         if not names or s.contact is None and len(names) > 1:
@@ -114,6 +152,28 @@ class Tuned:
         if s.contact is not None and s.contact not in names:
             raise UserError(f"{s.of}: there is no contact '{s.contact}', but {', '.join(names)}")
         return names[s.contact or next(iter(names))]
+
+
+def _named(assembly: Assembly, name: str) -> Component:
+    names = {m.name: m for m in assembly.components}
+    if name not in names:
+        raise UserError(f"others: an assembly has no body '{name}', but {', '.join(names)}")
+    return names[name]
+
+
+def _in_place(where: str, side: ContactFace, nominal: ModalGroup, other: ModalGroup) -> None:
+    """Raise `UserError` for a face that stands elsewhere, or whose patch deforms by the nominal body's shapes."""
+    if side.rows is not None:
+        raise UserError(f"{where}: the patch at {side.interface} deforms as the nominal body does; take a rigid one")
+    if side.interface not in other.interfaces:
+        raise UserError(f"{where}: has no interface '{side.interface}', but {', '.join(other.interfaces) or 'none'}")
+    a, b = nominal.interfaces[side.interface], other.interfaces[side.interface]
+    apart, size = float(np.linalg.norm(b.origin - a.origin)), float(np.sqrt(a.areas.sum()))
+    if apart > ELSEWHERE * size + 1e-9 or np.abs(b.rotation - a.rotation).max() > ELSEWHERE:
+        raise UserError(
+            f"{where}: its interface '{side.interface}' stands {apart:.3g} m off the nominal one's place, or is turned "
+            f"by more than {ELSEWHERE:g} rad, and contacts stay where they are: give a body with its faces there"
+        )
 
 
 def _positive(s: Scatter, values: Array) -> None:

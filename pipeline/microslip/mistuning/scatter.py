@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ndtr
 
 from ..data import Array, UserError
 
+if TYPE_CHECKING:
+    from ..system.assembly import Assembly
+
 OF_BLADES = {
     "frequency": "eigenfrequencies of a body's modes",
     "damping": "damping ratios of a body's modes",
     "mass": "mass of a body, and what it presses by its centrifugal load",
     "added_mass": "kg that sit at a monitor of a body, as screws at the tips of the blades of section 5.4",
+    "modal_file": "the modal file of a body, and so its geometry",
 }
 """What may differ in the bodies."""
 
@@ -41,7 +46,8 @@ class Scatter:
         of: a key of `OF_BLADES` or `OF_CONTACTS`. deviation: standard deviation, a share of the nominal value (of
             `ABSOLUTE` in kg or m). distribution: ``normal``, ``lognormal`` (median nominal) or ``uniform``.
         values: deviations that are known, sector by sector; fewer than there are sectors are repeated round the ring.
-            arrangement: of them, as ``given``, ``shuffled`` from sample to sample, or ``drawn`` one by one.
+            others: sector -> what stands for the ring made with another modal file, of ``modal_file``.
+        arrangement: of them, as ``given``, ``shuffled`` from sample to sample, or ``drawn`` one by one.
         component, contact: name, of an assembly with one the only one if None. at: monitor of ``added_mass``.
         together: correlation between the modes of a body: 1 all alike, 0 each alone. neighbours: correlation between a
             sector and the next one, its powers those farther away.
@@ -51,6 +57,7 @@ class Scatter:
     deviation: float = 0.0
     distribution: str = "normal"
     values: tuple[float, ...] = ()
+    others: Mapping[int, Assembly] = field(default_factory=dict)
     arrangement: str = "given"
     component: str | None = None
     contact: str | None = None
@@ -64,8 +71,10 @@ class Scatter:
             raise UserError(f"of: '{self.of}' is none of {', '.join(known)}")
         if not np.isfinite([self.deviation, *self.values]).all() or self.deviation < 0:
             raise UserError(f"deviation of {self.of}: must be a number that is not negative")
-        if (self.deviation > 0) == bool(self.values):
-            raise UserError(f"{self.of}: give deviation, or values that are known, and not both")
+        if (self.of == "modal_file") != bool(self.others):
+            raise UserError(f"{self.of}: others belong to modal_file, which needs them")
+        if (self.deviation > 0) + bool(self.values) + bool(self.others) != 1:
+            raise UserError(f"{self.of}: give one of deviation, values that are known, and others")
         for key, choices in (("distribution", DISTRIBUTIONS), ("arrangement", ARRANGEMENTS)):
             if getattr(self, key) not in choices:
                 raise UserError(f"{key}: '{getattr(self, key)}' is none of {', '.join(choices)}")
@@ -84,12 +93,12 @@ class Scatter:
             UserError: values that do not go round the ring.
         """
         rng = np.random.default_rng([seed, sample, number])
-        if self.values:
+        if self.values or self.others:
             return np.repeat(self._known(sectors, rng)[:, None], modes, axis=1)
         return self._of(self._normal(rng, sectors, modes))
 
     def _known(self, sectors: int, rng: np.random.Generator) -> Array:
-        known = np.array(self.values)
+        known = np.array(self.values) if self.values else self._numbered(sectors)
         if self.arrangement == "drawn":
             return rng.choice(known, sectors)
         if sectors % len(known):
@@ -99,6 +108,14 @@ class Scatter:
             )
         whole = np.tile(known, sectors // len(known))
         return rng.permutation(whole) if self.arrangement == "shuffled" else whole
+
+    def _numbered(self, sectors: int) -> Array:
+        """(sectors,) 1, 2, ... of those with another modal file, 0 of the nominal ones."""
+        if not set(self.others) <= set(range(sectors)):
+            raise UserError(f"others: {max(self.others)} is none of the sectors 0 to {sectors - 1}")
+        known = np.zeros(sectors)
+        known[list(self.others)] = 1 + np.arange(len(self.others))
+        return known
 
     def _normal(self, rng: np.random.Generator, sectors: int, modes: int) -> Array:
         """(sectors, modes) correlated numbers of variance 1."""

@@ -28,7 +28,7 @@ from ..mistuning.scatter import OF_CONTACTS, Scatter, check
 from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
 from ..report.mistuning import mistuning_html
-from ..system.assembly import Contact
+from ..system.assembly import Assembly, Contact
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, hash_of_code
 
@@ -70,7 +70,7 @@ def _work(
         kept.unlink(missing_ok=True)
     known = _of_samples(inputs)
     try:
-        what = asked_of(built, asked, case_path)
+        what = asked_of(built, settings, case_path)
         found = run(what, asked.samples, asked.until, workers, kept, known, report=stage.report)
     except UserError as error:
         text = str(error).removeprefix(f"{case_path}: ").removeprefix("mistuning: ")
@@ -101,16 +101,19 @@ def _of_samples(inputs: Mapping[str, Any]) -> str:
     return store.fingerprint({**inputs, "case": case, "pictures": None}, hash_of_code(("mistuning.samples",)))
 
 
-def asked_of(built: Built, asked: MistuningOfCase, path: Path) -> Asked:
+def asked_of(built: Built, case: CaseSettings, path: Path) -> Asked:
     """What is asked of every sample of a case.
 
     Raises:
         UserError: a scatter of what is not there, or that leaves nothing of it.
     """
-    settings = built.settings
-    sector = built.one(_normal_force(built, asked))
+    settings, asked = built.settings, case.mistuning
+    assert asked is not None
+    force = _normal_force(built, asked)
+    sector = built.one(force)
     sector = replace(sector, outputs=sector.outputs[:1])
-    scatter = tuple(_scatter(s, i, built, path) for i, s in enumerate(asked.scatter))
+    others = (_others(s, i, built, case, path, force) for i, s in enumerate(asked.scatter))
+    scatter = tuple(_scatter(s, i, built, path, o) for i, (s, o) in enumerate(zip(asked.scatter, others, strict=True)))
     check(scatter)
     thrown = {b.name for b in settings.components if b.pressed_at_rpm is not None}
     pressed = {name: tuple(c.name for c in sector.contacts if name in _ends(c)) for name in thrown}
@@ -137,7 +140,23 @@ def _normal_force(built: Built, asked: MistuningOfCase) -> float | None:
     return asked.normal_force if asked.normal_force is not None else min(float(x) for x in given or ())
 
 
-def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path) -> Scatter:
+def _others(
+    s: ScatterOfCase, number: int, built: Built, case: CaseSettings, path: Path, force: float | None
+) -> dict[int, Assembly]:  # fmt: skip
+    """Sector -> what stands for a ring of bodies made from its modal file; every file is read once."""
+    bases, made = {name: b.basis for name, b in built.bodies.items()}, dict[str, Assembly]()
+    name = s.body or next(iter(bases))
+    for sector, file in s.others.items():
+        try:
+            if file not in made:
+                made[file] = build(case, {**bases, name: read_basis(path.parent / file)}, path).one(force)
+        except UserError as error:
+            text = str(error).removeprefix(f"{path}: ")
+            raise UserError(f"scatter.{number}.others.{sector} ({file}): {text}") from error
+    return {int(sector): made[file] for sector, file in s.others.items()}
+
+
+def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path, others: Mapping[int, Assembly]) -> Scatter:
     where = f"scatter.{number} ({s.of})"
     values = _measured(path.parent / s.file, s.of) if s.file else s.values
     contact = s.contact
@@ -145,8 +164,8 @@ def _scatter(s: ScatterOfCase, number: int, built: Built, path: Path) -> Scatter
         named = {c.interface: x.name for c, x in zip(built.contacts, built.assembly.contacts, strict=True)}
         contact = named.get(contact, contact)
     try:
-        return Scatter(s.of, s.deviation, s.distribution, values, s.arrangement, s.body, contact, s.at, s.together,
-                       s.neighbours)  # fmt: skip
+        return Scatter(s.of, s.deviation, s.distribution, values, others, s.arrangement, s.body, contact, s.at,
+                       s.together, s.neighbours)  # fmt: skip
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
 

@@ -21,10 +21,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from ..data import INTERFACE_ROWS, Array, ComplexArray, UserError
+from ..data import INTERFACE_ROWS, Array, ComplexArray, Indices, UserError
 from ..settings.mistakes import bounded
 from .component import Component, InWave, Ring
-from .disc import spread, whole
+from .disc import directed, spread, whole
+from .flow import Flow, through
 from .ground import Ground
 
 if TYPE_CHECKING:
@@ -242,7 +243,8 @@ class Assembly:
     Attributes:
         components, contacts, loads, outputs. ring: if the components are one sector that stands for N, or N sectors.
         stuck_damping: ratios of the modes with sticking contacts, one for all or one a mode from the lowest, the last
-            one for all that follow; None: what the components bring. It couples them, so they are eliminated together.
+            one for all that follow; None: what the components bring. flow: what it adds among the components of a
+            whole ring. Both couple components, so that they are eliminated together.
     """
 
     components: tuple[Component, ...]
@@ -251,6 +253,7 @@ class Assembly:
     outputs: tuple[Output, ...]
     ring: Ring | None = None
     stuck_damping: tuple[float, ...] | None = None
+    flow: tuple[Flow, ...] = ()
 
     def __repr__(self) -> str:
         named = {
@@ -336,18 +339,9 @@ class Assembly:
     def unrolled(self) -> Assembly:
         """All N sectors in place of the one that stands for them: bodies ``blade_0``, ``blade_1``, ..., or one ring of
         a cyclic body, whose faces and rows are then ``right@0``, ``right@1``, ...
-
-        Raises:
-            UserError: a lone blade to which the flow adds something else in each wave.
         """
         if self.ring is None:
             return self
-        flown = [m.name for m in self.components if m.sectors == 1 and len(set(m.aerodynamic.values())) > 1]
-        if flown:
-            raise UserError(
-                f"{flown[0]}: what the flow adds differs from wave to wave, which couples the blades of a whole ring: "
-                "let one sector stand for it"
-            )
         N, ring = self.ring.blades, self.ring
         cyclic = {m.name for m in self.components if m.sectors > 1}
 
@@ -384,11 +378,17 @@ class Assembly:
             tuple(output(w, j) for j in range(N) for w in self.outputs),
             None,
             self.stuck_damping,
+            _flows(self.components, N),
         )
 
     def joined(self, harmonic: int) -> Linear:
         """All components in one harmonic; the contact coordinates are the relative motions, contact by contact."""
-        part = join([self.part(m, harmonic) for m in self.components], self.signs)
+        parts = [self.part(m, harmonic) for m in self.components]
+        part = join(parts, self.signs)
+        if self.flow:
+            ends = np.cumsum([len(p.M) for p in parts])
+            own = {m.name: np.arange(b - len(p.M), b) for m, p, b in zip(self.components, parts, ends, strict=True)}
+            part = _flown(part, self.flow, own, harmonic)
         return part if self.stuck_damping is None else _damped(part, self.stiffness, self.stuck_damping)
 
     @property
@@ -421,7 +421,31 @@ class Assembly:
 def _all_round(components: Sequence[Component], blades: int) -> tuple[Component, ...]:
     """The components of every sector, sector by sector; a cyclic body once, as a whole ring."""
     rings = [whole(m) for m in components if m.sectors > 1]
-    return (*rings, *(replace(m, name=f"{m.name}_{j}") for j in range(blades) for m in components if m.sectors == 1))
+    lone = [replace(m, aerodynamic={}) if _coupled(m) else m for m in components if m.sectors == 1]
+    return (*rings, *(replace(m, name=f"{m.name}_{j}") for j in range(blades) for m in lone))
+
+
+def _coupled(component: Component) -> bool:
+    """Whether the flow adds something else to a lone blade in each wave, and so couples the blades of a ring."""
+    return component.sectors == 1 and len(set(component.aerodynamic.values())) > 1
+
+
+def _flows(components: Sequence[Component], N: int) -> tuple[Flow, ...]:
+    """What the flow adds among the components of a whole ring."""
+    lone = [through([replace(m, name=f"{m.name}_{j}") for j in range(N)], m.aerodynamic)
+            for m in components if _coupled(m)]  # fmt: skip
+    return (*lone, *(flow for m in components if m.sectors > 1 and (flow := directed(m)) is not None))
+
+
+def _flown(part: Linear, flows: Sequence[Flow], own: Mapping[str, Indices], harmonic: int) -> Linear:
+    """A joined part with what the flow adds. own: name -> coordinates of a component."""
+    kind = np.result_type(part.K, *(f.K for f in flows), *(f.C for f in flows))
+    K, C = part.K.astype(kind if harmonic else part.K.dtype), part.C.astype(kind)
+    for f in flows:
+        at = np.concatenate([own[name] for name in f.components])
+        K[np.ix_(at, at)] += f.K if harmonic else f.K.real
+        C[np.ix_(at, at)] += f.C
+    return replace(part, K=K, C=C)
 
 
 def _rows_all_round(side: ContactFace, sector: int, N: int) -> Mapping[int, Array]:

@@ -17,6 +17,7 @@ import scipy.linalg
 
 from ..data import Array, Compliance, Interface, ModalGroup, Rows, UserError
 from .component import Component, InWave
+from .flow import Flow
 
 
 def at_sector(name: str, sector: int) -> str:
@@ -27,19 +28,16 @@ def at_sector(name: str, sector: int) -> str:
 def whole(component: Component) -> Component:
     """The component of N sectors that a cyclic component stands for; its rows are named ``right@0``, ``right@1``, ...
 
+    Of what the flow adds to the two directions of a nodal diameter it has the mean; `directed` has the rest.
+
     Raises:
-        UserError: a nodal diameter is not in the file, or the flow damps the two directions of a wave differently.
+        UserError: a nodal diameter is not in the file.
     """
     N = component.sectors
     waves = [component.at(k) for k in range(N // 2 + 1)]
-    if any(component.aerodynamic.get(k) != component.aerodynamic.get(N - k) for k in range(1, (N + 1) // 2)):
-        raise UserError(
-            f"{component.name}: a whole ring needs the same aerodynamic damping for both directions of a nodal "
-            'diameter; use ring.model = "sector"'
-        )
     if any(w.group.N_r is not None for w in waves):
         raise UserError(f"{component.name}: a whole ring has no circulatory forces (N_r); use a sector")
-    M, K, C = (scipy.linalg.block_diag(*[_real(w.matrices[i], k, N) for k, w in enumerate(waves)]) for i in range(3))
+    M, K, C = (A.real for A in _both_ways(component))
     first = component.at(0).group
     named: Any = {
         "interfaces": _faces(first, waves, N),
@@ -56,6 +54,30 @@ def whole(component: Component) -> Component:
     H = [_real(w.loss, k, N) for k, w in enumerate(waves) if w.loss is not None]
     loss = {0: scipy.linalg.block_diag(*H)} if H else {}
     return Component(component.name, {0: group}, 1, residual_share, loss=loss, residual_loss=component.residual_loss)
+
+
+def directed(component: Component) -> Flow | None:
+    """What the flow adds to the ring of `whole` in a vibration, whose waves it tells apart; None where it does not."""
+    N = component.sectors
+    if all(component.aerodynamic.get(k) == component.aerodynamic.get(N - k) for k in range(1, (N + 1) // 2)):
+        return None
+    _, K, C = _both_ways(component)
+    return Flow((component.name,), 1j * K.imag, 1j * C.imag)
+
+
+def _both_ways(component: Component) -> tuple[Array, ...]:
+    """(ring, ring) complex M, K, C of both directions of every nodal diameter."""
+    N, found = component.sectors, list[list[Array]]()
+    for k in range(N // 2 + 1):
+        ahead, back = component.at(k).matrices, component.at((N - k) % N).matrices
+        pairs = zip(ahead, back, strict=True)
+        found.append([A.real if _single(k, N) else 0.5 * _turned(A, B) for A, B in pairs])
+    return tuple(scipy.linalg.block_diag(*own).astype(complex) for own in zip(*found, strict=True))
+
+
+def _turned(A: Array, B: Array) -> Array:
+    """For the coordinates (c, s) of waves (c + i s) / sqrt 2 with A and (c - i s) / sqrt 2 with B; twice that."""
+    return np.block([[A + B, 1j * (A - B)], [-1j * (A - B), A + B]])
 
 
 def _single(k: int, N: int) -> bool:
