@@ -14,7 +14,7 @@ from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, preloaded_contact
 from ..system.component import Component
 from . import subset
-from .scatter import OF_BLADES, Scatter
+from .scatter import MODAL, OF_BLADES, Scatter
 
 Deviations = Sequence[tuple[Scatter, Array]]
 """What differs, and its (sectors, modes) deviations."""
@@ -50,7 +50,7 @@ class Tuned:
 
     def modes(self, s: Scatter) -> int:
         """Into how many modes deviations may differ in one sector."""
-        if s.of not in ("frequency", "damping"):
+        if s.of not in MODAL:
             return 1
         body = self.body(s)
         return len(body.groups[0].omega) if body.sectors == 1 else 1
