@@ -46,14 +46,14 @@ class Beside:
     eta: ComplexArray
     y: ComplexArray
 
-    def __call__(self, deviations: Deviations) -> float:
-        """The highest amplitude of a sample, m: on the frequencies, or between them as parabolas tell."""
+    def __call__(self, deviations: Deviations) -> tuple[float, float]:
+        """The highest amplitude of a sample, m: on the frequencies, and between them as parabolas tell."""
         own = np.array([deviations[i][1][sector, mode] for i, sector, mode in self.modes])
         s = self.rise * own
         moved = np.linalg.solve(np.eye(s.shape[1]) + self.G * s[:, None, :], self.eta[..., None])[..., 0]
         y = np.abs(self.y - np.einsum("fwn,fn->fw", self.Y, s * moved))
         told, top = told_by(dict(zip(self.frequency, y, strict=True))), float(y.max())
-        return told[0] if told is not None and top < told[0] < np.sqrt(2) * top else top  # higher: between no points
+        return top, told[0] if told is not None and top < told[0] < np.sqrt(2) * top else top
 
 
 def beside(asked: Asked) -> Beside:
