@@ -521,20 +521,22 @@ def bifurcate(
 
 def mistune(
     system: Assembly, scatter: Scatter | Sequence[Scatter], frequency: ArrayLike, *, samples: int = 100,
-    until: float | None = None, seed: int = 0, stuck: bool = False, harmonics: int = 3, points: int | None = None,
-    workers: int = 1, executor: Executor | None = None, report: Report = lambda _: None,
+    until: float | None = None, rare: int = 0, seed: int = 0, stuck: bool = False, harmonics: int = 3,
+    points: int | None = None, workers: int = 1, executor: Executor | None = None, report: Report = lambda _: None,
 ) -> Ensemble:  # fmt: skip
     """Whole rings whose sectors differ, sample by sample: how much higher the highest blade gets (Sextro section 5.6).
 
     Args:
         system: one sector that stands for its ring. scatter: what differs, see `Scatter`. frequency: (f,) Hz, rising, a
             sweep that sees every resonance; peaks are searched for between. samples: at most. until: ends when half of
-            the interval of the 95 % quantile is that share of it. seed: of all random numbers; a sample depends on it
-            and its number alone. stuck: contacts stick. harmonics, points: of the balance, samples of a cycle.
+            the interval of the 95 % quantile is that share of it. rare: further samples, chosen by a linear ring, for
+            the 99.9 % quantile. seed: of all random numbers; a sample depends on it and its number alone. stuck:
+            contacts stick. harmonics, points: of the balance, samples of a cycle.
         workers: processes. executor: in their place, such as that of a cluster. report: is told what is under way.
 
     Returns:
-        An `Ensemble`: ``amplification`` of each sample, ``quantile(0.95)`` with its interval, ``envelope``.
+        An `Ensemble`: ``amplification`` of each sample, ``quantile(0.95)`` with its interval, ``envelope``,
+        ``rare``.
 
     Raises:
         UserError: no ring; a scatter of what is not there, or that leaves nothing of it.
@@ -566,4 +568,7 @@ def mistune(
     tuned.check(every)
     balance = {"harmonics": harmonics, "samples": points or max(64, 16 * harmonics)}
     asked = Asked(tuned, every, f, seed, balance, stuck)
-    return ensemble.run(asked, samples, until, workers, executor=executor, report=report)
+    found = ensemble.run(asked, samples, until, workers, executor=executor, report=report)
+    if rare:
+        found.rare = ensemble.choose(found, rare, workers, executor=executor, report=report)
+    return found

@@ -450,8 +450,9 @@ def two_tones(
 
 @app.command
 def mistune(
-    case: Path, /, *, samples: int | None = None, until: str | None = None, workers: int | None = None,
-    no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False,
+    case: Path, /, *, samples: int | None = None, until: str | None = None, rare: int | None = None,
+    workers: int | None = None, no_pictures: NoPictures = False, set_: Set = (), force: Force = False,
+    quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Samples of a ring whose blades or contacts differ, as [mistuning] says: how much higher the highest blade gets.
 
@@ -459,6 +460,7 @@ def mistune(
         case: a case.toml, the folder that holds it, its name, or its products.
         samples: at most, in the place of the case's number.
         until: ends when half of the 95 % quantile's interval is that share of it, as 2%.
+        rare: further samples, chosen by a linear ring, for the 99.9 % quantile.
         workers: processes; as many as there are cores if not given. Samples are the same for any number.
     """
     from .case import load_case
@@ -468,6 +470,7 @@ def mistune(
     case = _case_file(case)
     asked = [*set_] + [f"mistuning.samples={samples}"] * (samples is not None)
     asked += [f"mistuning.until={_share(until)}"] if until is not None else []
+    asked += [f"mistuning.rare={rare}"] if rare is not None else []
     with progress(f"mistuning of {case}", quiet) as report:
         settings, _ = load_case(case, asked)
         files, folder = modal_files(settings, case, Path("."), report), Path("build") / settings.name

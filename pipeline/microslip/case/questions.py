@@ -270,13 +270,15 @@ class MistuningOfCase(Model):
     """Samples of the whole ring with sectors that differ, by `microslip mistune`.
 
     scatter: what differs. samples: at most. until: a run ends when the interval of the 95 % quantile is as narrow, half
-    of it over the quantile. seed: of all random numbers. stuck: contacts stick, which is linear. normal_force: N, of
+    of it over the quantile. rare: further samples, chosen by a linear ring, for the 99.9 % quantile. seed: of all
+    random numbers. stuck: contacts stick, which is linear. normal_force: N, of
     the contacts that the sweep presses; the smallest of the sweep if not given.
     """
 
     scatter: Annotated[tuple[ScatterOfCase, ...], BeforeValidator(_tuple), Field(min_length=1)]
     samples: Annotated[int, Field(ge=1, le=100000000)] = 100
     until: Annotated[Positive, Field(le=1)] | None = None
+    rare: Annotated[int, Field(ge=0, le=1000000)] = 0
     seed: Annotated[int, Field(ge=0)] = 0
     stuck: bool = False
     normal_force: NotNegative | None = None

@@ -24,6 +24,9 @@ class Matrix(Protocol):
         """(size, size)."""
         ...
 
+    @property
+    def transposed(self) -> Matrix: ...
+
 
 SINGULAR = 1e-10
 """Share of the largest pivot or singular value below which one stands for nothing but rounding."""
@@ -37,6 +40,10 @@ class Dense:
 
     def dense(self) -> Array:
         return self.A
+
+    @property
+    def transposed(self) -> Matrix:
+        return Dense(self.A.T)
 
     @cached_property
     def _factors(self) -> tuple[Array, Array]:
@@ -81,6 +88,12 @@ class Cyclic:
         out = np.empty_like(A)
         out[np.ix_(self.order, self.order)] = A
         return out
+
+    @property
+    def transposed(self) -> Matrix:
+        n, turn = len(self.diagonal), lambda block: None if block is None else block.T
+        behind = [turn(self.before[(i + 1) % n]) for i in range(n)]
+        return Cyclic([d.T for d in self.diagonal], behind, [turn(self.behind[i - 1]) for i in range(n)], self.order)
 
     def solve(self, right: Array) -> Array:
         """See `Matrix`. Block elimination; what goes round the ring is carried along as one more block column."""

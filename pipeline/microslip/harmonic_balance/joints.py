@@ -78,6 +78,10 @@ class Joints:
     def dense(self) -> Array:
         return self._of_sides.dense()
 
+    @property
+    def transposed(self) -> Matrix:
+        return self._of_sides.transposed
+
     @cached_property
     def _of_sides(self) -> Matrix:
         return self.blocks()

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ import numpy as np
 from ..data import Array, UserError
 from ..files import store
 from ..settings.mistakes import whole
+from . import rare
+from .linear import beside
 from .samples import Asked, Sample, of_ring, sample
 from .statistics import Envelope, Quantile, quantile
 
@@ -27,6 +29,15 @@ COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unso
 EACH = 4
 """Samples a worker gets before what is known is written."""
 
+RARE = 0.999
+"""Share of the samples below the quantile that samples are chosen for."""
+
+FIRST = 1_000_000_000
+"""Number of the first of the samples that are chosen from."""
+
+BEFORE = 20
+"""Plain samples, at least, that tell the correlation before others are chosen."""
+
 WATCHED = 0.95
 """Share of the samples below the quantile that progress shows, and that ends a run."""
 
@@ -36,13 +47,15 @@ class Ensemble:
     """Samples of a mistuned ring.
 
     Attributes:
-        asked. tuned: the ring of equal sectors. rows: (n, len(COLUMNS)) of the samples. envelope: see `Envelope`.
+        asked. tuned: the ring of equal sectors. rows: (n, len(COLUMNS)) of the samples. envelope: see `Envelope`. rare:
+            the 99.9 % quantile by samples that a linear ring chose, see `rare.Rare`; None where none were asked for.
     """
 
     asked: Asked
     tuned: Sample
     rows: Array
     envelope: Envelope
+    rare: rare.Rare | None = field(default=None)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -103,6 +116,53 @@ def run(
     return found
 
 
+def choose(
+    found: Ensemble, samples: int, workers: int | None = None, file: Path | None = None, inputs: str = "",
+    executor: Executor | None = None, report: Report = lambda _: None,
+) -> rare.Rare:  # fmt: skip
+    """The 99.9 % quantile of the amplification by about so many samples that a linear ring chooses, see `rare`.
+
+    Args: found: plain samples. The others are those of `run`.
+
+    Raises:
+        UserError: fewer plain samples than `BEFORE`; blades whose modes do not scatter.
+    """
+    whole("rare", samples, ge=1)
+    asked, known = found.asked, found.solved
+    if known.sum() < BEFORE:
+        raise UserError(f"rare: {known.sum()} plain samples tell too little of the linear ring; ask for {BEFORE}")
+    report(f"{rare.EACH * samples} samples of the linear ring")
+    linear = beside(asked)
+    before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)]).T
+    told, way = max((rare.correlation(z, found.amplification[known]), i) for i, z in enumerate(before))
+    every = np.array([linear(asked.deviations(FIRST + i))[way] for i in range(rare.EACH * samples)])
+    pi = rare.chances(every, samples, RARE, told, int(known.sum()))
+    chosen, inputs = rare.chosen(pi, asked.seed), f"{inputs} {len(found)} {samples}"
+    high = _read(file, inputs)
+    workers = workers or _cores()
+    with _computed(asked, workers, executor) as of:
+        while len(high) < len(chosen):
+            part = chosen[len(high) : len(high) + EACH * workers]
+            high = np.append(high, [one.top.amplitude for one in of([FIRST + int(i) for i in part])])
+            report(f"{len(high)} of {len(chosen)} chosen samples")
+            if file is not None:
+                with store.complete_or_absent(file) as temporary:
+                    np.savez(temporary, high=high, inputs=np.array(inputs))
+    solved = np.isfinite(high)
+    return rare.estimate(high[solved] / found.tuned.top.amplitude, pi[chosen][solved], len(pi), RARE, told)
+
+
+def _read(file: Path | None, inputs: str) -> Array:
+    """Amplitudes of chosen samples that a run with the same inputs has left."""
+    try:
+        if file is not None and file.is_file():
+            with np.load(store.ordinary(file), allow_pickle=False) as known:
+                return np.array(known["high"]) if str(known["inputs"]) == inputs else np.zeros(0)
+    except (OSError, ValueError, KeyError):
+        pass
+    return np.zeros(0)
+
+
 def _row(one: Sample) -> list[float]:
     top = one.top
     solved = np.isfinite(top.amplitude)
@@ -128,7 +188,7 @@ def _cores() -> int:
 @contextmanager
 def _computed(
     asked: Asked, workers: int, executor: Executor | None
-) -> Iterator[Callable[[range], Iterator[Sample]]]:  # fmt: skip
+) -> Iterator[Callable[[Sequence[int]], Iterator[Sample]]]:  # fmt: skip
     if executor is not None:
         yield lambda numbers: executor.map(sample, [asked] * len(numbers), numbers)
         return

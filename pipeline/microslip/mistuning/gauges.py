@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from ..data import Array, UserError
 from ..system.assembly import Assembly, Linear
 from .estimate import Estimate, accepted, covariance, misfit
+from .linear import held
 from .ring import Tuned
 from .scatter import Scatter
 
@@ -55,13 +56,7 @@ class Stuck:
     @cached_property
     def part(self) -> Linear:
         """The tuned ring, its contacts' stiffness in K."""
-        part, k = self.tuned.whole.joined(1), self.tuned.whole.stiffness
-        held, T = k @ np.linalg.inv(np.eye(part.count) + part.yielding @ k), part.rows
-        return replace(
-            part, K=part.stiff + T.T @ held @ T, loss=None, load=part.load - T.T @ (held @ part.given),
-            output=part.output - part.output_residual @ (held @ T),
-            output_given=part.output_given - part.output_residual @ (held @ part.given),
-        )  # fmt: skip
+        return held(self.tuned.whole.joined(1), self.tuned.whole.stiffness)
 
     @cached_property
     def blades(self) -> list[tuple[slice, Array, Array]]:

@@ -62,7 +62,7 @@ def highest(respond: Respond, frequency: Array, tolerance: float = TOLERANCE, mo
     for f in frequency:
         look(float(f))
     for _ in range(most):
-        told = _told(known)
+        told = told_by(known)
         if told is None or told[0] <= max(y.max() for y in known.values()) * (1 + tolerance):
             break
         if not look(told[1]):
@@ -72,13 +72,13 @@ def highest(respond: Respond, frequency: Array, tolerance: float = TOLERANCE, mo
     at = np.array(sorted(known))
     y = np.array([known[f] for f in at])
     i, output = np.unravel_index(int(y.argmax()), y.shape)
-    told = _told(known)
+    told = told_by(known)
     missed = 0.0 if told is None else max(told[0] / y.max() - 1, 0.0)
     ends = at[i] in (min(frequency), max(frequency))
     return Highest(int(output), float(at[i]), float(y.max()), missed, at, y, tuple(failed), bool(ends))
 
 
-def _told(known: dict[float, Array]) -> tuple[float, float] | None:
+def told_by(known: dict[float, Array]) -> tuple[float, float] | None:
     """The highest amplitude that parabolas tell, and its frequency (Hz), where no point is yet."""
     at = np.array(sorted(known))
     if len(at) < 3:

@@ -15,7 +15,7 @@ from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
 from ..system.flow import Flow, through
 from . import subset
-from .scatter import OF_BLADES, Scatter
+from .scatter import MODAL, OF_BLADES, Scatter
 
 ELSEWHERE = 0.1
 """rad, and share of its size, by which an interface of another modal file may stand off the nominal one's."""
@@ -54,7 +54,7 @@ class Tuned:
 
     def modes(self, s: Scatter) -> int:
         """Into how many modes deviations may differ in one sector."""
-        if s.of not in ("frequency", "damping"):
+        if s.of not in MODAL:
             return 1
         body = self.body(s)
         return len(body.groups[0].omega) if body.sectors == 1 else 1

@@ -34,6 +34,9 @@ OF_CONTACTS = {
 ABSOLUTE = "added_mass", "gap"
 """Those whose deviations are values in kg or m; of all others they are shares of the nominal value."""
 
+MODAL = "frequency", "damping"
+"""Those of which every mode of a body has its own."""
+
 DISTRIBUTIONS = "normal", "lognormal", "uniform"
 ARRANGEMENTS = "given", "shuffled", "drawn"
 

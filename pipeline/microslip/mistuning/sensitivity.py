@@ -5,22 +5,24 @@ R(x, p) = 0 (for one that does not, Eq. (5.6-3) is the same):
 
     dy/dp = y_p - y_x (dR/dx)^-1 R_p
 
-By the symmetry of the tuned ring a blade answers to the deviation of another one as blade 0 does to that of one as far
-away, so the solutions for the deviations of blade 0 hold all sensitivities of the ring.
+From the left, y_x (dR/dx)^-1 is one solution of the transposed equations, and holds what one blade gains by any
+deviation. By the symmetry of the tuned ring the other blades gain as much by those of blades as far away.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..data import Array, ComplexArray
+from ..harmonic_balance.blocks import Matrix
 from ..harmonic_balance.problem import AtFrequency, Problem
 from ..harmonic_balance.solver import Point
 from .ring import Tuned, deviated
 from .samples import Asked, read
-from .scatter import Scatter
+from .scatter import MODAL, Scatter
 from .weibull import exponent, median, quantile
 
 
@@ -61,81 +63,100 @@ def approximation(asked: Asked, scatter: Scatter) -> Approximation:
 
 
 def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, Array]:
-    """Amplitude of the tuned ring at a solution (m), and (sectors, modes) how blade 0's changes by the relative
-    deviations of another one, at one frequency: a solution for each mode of blade 0."""
-    problem = asked.problem(asked.tuned.whole)
-    at = problem.at(point.Omega)
-    force, slopes = at.forces(point.x)
-    q = at.modal(point.x, force)
-    y = read(at, q[1], force, problem.share)
-    matrix, modes = at.jacobian(slopes), asked.tuned.modes(scatter)
-    out = np.empty((asked.tuned.sectors, modes))
-    for j in range(modes):
-        by, moved = _forced(at, asked.tuned, scatter, j, q)
-        dx = matrix.solve(-by)
-        dforce = at.along(
-            [np.einsum("nkwlz,nlz->nkw", S, d) for S, d in zip(slopes, _relative(at, dx), strict=True)], preload=False
-        )
-        dq = _moved(at, dx, dforce)
-        dq[moved[0]] = dq[moved[0]] + moved[1]
-        dy = read(at, dq, dforce, 0.0)
-        change = (np.conj(y) * dy).real / np.abs(y)
-        out[:, j] = np.roll(change[::-1], 1)  # of blade 0 by blade i is that of blade -i by blade 0
-    return float(np.abs(y[0])), out
-
-
-def _relative(at: AtFrequency, dx: Array) -> list[Array]:
-    """Of every group of contacts (n, k, W) changes of the displacements."""
-    v = at.problem.displacement(dx)
-    return [g.relative(v) - g.relative(0 * v) for g in at.problem.groups]
-
-
-def _moved(at: AtFrequency, dx: Array, dforce: Array) -> list[ComplexArray]:
-    """Of every part (m,) change of the first harmonic of its coordinates, by those of unknowns and (W, c) forces."""
-    p = at.problem
-    g = np.array(at.amplitudes(dforce - _held(at, dx)))
-    each = zip(p.eliminated, p.slices, strict=True)
-    return [one.coordinates(at.Omega, 0.0, g[:, s])[1] for one, s in each]
-
-
-def _held(at: AtFrequency, dx: Array) -> Array:
-    """(W, c) what the stiffness taken into the parts makes of a change of the unknowns."""
-    p, v = at.problem, at.problem.displacement(dx)
-    return np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
-
-
-def _forced(
-    at: AtFrequency, tuned: Tuned, scatter: Scatter, mode: int, q: list[list[ComplexArray]]
-) -> tuple[Array, tuple[int, ComplexArray]]:
-    """(size,) R_p of one mode of blade 0, and the change of its coordinates in the first harmonic besides."""
-    p = at.problem
-    body = next(i for i, m in enumerate(p.assembly.components) if m.name == f"{tuned.body(scatter).name}_0")
-    d = np.zeros(tuned.modes(scatter))
-    d[mode] = STEP
-    more, less = (deviated(p.assembly.components[body], scatter, sign * d) for sign in (1.0, -1.0))
-    by, changed = np.zeros((p.coefficients, p.count)), np.zeros(0, dtype=complex)
-    at_part, own = _where(p, body)
+    """Amplitude of blade 0 of the tuned ring at a solution (m), and (sectors, modes) how it changes by the relative
+    deviations of every blade, at one frequency: one solution of the transposed equations."""
+    now, modes = Linearised.of(asked.problem(asked.tuned.whole), point), asked.tuned.modes(scatter)
+    p, pushed = now.at.problem, now.pushes()
+    out = np.zeros((asked.tuned.sectors, modes))
+    bodies = [_number(p, asked.tuned, scatter, j) for j in range(asked.tuned.sectors)]
+    where = [_where(p, body) for body in bodies]
     for h in range(p.harmonics + 1):
-        part, k, s, w = p.parts[h][at_part], p.stiffness[at_part], p.slices[at_part], h * at.Omega
-        index = p.assembly.index(h)
-        (M1, K1, C1), (M0, K0, C0) = more.at(index).matrices, less.at(index).matrices
-        H1, H0 = more.at(index).loss, less.at(index).loss
-        H = H1 - H0 if h and H1 is not None and H0 is not None else 0.0
-        dS = ((K1 - K0 + 1j * H) - w**2 * (M1 - M0) + 1j * w * (C1 - C0)) / (2 * STEP)
-        P = np.linalg.inv(np.eye(part.count) + part.yielding @ k)
-        T = part.rows
+        for mode in range(modes):
+            dS = softening(now.at, bodies[0], scatter, mode, h)
+            out[:, mode] += [(pushed[h][i][own] @ (dS @ now.q[h][i][own])).real for i, own in where]
+    return float(np.abs(now.y[0])), out
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A ring about its motion at one frequency.
+
+    Attributes: at. force: (W, c) of the contacts. slopes: its derivatives, of each group. q: harmonic -> part -> its
+        coordinates. y: (w,) read-outs.
+    """
+
+    at: AtFrequency
+    force: Array
+    slopes: list[Array]
+    q: list[list[ComplexArray]]
+    y: ComplexArray
+
+    @classmethod
+    def of(cls, problem: Problem, point: Point) -> Linearised:
+        at = problem.at(point.Omega)
+        force, slopes = at.forces(point.x)
+        q = at.modal(point.x, force)
+        return cls(at, force, slopes, q, read(at, q[1], force, at.problem.share))
+
+    @cached_property
+    def matrix(self) -> Matrix:
+        return self.at.jacobian(self.slopes)
+
+    def felt(self, v: Array, turned: bool = False) -> Array:
+        """(W, c) E^T S E v, or that of the transposed S: changes of the forces by (W, c) v of the coordinates."""
+        groups = self.at.problem.groups
+        along = "nlzkw,nlz->nkw" if turned else "nkwlz,nlz->nkw"
+        each = zip(groups, self.slopes, strict=True)
+        moved = [np.einsum(along, S, g.relative(v) - g.relative(0 * v)) for g, S in each]
+        return self.at.along(moved, preload=False)
+
+    def after(self, R: Array, force: Array | None = None) -> tuple[list[ComplexArray], ComplexArray]:
+        """First harmonics of the coordinates of every part, and of the read-outs, that (W, c) R, a change of the
+        residual in m, and (W, c) force, one of the contacts' forces, bring about."""
+        p = self.at.problem
+        v = p.displacement(self.matrix.solve(-(R / p.scale).ravel()))
+        changed = self.felt(v) + (0.0 if force is None else force)
+        held = np.hstack([v[:, s] @ k.T for s, k in zip(p.slices, p.stiffness, strict=True)])
+        g = np.array(self.at.amplitudes(changed - held))
+        each = zip(p.eliminated, p.slices, strict=True)
+        dq = [one.coordinates(self.at.Omega, 0.0, g[:, s])[1] for one, s in each]
+        return dq, read(self.at, dq, changed, 0.0)
+
+    def pushes(self) -> list[list[ComplexArray]]:
+        """Harmonic -> part -> (m,) z: the real part of z . S q is how much amplitude the first read-out gains where a
+        part's dynamic stiffness grows by S."""
+        p, u = self.at.problem, np.conj(self.y[0]) / np.abs(self.y[0])
+        by_force, by_motion = np.zeros((2, p.coefficients, p.count))
+        own = {}
+        for i, (part, k, s) in enumerate(zip(p.parts[1], p.stiffness, p.slices, strict=True)):
+            A, rows = self._of_part(i, 1)
+            own[i] = u * np.linalg.solve(A.T, part.output[0])
+            moved = own[i] @ part.rows.conj().T @ np.linalg.inv(np.eye(part.count) + k @ part.yielding)
+            for out, z in ((by_force, moved + u * part.output_residual[0]), (by_motion, moved @ k)):
+                out[1, s], out[2, s] = -z.real, -z.imag
+        c = self.felt(by_force, turned=True) - by_motion
+        turned = self.matrix.transposed.solve((c * p.scale).ravel()).reshape(c.shape) / p.scale
+        found: list[list[ComplexArray]] = []
+        for h in range(p.harmonics + 1):
+            z = turned[0] if h == 0 else turned[2 * h - 1] + 1j * turned[2 * h]
+            each = [(*self._of_part(i, h), s) for i, s in enumerate(p.slices)]
+            found.append([np.asarray(-np.linalg.solve(A.T, z[s] @ rows), complex) for A, rows, s in each])
+        found[1] = [z - own[i] for i, z in enumerate(found[1])]
+        return found
+
+    def _of_part(self, i: int, h: int) -> tuple[ComplexArray, ComplexArray]:
+        """A part's dynamic stiffness with contacts of the stiffness taken into it, and what of it they feel."""
+        p, w = self.at.problem, h * self.at.Omega
+        part, k = p.parts[h][i], p.stiffness[i]
+        P, T = np.linalg.inv(np.eye(part.count) + part.yielding @ k), part.rows
         A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ k @ P @ T
-        driven = np.zeros(len(A), dtype=complex)
-        driven[own] = dS @ q[h][at_part][own]
-        dq = -np.linalg.solve(A, driven)
-        d = -P @ (T @ dq)
-        if h:
-            by[2 * h - 1, s], by[2 * h, s] = d.real, -d.imag
-        else:
-            by[0, s] = d.real
-        if h == 1:
-            changed = dq
-    return (by / p.scale).ravel(), (at_part, changed)
+        return A.astype(complex), P @ T
+
+
+def _number(p: Problem, tuned: Tuned, scatter: Scatter, sector: int) -> int:
+    """Of a sector's body among the parts."""
+    name = f"{tuned.body(scatter).name}_{sector}"
+    return next(i for i, m in enumerate(p.assembly.components) if m.name == name)
 
 
 def _where(p: Problem, body: int) -> tuple[int, slice]:
@@ -144,6 +165,18 @@ def _where(p: Problem, body: int) -> tuple[int, slice]:
         return body, slice(None)
     ends = np.cumsum([0, *(len(m.groups[0].M_r) for m in p.assembly.components)])
     return 0, slice(int(ends[body]), int(ends[body + 1]))
+
+
+def softening(at: AtFrequency, body: int, scatter: Scatter, mode: int, h: int) -> ComplexArray:
+    """(m, m) derivative of a body's dynamic stiffness in a harmonic by the relative deviation of one mode."""
+    component, w = at.problem.assembly.components[body], h * at.Omega
+    own = np.zeros(max(mode + 1, len(component.groups[0].omega)) if scatter.of in MODAL else 1)
+    own[mode] = STEP
+    index = at.problem.assembly.index(h)
+    more, less = (deviated(component, scatter, sign * own).at(index) for sign in (1.0, -1.0))
+    (M1, K1, C1), (M0, K0, C0) = more.matrices, less.matrices
+    H = more.loss - less.loss if h and more.loss is not None and less.loss is not None else 0.0
+    return ((K1 - K0 + 1j * H) - w**2 * (M1 - M0) + 1j * w * (C1 - C0)) / (2 * STEP)
 
 
 STEP = 1e-4

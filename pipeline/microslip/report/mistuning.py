@@ -31,6 +31,10 @@ def mistuning_html(title: str, found: Ensemble, messages: Sequence[str], picture
 def _quantiles(found: Ensemble) -> Piece:
     told = [found.quantile(share) for share in SHARES]
     rows = [[f"{100 * q.share:g} %", number(q.value), _end(q.low), _end(q.high)] for q in told]
+    if found.rare is not None:
+        q = found.rare.quantile
+        head = f"{100 * q.share:g} %, by {found.rare.samples} chosen samples"
+        rows.append([head, number(q.value), _end(q.low), _end(q.high)])
     return table(["of the samples below", "amplification", "at least", "at most"], rows)
 
 

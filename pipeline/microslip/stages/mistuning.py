@@ -21,7 +21,7 @@ from ..data import Array, UserError
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
-from ..mistuning.ensemble import COLUMNS, Ensemble, run
+from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, run
 from ..mistuning.ring import Tuned
 from ..mistuning.samples import Asked
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
@@ -67,11 +67,14 @@ def _work(
     built = build(settings, {name: read_basis(file) for name, file in files.items()}, case_path)
     kept = folder / "mistuning.npz"
     if stage.force:
-        kept.unlink(missing_ok=True)
+        for old in (kept, folder / "rare.npz"):
+            old.unlink(missing_ok=True)
     known = _of_samples(inputs)
     try:
         what = asked_of(built, settings, case_path)
         found = run(what, asked.samples, asked.until, workers, kept, known, report=stage.report)
+        if asked.rare:
+            found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=stage.report)
     except UserError as error:
         text = str(error).removeprefix(f"{case_path}: ").removeprefix("mistuning: ")
         raise UserError(f"{case_path}: mistuning: {text}") from error
@@ -97,7 +100,7 @@ def _work(
 def _of_samples(inputs: Mapping[str, Any]) -> str:
     """Hash of what one sample depends on: not how many there are."""
     case = dict(inputs["case"])
-    case["mistuning"] = {k: v for k, v in case["mistuning"].items() if k not in ("samples", "until")}
+    case["mistuning"] = {k: v for k, v in case["mistuning"].items() if k not in ("samples", "until", "rare")}
     return store.fingerprint({**inputs, "case": case, "pictures": None}, hash_of_code(("mistuning.samples",)))
 
 
@@ -206,6 +209,14 @@ def said(found: Ensemble) -> list[str]:
         f"Amplification of the highest blade in {count} samples: mean {np.nanmean(a):.4g}, 95 % quantile "
         f"{found.quantile(0.95)}, 99 % quantile {found.quantile(0.99)}; the intervals hold with 95 %."
     )
+    if (rare := found.rare) is not None:
+        told.append(
+            f"99.9 % quantile by {rare.samples} of {rare.drawn} samples, chosen by a linear ring: {rare.quantile}, as "
+            f"well told as by {rare.worth:.3g} plain samples; by the plain ones {found.quantile(RARE)}. Ranks of the "
+            f"linear ring and of that with friction correlate by {rare.correlation:.2f}."
+        )
+        if not rare.worth > rare.samples:
+            told.append("warning: chosen samples tell no more than plain ones would; the linear ring says too little.")
     told.append(
         f"The highest of all is {a[at]:.4g}, sample {at}: blade {int(found.column('sector')[at])} at "
         f"{found.column('frequency_Hz')[at]:.6g} Hz."
@@ -242,6 +253,10 @@ def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[
         "share": np.array(SHARES),
         **{name: np.array([getattr(q, name) for q in told]) for name in ("value", "low", "high")},
     }
+    if found.rare is not None:
+        for name in ("value", "low", "high"):
+            own = getattr(found.rare.quantile, name)
+            quantiles[f"chosen_{name}"] = np.array([own if share == RARE else np.nan for share in SHARES])
     for fit in fits(found.amplification[found.solved]):
         quantiles[fit.name.replace(" ", "_")] = np.array([fit.quantiles[share] for share in SHARES])
     store.write_text(folder / "quantiles.csv", columns_csv(quantiles, 8))
