@@ -1,5 +1,5 @@
 #!/bin/sh
-# Make an environment of its own for every program that exports are tried in: build/peers/<name> from <name>.txt beside.
+# Make an environment of its own for every program that exports or answers are compared with: build/peers/<name> from <name>.txt beside.
 # An argument names one of them. What cannot be installed is said and left out: its tests are then skipped; exit code 1.
 set -u
 cd "$(dirname "$0")/../.."
@@ -22,7 +22,7 @@ make_one() { # name
 }
 
 failed=0
-for name in ${1:-pyharm exudyn}; do
+for name in ${1:-pyharm exudyn tamaas}; do
     if make_one "$name"; then
         echo "$name: build/peers/$name"
     else
