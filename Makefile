@@ -88,6 +88,7 @@ bench: $(READY) ## timings against CalculiX, NGSolve and pyHarm, of rings and cy
 	@$(PYTHON) benchmarks/two_tone.py
 	@$(PYTHON) benchmarks/stability.py
 	@$(PYTHON) benchmarks/squeal.py
+	@$(PYTHON) benchmarks/rolling.py
 
 clean: ## remove products
 	rm -rf build meshes/*.msh meshes/*.json

@@ -30,7 +30,7 @@ QUICK = (
     "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1"
 )
 """Compile in a quarter of the time: a test runs a program once or twice, and each piece that a program is split into
-costs a compiler of its own. That a user's compiler gives the same numbers: test_conformance, the sample from a wheel."""
+costs a compiler of its own. That a user's gives the same numbers: test_conformance, the sample from a wheel."""
 
 
 def locked(package: str) -> bool:

@@ -211,7 +211,7 @@ def run(
     """
     from .basis import read_basis
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case, meant
+    from .stages.places import is_case, is_rolling, meant
     from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system
     from .stages.summary import frequency_lines
@@ -220,6 +220,8 @@ def run(
 
     path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
+    if is_rolling(path):
+        return roll(path, no_pictures=no_pictures, set_=set_, force=force, quiet=quiet)
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
             page, converged = run_system(system, list(set_), force, report, wanted)
@@ -478,6 +480,23 @@ def mistune(
     _say("\n".join([*sentences, *map(str, made)]), quiet)
     if not fine:
         raise NotConverged("some samples have no solution; samples.csv has no amplitude for them")
+
+
+@app.command
+def roll(
+    case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
+) -> None:
+    """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions.
+
+    Args:
+        case: a case.toml with [wheel] and [rail], the folder that holds it, its name, or its products.
+    """
+    from .stages.rolling import rolling_stage
+
+    case = _case_file(case)
+    with progress(f"roll {case}", quiet) as report:
+        made, sentences = rolling_stage(case, Path("build"), list(set_), force, report, not no_pictures)
+    _say("\n".join([*sentences, *map(str, made)]), quiet)
 
 
 def _share(text: str) -> float:

@@ -62,9 +62,18 @@ def _bodies_in(root: Path) -> set[str]:
     return {p.parent.name for p in root.glob("geometry/*/body.toml")}
 
 
+def _keys(path: Path) -> set[str]:
+    return set(load_toml(path)) if path.is_file() and path.suffix == ".toml" else set()
+
+
+def is_rolling(path: Path) -> bool:
+    """True for a case of rolling contact."""
+    return _keys(path) >= {"wheel", "rail"}
+
+
 def is_case(path: Path) -> bool:
     """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
-    keys = set(load_toml(path)) if path.is_file() and path.suffix == ".toml" else set()
+    keys = _keys(path)
     return bool(keys & {"body", "sweep"}) or bool(keys & {"bodies"} and keys & ASKED)
 
 

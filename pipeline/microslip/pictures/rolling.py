@@ -1,0 +1,78 @@
+"""Rolling contact: the creep curve, tractions over the patch, and where the wheel touches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import Array
+from ..rolling.strips import Tractions
+from ..rolling.study import Studied
+from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+
+LABELS = {"longitudinal": "longitudinal creepage", "lateral": "lateral creepage", "spin": "spin in 1/m"}
+
+
+def curve_picture(found: Studied, path: Path, title: str) -> Path:
+    """Creep forces over the friction that is held, and the published FASTSIM at some points."""
+    assert found.forces is not None
+    figure, axes = single_panel(8.0, 4.8)
+    x, f, held = found.over, found.forces, found.held
+    drawn = {"F_x": f.x, "F_y": f.y, "|F|": np.hypot(f.x, f.y)}
+    for i, (name, values) in enumerate(drawn.items()):
+        if np.abs(values).max() > 1e-6 * held:
+            axes.plot(x, values / held, color=COLOURS[i], label=f"${name}/\\mu F_N$")
+    if found.reference is not None:
+        at, of = found.reference
+        axes.plot(x[at], of, "o", markersize=4, color="0.35", fillstyle="none", label="|F| by FASTSIM, 44 x 44")
+    axes.axvline(x[found.shown], color="0.6", linestyle=":", linewidth=1.0)
+    axes.set(xlabel=LABELS[found.case.creep.over], ylabel="force on the wheel", title=title)
+    axes.legend(fontsize=9, loc="center right")
+    return save_figure(figure, path)
+
+
+def traction_picture(found: Studied, path: Path, title: str) -> Path:
+    """Tractions over the patch, and along its middle strip."""
+    assert found.tractions is not None
+    t, mu = found.tractions, found.case.friction
+    figure = empty_figure(9.6, 4.6)
+    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
+    size = np.hypot(t.traction_x, t.traction_y) / 1e6
+    plain_axes(right)
+    image = _cells(left, t, size)
+    step = (max(1, t.x.shape[0] // 10), max(1, t.x.shape[1] // 10))
+    pick = np.s_[step[0] // 2 :: step[0], step[1] // 2 :: step[1]]
+    left.quiver(1e3 * t.x[pick], 1e3 * t.y[pick], t.traction_x[pick], t.traction_y[pick], color="white", width=0.004)
+    left.set(xlabel="x in mm, rolling to the right", ylabel="y in mm", aspect="equal", title="traction in MPa")
+    figure.colorbar(image, ax=left, shrink=0.85)
+    row = t.x.shape[0] // 2
+    x, limit = 1e3 * t.x[row], mu * t.pressure[row] / 1e6
+    right.fill_between(x, -limit, limit, color="0.9", label="$\\pm\\mu p$")
+    for i, (name, values) in enumerate((("x", t.traction_x), ("y", t.traction_y))):
+        right.plot(x, values[row] / 1e6, color=COLOURS[i], label=f"traction along {name}")
+    right.set(xlabel="x in mm", ylabel="MPa", title=f"along the strip y = {1e3 * t.y[row, 0]:.3g} mm")
+    right.legend(fontsize=9)
+    over = LABELS[found.case.creep.over].split(" in ")[0]
+    figure.suptitle(f"{title}: {over} {found.over[found.shown]:.4g}")
+    return save_figure(figure, path)
+
+
+def _cells(axes: Axes, t: Tractions, values: Array) -> PolyCollection:
+    """A rectangle for each element, coloured."""
+    from matplotlib.collections import PolyCollection
+
+    half = 0.5 * np.abs(np.diff(t.x, axis=1)).mean(axis=1, keepdims=True)
+    tall = 0.5 * t.area / (2 * half)
+    corners = [(t.x + i * half, t.y + j * tall) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    places = 1e3 * np.stack([np.stack(c, axis=-1) for c in corners], axis=-2).reshape(-1, 4, 2)
+    drawn = PolyCollection(list(places), array=values.ravel(), cmap="viridis")
+    axes.add_collection(drawn)
+    axes.autoscale_view()
+    axes.grid(False)
+    return drawn

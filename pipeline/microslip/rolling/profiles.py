@@ -1,0 +1,157 @@
+"""Cross-sections of wheel and rail: files, circles, polynomials (Sextro, 6.2).
+
+y runs to the field side, z down; m. A wheel's material lies above its profile, a rail's below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline, UnivariateSpline
+
+from ..data import Array, UserError
+from ..files import store
+
+WIDTH = 0.07
+"""m, of profiles that are given by a formula."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A smooth curve z(y) through points.
+
+    Attributes: y, z: (k,) m, y rising. name: for sentences. noise: standard deviation of measured z, m; the curve then
+        keeps that distance from the points on average, which is what makes its curvature usable.
+    """
+
+    y: Array
+    z: Array
+    name: str = "profile"
+    noise: float = 0.0
+
+    @cached_property
+    def curve(self) -> CubicSpline | UnivariateSpline:
+        if self.noise:
+            return UnivariateSpline(self.y, self.z, k=5, s=len(self.y) * self.noise**2, ext=2)
+        return CubicSpline(self.y, self.z, extrapolate=False)
+
+    def height(self, y: ArrayLike) -> Array:
+        """z, m; NaN beyond its ends."""
+        return self._of(self.curve, y)
+
+    def slope(self, y: ArrayLike) -> Array:
+        """dz/dy; NaN beyond its ends."""
+        return self._of(self.curve.derivative(), y)
+
+    def _of(self, curve: CubicSpline | UnivariateSpline, y: ArrayLike) -> Array:
+        at = np.asarray(y, dtype=float)
+        inside = (at >= self.y[0]) & (at <= self.y[-1])
+        return np.where(inside, curve(np.clip(at, self.y[0], self.y[-1])), np.nan)
+
+    def turned(self, angle: float) -> Profile:
+        """Inclined by an angle (rad) towards the track, about its highest point where z = 0: a canted rail."""
+        if not angle:
+            return self
+        c, s = np.cos(angle), np.sin(angle)
+        y, z = c * self.y + s * self.z, c * self.z - s * self.y
+        top = np.argmin(z)
+        return _checked(y - y[top], z - z[top], self.name, self.noise)
+
+
+def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:
+    """z = c_0 y^2 + c_1 y^3 + ... over the width, m (6.2-12)."""
+    y = np.linspace(-0.5 * width, 0.5 * width, 401)
+    return Profile(y, sum((c * y ** (k + 2) for k, c in enumerate(coefficients)), np.zeros_like(y)))
+
+
+def circle(radius: float, width: float = WIDTH) -> Profile:
+    """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
+
+    Raises:
+        UserError: an arc as wide as its circle.
+    """
+    if not 0 < width < 1.8 * abs(radius):
+        raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
+    y = np.linspace(-0.5 * width, 0.5 * width, 401)
+    return Profile(y, np.sign(radius) * (abs(radius) - np.sqrt(radius**2 - y**2)))
+
+
+def read_profile(path: Path | str, noise: float = 0.0, unit: float = 1e-3) -> Profile:
+    """A profile of a file: ``.prr`` and ``.prw`` (points between point.begin and point.end), or a table of y and z with
+    commas or blanks between.
+
+    Args:
+        noise: see `Profile`. unit: of the numbers, m.
+
+    Raises:
+        UserError: no file, no numbers; points that turn back or of another unit.
+    """
+    path = Path(path)
+    try:
+        lines = store.ordinary(path).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read as a profile ({error}); correct the path") from error
+    lines = [line.split("!")[0].split("#")[0].strip() for line in lines]
+    sign, shift = np.ones(2), np.zeros(2)
+    if "point.begin" in lines:
+        begin, end = lines.index("point.begin"), lines.index("point.end") if "point.end" in lines else len(lines)
+        unit, sign, shift = _header(lines[:begin], path)
+        lines = lines[begin + 1 : end]
+    rows = [line.replace(",", " ").replace(";", " ").split() for line in lines if line]
+    if rows and not _is_number(rows[0][0]):
+        rows = rows[1:]
+    try:
+        points = np.array([[float(v) for v in row[:2]] for row in rows])
+    except ValueError as error:
+        raise UserError(f"{path}: {error}; a profile is a table of y and z") from error
+    if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 5 or not np.isfinite(points).all():
+        raise UserError(f"{path}: has no five points of y and z; a profile is a table of both")
+    y, z = ((points + shift) * sign * unit).T
+    return _checked(y, z, str(path), noise)
+
+
+def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:
+    """Unit in m, signs and shifts of y and z, as a ``.prr`` or ``.prw`` tells them."""
+    told = dict.fromkeys(("shift.y", "shift.z", "mirror.y", "mirror.z", "rotate"), 0.0) | {"units.len.f": 1e3}
+    for line in lines:
+        key, equals, value = (part.strip() for part in line.partition("="))
+        if equals and key in told and _is_number(value):
+            told[key] = float(value)
+    if told["rotate"]:
+        raise UserError(f"{path}: rotate is not read; turn the points, or set inclination in the case")
+    if not told["units.len.f"] > 0:
+        raise UserError(f"{path}: units.len.f must be greater than 0; 1000 says that the points are in mm")
+    sign = 1 - 2 * np.array([told["mirror.y"], told["mirror.z"]])
+    return 1 / told["units.len.f"], sign, np.array([told["shift.y"], told["shift.z"]])
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+WIDEST = 0.5
+"""m: what is wider than this, or narrower than a thousandth of it, is given in another unit."""
+
+
+def _checked(y: Array, z: Array, name: str, noise: float) -> Profile:
+    rising = np.diff(y) * np.sign(y[-1] - y[0])
+    if not (rising > 0).all():
+        at = int(np.argmax(rising <= 0)) + 1
+        raise UserError(
+            f"{name}: turns back or crosses itself at point {at + 1} (y = {y[at] * 1e3:.4g} mm); y must rise or fall "
+            "all along, so cut off what lies behind"
+        )
+    width = abs(y[-1] - y[0])
+    if not WIDEST / 1000 < width < WIDEST:
+        raise UserError(f"{name}: is {width:.3g} m wide; profiles are given in mm (unit = 1.0 for metres)")
+    order = slice(None, None, 1 if y[-1] > y[0] else -1)
+    return Profile(np.ascontiguousarray(y[order]), np.ascontiguousarray(z[order]), name, noise)

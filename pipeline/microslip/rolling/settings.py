@@ -1,0 +1,143 @@
+"""The case of a rolling contact: wheel, rail, pose, load and what is asked; every key, checked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..contact.keys import FileName, Poisson
+from ..contact.solids import Solid
+from ..settings.body import (
+    Coefficient,
+    Model,
+    Name,
+    NotNegative,
+    Number,
+    Numbers,
+    Positive,
+    _tuple,
+    load_toml,
+    override,
+)
+from ..settings.mistakes import validate
+from .ellipse import combined
+from .kalker import Coefficients
+from .profiles import WIDTH, Profile, circle, polynomial, read_profile
+from .strips import Distribution, Spin
+from .wheelset import Pose, Track
+
+Count = Annotated[int, Field(ge=2, le=400)]
+
+BIGGEST = 5.0
+"""m: a wheel's radius above this is given in another unit."""
+
+
+class Section(Model):
+    """A cross-section. Attributes: profile: radius of a circle, m (convex positive, hollow negative), coefficients of
+    y^2, y^3, ... (1/m, ...), or a file. width: of a circle or polynomial, m. noise: of a measured profile, m. at: of
+    the profile's origin from the middle of the track or axle, m."""
+
+    profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
+    width: Positive = WIDTH
+    noise: NotNegative = 0.0
+    at: Positive = 0.75
+    young: Positive = 2.1e11
+    poisson: Poisson = 0.28
+
+    def made(self, folder: Path, outward: float) -> Profile:
+        """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
+        if isinstance(self.profile, str):
+            return read_profile(folder / self.profile, self.noise)
+        if isinstance(self.profile, tuple):
+            return polynomial(self.profile, self.width)
+        return circle(outward * self.profile, self.width)
+
+
+class Wheel(Section):
+    """radius: of the running circle, m."""
+
+    radius: Annotated[Positive, Field(le=BIGGEST)]
+
+
+class Rail(Section):
+    """inclination: of the rail towards the track's middle, rad; a profile that is drawn canted has 0."""
+
+    inclination: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+
+
+class PoseOfCase(Model):
+    """lateral: to the right, m. yaw, roll: rad. speed: m/s. turning: of the axle, rad/s; it rolls if not given."""
+
+    lateral: Number = 0.0
+    yaw: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+    roll: Annotated[Number, Field(ge=-0.2, le=0.2)] = 0.0
+    speed: Positive = 20.0
+    turning: Positive | None = None
+    side: Literal["left", "right"] = "right"
+
+
+class Creep(Model):
+    """What the curve runs over; the other creepages are those of the pose if not given. spin: 1/m."""
+
+    over: Literal["longitudinal", "lateral", "spin"] = "longitudinal"
+    start: Number = 0.0
+    stop: Number
+    points: Annotated[int, Field(ge=2, le=100000)] = 61
+    longitudinal: Number | None = None
+    lateral: Number | None = None
+    spin: Number | None = None
+    shown: Number | None = None
+
+    @model_validator(mode="after")
+    def _runs(self) -> Creep:
+        if self.start == self.stop:
+            raise ValueError("creep.stop: must differ from start")
+        return self
+
+
+class ModelOfCase(Model):
+    """elements: along and across rolling; the rest as `strips.creep_forces`."""
+
+    elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
+    distribution: Distribution = "constant"
+    coefficients: Coefficients = "table"
+    spin: Spin = "kalker"
+
+
+class RollingCase(Model):
+    """friction: coefficient. vertical_force: N, on this wheel."""
+
+    name: Name
+    wheel: Wheel
+    rail: Rail
+    friction: Coefficient
+    vertical_force: NotNegative
+    pose: PoseOfCase = PoseOfCase()
+    creep: Creep
+    model: ModelOfCase = ModelOfCase()
+
+    def track(self, folder: Path) -> Track:
+        """Of files beside the case.
+
+        Raises:
+            UserError: profiles that are none.
+        """
+        elastic = combined(*(Solid(s.young, s.poisson) for s in (self.wheel, self.rail)))
+        rail = self.rail.made(folder, 1.0).turned(self.rail.inclination)
+        return Track(self.wheel.made(folder, -1.0), rail, self.wheel.radius, self.wheel.at, self.rail.at, elastic)
+
+    def posed(self) -> Pose:
+        p = self.pose
+        return Pose(p.lateral, p.yaw, p.roll, p.speed, p.turning)
+
+
+def load_rolling(path: Path, assignments: list[str] | None = None) -> tuple[RollingCase, dict[str, Any]]:
+    """Read and check a rolling case (SI units).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    raw = override(load_toml(path), assignments or [], path)
+    return validate(RollingCase, raw, path), raw

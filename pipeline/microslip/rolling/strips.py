@@ -1,0 +1,306 @@
+"""Creep forces by strips: point contacts marched from the leading edge, each with its springs and its slider.
+
+Sextro, 6.3 to 6.5. The upper body is 1; x along rolling, the material enters at x = +a. Rigid slip of body 1 relative
+to 2, over the speed: s_M = (xi - phi y, eta + phi x) (6.3-8). The springs between both stretch by u' = s_M - s_P
+(6.3-4); the traction on body 1 is their stiffness times u, cut where friction holds no more. The return map of
+`contact.point` does that, so that a point that slid sticks again where the spin turns its slip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..contact.law import program
+from ..contact.point import opposed
+from .kalker import Coefficients, creep_coefficients
+
+Array = Any
+"""Of numpy; of jax in what is traced."""
+
+Distribution = Literal["constant", "non-constant"]
+Spin = Literal["kalker", "book"]
+
+BLOCK = 256
+"""Poses that are marched side by side: what they remember stays in the nearest cache."""
+
+
+class Poses(NamedTuple):
+    """n states of rolling, arrays (n,) that broadcast.
+
+    Attributes: xi, eta: creepages. phi_x, phi_y: spin, 1/m, as the springs along and across feel it (`poses`). a, b:
+        half axes along and across rolling, m. normal_force: N. friction: coefficient. stiffness_x, stiffness_y: C11 G
+        and C22 G, Pa.
+    """
+
+    xi: Array
+    eta: Array
+    phi_x: Array
+    phi_y: Array
+    a: Array
+    b: Array
+    normal_force: Array
+    friction: Array
+    stiffness_x: Array
+    stiffness_y: Array
+
+
+class Forces(NamedTuple):
+    """On body 1 at the middle of the patch, arrays (n,).
+
+    Attributes: x, y: N. moment: about z, N m. power: of friction over the speed, N; the heat. sliding: share of the
+        area that slips.
+    """
+
+    x: Array
+    y: Array
+    moment: Array
+    power: Array
+    sliding: Array
+
+
+class Tractions(NamedTuple):
+    """Over the elements, (..., ny, nx), x and y ascending.
+
+    Attributes: x, y: middles, m. area: m2. pressure, traction_x, traction_y: on body 1, Pa. slip_x, slip_y: of body 1
+        relative to 2 over the speed, s_P.
+    """
+
+    x: Array
+    y: Array
+    area: Array
+    pressure: Array
+    traction_x: Array
+    traction_y: Array
+    slip_x: Array
+    slip_y: Array
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Strips and their elements, without unit; the elements begin at the leading edge.
+
+    Attributes:
+        y, width: (ny,) of the strips over b, at Gauss' points, so that what does not slip is integrated exactly.
+        chord: (ny,) x_A/a (6.4-28). x: (nx,) middles over x_A. way: (nx,) from middle to middle over the length of an
+            element; the first begins at the edge. pressure, stiffness: (nx,) means over the element of what (6.4-29),
+            (6.4-33) and (6.4-39), (6.4-42) distribute. powers: of the chord by which both grow from strip to strip.
+            pressed, sprung, spun: sums that make the force F_N and, without slip, C G a b s (6.4-25) and C23 G c^3 phi.
+    """
+
+    y: np.ndarray
+    width: np.ndarray
+    chord: np.ndarray
+    x: np.ndarray
+    way: np.ndarray
+    pressure: np.ndarray
+    stiffness: np.ndarray
+    powers: tuple[int, int]
+    pressed: float
+    sprung: float
+    spun: float
+
+
+@cache
+def grid(elements: tuple[int, int], distribution: Distribution) -> Grid:
+    """elements: (nx, ny) along and across rolling."""
+    nx, ny = elements
+    y, width = np.polynomial.legendre.leggauss(ny)
+    chord = np.sqrt(1 - y**2)
+    edge = 1 - 2 * np.arange(nx + 1) / nx
+    x, way = 0.5 * (edge[1:] + edge[:-1]), np.where(np.arange(nx), 1.0, 0.5)
+
+    def mean(of: np.ndarray) -> np.ndarray:
+        return 0.5 * nx * -np.diff(of)
+
+    if distribution == "constant":
+        pressure, stiffness, powers = mean(edge - edge**3 / 3), np.ones(nx), (2, 0)
+    else:
+        angle = np.arcsin(edge)
+        pressure, stiffness, powers = mean(0.5 * (angle + edge * np.sqrt(1 - edge**2))), mean(angle), (1, -1)
+    pressed = np.sum(chord ** (powers[0] + 1) * width) * np.sum(pressure) * 2 / nx
+    sprung = np.sum(chord ** (powers[1] + 2) * width) * np.sum(stiffness * (1 - x)) * 2 / nx
+    spun = np.sum(chord ** (powers[1] + 3) * width) * np.sum(stiffness * (1 - x**2)) * 2 / nx
+    return Grid(y, width, chord, x, way, pressure, stiffness, powers, float(pressed), float(sprung), float(spun))
+
+
+Pair = tuple[Array, ...]
+
+
+def _strip(pose: Poses, g: Grid, y: Array, chord: Array) -> tuple[Any, Array]:
+    """What a strip is marched by, from the stretch u of an element to the next one, and the length of an element."""
+    reach, across, nx = pose.a * chord, pose.b * y, len(g.x)
+    length = 2 * reach / nx
+    along = pose.xi - pose.phi_x * across
+    pressure = pose.normal_force / (pose.a * pose.b * g.pressed) * chord ** g.powers[0]
+    by = chord ** g.powers[1] / (pose.a * g.sprung)
+    springs = pose.stiffness_x * by, pose.stiffness_y * by
+    stiffer = jnp.maximum(*springs)
+    relative = springs[0] / stiffer, springs[1] / stiffer
+
+    def step(u: Pair, element: Pair) -> tuple[Pair, Pair, Pair, tuple[Array, ...]]:
+        x, way, pressed, share = element
+        x, h, p, k = reach * x, length * way, pressure * pressed, (springs[0] * share, springs[1] * share)
+        far = u[0] - h * along, u[1] - h * (pose.eta + pose.phi_y * (x + 0.5 * h))
+        left, slides = opposed((k[0] * far[0], k[1] * far[1]), relative, pose.friction * p)
+        u = left[0] * far[0], left[1] * far[1]
+        return u, (k[0] * u[0], k[1] * u[1]), (far[0] - u[0], far[1] - u[1]), (x, p, slides)
+
+    return step, length
+
+
+def _elements(g: Grid) -> tuple[Array, ...]:
+    return tuple(map(jnp.asarray, (g.x, g.way, g.pressure, g.stiffness)))
+
+
+@partial(program, static_argnums=(1, 2))
+def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant") -> Forces:
+    """Forces of poses whose arrays are all (n,): pure, for `jax.jit`, `vmap` and `grad`; see `creep_forces`."""
+    g = grid(elements, distribution)
+    none = jnp.zeros_like(pose.a)
+
+    def strip(total: Forces, of: tuple[Array, ...]) -> tuple[Forces, None]:
+        y, chord, width = of
+        step, length = _strip(pose, g, y, chord)
+
+        def element(carry: tuple[Pair, Pair, Forces], one: Any) -> tuple[tuple[Pair, Pair, Forces], None]:
+            u, before, sum_ = carry
+            u, t, slid, (x, _, slides) = step(u, one)
+            work = 0.5 * ((before[0] + t[0]) * slid[0] + (before[1] + t[1]) * slid[1])
+            added = (t[0], t[1], x * t[1] - pose.b * y * t[0], work, slides)
+            return (u, t, Forces(*(s + a for s, a in zip(sum_, added, strict=True)))), None
+
+        start = (none, none), (none, none), Forces(*[none] * 5)
+        (u, t, sum_), _ = jax.lax.scan(element, start, _elements(g))
+        h = 0.5 * length  # to the trailing edge, where nothing is left of u
+        rigid = pose.xi - pose.phi_x * pose.b * y, pose.eta - pose.phi_y * (pose.a * chord - 0.5 * h)
+        left = u[0] - h * rigid[0], u[1] - h * rigid[1]
+        power = sum_.power + 0.5 * (t[0] * left[0] + t[1] * left[1])
+        across = pose.b * width
+        area = length * across
+        slid = sum_.sliding * area / (jnp.pi * pose.a * pose.b)
+        added = *(f * area for f in sum_[:3]), power * across, slid
+        return Forces(*(s + f for s, f in zip(total, added, strict=True))), None
+
+    return jax.lax.scan(strip, Forces(*[none] * 5), tuple(map(jnp.asarray, (g.y, g.chord, g.width))))[0]
+
+
+@partial(program, static_argnums=(1, 2))
+def _marched(pose: Poses, elements: tuple[int, int], distribution: Distribution) -> tuple[Array, ...]:
+    """x, pressure, both tractions and both stretches, (ny, nx, n), from the leading edge on; lengths (ny, n)."""
+    g = grid(elements, distribution)
+    none = jnp.zeros_like(pose.a)
+
+    def strip(of: Any) -> tuple[Array, ...]:
+        step, length = _strip(pose, g, *of)
+
+        def element(u: Pair, one: Any) -> tuple[Pair, tuple[Array, ...]]:
+            u, t, _, (x, p, _) = step(u, one)
+            return u, (x, p, *t, *u)
+
+        return *jax.lax.scan(element, (none, none), _elements(g))[1], length
+
+    return jax.lax.map(strip, (jnp.asarray(g.y), jnp.asarray(g.chord)))
+
+
+def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
+    """Kalker's flexibilities (3, ...), nearer to a single one the larger the creepage is.
+
+    The rule of CONTACT, whose outputs the validation compares with: w = min(1, |creepage| / 3 of what would be held
+    without slip), and each L_i becomes (1 - w) L_i + w of their mean weighted by the creepages.
+
+    Args:
+        L: of xi, eta and phi, m3/N. creep: (3, ...) xi, eta, phi. held: mu F_N, N.
+    """
+    of_force = 8 * a**2 * b / 3  # c^2 G C_ii L_i
+    limit = held / of_force * np.hypot(L[0], L[1])
+    w = np.minimum(1.0, np.hypot(creep[0], creep[1]) / limit / 3)
+    square = np.stack([creep[0], creep[1], creep[2] * (3 * np.pi / 32) * a]) ** 2
+    total = square.sum(axis=0)
+    one = np.divide(total, (square / L).sum(axis=0), out=np.array(L[0]), where=total > 0)
+    return (1 - w) * L + w * one
+
+
+def poses(
+    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
+    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
+    distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
+) -> Poses:  # fmt: skip
+    """What `forces` takes, from what `creep_forces` takes."""
+    given = (np.atleast_1d(np.asarray(v, float)) for v in (xi, eta, phi, a, b, normal_force, friction))
+    xi, eta, phi, a, b, N, mu = np.broadcast_arrays(*given)
+    G, g = np.asarray(creep_coefficients(a / b, poisson, coefficients))[:3] * shear, grid(elements, distribution)
+    if spin == "book":
+        return Poses(xi, eta, phi, phi, a, b, N, mu, G[0], G[1])
+    turned = 2 * np.sqrt(b / a) * G[2] * g.sprung / g.spun  # stiffness against the spin, of the form of G[0] and G[1]
+    L = blended(8 * a / 3 / np.stack([G[0], G[1], turned]), np.stack([xi, eta, phi]), a, b, mu * N)
+    x, y, turned = 8 * a / 3 / L
+    return Poses(xi, eta, phi * turned / x, phi * turned / y, a, b, N, mu, x, y)
+
+
+def creep_forces(
+    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
+    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
+    distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
+) -> Forces:  # fmt: skip
+    """Forces on body 1 of any number of states of rolling, by the strip model of Sextro, 6.5.
+
+    Args:
+        xi, eta: creepages. phi: spin, 1/m. a, b: half axes along and across rolling, m. normal_force: N. friction:
+            coefficient. All are arrays that broadcast. shear, poisson: G (Pa) and nu of both bodies combined
+            (`ellipse.combined`). elements: along and across rolling. distribution: of stiffness and pressure over a
+            strip, (6.4-29) to (6.4-38) or (6.4-39) to (6.4-46). coefficients: Kalker's table, or the book's
+            polynomials. spin: "kalker" has a third flexibility of C23, and `blended` ones; "book" the springs of C11
+            and C22 alone.
+
+    Returns:
+        Arrays (n,), N and N m.
+    """
+    pose = poses(
+        xi, eta, phi, a, b, normal_force, friction, shear, poisson, elements=elements, distribution=distribution,
+        coefficients=coefficients, spin=spin,
+    )  # fmt: skip
+    n = len(pose.a)
+    filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]) for v in pose]
+    parts = [forces(Poses(*(v[i : i + BLOCK] for v in filled)), elements, distribution) for i in range(0, n, BLOCK)]
+    return Forces(*(np.concatenate([np.asarray(p[k]) for p in parts])[:n] for k in range(5)))
+
+
+def tractions(
+    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
+    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
+    distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
+) -> Tractions:  # fmt: skip
+    """Pressure, tractions and slip over the elements, of the states that `creep_forces` takes: arrays (n, ny, nx).
+
+    The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
+    creepages give (errata to (6.5-16)).
+    """
+    pose = poses(
+        xi, eta, phi, a, b, normal_force, friction, shear, poisson, elements=elements, distribution=distribution,
+        coefficients=coefficients, spin=spin,
+    )  # fmt: skip
+    g = grid(elements, distribution)
+    *found, length = (np.asarray(v) for v in _marched(pose, elements, distribution))
+    x, p, t_x, t_y, u_x, u_y = (np.moveaxis(v, -1, 0)[..., ::-1] for v in found)
+    length = length.T[..., None]
+    y = np.broadcast_to((pose.b[:, None] * g.y)[..., None], x.shape)
+    xi, eta, phi_x, phi_y = (v[:, None, None] for v in pose[:4])
+    rigid = xi - phi_x * y, eta + phi_y * x
+    slip = [r - _slope(u) / length for r, u in zip(rigid, (u_x, u_y), strict=True)]
+    area = np.broadcast_to(length * (pose.b[:, None] * g.width)[..., None], x.shape)
+    return Tractions(x, y, area, p, t_x, t_y, *slip)
+
+
+def _slope(u: np.ndarray) -> np.ndarray:
+    """Per element, x ascending; nothing is left of u at both edges, half an element away."""
+    ends = np.pad(u, [(0, 0)] * (u.ndim - 1) + [(1, 1)])
+    slope = 0.5 * (ends[..., 2:] - ends[..., :-2])
+    slope[..., 0], slope[..., -1] = 0.5 * (u[..., 0] + u[..., 1]), -0.5 * (u[..., -1] + u[..., -2])
+    return slope

@@ -1,0 +1,136 @@
+"""What a case of rolling contact asks: its patches, the creep curve of the one that carries most, its tractions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Array
+from .fastsim import fastsim
+from .settings import RollingCase
+from .strips import Forces, Tractions, creep_forces, tractions
+from .wheelset import Patch, Track, patches
+
+UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
+STEEPEST = 1.5
+"""Coefficient of friction above which a warning is due: nothing that rolls on rails is held so well."""
+
+
+@dataclass(frozen=True)
+class Studied:
+    """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
+    of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
+    shown: index of the state whose tractions these are."""
+
+    case: RollingCase
+    track: Track
+    patches: list[Patch]
+    creep: Array
+    forces: Forces | None
+    reference: tuple[Array, Array] | None
+    shown: int
+    tractions: Tractions | None
+
+    @property
+    def over(self) -> Array:
+        """(n,) what the curve runs over."""
+        return self.creep[list(UNITS).index(self.case.creep.over)]
+
+    @property
+    def held(self) -> float:
+        """mu F_N of the patch that carries most, N."""
+        return self.case.friction * self.patches[0].normal_force
+
+    def columns(self) -> dict[str, Array]:
+        """Of the table of the curve."""
+        f, m = self.forces, self.held
+        assert f is not None
+        return {
+            "longitudinal_creepage": self.creep[0], "lateral_creepage": self.creep[1], "spin_1_per_m": self.creep[2],
+            "F_x_N": f.x, "F_y_N": f.y, "M_z_Nm": f.moment, "F_x_over_mu_F_N": f.x / m, "F_y_over_mu_F_N": f.y / m,
+            "friction_power_W": f.power * self.patches[0].speed, "share_sliding": f.sliding,
+        }  # fmt: skip
+
+    def sentences(self) -> list[str]:
+        """What a reader came for."""
+        if not self.patches or self.forces is None:
+            return ["The wheel does not touch the rail: all forces are zero."]
+        p, told = self.patches[0], []
+        if len(self.patches) > 1:
+            told.append(f"The wheel touches the rail in {len(self.patches)} patches; the curve is of the most loaded.")
+        told.append(
+            f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "
+            f"most {p.pressure / 1e6:.4g} MPa."
+        )
+        most = np.hypot(self.forces.x, self.forces.y) / self.held
+        at = int(most.argmax())
+        told.append(f"The largest creep force is {most[at]:.4g} mu F_N, at a {self.case.creep.over} "
+                    f"{'creepage' if self.case.creep.over != 'spin' else 'value'} of {self.over[at]:.4g}.")  # fmt: skip
+        if self.reference is not None:
+            i, other = self.reference
+            off = np.abs(np.hypot(self.forces.x, self.forces.y)[i] / self.held - other).max()
+            told.append(
+                f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
+            )
+        return [*told, *self.warnings()]
+
+    def warnings(self) -> list[str]:
+        """What a person should doubt."""
+        told = []
+        if self.case.friction > STEEPEST:
+            told.append(f"warning: friction is {self.case.friction:g}; steel on steel has 0.05 to 0.6.")
+        for k, p in enumerate(self.patches):
+            if p.conformal:
+                told.append(
+                    f"warning: patch {k + 1}: wheel and rail conform: it is {2e3 * p.b:.3g} mm wide, too wide for its "
+                    "radii of curvature, so that neither body is a half-space and the numbers are a guess."
+                )
+        return told
+
+
+def study(case: RollingCase, folder: Path) -> Studied:
+    """Patches, curve and tractions of a case whose files stand in a folder.
+
+    Raises:
+        UserError: profiles that are none, or do not overlap.
+    """
+    track = case.track(folder)
+    found = patches(track, case.posed(), case.pose.side, case.vertical_force)
+    creep = _creep(case, found[0] if found else None)
+    if not found:
+        return Studied(case, track, found, creep, None, None, 0, None)
+    p, c, m = found[0], case.creep, case.model
+    of = p.a, p.b, p.normal_force, case.friction, track.elastic.shear, track.elastic.poisson
+    how = m.model_dump()
+    xi, eta, phi = creep
+    forces = creep_forces(xi, eta, phi, *of, **how)
+    over = creep[list(UNITS).index(c.over)]
+    shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
+    drawn = tractions(xi[shown], eta[shown], phi[shown], *of, **how)
+    reference = None
+    if case.friction:
+        at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
+        totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
+        reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
+    return Studied(case, track, found, creep, forces, reference, shown, Tractions(*(v[0] for v in drawn)))
+
+
+def _creep(case: RollingCase, p: Patch | None) -> Array:
+    c = case.creep
+    fixed = [c.longitudinal, c.lateral, c.spin]
+    of_pose = [p.xi, p.eta, p.phi] if p else [0.0] * 3
+    rows = [np.full(c.points, y if x is None else x) for x, y in zip(fixed, of_pose, strict=True)]
+    rows[list(UNITS).index(c.over)] = np.linspace(c.start, c.stop, c.points)
+    return np.array(rows)
+
+
+def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float]]]:
+    """Head and a row for each patch, as in patches.csv."""
+    head = ["x_m", "y_m", "z_m", "y_rail_m", "y_wheel_m", "angle_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
+            "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
+            "spin_1_per_m", "speed_m_per_s", "conformal"]  # fmt: skip
+    return head, [[float(v) for v in (*p[0], *p[1:])] for p in found]
+
+

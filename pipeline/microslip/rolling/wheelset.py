@@ -1,0 +1,239 @@
+"""Where a wheelset touches its rails: patches, their curvatures, and how they share the vertical force (Sextro, 6.2).
+
+Track axes: x forward, y to the right, z down, from the middle between the rails in the plane of their tops. Both sides
+are found as the right one: the left one's pose is mirrored first, and what it found is mirrored back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..data import Array, UserError
+from .ellipse import Elastic, ellipses
+from .profiles import Profile
+
+
+@dataclass(frozen=True)
+class Track:
+    """Wheels on an axle and the rails below them.
+
+    Attributes:
+        wheel, rail: profiles of the right side. radius: of the running circle (z = 0 of the wheel's profile), m.
+            wheel_at: of the wheel profile's origin from the middle of the axle, m. rail_at: of the rail profile's from
+            the middle of the track, m. elastic: both bodies.
+    """
+
+    wheel: Profile
+    rail: Profile
+    radius: float
+    wheel_at: float
+    rail_at: float
+    elastic: Elastic
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Of a wheelset. Attributes: lateral: to the right, m. yaw: about z, roll: about x, rad. speed: m/s, forward.
+    turning: of the axle, rad/s, positive forward; None: it rolls, at speed over the nominal radius."""
+
+    lateral: float = 0.0
+    yaw: float = 0.0
+    roll: float = 0.0
+    speed: float = 1.0
+    turning: float | None = None
+
+    def mirrored(self) -> Pose:
+        return replace(self, lateral=-self.lateral, yaw=-self.yaw, roll=-self.roll)
+
+
+class Patch(NamedTuple):
+    """One contact of one wheel; axes of `strips`: x forward, z up out of the rail, y to the left, the wheel is body 1.
+
+    Attributes:
+        place: x, y, z in track axes, m. on_rail, on_wheel: y of the profiles, m. angle: of the rail's surface to the
+            horizontal there, rad, positive where it falls to the right. A, B: half curvatures, 1/m. a, b, approach: m.
+            pressure: Pa. normal_force: N. xi, eta: creepages; phi: spin, 1/m. speed: of rolling, m/s. conformal:
+            whether the patch is too wide for a half-space.
+    """
+
+    place: Array
+    on_rail: float
+    on_wheel: float
+    angle: float
+    A: float
+    B: float
+    a: float
+    b: float
+    approach: float
+    pressure: float
+    normal_force: float
+    xi: float
+    eta: float
+    phi: float
+    speed: float
+    conformal: bool
+
+
+STEP = 2e-5
+"""m, between the points of a wheel at which it is looked for a contact; the summit is found between them."""
+
+
+def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]:
+    """Contacts of one wheel under a vertical force, the one with the largest normal force first; none if it is 0.
+
+    Args:
+        side: "left" or "right". vertical: N, on this wheel. Friction is left out of the balance.
+
+    Raises:
+        UserError: wheel and rail lie nowhere above each other.
+    """
+    left = side == "left"
+    seen = pose.mirrored() if left else pose
+    gap = _gap(track, seen)
+    if not vertical > 0:
+        return []
+    def missing(down: float) -> float:
+        return float(vertical ** (2 / 3) - sum(_lifted(p) for p in _pressed(track, gap, down)) ** (2 / 3))
+
+    deep = 1e-4
+    while missing(deep) > 0:
+        deep *= 4
+        if deep > 0.05:
+            raise UserError("vertical_force: presses the wheel 50 mm into the rail; give it in N")
+    down = brentq(missing, 0.0, deep, xtol=1e-12, rtol=1e-10) if missing(0.0) > 0 else 0.0
+    found = sorted(_pressed(track, gap, down), key=lambda p: -p.force)
+    return [_patch(track, seen, gap, p, left) for p in found]
+
+
+class Gap(NamedTuple):
+    """Above the rail, over the wheel's profile, (k,). Attributes: on_wheel: y of the profile; x, y, z: of the point of
+    its circle that comes nearest to the rail, m, the axle's middle as high as the nominal radius; gap: vertical, m;
+    radius: m; slope: of the gap along the surface; arc: from point to point, m."""
+
+    on_wheel: Array
+    x: Array
+    y: Array
+    z: Array
+    gap: Array
+    radius: Array
+    slope: Array
+    arc: Array
+
+
+def _gap(track: Track, pose: Pose) -> Gap:
+    """Of the right wheel: the normal of its surface has no component along the rail at the nearest point."""
+    y_w = np.arange(track.wheel.y[0], track.wheel.y[-1], STEP)
+    r, slope = track.radius + track.wheel.height(y_w), track.wheel.slope(y_w)
+    c, s, t = np.cos(pose.roll), np.sin(pose.roll), np.tan(pose.yaw)
+    turn = np.zeros_like(r)
+    for _ in range(20):  # of 0.1 rad at the most each
+        turn = np.arcsin(np.clip(-t * (slope * c + np.cos(turn) * s), -1, 1))
+    along, across, down = r * np.sin(turn), track.wheel_at + y_w, r * np.cos(turn)
+    across, down = across * c - down * s, across * s + down * c
+    x = along * np.cos(pose.yaw) - across * np.sin(pose.yaw)
+    y = pose.lateral + along * np.sin(pose.yaw) + across * np.cos(pose.yaw)
+    z = down - track.radius
+    gap = track.rail.height(y - track.rail_at) - z
+    if not np.isfinite(gap).any():
+        raise UserError(
+            f"wheel, rail: the profiles do not overlap: the wheel reaches from {y.min():.4g} to {y.max():.4g} m from "
+            f"the track's middle, the rail from {track.rail_at + track.rail.y[0]:.4g} to "
+            f"{track.rail_at + track.rail.y[-1]:.4g} m; correct the positions (at, pose.lateral)"
+        )
+    incline = np.arctan(np.gradient(z, y))
+    arc = np.gradient(y) / np.cos(incline)
+    return Gap(y_w, x, y, z, gap, r, np.gradient(gap) * np.cos(incline) / arc, arc)
+
+
+class Pressed(NamedTuple):
+    """A stretch of the wheel that the undeformed rail would reach into. Attributes: at: index of its middle, not whole.
+    angle: rad. A, B: 1/m, B not positive if the bodies conform. force: normal, N. a, b, approach: m. pressure: Pa."""
+
+    at: float
+    angle: float
+    A: float
+    B: float
+    force: float
+    a: float
+    b: float
+    approach: float
+    pressure: float
+
+
+def _pressed(track: Track, gap: Gap, down: float) -> list[Pressed]:
+    """Stretches of the wheel, lowered by ``down`` (m) from where it touches first."""
+    open_ = np.nan_to_num(gap.gap, nan=np.inf)
+    below = np.flatnonzero(open_ < open_.min() + down)
+    runs = np.split(below, np.flatnonzero(np.diff(below) > 1) + 1)
+    return [_stretch(track, gap, run, open_.min() + down) for run in runs if len(run)]
+
+
+def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
+    """Hertz' contact of a stretch: its curvature across is the mean over the patch (6.4-3), half the change of the
+    slope of the gap from one edge to the other. The middle of the patch is the centre of the squared penetration (over
+    x too, hence 2.5)."""
+    _, least = _summit(gap.gap, int(run[np.argmin(gap.gap[run])]))
+    weight = (level - gap.gap[run]) ** 2.5 * np.gradient(gap.y)[run]
+    at = float(np.sum(weight * run) / np.sum(weight))
+    y = float(np.interp(at, np.arange(len(gap.y)), gap.y))
+    angle = float(np.arctan(track.rail.slope(y - track.rail_at)))
+    cosine = np.cos(angle)
+    approach = (level - least) * cosine
+    A = cosine / (2 * float(np.interp(at, np.arange(len(gap.y)), gap.radius)))
+    B, b = 0.0, 1e-3
+    for _ in range(12):
+        B = _curvature(gap, at, b)
+        one = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
+        grown = float(approach / one.approach)
+        b = 0.5 * (b + float(one.b) * grown**0.5)
+    axes = float(one.a) * grown**0.5, float(one.b) * grown**0.5
+    return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(one.pressure) * grown**0.5)
+
+
+def _summit(gap: Array, i: int) -> tuple[float, float]:
+    """Index and value of the least gap, by the parabola through three points."""
+    if not 0 < i < len(gap) - 1 or not np.isfinite(gap[i - 1 : i + 2]).all():
+        return float(i), float(gap[i])
+    low, middle, high = gap[i - 1 : i + 2]
+    bend, lean = low - 2 * middle + high, 0.5 * (high - low)
+    shift = -lean / bend if bend > 0 else 0.0
+    return i + float(shift), float(middle + 0.5 * lean * shift)
+
+
+def _curvature(gap: Gap, at: float, half: float) -> float:
+    """Half the mean second derivative of the gap over +-half (m) about an index."""
+    steps = half / gap.arc[round(at)]
+    known = np.flatnonzero(np.isfinite(gap.slope))
+    ends = np.interp([at - steps, at + steps], known, gap.slope[known])
+    return float(ends[1] - ends[0]) / (4 * half)
+
+
+def _lifted(p: Pressed) -> float:
+    return p.force * np.cos(p.angle)
+
+
+def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool) -> Patch:
+    """With its creepages, in the axes of `Patch`; mirrored back if it is of the left wheel."""
+    index = np.arange(len(gap.y))
+    y_w, x, y = (float(np.interp(p.at, index, v)) for v in (gap.on_wheel, gap.x, gap.y))
+    z = float(track.rail.height(y - track.rail_at))
+    turning = pose.speed / track.radius if pose.turning is None else pose.turning
+    r = track.radius + float(track.wheel.height(y_w))
+    rim = turning * r * np.cos(pose.yaw)
+    V = 0.5 * (pose.speed + rim)
+    # the right wheel's, of the wheel relative to the rail: y to the left
+    xi, eta = (pose.speed - rim) / V, turning * r * np.sin(pose.yaw) * np.cos(p.angle) / V
+    phi = -turning * np.sin(p.angle - pose.roll) / V
+    sign = -1.0 if left else 1.0
+    place = np.array([x, sign * y, z])
+    conformal = p.B < CONFORMAL * p.A or p.b > track.radius * 0.1 or p.b * 2 * max(p.B, 0) > 0.3
+    return Patch(place, y - track.rail_at, y_w, sign * p.angle, p.A, p.B, p.a, p.b, p.approach, p.pressure, p.force,
+                 xi, sign * eta, sign * phi, V, bool(conformal))  # fmt: skip
+
+
+CONFORMAL = 0.01
+"""Of the half curvature along rolling: bodies that are closer to each other across do not touch in a point."""

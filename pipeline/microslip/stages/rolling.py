@@ -1,0 +1,73 @@
+"""Rolling contact of a case: patches and creep curve as tables, pictures and a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ..data import UserError
+from ..files import store
+from ..files.tables import columns_csv, rows_csv
+from ..report.rolling import rolling_html
+from ..rolling.settings import RollingCase, load_rolling
+from ..rolling.study import Studied, rows_of_patches, study
+from .stage import Made, Report, Stage
+
+
+def rolling_stage(
+    case_path: Path, root: Path = Path("build"), assignments: list[str] | None = None, force: bool = False,
+    report: Report = lambda _: None, pictures: bool = True,
+) -> tuple[list[Path], list[str]]:  # fmt: skip
+    """What a rolling case asks for, in ``root/NAME``.
+
+    Returns:
+        The files, the page first, and sentences.
+
+    Raises:
+        UserError: mistakes of the case or its profiles.
+    """
+    case, raw = load_rolling(case_path, assignments)
+    stage = Stage(root / case.name / "rolling.json", ("stages.rolling",), force, report)
+    files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
+    profiles = [store.hash_file(file) for file in files if file.is_file()]
+    inputs = {"case": raw, "profiles": profiles, "pictures": pictures}
+    stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
+    told = json.loads(stage.product.read_text())
+    return [stage.product.parent / name for name in told["files"]], told["sentences"]
+
+
+def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> Made:
+    folder = stage.product.parent
+    stage.report("patches and creep curve")
+    try:
+        found = study(case, case_path.parent)
+    except UserError as error:
+        raise UserError(f"{case_path}: {error}") from error
+    stage.begin()
+    made = _tables(found, folder)
+    drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
+    page = folder / "rolling.html"
+    store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, drawn))
+    made = [page, *made, *drawn]
+    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": found.sentences()}
+    store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
+    return Made(made)
+
+
+def _tables(found: Studied, folder: Path) -> list[Path]:
+    head, rows = rows_of_patches(found.patches)
+    store.write_text(folder / "patches.csv", rows_csv(head, ([f"{v:.8g}" for v in row] for row in rows)))
+    if found.forces is None:
+        return [folder / "patches.csv"]
+    store.write_text(folder / "creep.csv", columns_csv(found.columns(), 8))
+    return [folder / "creep.csv", folder / "patches.csv"]
+
+
+def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
+    from ..pictures.rolling import curve_picture, traction_picture
+
+    folder.mkdir(parents=True, exist_ok=True)
+    return [
+        curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
+        traction_picture(found, folder / "tractions.png", name),
+    ]
