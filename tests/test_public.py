@@ -220,6 +220,17 @@ def test_a_backbone_goes_from_stuck_to_free(tmp_path):
         np.testing.assert_array_equal(getattr(again, name), getattr(mode, name))
 
 
+@pytest.mark.slow
+def test_a_backbone_of_a_gauge_is_in_strains(tmp_path):
+    case = CASE | {"monitor": "root", "contacts": [RUB | {"interface": "right"}]}
+    of = ms.assemble(case, normal_force=20.0, vane=ms.sample())
+    mode = ms.backbone(of, 1e-9, 1.1e-9, harmonics=1)
+    again = ms.load(mode.save(tmp_path / "mode.h5"))
+    for one in (mode, again):
+        assert "amplitude_strain" in one.columns() and " m/m," in repr(one)
+        assert one.plot().get_xlabel() == "amplitude in m/m" and one.to_xarray()["amplitude"].attrs["units"] == "1"
+
+
 # bodies ---------------------------------------------------------------------------------------------------------------
 
 RUB = {"normal_stiffness": 2e5, "tangential_stiffness": 4e5, "includes": "surface", "friction": 0.2, "points": [3, 2]}

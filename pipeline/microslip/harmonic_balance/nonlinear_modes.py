@@ -30,8 +30,9 @@ from ..results.files import FORMAT, Response, write_response
 from ..results.series import Series
 from ..system import assembly
 from ..system.assembly import Linear
+from ..units import METRES, Quantity
 from .problem import AtFrequency, Problem
-from .readout import amplitude
+from .readout import amplitude, measured
 from .response import operating
 from .solver import CONVERGED, Report
 from .solver import Point as Solved
@@ -54,9 +55,11 @@ class Backbone:
     """A nonlinear mode.
 
     Attributes:
-        amplitude: (k,) of the read-out's first harmonic, m. Omega: (k,) rad/s. damping: (k,) ratio.
+        amplitude: (k,) of the read-out's first harmonic, in the unit of `quantity`. Omega: (k,) rad/s.
+            damping: (k,) ratio.
         x: (k, size), see `Problem`. stuck: rad/s, with sticking contacts. status: why it ended. checks: of its points
-            (`results.checks`), the force that feeds the losses among the bodies' own.
+            (`results.checks`), the force that feeds the losses among the bodies' own. quantity: what the read-out
+            measures.
     """
 
     amplitude: Array
@@ -66,6 +69,7 @@ class Backbone:
     stuck: float
     status: str
     checks: tuple[Checks, ...]
+    quantity: Quantity = METRES
 
     @property
     def frequency(self) -> Array:
@@ -74,7 +78,8 @@ class Backbone:
 
     def columns(self) -> dict[str, Array]:
         """Heading -> (k,) numbers."""
-        return {"amplitude_m": self.amplitude, "frequency_Hz": self.frequency, "damping_ratio": self.damping}
+        column = self.quantity.column("amplitude")
+        return {column: self.amplitude, "frequency_Hz": self.frequency, "damping_ratio": self.damping}
 
     def to_dataframe(self) -> Any:
         """The table of `columns` as a `pandas.DataFrame`."""
@@ -88,7 +93,8 @@ class Backbone:
 
         table = {"frequency": (self.frequency, "Hz"), "damping_ratio": (self.damping, "1")}
         variables = {name: ("amplitude", values, {"units": unit}) for name, (values, unit) in table.items()}
-        return xarray.Dataset(variables, coords={"amplitude": ("amplitude", self.amplitude, {"units": "m"})})
+        amplitude = ("amplitude", self.amplitude, {"units": self.quantity.unit})
+        return xarray.Dataset(variables, coords={"amplitude": amplitude})
 
     def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
         """Draw the frequency over the amplitude. Returns the axes, new ones if none are given."""
@@ -97,7 +103,7 @@ class Backbone:
 
             axes = plt.subplots(layout="constrained")[1]
         axes.semilogx(self.amplitude, self.frequency, **line)
-        axes.set_xlabel("amplitude in m")
+        axes.set_xlabel(f"amplitude in {self.quantity.said}")
         axes.set_ylabel("frequency in Hz")
         return axes
 
@@ -105,8 +111,8 @@ class Backbone:
         if not len(self.amplitude):
             return f"<Backbone: no points; {self.status}>"
         f, a, d = (f"{v[0]:.5g} to {v[-1]:.5g}" for v in (self.frequency, self.amplitude, self.damping))
-        most = f"at most {self.damping.max():.3g}"
-        return f"<Backbone: {len(self.Omega)} points, {a} m, {f} Hz, damping ratio {d}, {most}; {self.status}>"
+        damped = f"damping ratio {d}, at most {self.damping.max():.3g}"
+        return f"<Backbone: {len(self.Omega)} points, {a} {self.quantity.said}, {f} Hz, {damped}; {self.status}>"
 
     def save(self, path: Path | str) -> Path:
         """Write a response file (``docs/response_file.md``), complete or absent; `load` reads it.
@@ -119,7 +125,8 @@ class Backbone:
         known |= {f"checks/{n.name}": np.array([getattr(c, n.name) for c in self.checks]) for n in fields(Checks)}
         status = tuple(c.failure or CONVERGED for c in self.checks)
         series = Series("nonlinear mode", {"stuck": self.stuck}, self.amplitude, status, known, over=OVER_AMPLITUDE)
-        write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status))
+        labels = {"parameter": (self.quantity.unit,)}
+        write_response(path, Response("nonlinear mode", "aft", (series,), description=self.status, labels=labels))
         return Path(path)
 
     @classmethod
@@ -129,8 +136,9 @@ class Backbone:
         rows = zip(*(s.arrays[f"checks/{n.name}"].tolist() for n in fields(Checks)), strict=True)
         Omega, damping, x = 2 * np.pi * s.frequency, s.arrays["damping_ratio"], s.arrays["x"]
         return cls(
-            s.parameter, Omega, damping, x, s.parameters["stuck"], response.description, tuple(Checks(*r) for r in rows)
-        )
+            s.parameter, Omega, damping, x, s.parameters["stuck"], response.description,
+            tuple(Checks(*r) for r in rows), Quantity(response.labels.get("parameter", ("m",))[0]),
+        )  # fmt: skip
 
     @property
     def complete(self) -> bool:
@@ -139,7 +147,7 @@ class Backbone:
 
 
 def _in_words(status: str, points: Sequence[Point], low: float, high: float) -> str:
-    """Why a curve between two amplitudes (m) ended, without the logarithm that it runs over."""
+    """Why a curve between two amplitudes ended, without the logarithm that it runs over."""
     if not status.startswith("bound"):
         return status
     back = f"it came back to {low:.4g} m without reaching {high:.4g} m; take another low"
@@ -192,7 +200,8 @@ def backbone(
     x = np.array([p.x[:-2] * a / problem.length for p, a in zip(points, A, strict=True)]).reshape(len(A), len(z) - 2)
     found = tuple(curve.checks(*one) for one in zip(x, Omega, xi, strict=True))
     status = next((one.failure for one in found if one.failure), _in_words(state.status, points, low, high))
-    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found)
+    quantity = measured(problem.assembly, output)
+    return Backbone(A, Omega, xi / (2 * Omega) if len(A) else xi, x, omega, status, found, quantity)
 
 
 def strongest(problem: Problem, low: float, high: float, output: int = 0) -> int:
