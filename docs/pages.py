@@ -603,6 +603,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "stability.cycle.across.start": ("", "of it"),
     "stability.cycle.across.stop": ("", "above it"),
     "stability.cycle.across.points": ("", "values of it, evenly spaced"),
+    "stability.cycle.across.harmonics": ("", "of the balance along these branches"),
     "bifurcation.name": ("", "of the diagram's files"),
     "bifurcation.parameter": ("", "what its axis says"),
     "bifurcation.unit": ("", "of the parameter, on the axis"),

@@ -33,6 +33,12 @@ def velocity() -> Diagram:
     return diagram(belt(2.3, 5.0, "v_0", B=20.0), np.zeros(4), asked)
 
 
+@cache
+def damping() -> Diagram:
+    """Load and velocity are chosen, 8 m and 1 m/s, as in pipeline/cases/belt.toml."""
+    return diagram(belt(0.06, 1.0, "D", B=8.0), np.zeros(4), Asked(1.0, 0.06, doublings=1))
+
+
 def test_hopf_point_h2() -> None:
     """Printed: 7.09 m."""
     assert load().hopf[1].p == pytest.approx(7.09, rel=2e-3)
@@ -121,9 +127,9 @@ def away(orbit: np.ndarray, x: np.ndarray) -> float:
 
 
 def test_stability_of_every_branch_is_what_motions_do() -> None:
-    """Three points of each, both over the load and over the velocity: beside a stable orbit or equilibrium a motion
+    """Three points of each, over the load, the velocity and the damping: beside a stable orbit or equilibrium a motion
     comes nearer, beside an unstable one, along the most unstable direction, it goes away."""
-    for found in (load(), velocity()):
+    for found in (load(), velocity(), damping()):
         for branch in found.branches:
             for i in chosen(branch):
                 p, x = float(branch.parameter[i]), branch.x[i]

@@ -4,8 +4,9 @@ A static step presses the pin and turns the disc until every point of the contac
 then takes K with the part of friction that is not symmetric, mu k_n t n^T at each integration point, and prints complex
 frequencies. Matched: both bodies (C3D10), normal springs, friction that follows the normal force, its direction at each
 point. Made small, as the two differ there: CalculiX holds a slipping point across its way by the stick slope, here
-1e-5 of the normal stiffness; microslip damps it by mu N / |V|, here 7e-5 N over 1e4 m/s. CalculiX finds the opposite
-points anew where the disc has been turned to, microslip before it turns: the difference grows with that way.
+1e-5 of the normal stiffness; microslip damps it by mu N / |V|, here 7e-6 N over 1e4 m/s. CalculiX finds the opposite
+points anew where the disc has been turned to, microslip before it turns: the difference grows with that way, which is
+as short as all points need to slip (a fifth of it, and they stick): so they are pressed little.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ ANGLE = 2 * np.pi / CELLS  # that the pin takes
 BORE, INNER, OUTER, THICK = 0.04, 0.07, 0.10, 0.008  # m, the pin from the second radius to the third
 HIGH, LEAN = 0.1, 0.3  # m of the pin, and by how much its back stands ahead over that
 STIFF = 3e10  # N/m3, normal; 0.3 to 0.7 of what the pin is pressed by is overlap, so no point opens
-PRESSED = 3e-12  # m, so little that stresses and ways do not count
+PRESSED = 3e-13  # m, so little that stresses and ways do not count
+TURNED = 1e-6  # rad, of the disc
 HELD = (("disc", "x0"), ("pin", "z1"))
 WINDOW = Window((-1e4, 1e4), (0.0, 2 * np.pi * 7300.0))
 COUNT = 12  # roots in it
@@ -143,22 +145,21 @@ def apart(theirs: np.ndarray, s: np.ndarray) -> float:
 
 
 def test_frequencies_of_the_pair_without_friction(meshes, bases, tmp_path):
-    """Normal springs alone: 3e-6."""
-    theirs, found = by_calculix(meshes, tmp_path, 0.0, 1e-5), ours(bases, 0.0)
+    """Normal springs alone: 6e-7."""
+    theirs, found = by_calculix(meshes, tmp_path, 0.0, TURNED), ours(bases, 0.0)
     assert found.complete and len(found.roots) == COUNT and "unstable" not in found.verdict
-    assert apart(theirs, found.roots.s) < 1e-5
+    assert apart(theirs, found.roots.s) < 1e-6
 
 
 def test_complex_frequencies_with_friction(meshes, bases, tmp_path):
-    """All roots to 6e-6 of their size, the growth rate of the one that grows, 182 1/s at 3913 Hz, to 6e-4; both
-    differences are as large as the way that the disc is turned by, and twice at twice the way."""
+    """All roots to 4e-6 of their size, the growth rate of the one that grows, 182 1/s at 3913 Hz, to 4e-5; this falls
+    with the way that the disc is turned by."""
     found = ours(bases, 0.4)
     assert found.complete and len(found.roots) == COUNT and found.verdict.count("unstable") == 1
     grows = found.growth.max()
     assert grows == pytest.approx(182.4, abs=0.1)
-    assert apart(by_calculix(meshes, tmp_path, 0.0, 1e-5), found.roots.s) > 1e-3
-    one, two = (by_calculix(meshes, tmp_path, 0.4, turned) for turned in (1e-5, 2e-5))
+    assert apart(by_calculix(meshes, tmp_path, 0.0, TURNED), found.roots.s) > 1e-3
+    one, far = (by_calculix(meshes, tmp_path, 0.4, turned) for turned in (TURNED, 10 * TURNED))
     assert apart(one, found.roots.s) < 1e-5
-    assert apart(one, found.roots.s) < 0.6 * apart(two, found.roots.s)
-    assert np.abs(one.imag).max() == pytest.approx(grows, rel=1e-3)
-    assert abs(2 * one.imag.max() - two.imag.max() - grows) < 1e-4 * grows
+    assert np.abs(one.imag).max() == pytest.approx(grows, rel=1e-4)
+    assert np.abs(far.imag).max() - grows > 5 * abs(np.abs(one.imag).max() - grows)

@@ -146,8 +146,11 @@ class Balance:
         found[:, range(n), :, range(n)] += omega * D
         mean = J.mean(axis=0)
         found[range(k), :, range(k), :] -= mean
-        for i, j in zip(*np.nonzero(np.ptp(J, axis=0) > 1e-13 * np.abs(J).max()), strict=True):
-            found[:, i, :, j] -= (P * (J - mean)[:, i, j, None]).T @ E
+        changes = np.ptp(J, axis=0) > 1e-13 * np.abs(J).max()
+        for i in np.flatnonzero(changes.any(axis=1)):
+            j = np.flatnonzero(changes[i])
+            parts = P.T[:, :, None] * (J[:, i, j] - mean[i, j])
+            found[:, i][:, :, j] -= np.tensordot(parts, E, (1, 0)).swapaxes(1, 2)
         size = len(x)
         R, A, over = np.zeros(size), np.zeros((size, size)), np.zeros(size)
         R[: k * n], A[: k * n, : k * n] = (omega * moving - P.T @ f).ravel(), found.reshape(k * n, k * n)

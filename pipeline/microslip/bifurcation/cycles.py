@@ -96,7 +96,7 @@ class Cycles:
             "in_time_leaves_by": self._told(lambda c: c.drift),
             "harmonics": self._told(lambda c: c.orbit.count),
             "estimated_error": self._told(lambda c: c.error),
-            "largest_multiplier": self._told(lambda c: np.abs(c.multipliers).max()),
+            "largest_multiplier": self._told(lambda c: np.abs(c.multipliers).max() if len(c.multipliers) else np.nan),
         }
 
     def _told(self, of: Callable[[Checked], Any], *shape: int) -> Array:
@@ -206,8 +206,12 @@ def multipliers(system: Dynamics, orbit: Harmonics) -> ComplexArray:
     return floquet.multipliers(Orbit(system, orbit.at(np.arange(nodes) / nodes), period, orbit.p))
 
 
-def checked(system: Dynamics, orbit: Harmonics, accuracy: float, report: Report = lambda _: None) -> Checked:
-    """An orbit refined to an accuracy, and what time says of it."""
+def checked(
+    system: Dynamics, orbit: Harmonics, accuracy: float | None, report: Report = lambda _: None
+) -> Checked:  # fmt: skip
+    """An orbit refined to an accuracy, and what time says of it; without one, as it is and by a motion alone."""
+    if accuracy is None:
+        return Checked(orbit, np.nan, *in_time(system, orbit), np.zeros(0, dtype=complex))
     fine, error = refined(system, orbit, accuracy, report=report)
     return Checked(fine, error, *in_time(system, fine), multipliers(system, fine))
 

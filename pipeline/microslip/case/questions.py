@@ -306,6 +306,13 @@ class Over(Model):
         return self
 
 
+class Across(Over):
+    """A second parameter, at whose values limit cycles are followed as well, with so many harmonics."""
+
+    points: Annotated[int, Field(ge=2, le=1000)] = 5
+    harmonics: Annotated[int, Field(ge=1, le=200)] = 5
+
+
 class Cycle(Over):
     """A parameter over which the limit cycles born at Hopf points are followed, with so many harmonics.
 
@@ -315,7 +322,7 @@ class Cycle(Over):
 
     harmonics: Annotated[int, Field(ge=1, le=200)] = 7
     accuracy: Annotated[Positive, Field(le=0.1)] = 1e-4
-    across: Over | None = None
+    across: Across | None = None
 
 
 class StabilityOfCase(Model):

@@ -48,13 +48,15 @@ def born(varied: Varied, asked: Cycle, band: tuple[float, float], journal: Journ
         UserError: no equilibrium to begin with; equations that do not change smoothly.
     """
     work = _Work(varied, asked, band, journal, report)
-    own = [work.judged(c, f"{i}", (1, 2, 3), asked.accuracy) for i, c in enumerate(work.followed(-1, {}))]
+    first = work.followed(-1, {}, asked.harmonics)
+    own = [work.judged(c, f"{i}", (1, 2, 3), asked.accuracy) for i, c in enumerate(first)]
     over, relief = asked.across, list[tuple[float, Cycles]]()
     for number, value in enumerate(np.linspace(over.start, over.stop, over.points).tolist() if over else []):
         assert over is not None
         report(f"{over.parameter} {value:.4g}, {number + 1} of {over.points}")
-        found = work.followed(number, {key: factor * value for key, factor in over.keys.items()})
-        relief += [(value, work.judged(c, f"{number}.{i}", (2, 3), np.inf)) for i, c in enumerate(found)]
+        fixed = {key: factor * value for key, factor in over.keys.items()}
+        found = work.followed(number, fixed, over.harmonics)
+        relief += [(value, work.judged(c, f"{number}.{i}", (1, 2, 3), None)) for i, c in enumerate(found)]
     return Born(own, relief)
 
 
@@ -66,7 +68,7 @@ class _Work:
     journal: Journal
     report: Report
 
-    def followed(self, number: int, fixed: Mapping[str, float]) -> list[Cycles]:
+    def followed(self, number: int, fixed: Mapping[str, float], harmonics: int) -> list[Cycles]:
         """The limit cycles with other values of keys; from the journal, if they are there."""
         asked, where = self.asked, "stability.cycle.keys" if number < 0 else "stability.cycle.across.keys"
 
@@ -80,9 +82,7 @@ class _Work:
             return [_unpacked(known, f"{i}/", system) for i in range(int(known["count"]))]
         begin = sliding.equilibrium(sliding.of(make(asked.start)))
         try:
-            found = cycles(
-                system, begin, asked.start, asked.stop, asked.harmonics, self.band, asked.points, self.report
-            )
+            found = cycles(system, begin, asked.start, asked.stop, harmonics, self.band, asked.points, self.report)
         except UserError as error:
             raise UserError(f"{self.varied.path}: stability.cycle: {asked.parameter}: {error}") from error
         point: dict[str, Any] = {"count": len(found)}
@@ -91,8 +91,8 @@ class _Work:
         self.journal.keep(KEPT, number, point)
         return found
 
-    def judged(self, c: Cycles, name: str, thirds: Sequence[int], accuracy: float) -> Cycles:
-        """The cycles with orbits at so many thirds of the branch checked; with an infinite accuracy as they are."""
+    def judged(self, c: Cycles, name: str, thirds: Sequence[int], accuracy: float | None) -> Cycles:
+        """The cycles with orbits at so many thirds of the branch checked, see `bifurcation.cycles.checked`."""
         series = f"orbits checked {name}"
         for number in dict.fromkeys((len(c.orbits) - 1) * k // 3 for k in thirds):
             known = self.journal.of(series).get(number)
@@ -144,7 +144,7 @@ def sentences_of(c: Cycles, over: Cycle) -> list[str]:
 
 
 def sentence_of_relief(found: Born, over: Cycle) -> list[str]:
-    """How many limit cycles of which kind there are over the second parameter, and what time says of them."""
+    """How many limit cycles of which kind there are over the second parameter, and how motions in time keep to them."""
     if over.across is None:
         return []
     unit = f" {over.across.unit}" if over.across.unit else ""
@@ -155,6 +155,6 @@ def sentence_of_relief(found: Born, over: Cycle) -> list[str]:
     worst = max((one.drift for one in every), default=np.nan)
     return [
         f"limit cycles at {over.across.points} values of {range_}: {counts}; motions in time leave {len(every)} of "
-        f"their orbits, by {over.harmonics} harmonics, by {worst:.1e} of the amplitude at most in {PERIODS} periods; "
-        f"{sum(one.stable for one in every)} of these are stable"
+        f"their orbits, by {over.across.harmonics} harmonics, by {worst:.1e} of the amplitude at most in {PERIODS} "
+        "periods"
     ]
