@@ -68,21 +68,20 @@ def beside(asked: Asked) -> Beside:
     whole = asked.tuned.whole
     part, found = whole.joined(1), list[tuple[ComplexArray, ...]]()
     modes, P, problem = *_columns(asked.tuned, scatter, len(part.M)), asked.problem(whole)
-    points = [] if asked.stuck else asked.tuned_points
-    for at, k in [(problem.at(p.Omega), _answer(problem.at(p.Omega), p.x)) for p in points] or [
-        (problem.at(2 * np.pi * f), whole.stiffness) for f in asked.frequency
-    ]:
+    hertz = asked.frequency if asked.stuck else np.array([p.Omega for p in asked.tuned_points]) / (2 * np.pi)
+    for i, f in enumerate(hertz):
+        at = problem.at(2 * np.pi * f)
+        k = whole.stiffness if asked.stuck else answer(at, at.forces(asked.tuned_points[i].x)[1])
         one, w = held(part, k), at.Omega
         X = np.linalg.solve(one.stiff - w**2 * one.M + 1j * w * one.C, np.column_stack([one.load, P]))
-        by = {(i, m): _rise(at, asked.tuned, asked.scatter[i], m) for i, sector, m in modes if not sector}
-        rise = np.array([by[i, mode] for i, _, mode in modes])
+        by = {(j, m): _rise(at, asked.tuned, asked.scatter[j], m) for j, sector, m in modes if not sector}
+        rise = np.array([by[j, mode] for j, _, mode in modes])
         q, Z = X[:, 0], X[:, 1:]
         found.append((rise, P.T @ Z, one.output @ Z, P.T @ q, one.output @ q + one.output_given))
     rise, G, Y, eta, y = (np.array(one) for one in zip(*found, strict=True))
     size = np.abs(Y * (rise * eta)[:, None]).max(axis=(0, 1))
     strong = {(i, mode) for (i, _, mode), a in zip(modes, size, strict=True) if a > LEAST * size.max()}
     kept = [n for n, (i, _, mode) in enumerate(modes) if (i, mode) in strong]
-    hertz = np.array([p.Omega for p in points]) / (2 * np.pi) if points else asked.frequency
     return Beside(
         hertz, tuple(modes[n] for n in kept), rise[:, kept], G[:, kept][:, :, kept], Y[:, :, kept], eta[:, kept], y
     )
@@ -124,11 +123,10 @@ def _rise(at: AtFrequency, tuned: Tuned, s: Scatter, mode: int) -> complex:
     return complex(V[:, mode] @ softening(at, body, s, mode, 1) @ V[:, mode])
 
 
-def _answer(at: AtFrequency, x: Array) -> ComplexArray:
-    """(relative, relative) k of all contacts of the tuned ring in its motion."""
-    p, slopes = at.problem, at.forces(x)[1]
+def answer(at: AtFrequency, slopes: list[Array]) -> ComplexArray:
+    """(relative, relative) k of all contacts, from the derivatives of their forces."""
     found = {}
-    for g, S in zip(p.groups, slopes, strict=True):
+    for g, S in zip(at.problem.groups, slopes, strict=True):
         for i, one in zip(g.contacts, S, strict=True):
             cc, ss, cs, sc = one[:, 1, :, 1], one[:, 2, :, 2], one[:, 1, :, 2], one[:, 2, :, 1]
             found[i] = 0.5 * (cc + ss + 1j * (cs - sc))

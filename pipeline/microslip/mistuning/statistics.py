@@ -43,10 +43,9 @@ def quantile(values: Array, share: float, confidence: float = CONFIDENCE) -> Qua
     x = np.sort(np.asarray(values, dtype=float))
     if not len(x):
         return Quantile(share, np.nan, 0.0, np.inf)
-    test = scipy.stats.quantile_test(x, q=x[0], p=share)
-    low, high = test.confidence_interval(confidence)
-    value = float(np.quantile(x, share))
-    return Quantile(share, value, 0.0 if np.isnan(low) else float(low), np.inf if np.isnan(high) else float(high))
+    low, high = (int(scipy.stats.binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
+    ends = (float(x[low - 1]) if low else 0.0, float(x[high]) if high < len(x) else np.inf)
+    return Quantile(share, float(np.quantile(x, share)), *ends)
 
 
 LOW, HIGH, WIDTH = -14.0, 4.0, 0.01
