@@ -28,6 +28,12 @@ PUBLIC = {
     "mistuning.identification": "blades_from_modes",
     "mistuning.gauges": "blades_from_gauges",
     "mistuning.weibull": "amplitude_spread",
+    "rolling.profiles": "read_profile circle",
+    "rolling.ellipse": "ellipses",
+    "rolling.kalker": "creep_coefficients",
+    "rolling.strips": "creep_forces tractions",
+    "rolling.fastsim": "fastsim",
+    "rolling.wheelset": "Track Pose patches",
 }
 """Module -> the names of it that are public."""
 

@@ -452,11 +452,11 @@ def opposed(
     x, y = trial[0] ** 2, trial[1] ** 2
     square = x + y
     slides = square > held**2
-    m = (jnp.sqrt(square + _TINY) / held - 1) * square / (a * x + b * y + _TINY)
+    m = (jnp.sqrt(square + _TINY) - held) * square / (held * (a * x + b * y) + _TINY)
     p, q = 1 + m * a, 1 + m * b
-    x, y = x * q**2, y * p**2  # of what is left, times (p q)^2
-    square, both = x + y, p * q
-    m = m + square / (a * x / p + b * y / q + _TINY) * (jnp.sqrt(square + _TINY) / (both * held) - 1)
+    x, y, both = x * q**2, y * p**2, p * q  # squares of what is left, times (p q)^2
+    square = x + y
+    m = m + (jnp.sqrt(square + _TINY) - both * held) * square / (held * (a * x * q + b * y * p) + _TINY)
     m = jnp.where(slides, m, 0.0)
     p, q = 1 + m * a, 1 + m * b
     inverse = 1 / (p * q)

@@ -36,7 +36,7 @@ def fastsim(
     """
     L = flexibilities(a, b, shear, poisson)
     if blend:
-        L = blended(L, np.array([xi, eta, phi]), np.array(a), np.array(b), np.array(friction * normal_force))
+        L = np.asarray(blended(L, np.array([xi, eta, phi]), a, b, friction * normal_force))
     x, y = (cover * half * ((2 * np.arange(n) + 1) / n - 1) for half, n in zip((a, b), elements, strict=True))
     h, across = (2 * cover * half / n for half, n in zip((a, b), elements, strict=True))
     inside = np.maximum(1 - (x / a) ** 2 - (y[:, None] / b) ** 2, 0.0)

@@ -7,8 +7,10 @@ Eq. (6.4-25) with the minus of the errata).
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +58,7 @@ LEAST = 0.1
 """g below which Kalker's asymptotes are used."""
 
 
+@partial(jax.jit, static_argnames="source")
 def creep_coefficients(ratio: ArrayLike, poisson: ArrayLike, source: Coefficients = "table") -> Array:
     """(4, ...) C11, C22, C23, C33.
 

@@ -6,13 +6,14 @@ y runs to the field side, z down; m. A wheel's material lies above its profile, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, UnivariateSpline
+from scipy.optimize import minimize_scalar
 
 from ..data import Array, UserError
 from ..files import store
@@ -59,8 +60,10 @@ class Profile:
             return self
         c, s = np.cos(angle), np.sin(angle)
         y, z = c * self.y + s * self.z, c * self.z - s * self.y
-        top = np.argmin(z)
-        return _checked(y - y[top], z - z[top], self.name, self.noise)
+        turned = _checked(y, z, self.name, self.noise)
+        at = np.clip(np.argmin(z), 1, len(z) - 2)
+        top = minimize_scalar(turned.height, bounds=sorted((y[at - 1], y[at + 1])), method="bounded").x
+        return replace(turned, y=turned.y - top, z=turned.z - turned.height(top))
 
 
 def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:

@@ -159,7 +159,6 @@ def _elements(g: Grid) -> tuple[Array, ...]:
     return tuple(map(jnp.asarray, (g.x, g.way, g.pressure, g.stiffness)))
 
 
-@partial(program, static_argnums=(1, 2))
 def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant") -> Forces:
     """Forces of poses whose arrays are all (n,): pure, for `jax.jit`, `vmap` and `grad`; see `creep_forces`."""
     g = grid(elements, distribution)
@@ -219,62 +218,69 @@ def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
         L: of xi, eta and phi, m3/N. creep: (3, ...) xi, eta, phi. held: mu F_N, N.
     """
     of_force = 8 * a**2 * b / 3  # c^2 G C_ii L_i
-    limit = held / of_force * np.hypot(L[0], L[1])
-    w = np.minimum(1.0, np.hypot(creep[0], creep[1]) / limit / 3)
-    square = np.stack([creep[0], creep[1], creep[2] * (3 * np.pi / 32) * a]) ** 2
-    total = square.sum(axis=0)
-    one = np.divide(total, (square / L).sum(axis=0), out=np.array(L[0]), where=total > 0)
+    limit = jnp.maximum(held, TINY) / of_force * jnp.sqrt(L[0] ** 2 + L[1] ** 2)
+    w = jnp.minimum(1.0, jnp.sqrt(creep[0] ** 2 + creep[1] ** 2 + TINY) / limit / 3)
+    square = jnp.stack([creep[0], creep[1], creep[2] * (3 * jnp.pi / 32) * a]) ** 2
+    one = (jnp.sum(square, axis=0) + TINY) / (jnp.sum(square / L, axis=0) + TINY / L[0])
     return (1 - w) * L + w * one
 
 
+TINY = 1e-300
+
+
 def poses(
-    xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
-    distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
+    xi: Array, eta: Array, phi: Array, a: Array, b: Array, normal_force: Array, friction: Array, shear: Array,
+    poisson: Array, *, elements: tuple[int, int] = (20, 20), distribution: Distribution = "constant",
+    coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Poses:  # fmt: skip
-    """What `forces` takes, from what `creep_forces` takes."""
-    given = (np.atleast_1d(np.asarray(v, float)) for v in (xi, eta, phi, a, b, normal_force, friction))
-    xi, eta, phi, a, b, N, mu = np.broadcast_arrays(*given)
-    G, g = np.asarray(creep_coefficients(a / b, poisson, coefficients))[:3] * shear, grid(elements, distribution)
+    """What `forces` takes, from what `creep_forces` takes, arrays (n,): as pure."""
+    G, g = creep_coefficients(a / b, poisson, coefficients)[:3] * shear, grid(elements, distribution)
     if spin == "book":
-        return Poses(xi, eta, phi, phi, a, b, N, mu, G[0], G[1])
-    turned = 2 * np.sqrt(b / a) * G[2] * g.sprung / g.spun  # stiffness against the spin, of the form of G[0] and G[1]
-    L = blended(8 * a / 3 / np.stack([G[0], G[1], turned]), np.stack([xi, eta, phi]), a, b, mu * N)
+        return Poses(xi, eta, phi, phi, a, b, normal_force, friction, G[0], G[1])
+    turned = 2 * jnp.sqrt(b / a) * G[2] * g.sprung / g.spun  # stiffness against the spin, of the form of G[0] and G[1]
+    L = blended(8 * a / 3 / jnp.stack([G[0], G[1], turned]), jnp.stack([xi, eta, phi]), a, b, friction * normal_force)
     x, y, turned = 8 * a / 3 / L
-    return Poses(xi, eta, phi * turned / x, phi * turned / y, a, b, N, mu, x, y)
+    return Poses(xi, eta, phi * turned / x, phi * turned / y, a, b, normal_force, friction, x, y)
+
+
+@partial(program, static_argnames=("elements", "distribution", "coefficients", "spin"))
+def _rolled(*given: Array, elements: tuple[int, int], distribution: Distribution, **how: Any) -> Forces:
+    pose = poses(*given, elements=elements, distribution=distribution, **how)
+    return forces(pose, elements, distribution)
 
 
 def creep_forces(
     xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
+    friction: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *, elements: tuple[int, int] = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Forces:  # fmt: skip
     """Forces on body 1 of any number of states of rolling, by the strip model of Sextro, 6.5.
 
     Args:
         xi, eta: creepages. phi: spin, 1/m. a, b: half axes along and across rolling, m. normal_force: N. friction:
-            coefficient. All are arrays that broadcast. shear, poisson: G (Pa) and nu of both bodies combined
-            (`ellipse.combined`). elements: along and across rolling. distribution: of stiffness and pressure over a
-            strip, (6.4-29) to (6.4-38) or (6.4-39) to (6.4-46). coefficients: Kalker's table, or the book's
-            polynomials. spin: "kalker" has a third flexibility of C23, and `blended` ones; "book" the springs of C11
-            and C22 alone.
+            coefficient. shear, poisson: G (Pa) and nu of both bodies combined (`ellipse.combined`). All are arrays that
+            broadcast. elements: along and across rolling. distribution: of stiffness and pressure over a strip,
+            (6.4-29) to (6.4-38) or (6.4-39) to (6.4-46). coefficients: Kalker's table, or the book's polynomials.
+            spin: "kalker" has a third flexibility of C23, and `blended` ones; "book" the springs of C11 and C22 alone.
 
     Returns:
         Arrays (n,), N and N m.
     """
-    pose = poses(
-        xi, eta, phi, a, b, normal_force, friction, shear, poisson, elements=elements, distribution=distribution,
-        coefficients=coefficients, spin=spin,
-    )  # fmt: skip
-    n = len(pose.a)
-    filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]) for v in pose]
-    parts = [forces(Poses(*(v[i : i + BLOCK] for v in filled)), elements, distribution) for i in range(0, n, BLOCK)]
+    given = _broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    n = len(given[0])
+    filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]) for v in given]
+    how = {"elements": elements, "distribution": distribution, "coefficients": coefficients, "spin": spin}
+    parts = [_rolled(*(v[i : i + BLOCK] for v in filled), **how) for i in range(0, n, BLOCK)]
     return Forces(*(np.concatenate([np.asarray(p[k]) for p in parts])[:n] for k in range(5)))
+
+
+def _broadcast(*given: ArrayLike) -> list[np.ndarray]:
+    return list(np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given)))
 
 
 def tractions(
     xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
-    friction: ArrayLike, shear: float, poisson: float, *, elements: tuple[int, int] = (20, 20),
+    friction: ArrayLike, shear: ArrayLike, poisson: ArrayLike, *, elements: tuple[int, int] = (20, 20),
     distribution: Distribution = "constant", coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Tractions:  # fmt: skip
     """Pressure, tractions and slip over the elements, of the states that `creep_forces` takes: arrays (n, ny, nx).
@@ -282,10 +288,9 @@ def tractions(
     The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
     creepages give (errata to (6.5-16)).
     """
-    pose = poses(
-        xi, eta, phi, a, b, normal_force, friction, shear, poisson, elements=elements, distribution=distribution,
-        coefficients=coefficients, spin=spin,
-    )  # fmt: skip
+    given = _broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    how = {"coefficients": coefficients, "spin": spin}
+    pose = Poses(*map(np.asarray, poses(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     g = grid(elements, distribution)
     *found, length = (np.asarray(v) for v in _marched(pose, elements, distribution))
     x, p, t_x, t_y, u_x, u_y = (np.moveaxis(v, -1, 0)[..., ::-1] for v in found)

@@ -1,0 +1,336 @@
+"""Rolling contact: Hertz for many poses, Kalker's linear theory, the strip model, profiles and poses, bad input."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from closed_forms.no_slip import extrapolated
+
+import microslip as ms
+from microslip.cli import main
+from microslip.contact.friction import Coulomb
+from microslip.contact.hertz import Hertz
+from microslip.contact.law import value
+from microslip.contact.point import opposed, slide, weight
+from microslip.contact.solids import Solid
+from microslip.data import UserError
+from microslip.rolling.ellipse import combined, ellipses
+from microslip.rolling.profiles import Profile, polynomial
+from microslip.rolling.strips import forces, poses
+from microslip.rolling.wheelset import Track
+
+CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "wheel-rail.toml"
+G, NU, MU = 82e9, 0.28, 0.3
+STEEL = Solid(2 * G * (1 + NU), NU)
+ELASTIC = combined(STEEL, STEEL)
+PATCH = {"a": 8e-3, "b": 4e-3, "normal_force": 82e3, "friction": MU, "shear": G, "poisson": NU}
+HELD = MU * PATCH["normal_force"]
+DISTRIBUTIONS = ("constant", "non-constant")
+
+
+def reduced(stress: float) -> float:
+    """Creepage xi at which C11 G a b xi / (3 mu F_N) is so large (6.6-1)."""
+    c11 = float(ms.creep_coefficients(PATCH["a"] / PATCH["b"], NU)[0])
+    return stress * 3 * HELD / (c11 * G * PATCH["a"] * PATCH["b"])
+
+
+# --- ellipse -------------------------------------------------------------------------------------------------------
+
+
+def test_ellipses_of_many_poses_are_those_of_one_in_both_directions() -> None:
+    A, B = np.array([0.8, 2.4, 1.0, 0.01]), np.array([2.4, 0.8, 1.0, 3.0])
+    many = ellipses(A, B, 82e3, ELASTIC.modulus)
+    for i in range(4):
+        one = Hertz(STEEL, STEEL, A[i], B[i])
+        a, b = one.semi_axes(82e3)
+        found = [many.a[i], many.b[i], many.approach[i], many.pressure[i]]
+        np.testing.assert_allclose(found, [a, b, one.approach(82e3), one.largest_pressure(82e3)], rtol=1e-12)
+    np.testing.assert_allclose([many.a[0], many.b[0]], [many.b[1], many.a[1]], rtol=1e-12)
+
+
+# --- Kalker's coefficients -----------------------------------------------------------------------------------------
+
+
+def test_coefficients_at_the_rows_and_between_poissons_ratios() -> None:
+    """Kalker's table E.3 and the values that follow from 1/C over nu."""
+    found = np.asarray(ms.creep_coefficients([1.0, 2.0, 0.5], [0.25, 0.28, 0.28])).T[:, :3]
+    expected = [[4.12, 3.67, 1.47], [5.2037, 4.9715, 2.6566], [3.7335, 3.0256, 0.94350]]
+    np.testing.assert_allclose(found, expected, rtol=2e-5)
+
+
+def test_the_books_polynomials_are_near_the_table() -> None:
+    """(6.4-26) for nu = 0.3 between a/b = 0.1 and 10: 2 % by the errata."""
+    ratio = np.geomspace(0.1, 10, 41)
+    book, table = (np.asarray(ms.creep_coefficients(ratio, 0.3, source)) for source in ("book", "table"))
+    assert np.abs(book[:2] / table[:2] - 1).max() < 0.04
+    assert np.abs(book[:2] / table[:2] - 1).mean() < 0.015
+
+
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 4.0])
+def test_vanishing_creepage_gives_kalkers_linear_theory(ratio: float, distribution: str) -> None:
+    """F_x = -c^2 G C11 xi, F_y = -c^2 G C22 eta - c^3 G C23 phi, exactly on any grid."""
+    b, small = 4e-3, 1e-9
+    a, c = ratio * b, b * np.sqrt(ratio)
+    load = {"a": a, "b": b, "normal_force": 1e5, "friction": MU, "shear": G, "poisson": NU, "elements": (20, 20)}
+    creep = small * np.diag([1, 1, 1 / c])
+    f = ms.creep_forces(*creep, **load, distribution=distribution)
+    c11, c22, c23, _ = np.asarray(ms.creep_coefficients(ratio, NU))
+    expected = -(c**2) * G * small * np.array([[c11, 0, 0], [0, c22, c23]])
+    np.testing.assert_allclose([f.x, f.y], expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+# --- the strip model -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("distribution", "at"), [("constant", 32 / (9 * np.pi)), ("non-constant", np.pi / 2)])
+def test_everything_slides_from_the_reduced_creepage_on(distribution: str, at: float) -> None:
+    """s* = 32/(9 pi) and pi/2: there the springs reach what is held at the leading edge already. But for the first
+    element, in which the springs of the non-constant distribution are not those of its middle."""
+    xi = reduced(at) * np.array([0.8, 1.01])
+    f = ms.creep_forces(xi, 0, 0, **PATCH, distribution=distribution, elements=(80, 20))
+    assert f.sliding[0] < 0.9 and f.x[0] > -0.997 * HELD
+    assert f.sliding[1] > 0.99 and f.x[1] == pytest.approx(-HELD, rel=2e-4)
+
+
+def test_moment_of_a_circle_that_only_spins() -> None:
+    """Without any stick M_z = -mu int p r dA: 8/15 and 3 pi/16 of mu F_N a."""
+    round_ = PATCH | {"b": PATCH["a"], "elements": (80, 20)}
+    for distribution, share in (("constant", 8 / 15), ("non-constant", 3 * np.pi / 16)):
+        f = ms.creep_forces(0, 0, 1e6, **round_, distribution=distribution)
+        assert f.moment[0] == pytest.approx(-share * HELD * PATCH["a"], rel=3e-3)
+
+
+def test_strips_converge_with_their_order() -> None:
+    """Fitted over 10 to 80 elements along: second order for creepages, first where spin turns the slip; a thousandth
+    of mu F_N off at 20."""
+    creep = np.array([[1e-3, 0, 0], [0, 0, 0.3]]).T
+    f = [ms.creep_forces(*creep, **PATCH, elements=(n, 20)) for n in (10, 20, 40, 80, 320)]
+    error = np.array([np.hypot(one.x - f[-1].x, one.y - f[-1].y) for one in f[:-1]]) / HELD
+    orders = -np.polyfit(np.log([10, 20, 40, 80]), np.log(error), 1)[0]
+    assert 1.7 < orders[0] < 2.6 and 0.5 < orders[1] < 1.3
+    assert error[1].max() < 2e-3
+
+
+def test_friction_takes_the_power_of_the_creepages() -> None:
+    """Of the constant distribution, with errors of second order; the slip of (6.5-16), which leaves p' out, takes less:
+    what mu p s_M is over the slip zone, here by quadrature of the closed form."""
+    xi = 2e-3
+    given = [ms.creep_forces(xi, 0, 0, **PATCH, elements=(n, 20)) for n in (20, 40, 80)]
+    error = np.array([f.power[0] + f.x[0] * xi for f in given]) / given[-1].power[0]
+    assert np.abs(error[-1]) < 5e-4
+    assert np.log2(np.abs(error[0] / error[1])) > 1.5
+    t = ms.tractions(xi, 0, 0, **PATCH, elements=(80, 20))
+    exact = -np.sum((t.traction_x * t.slip_x + t.traction_y * t.slip_y) * t.area)
+    assert exact == pytest.approx(given[-1].power[0], rel=2e-3)
+    slides = np.hypot(t.traction_x, t.traction_y) > (1 - 1e-6) * MU * t.pressure
+    printed = -np.sum((t.traction_x * xi * t.area)[slides])
+    a, b = PATCH["a"], PATCH["b"]
+    top, spring = 2 * HELD / (np.pi * a**3 * b), 3 * float(ms.creep_coefficients(a / b, NU)[0]) * G / (8 * a)
+    y = b * (np.arange(2000) + 0.5) / 2000
+    reach = a * np.sqrt(1 - (y / b) ** 2)
+    to = np.minimum(spring * xi / top - reach, reach)  # from there to the trailing edge it slides
+    closed = 2 * xi * top * np.sum((reach**2 * (to + reach) - (to**3 + reach**3) / 3)[to > -reach]) * b / 2000
+    assert printed == pytest.approx(closed, rel=0.02)
+    assert printed < 0.5 * exact
+
+
+def test_a_strip_slides_sticks_and_slides_again_under_spin() -> None:
+    t = ms.tractions(0, -6e-4, 0.8, **PATCH, elements=(80, 20))
+    slides = (np.hypot(t.traction_x, t.traction_y) > (1 - 1e-6) * MU * t.pressure)[0, :, ::-1]
+    assert any(s[0] and s[-1] and np.abs(np.diff(s.astype(int))).sum() == 2 for s in slides)
+
+
+def test_mirrored_creepages_give_mirrored_forces() -> None:
+    """y -> -y turns lateral creepage and spin round, and with them F_y and M_z."""
+    f = ms.creep_forces([1e-3, 1e-3], [5e-4, -5e-4], [0.2, -0.2], **PATCH)
+    np.testing.assert_allclose(f.x[0], f.x[1], rtol=1e-12)
+    np.testing.assert_allclose([f.y[0], f.moment[0]], [-f.y[1], -f.moment[1]], rtol=1e-9)
+
+
+def test_totals_are_those_of_the_tractions() -> None:
+    how = PATCH | {"distribution": "non-constant"}
+    f, t = ms.creep_forces(1e-3, 4e-4, 0.2, **how), ms.tractions(1e-3, 4e-4, 0.2, **how)
+    moment = ((t.x * t.traction_y - t.y * t.traction_x) * t.area).sum()
+    np.testing.assert_allclose([(t.traction_x * t.area).sum(), (t.traction_y * t.area).sum(), moment],
+                               [f.x[0], f.y[0], f.moment[0]], rtol=1e-10)  # fmt: skip
+    assert (t.pressure * t.area).sum() == pytest.approx(PATCH["normal_force"], rel=1e-12)
+    assert np.pi * PATCH["a"] * PATCH["b"] == pytest.approx(t.area.sum(), rel=2e-3)
+    assert (np.hypot(t.traction_x, t.traction_y) <= (1 + 1e-5) * MU * t.pressure).all()
+    assert (np.diff(t.x) > 0).all() and (np.diff(t.y, axis=1) > 0).all()
+
+
+def test_forces_are_pure_and_have_derivatives() -> None:
+    """The derivative of the force with respect to the creepage, beside a difference quotient."""
+    one = jnp.ones(3)
+
+    @jax.jit
+    def along(xi):
+        given = (xi, *(one * v for v in (3e-4, 0.2, 8e-3, 4e-3, 82e3, MU, G, NU)))
+        shifted = lambda xi: forces(poses(xi, *given[1:], elements=(6, 6)), (6, 6)).x  # noqa: E731
+        return jax.jvp(shifted, (xi,), (one,))
+
+    force, slope = along(8e-4 + 1e-8 * jnp.array([-1.0, 0.0, 1.0]))
+    assert slope[1] == pytest.approx(float(force[2] - force[0]) / 2e-8, rel=1e-5)
+
+
+def test_the_short_return_is_that_of_the_point_contact() -> None:
+    """`point.opposed` beside `point.slide`, stiffnesses of a ratio up to 2, forces up to ten times what is held."""
+    random = np.random.default_rng(2)
+    trial = jnp.asarray(random.normal(size=(2, 2000)) * 10 ** random.uniform(-1, 1, 2000))
+    relative = jnp.asarray(np.stack([np.ones(2000), random.uniform(0.5, 1, 2000)]))
+    theta = slide(trial, relative, relative, Coulomb(value(1.0)), jnp.ones(2000), 1.0, 0.0)
+    exact = trial * weight(theta, relative)
+    shares, slides = opposed(tuple(trial), tuple(relative), jnp.ones(2000))
+    assert np.abs(np.stack([s * t for s, t in zip(shares, trial, strict=True)]) - exact).max() < 3e-4
+    np.testing.assert_array_equal(slides, theta < 1)
+
+
+# --- profiles and poses --------------------------------------------------------------------------------------------
+
+
+def track(wheel: Profile | None = None, rail: Profile | None = None) -> Track:
+    """Two circles: a hollow wheel of 0.5 m on a rail of 0.3 m."""
+    return Track(wheel or ms.circle(0.5), rail or ms.circle(0.3), 0.46, 0.75, 0.75, ELASTIC)
+
+
+def test_circles_touch_where_their_slopes_are_one() -> None:
+    """y / 0.3 = (y - 4 mm) / 0.5, so y = -6 mm; A = 1/(2 r), B = (1/0.3 - 1/0.5)/2 but for the angle of 0.02 rad."""
+    (p,) = ms.patches(track(), ms.Pose(lateral=4e-3, speed=20.0), "right", 1e5)
+    np.testing.assert_allclose([p.on_rail, p.on_wheel], [-6e-3, -10e-3], atol=5e-6)
+    np.testing.assert_allclose([p.A, p.B], [1 / 0.92, (1 / 0.3 - 1 / 0.5) / 2], rtol=2e-3)
+    exact = ellipses(p.A, p.B, p.normal_force, ELASTIC.modulus)
+    np.testing.assert_allclose([p.a, p.b, p.approach], [exact.a, exact.b, exact.approach], rtol=1e-3)
+    assert p.normal_force * np.cos(p.angle) == pytest.approx(1e5, rel=1e-6)
+    assert p.phi == pytest.approx(0.02 / 0.46, rel=2e-3)
+
+
+def test_left_and_right_wheels_mirror() -> None:
+    """A pose and its mirror image: the left wheel of the one is the right wheel of the other."""
+    pose = ms.Pose(3e-3, 2e-3, 1e-3, 20.0)
+    left = ms.patches(track(), ms.Pose(3e-3, 2e-3, 1e-3, 20.0), "left", 1e5)[0]
+    right = ms.patches(track(), pose.mirrored(), "right", 1e5)[0]
+    np.testing.assert_allclose(left.place, right.place * [1, -1, 1], atol=1e-12)
+    np.testing.assert_allclose([left.xi, left.eta, left.phi], [right.xi, -right.eta, -right.phi], rtol=1e-12)
+
+
+def test_two_patches_share_the_vertical_force_by_their_stiffness() -> None:
+    """A rail with two equal crowns below a flat wheel: half each, and Hertz' force of the approach in both."""
+    y = np.linspace(-0.03, 0.03, 1201)
+    z = np.minimum((y - 0.012) ** 2, (y + 0.012) ** 2) / 0.2
+    rail = Profile(y, np.minimum(z, 6e-4))
+    found = ms.patches(track(polynomial([0.0]), rail), ms.Pose(), "right", 5e4)
+    assert len(found) == 2
+    np.testing.assert_allclose(sorted(p.on_rail for p in found), [-0.012, 0.012], atol=1e-4)
+    np.testing.assert_allclose([p.normal_force for p in found], 2.5e4, rtol=1e-3)
+    exact = ellipses(1 / 0.92, 5.0, 2.5e4, ELASTIC.modulus)
+    np.testing.assert_allclose([p.approach for p in found], exact.approach, rtol=1e-2)
+
+
+def test_wheels_off_the_rail_have_no_patch() -> None:
+    assert ms.patches(track(), ms.Pose(), "right", 0.0) == []
+
+
+def test_profiles_are_read_with_their_header(tmp_path: Path) -> None:
+    """mirror.y and the unit of a .prw; a table with commas; both are one curve, whatever the order of its points."""
+    y = np.linspace(-30, 30, 61)
+    z = y**2 / 600
+    body = "\n".join(f"{a} {b}" for a, b in zip(-y / 1e3, z / 1e3, strict=True))
+    text = f"! a wheel\nmirror.y = 1 ! yes\nunits.len.f = 1.0\npoint.begin\n!1 2\n{body}\npoint.end\n"
+    (tmp_path / "w.prw").write_text(text)
+    (tmp_path / "w.csv").write_text("y,z\n" + "\n".join(f"{a},{b}" for a, b in zip(y, z, strict=True)))
+    one, other = (ms.read_profile(tmp_path / name) for name in ("w.prw", "w.csv"))
+    np.testing.assert_allclose(one.height([-0.02, 0.01]), other.height([-0.02, 0.01]), atol=1e-12)
+    assert one.height(0.02) == pytest.approx(0.4 / 600, rel=1e-6)
+
+
+def test_an_inclined_circle_is_the_same_circle() -> None:
+    """A rail canted by 1:40 about its axis keeps its curvature; the highest point stays the origin."""
+    arc = ms.circle(0.3).turned(0.025)
+    np.testing.assert_allclose(arc.height([0.0, 0.01]), [0, 0.3 - np.sqrt(0.09 - 1e-4)], atol=2e-7)
+
+
+# --- the verb ------------------------------------------------------------------------------------------------------
+
+
+def test_a_case_makes_its_curve_pictures_and_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Numbers of the table are those of the library; once more there is nothing to do."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    assert main(["roll", "case.toml", "--set", "creep.points=21"]) == 0
+    folder = tmp_path / "build" / "wheel-rail"
+    assert {p.name for p in (folder / "pictures").iterdir()} == {"creep.png", "tractions.png"}
+    rows = list(csv.DictReader((folder / "creep.csv").open()))
+    patch = {k: float(v) for k, v in next(csv.DictReader((folder / "patches.csv").open())).items()}
+    row = {k: float(v) for k, v in rows[3].items()}
+    solid = Solid(2.1e11, 0.28)
+    f = ms.creep_forces(row["longitudinal_creepage"], row["lateral_creepage"], row["spin_1_per_m"], patch["a_m"],
+                        patch["b_m"], patch["normal_force_N"], 0.3, solid.shear, 0.28)  # fmt: skip
+    np.testing.assert_allclose([row["F_x_N"], row["F_y_N"], row["M_z_Nm"]], [f.x[0], f.y[0], f.moment[0]], rtol=1e-4)
+    said = capsys.readouterr().out
+    assert re.search(r"largest creep force is 1 mu F_N", said)
+    assert "data:image/png" in (folder / "rolling.html").read_text()
+
+
+WRONG = {
+    "a wheel in millimetres": ("wheel.radius=460", "wheel.radius"),
+    "pulled off": ("vertical_force=-1", "vertical_force"),
+    "no overlap": ("rail.at=0.9", "overlap"),
+    "no file": ('rail.profile="none.prr"', "none.prr"),
+    "friction in percent": ("friction=30", "friction"),
+    "flat": ("rail.width=1.0", "radius"),
+    "nothing to run over": ("creep.stop=0.0", "creep"),
+    "a key that is none": ("creep.form=1", "creep.form"),
+    "a table that is none": ('wheel.profile="case.toml"', "case.toml"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_bad_input_is_one_sentence(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    setting, named = WRONG[what]
+    assert main(["roll", "case.toml", "--set", setting, "-q"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert named in said and len(said.splitlines()) == 1
+    assert not (tmp_path / "build" / "wheel-rail" / "rolling.html").exists()
+
+
+def test_profiles_that_turn_back_are_named(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("\n".join(f"{y},0" for y in (0, 10, 20, 15, 30, 40)))
+    with pytest.raises(UserError, match="turns back or crosses itself at point 4"):
+        ms.read_profile(tmp_path / "p.csv")
+
+
+def test_what_should_be_doubted_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No contact has no forces; bodies that conform and friction above 1.5 are warnings."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    few = ["--set", "creep.points=3", "--no-pictures", "-q"]
+    assert main(["roll", "case.toml", "--set", "vertical_force=0", *few[:-1]]) == 0
+    assert "all forces are zero" in capsys.readouterr().out
+    assert main(["roll", "case.toml", "--set", "friction=1.6", "--set", "wheel.profile=-0.301", *few[:-1]]) == 0
+    said = capsys.readouterr().out
+    assert "friction is 1.6" in said and "conform" in said
+
+
+@pytest.mark.slow
+def test_the_table_of_coefficients_is_that_of_the_half_space() -> None:
+    """C33, computed, and the other three, published, between rows too: to 1.5 %."""
+    for ratio, nu in ((1.0, 0.25), (0.15, 0.25), (1 / 0.15, 0.25), (0.1, 0.5), (10.0, 0.0), (0.55, 0.3)):
+        c11, c22, c23, other, c33 = extrapolated(ratio, nu)
+        assert other == pytest.approx(c23, rel=5e-3)  # the force of spin is the moment of creepage
+        np.testing.assert_allclose(np.asarray(ms.creep_coefficients(ratio, nu)), [c11, c22, c23, c33], rtol=0.015)
