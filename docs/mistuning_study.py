@@ -9,6 +9,9 @@ import numpy as np
 from microslip.stages.running import run_case_file
 
 CASES = Path("pipeline/cases")
+SCATTERS = {"spin-pit-mistuned": 0.00325, "spin-pit-mistuned-wide": 0.01374}
+"""Name of the case -> standard deviation of the blades' frequencies (Sextro Figs. 5.6-3 and 5.6-5)."""
+
 
 def answered(case: str) -> Path:
     """The folder of a case, run where it is not up to date."""
@@ -24,7 +27,7 @@ def columns(file: Path) -> np.ndarray:
 def pictures() -> dict[str, Path]:
     """Name in docs/pictures -> picture of the case."""
     made = answered("ring-mistuned") / "pictures"
-    return {f"mistuning_{name}": made / f"{name}.png" for name in ("amplification", "mistuned", "worst")}
+    return {f"mistuning_{name}": made / f"{name}.png" for name in ("amplification", "mistuned", "worst", "sensitivity")}
 
 
 def amplification() -> tuple[list[str], list[list[str]]]:
@@ -52,3 +55,29 @@ def first_order() -> tuple[list[str], list[list[str]]]:
              f"{samples['weibull_exponent'][i]:.3g}", f"{near['weibull_exponent'][j]:.3g}"]
         )  # fmt: skip
     return ["Hz", "tuned, um", "mean, um", "deviation, um", "by first order, um", "k", "k by first order"], rows
+
+
+def spin_pit(build: Path = Path("build"), to: Path = Path("tests/validation")) -> None:
+    """The figures of 5.6 from the runs of both scatters, as the tables that tests/validation/test_sextro_5_6.py reads:
+    half an hour of CPU time where they are not there yet."""
+    lines = {"envelopes": [""], "samples": [""]}
+    for name, deviation in SCATTERS.items():
+        made = build / name
+        if not (made / "samples.csv").is_file():
+            given = [f"name={name}", f"mistuning.scatter.0.deviation={deviation}"]
+            run_case_file(CASES / "spin-pit-mistuned.toml", given, report=print)
+        head, *rows = (made / "samples.csv").read_text().split()
+        lines["samples"] = [f"scatter,{head}", *lines["samples"][1:], *(f"{deviation},{row}" for row in rows)]
+        head, *rows = (made / "envelope.csv").read_text().split()
+        near, *others = ([row.split(",")[i] for i in range(1, 6)] for row in
+                         (made / "approximation.csv").read_text().split())  # fmt: skip
+        lines["envelopes"] = [
+            f"scatter,{head},{','.join(f'first_order_{n}' for n in near)}", *lines["envelopes"][1:],
+            *(f"{deviation},{row},{','.join(other)}" for row, other in zip(rows, others, strict=True)),
+        ]  # fmt: skip
+    for name, table in lines.items():
+        (to / f"sextro_5_6_{name}.csv").write_text("\n".join(table) + "\n")
+
+
+if __name__ == "__main__":
+    spin_pit()

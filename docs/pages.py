@@ -559,6 +559,7 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
                         "marched; as many"),
     "mistuning.samples": ("", "whole rings that are solved, at most"),
     "mistuning.until": ("", "ends when half of the interval of the 95 % quantile is that share of it"),
+    "mistuning.rare": ("", "further samples, chosen by a linear ring, for the 99.9 % quantile; none if 0"),
     "mistuning.seed": ("", "of all random numbers; a sample depends on it and its number alone"),
     "mistuning.stuck": ("", "whether contacts stick, which is linear"),
     "mistuning.normal_force": ("N", "of the contacts that the sweep presses; its smallest if not given"),

@@ -162,6 +162,17 @@ def test_steps_by_relative_motions_are_those_of_the_sides(tuned: Tuned) -> None:
     assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
 
 
+def test_steps_of_a_ring_with_a_gaping_contact(tuned: Tuned) -> None:
+    """A contact that stands open feels nothing; the step still solves the system of the sides: 1e-9."""
+    p = balance.of(tuned.mistuned([(Scatter("gap", 1.0), np.eye(6)[:, :1] * 1e-2)]), form="sides", **FINE)
+    rng, at = np.random.default_rng(2), p.at(2 * np.pi * 287.0)
+    slopes = at.forces(np.zeros(p.size))[1]
+    assert not slopes[0][0].any()
+    right = rng.normal(size=p.size)
+    J = at.jacobian(slopes)
+    assert J.dense() @ J.solve(right) == pytest.approx(right, abs=1e-9)
+
+
 FLOW = {0: 0.002j, 1: 0.004 + 0.01j, 2: -0.01 + 0.003j, 3: 0.002 + 0.004j, 4: 0.012j, 5: 0.01 - 0.001j}
 
 

@@ -155,7 +155,7 @@ class Joints:
                     key = to.contact, by.contact
                     felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
                     block = (to.sign * by.sign) * applied(rows[..., by.at], felt)
-                    block = block.reshape(W * len(self._active[to.contact]), -1)
+                    block = block.reshape(W * len(self._active[to.contact]), W * len(a))
                     pieces[key] = pieces[key] + block if key in pieces else block
         return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
 
