@@ -184,7 +184,7 @@ def influence_change(grid: Grid, pair: Pair) -> Influence:
     return _influence(grid.nx, grid.ny, grid.dx, grid.dy, pair, 1 / grid.dx, grid.dx, -1 / grid.dx)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=16)
 def _influence(
     nx: int, ny: int, dx: float, dy: float, pair: Pair, here: float, step: float, ahead: float
 ) -> Influence:  # fmt: skip
