@@ -97,9 +97,13 @@ class Grid:
         """Of one element, m^2."""
         return self.dx * self.dy
 
-    def field(self, values: ArrayLike) -> Array:
-        """(nx, ny) of a number or of anything that broadcasts to it."""
-        return np.broadcast_to(np.asarray(values, float), (self.nx, self.ny))
+    def field(self, values: ArrayLike, key: str) -> Array:
+        """(nx, ny) of a number or of anything that broadcasts to it; `key` names it in the error."""
+        try:
+            return np.broadcast_to(np.asarray(values, float), (self.nx, self.ny))
+        except ValueError as error:
+            shape = np.shape(values)
+            raise UserError(f"{key}: shape {shape}; the grid has {self.nx} x {self.ny} elements") from error
 
 
 def rectangle(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
