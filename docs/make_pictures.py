@@ -1149,6 +1149,17 @@ def identification() -> None:
         fill("mistuning_identification.md", name, table(*getattr(study, name)()))
 
 
+def half_space() -> None:
+    """Exact half-spaces that roll: convergence, Kalker's coefficients, wear, timings, one patch with its heat."""
+    import half_space_study as study
+
+    fig = figure(4.6, 1.9)
+    study.picture(*fig.subplots(1, 2, width_ratios=(1.5, 1)))
+    save(drawn(fig), "half_space", colours=4)
+    for name in ("convergence", "coefficients", "worn_profiles", "timings"):
+        fill("half_space.md", name, table(*getattr(study, name)()))
+
+
 # the stability page ------------------------------------------------------------------------------------------------
 
 
@@ -1543,6 +1554,7 @@ STUDIES = {
         identification,
         stability,
         squeal,
+        half_space,
         geometry,
         meeting,
         damping_element,

@@ -288,6 +288,17 @@ def test_contact_stiffness_page(capsys: pytest.CaptureFixture[str]) -> None:
         assert capsys.readouterr().out.strip() == printed
 
 
+def test_half_space_page(capsys: pytest.CaptureFixture[str]) -> None:
+    """What its example prints, and its table of worn profiles made again."""
+    import half_space_study
+
+    assert pages.filled("half_space.md", "worn_profiles") == pages.table(*half_space_study.worn_profiles())
+    text = (DOCS / "half_space.md").read_text(encoding="utf-8")
+    code, printed = re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S)[0]
+    exec(compile(code, "half_space.md", "exec"), {})
+    assert capsys.readouterr().out.strip() == printed
+
+
 @pytest.mark.slow
 def test_contact_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Its tables made again, and what its examples print; the profile is the invented one of the table."""

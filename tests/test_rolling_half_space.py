@@ -211,6 +211,9 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
         ("friction", {"force": LOAD, "friction": -0.1}),
         ("tangential", {"force": LOAD, "tangential": (25000.0, None)}),
         ("grid", {"force": 40 * LOAD}),
+        ("creepages", {"force": LOAD, "creepages": (0, np.nan, 0)}),
+        ("creepages", {"force": LOAD, "creepages": (0, 1e-3)}),
+        ("friction", {"force": LOAD, "friction": np.ones(7)}),
         ("distance", {"force": LOAD, "distance": np.nan}),
     ],
 )

@@ -99,17 +99,19 @@ def test_fig_6_7_3_temperatures_rise_from_adhesion_to_the_trailing_edge() -> Non
 def with_heat(creepage: float, cold: float, vanishing: float) -> tuple[float, Array]:
     """F_x/(mu_0 F_n) and temperature with friction that falls with it."""
     last: list[Contact] = []
+    grid = Grid.around(1.1 * A, 1.1 * A, 23, 23)
+    h = (grid.x**2 + grid.y**2) / (2 * R)
 
     def heat(mu: Array) -> Array:
-        c = steady_rolling(DISTANCE, GRID, STEEL, mu, approach=0.02 * A, creepages=(-creepage, 0, 0))
+        c = steady_rolling(h, grid, STEEL, mu, approach=0.02 * A, creepages=(-creepage, 0, 0))
         last.append(c)
         return heat_source(c.traction, c.slip, V)
 
     _, T = settled(
         heat,
-        lambda q: marched(q, GRID.dx, HEAT, 0.5, V),
+        lambda q: marched(q, grid.dx, HEAT, 0.5, V),
         lambda T: falling(T, cold, vanishing),
-        np.full(DISTANCE.shape, cold),
+        np.full(h.shape, cold),
         1e-5,
     )
     return float(last[-1].force[0] / (cold * last[-1].force[2])), T
@@ -148,9 +150,9 @@ def test_fig_6_8_1_depths_behave_like_temperatures_along_x_and_like_a_parabola_a
     assert np.all(np.diff([strip_depth(source(s), GRID.dx, I, V).max() for s in (0.003, 0.006, 0.03, 0.06)]) > 0)
 
 
-def penetrated(delta: float) -> tuple[Array, Contact] | None:
-    """Full slip of .06 at the penetration of Fig. 6.8-2, or the bodies apart."""
-    approach = (0.02 + 0.03 * np.sin(delta)) * A
+@cache
+def penetrated(approach: float) -> tuple[Array, Contact] | None:
+    """Full slip of .06, or the bodies apart."""
     grid = Grid.around(1.8 * A, 1.8 * A, 30, 30)
     h = (grid.x**2 + grid.y**2) / (2 * R)
     c = steady_rolling(h, grid, STEEL, 0.3, approach=approach, creepages=(-0.06, 0, 0))
@@ -162,7 +164,8 @@ def test_fig_6_8_2_harmonic_normal_motion_with_separation() -> None:
     grows as p_0 a ~ Du and the temperature as p_0 sqrt(a) ~ Du^(3/4)."""
     n = 24
     y = np.linspace(-2 * A, 2 * A, 81)
-    found = [penetrated(2 * np.pi * k / n) for k in range(n)]
+    du = np.round(0.02 + 0.03 * np.sin(2 * np.pi * np.arange(n) / n), 12)
+    found = [penetrated(float(u) * A) for u in du]
     dx = 3.6 * A / 30
 
     def at(k: int) -> tuple[Array, float, float] | None:
@@ -172,7 +175,6 @@ def test_fig_6_8_2_harmonic_normal_motion_with_separation() -> None:
     worn = revolution(at, n, y)
     apart = np.array([one is None for one in found])
     assert apart.mean() == pytest.approx(np.arccos(2 / 3) / np.pi, abs=1 / n) and not worn[apart].any()
-    du = 0.02 + 0.03 * np.sin(2 * np.pi * np.arange(n) / n)
     deep = du > 0.01
     assert worn[deep, 40] / worn[:, 40].max() == pytest.approx(du[deep] / 0.05, abs=0.04)
     hot = np.array([0 if one is None else marched(one[0], dx, HEAT, 0.5, V).max() for one in found])

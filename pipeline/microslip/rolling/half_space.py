@@ -191,12 +191,14 @@ def _contact(
     motion: _Motion | None, given: ArrayLike, tangential: Forces, start: Contact | None,
 ) -> Contact:  # fmt: skip
     """Pressure and traction in turns until both stay (Panagiotopoulos); like bodies need one turn."""
-    h, mu = grid.field(distance), grid.field(friction)
+    h, mu, w = grid.field(distance, "distance"), grid.field(friction, "friction"), np.array(given, float)
     if not np.all(mu >= 0):
         raise UserError("friction: mu is negative or not a number somewhere; it must be 0 or more")
+    if w.shape != (3,) or not np.isfinite(w).all():
+        raise UserError(f"creepages: {w.tolist()}; give three numbers, along x, along y and the spin or turn")
     whole = influence(grid, pair)
     none = np.zeros((2, grid.nx, grid.ny))
-    now = Contact(grid, pair, none[0], none, none, none[0], 0.0, np.array(given, float))
+    now = Contact(grid, pair, none[0], none, none, none[0], 0.0, w)
     if start is not None:
         now = replace(now, pressure=start.pressure, traction=start.traction, slip=start.slip * (start.pressure > 0))
     for _ in range(ITERATIONS):

@@ -97,9 +97,13 @@ class Grid:
         """Of one element, m^2."""
         return self.dx * self.dy
 
-    def field(self, values: ArrayLike) -> Array:
-        """(nx, ny) of a number or of anything that broadcasts to it."""
-        return np.broadcast_to(np.asarray(values, float), (self.nx, self.ny))
+    def field(self, values: ArrayLike, key: str) -> Array:
+        """(nx, ny) of a number or of anything that broadcasts to it; `key` names it in the error."""
+        try:
+            return np.broadcast_to(np.asarray(values, float), (self.nx, self.ny))
+        except ValueError as error:
+            shape = np.shape(values)
+            raise UserError(f"{key}: shape {shape}; the grid has {self.nx} x {self.ny} elements") from error
 
 
 def rectangle(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
@@ -184,7 +188,7 @@ def influence_change(grid: Grid, pair: Pair) -> Influence:
     return _influence(grid.nx, grid.ny, grid.dx, grid.dy, pair, 1 / grid.dx, grid.dx, -1 / grid.dx)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=16)
 def _influence(
     nx: int, ny: int, dx: float, dy: float, pair: Pair, here: float, step: float, ahead: float
 ) -> Influence:  # fmt: skip

@@ -4,8 +4,9 @@ With the slip s = w + B p (rigid slip w; displacements B of a shift, of a moment
 the bound g = mu p_n: |p| <= g, s = 0 where |p| < g, p = -g s/|s| elsewhere (Kalker, Three-Dimensional Elastic Bodies in
 Rolling Contact, 1990, 3.2). That is one equation, p = P(p - r s) with P the way back into the circle of radius g and
 any r > 0. Newton's method on it is a strategy of active sets that finds the directions as well. It begins where all
-elements stick: begun from full slip it failed in a third of random cases, from stick in none of 400. Its linear
-equations are solved by GMRES; the preconditioner solves each row along x by itself.
+elements stick: so it settled in all of 400 random cases; begun from full slip, with r as large as the reciprocal of B's
+diagonal, it ran in circles in 18 of 60. Its linear equations are solved by GMRES; the preconditioner solves each row
+along x by itself.
 """
 
 from __future__ import annotations
@@ -164,7 +165,7 @@ def tractions(
         unbalanced = np.abs(_missing(problem, p)).sum() / bound.size
         error = float(np.abs(p - within(trial, bound)).max() + unbalanced) / largest
         if error <= tolerance:
-            return p, slip, amounts
+            return within(p, bound), slip, amounts
     raise UserError(f"slip: the tractions have not settled after {ITERATIONS} iterations (change {error:.1e})")
 
 
