@@ -193,6 +193,25 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
     np.testing.assert_array_equal(slides, theta < 1)
 
 
+# --- tables --------------------------------------------------------------------------------------------------------
+
+
+def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
+    """States of any sign and size, against the model itself: within the error that the file tells, and the finer the
+    table, the nearer."""
+    tables = [ms.creep_table(NU, points=(n, n, n, 5), checked=2000) for n in (5, 13)]
+    table = ms.read_creep_table(ms.write_creep_table(tmp_path / "t.h5", tables[1]))
+    random = np.random.default_rng(5)
+    given = [random.normal(size=400) * s for s in (2e-3, 2e-3, 0.4)] + [8e-3, 4e-3, 82e3, MU]
+    f = ms.creep_forces(*given, G, NU)
+    size = HELD * np.array([[1.0], [1.0], [np.sqrt(32e-6)]])
+    error = np.abs(table.forces(*given, G) - np.array([f.x, f.y, f.moment])) / size
+    assert (error.max(axis=1) <= 1.2 * table.error[:, 2]).all()
+    assert (table.error[:, 0] < 0.4 * tables[0].error[:, 0]).all()
+    with pytest.raises(UserError, match="no table of creep forces"):
+        ms.read_creep_table(CASE)
+
+
 # --- profiles and poses --------------------------------------------------------------------------------------------
 
 

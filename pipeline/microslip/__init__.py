@@ -33,6 +33,7 @@ PUBLIC = {
     "rolling.kalker": "creep_coefficients",
     "rolling.strips": "creep_forces tractions",
     "rolling.fastsim": "fastsim",
+    "rolling.table": "creep_table write_creep_table read_creep_table",
     "rolling.wheelset": "Track Pose patches",
 }
 """Module -> the names of it that are public."""

@@ -26,6 +26,7 @@ from .ellipse import combined
 from .kalker import Coefficients
 from .profiles import WIDTH, Profile, circle, polynomial, read_profile
 from .strips import Distribution, Spin
+from .table import POINTS
 from .wheelset import Pose, Track
 
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -106,6 +107,12 @@ class ModelOfCase(Model):
     spin: Spin = "kalker"
 
 
+class TableOfCase(Model):
+    """points: of a table of creep forces on its axes, see `table.CreepTable`."""
+
+    points: Annotated[tuple[Count, Count, Count, Count], BeforeValidator(_tuple)] = POINTS
+
+
 class RollingCase(Model):
     """friction: coefficient. vertical_force: N, on this wheel."""
 
@@ -117,6 +124,7 @@ class RollingCase(Model):
     pose: PoseOfCase = PoseOfCase()
     creep: Creep
     model: ModelOfCase = ModelOfCase()
+    table: TableOfCase | None = None
 
     def track(self, folder: Path) -> Track:
         """Of files beside the case.

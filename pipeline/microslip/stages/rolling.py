@@ -11,6 +11,7 @@ from ..files.tables import columns_csv, rows_csv
 from ..report.rolling import rolling_html
 from ..rolling.settings import RollingCase, load_rolling
 from ..rolling.study import Studied, rows_of_patches, study
+from ..rolling.table import creep_table, write_creep_table
 from .stage import Made, Report, Stage
 
 
@@ -44,12 +45,22 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> M
     except UserError as error:
         raise UserError(f"{case_path}: {error}") from error
     stage.begin()
+    sentences = found.sentences()
     made = _tables(found, folder)
+    if case.table is not None:
+        stage.report("table of creep forces")
+        table = creep_table(found.track.elastic.poisson, points=case.table.points, **case.model.model_dump())
+        made.append(write_creep_table(folder / "creep_table.h5", table))
+        sentences.append(
+            f"Between the points of the table forces are off by {100 * table.error[:, 0].max():.2g} % of mu F_N in the "
+            f"mean; 95 % of {table.checked} states are below {100 * table.error[:, 1].max():.2g} %, the largest "
+            f"error is {100 * table.error[:, 2].max():.2g} %."
+        )
     drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
     page = folder / "rolling.html"
     store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, drawn))
     made = [page, *made, *drawn]
-    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": found.sentences()}
+    told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": sentences}
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
     return Made(made)
 
