@@ -1418,7 +1418,7 @@ def results() -> None:
     found = study.assessed(basis)
     shown = draw(found, basis, "blade at 3000 rpm", BUILD, True)
     for title, name in (("stress at resonance", "result_stress"), ("Haigh diagram", "result_haigh")):
-        save(from_file(shown[title]), name, smooth=title == "stress at resonance")
+        save(from_file(shown[title]), name)
     basis = made("blade-rough", "blade", "mesh.size=12", *LIGHT)
     maps = study.maps(basis, 60.0, 112.0)
     save(from_file(operating.contact_map_plot(maps, "blade: 60 N, 112 Hz", BUILD / "maps.png")), "result_contacts")
