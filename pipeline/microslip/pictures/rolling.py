@@ -20,7 +20,7 @@ LABELS = {"longitudinal": "longitudinal creepage", "lateral": "lateral creepage"
 
 
 def curve_picture(found: Studied, path: Path, title: str) -> Path:
-    """Creep forces over the friction that is held, and the published FASTSIM at some points."""
+    """Creep forces over the friction that is held; the published FASTSIM and exact half-spaces at some points."""
     assert found.forces is not None
     figure, axes = single_panel(8.0, 4.8)
     x, f, held = found.over, found.forces, found.held
@@ -31,6 +31,9 @@ def curve_picture(found: Studied, path: Path, title: str) -> Path:
     if found.reference is not None:
         at, of = found.reference
         axes.plot(x[at], of, "o", markersize=4, color="0.35", fillstyle="none", label="|F| by FASTSIM, 44 x 44")
+    if found.exact is not None:
+        at, each = found.exact.at, np.hypot(found.exact.x, found.exact.y) / held
+        axes.plot(x[at], each, "D", markersize=6, color="black", fillstyle="none", label="|F| of exact half-spaces")
     axes.axvline(x[found.shown], color="0.6", linestyle=":", linewidth=1.0)
     axes.set(xlabel=LABELS[found.case.creep.over], ylabel="force on the wheel", title=title)
     axes.legend(fontsize=9, loc="center right")

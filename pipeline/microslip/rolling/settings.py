@@ -99,12 +99,14 @@ class Creep(Model):
 
 
 class ModelOfCase(Model):
-    """elements: along and across rolling; the rest as `strips.creep_forces`."""
+    """elements: along and across rolling. exact: states of the curve that are compared with exact half-spaces between
+    the profiles themselves. The rest as `strips.creep_forces`."""
 
     elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (20, 20)
     distribution: Distribution = "constant"
     coefficients: Coefficients = "table"
     spin: Spin = "kalker"
+    exact: Annotated[int, Field(ge=0, le=1000)] = 5
 
 
 class TableOfCase(Model):

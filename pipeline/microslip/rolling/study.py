@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array
+from ..contact.solids import Solid
+from ..data import Array, UserError
+from .exact import Exact, exact
 from .fastsim import fastsim
 from .settings import RollingCase
 from .strips import Forces, Tractions, creep_forces, tractions
-from .wheelset import Patch, Track, patches
+from .wheelset import Patch, Track, across, patches
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 STEEPEST = 1.5
@@ -22,7 +24,8 @@ STEEPEST = 1.5
 class Studied:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
     of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
-    shown: index of the state whose tractions these are."""
+    exact: half-spaces at some states; missed: why
+    there are none. shown: index of the state whose tractions these are."""
 
     case: RollingCase
     track: Track
@@ -30,8 +33,10 @@ class Studied:
     creep: Array
     forces: Forces | None
     reference: tuple[Array, Array] | None
+    exact: Exact | None
     shown: int
     tractions: Tractions | None
+    missed: str = ""
 
     @property
     def over(self) -> Array:
@@ -74,7 +79,29 @@ class Studied:
             told.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
-        return [*told, *self.warnings()]
+        return [*told, *self._beside_exact(), *self.warnings()]
+
+    def _beside_exact(self) -> list[str]:
+        """How far the strips are from the exact answer on this very case."""
+        e, f = self.exact, self.forces
+        if e is None or f is None:
+            return [f"Exact half-spaces could not be had: {self.missed}."] if self.missed else []
+        off = np.hypot(f.x[e.at] - e.x, f.y[e.at] - e.y) / self.held
+        i = int(off.argmax())
+        return [
+            f"Exact half-spaces between the profiles themselves, at {len(e.at)} points of the curve, are at most "
+            f"{100 * off[i]:.2g} % of mu F_N away, at {self.over[e.at[i]]:.4g} (their own error is about 1 %); their "
+            f"largest pressure is {e.pressure / 1e6:.4g} MPa."
+        ]
+
+    def beside(self) -> dict[str, Array]:
+        """Of the table of exact answers; none, no columns."""
+        e = self.exact
+        if e is None:
+            return {}
+        xi, eta, phi = self.creep[:, e.at]
+        return {"longitudinal_creepage": xi, "lateral_creepage": eta, "spin_1_per_m": phi, "F_x_N": e.x, "F_y_N": e.y,
+                "M_z_Nm": e.moment, "F_x_over_mu_F_N": e.x / self.held, "F_y_over_mu_F_N": e.y / self.held}  # fmt: skip
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""
@@ -100,10 +127,10 @@ def study(case: RollingCase, folder: Path) -> Studied:
     found = patches(track, case.posed(), case.pose.side, case.vertical_force)
     creep = _creep(case, found[0] if found else None)
     if not found:
-        return Studied(case, track, found, creep, None, None, 0, None)
+        return Studied(case, track, found, creep, None, None, None, 0, None)
     p, c, m = found[0], case.creep, case.model
     of = p.a, p.b, p.normal_force, case.friction, track.elastic.shear, track.elastic.poisson
-    how = m.model_dump()
+    how = m.model_dump(exclude={"exact"})
     xi, eta, phi = creep
     forces = creep_forces(xi, eta, phi, *of, **how)
     over = creep[list(UNITS).index(c.over)]
@@ -114,7 +141,22 @@ def study(case: RollingCase, folder: Path) -> Studied:
         at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
         totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
-    return Studied(case, track, found, creep, forces, reference, shown, Tractions(*(v[0] for v in drawn)))
+    beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y))
+    patch = Tractions(*(v[0] for v in drawn))
+    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, missed)
+
+
+def _exact(case: RollingCase, track: Track, p: Patch, creep: Array, size: Array) -> tuple[Exact | None, str]:
+    """At so many states of the curve as the case wants, in equal steps of the (n,) force; why not if there is none."""
+    way = np.cumsum(np.abs(np.diff(size, prepend=size[:1])))
+    at = np.unique(np.searchsorted(way, np.linspace(0, way[-1], case.model.exact)))
+    if not len(at) or not case.friction:
+        return None, ""
+    bodies = Solid(case.wheel.young, case.wheel.poisson), Solid(case.rail.young, case.rail.poisson)
+    try:
+        return exact(bodies, p, across(track, case.posed(), case.pose.side, p), case.friction, creep, at), ""
+    except UserError as error:
+        return None, str(error)
 
 
 def _creep(case: RollingCase, p: Patch | None) -> Array:

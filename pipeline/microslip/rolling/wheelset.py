@@ -109,6 +109,17 @@ def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]
     return [_patch(track, seen, gap, p, left) for p in found]
 
 
+def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Array]:
+    """(k,) places across a patch, ascending in its y, and the distances of both surfaces there along its normal, m."""
+    left = side == "left"
+    gap = _gap(track, pose.mirrored() if left else pose)
+    known = np.isfinite(gap.gap)
+    y_w, arc, opened = gap.on_wheel[known], np.cumsum(gap.arc[known]), gap.gap[known]
+    place = arc - np.interp(patch.on_wheel, y_w, arc)
+    apart = (opened - np.interp(patch.on_wheel, y_w, opened)) * np.cos(patch.angle)
+    return (place, apart) if left else (-place[::-1], apart[::-1])
+
+
 class Gap(NamedTuple):
     """Above the rail, over the wheel's profile, (k,). Attributes: on_wheel: y of the profile; x, y, z: of the point of
     its circle that comes nearest to the rail, m, the axle's middle as high as the nominal radius; gap: vertical, m;

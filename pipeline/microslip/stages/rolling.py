@@ -70,8 +70,11 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     store.write_text(folder / "patches.csv", rows_csv(head, ([f"{v:.8g}" for v in row] for row in rows)))
     if found.forces is None:
         return [folder / "patches.csv"]
-    store.write_text(folder / "creep.csv", columns_csv(found.columns(), 8))
-    return [folder / "creep.csv", folder / "patches.csv"]
+    made = {"creep.csv": found.columns(), "exact.csv": found.beside()}
+    for name, columns in made.items():
+        if columns:
+            store.write_text(folder / name, columns_csv(columns, 8))
+    return [*(folder / name for name, columns in made.items() if columns), folder / "patches.csv"]
 
 
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
