@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 import shutil
 from pathlib import Path
@@ -91,7 +92,7 @@ def test_a_root_moves_its_bodies_through_one_period_as_cosine_and_sine(tmp_path:
 def test_limit_cycles_by_harmonic_balance_are_the_circles_of_the_normal_form() -> None:
     """Radius sqrt(p), frequency 1; a motion in time stays on them."""
     (found,) = cycles(normal_form(), np.zeros(2), -1.0, 1.0, 2, (0.5, 2.0))
-    assert found.supercritical and "bound" in found.ended
+    assert found.supercritical and "bound" in found.ended and not found.lost
     for o in found.orbits:
         assert np.hypot(*o.at(np.zeros(1))[0]) == pytest.approx(np.sqrt(o.p), abs=1e-8)
         assert o.omega == pytest.approx(1.0, abs=1e-9)
@@ -194,6 +195,8 @@ def test_a_killed_run_goes_on_and_motions_in_time_swing_as_limit_cycles(belt: Pa
         "equations over load", "speed 0.98", "speed 1.02", *(f"limit cycle {i} of 4" for i in (1, 2, 3, 4))
     }  # fmt: skip
     assert not Path("a/stability.points").exists()
+    told = json.loads(Path("a/stability.json").read_text())  # four points do not reach the end
+    assert not told["complete"] and sum("lost at" in line and "points: 4" in line for line in told["lines"]) == 3
     for table, checks in (("stability_cycle_1.csv", 3), ("stability_relief.csv", 6)):
         rows = np.genfromtxt(Path("a", table), delimiter=",", names=True)
         rows = rows[np.isfinite(rows["in_time_leaves_by"])]

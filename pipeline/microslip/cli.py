@@ -538,7 +538,7 @@ def stability(
             made, lines, complete = stability_stage(path, list(set_), force, report, not no_pictures, speed)
     _say("\n".join([*lines, *(str(path) for path in made if path.suffix != ".vtu")]), quiet)
     if not complete:
-        raise NotConverged(f"roots are missing in the window; {made[0]} holds those that were found")
+        raise NotConverged(f"not all was found, roots in the window or limit cycles; {made[0]} says what")
 
 
 @app.command

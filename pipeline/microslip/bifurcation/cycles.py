@@ -16,6 +16,7 @@ from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
 from . import equilibria, floquet, flow
 from .balance import Balance, Harmonics, summed
+from .branches import LOST
 from .diagram import Asked, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
@@ -76,6 +77,11 @@ class Cycles:
     def supercritical(self) -> bool:
         """Whether orbits are born where the equilibrium is unstable, and as stable as it was."""
         return self.hopf.criticality < 0
+
+    @property
+    def lost(self) -> str:
+        """Where and why they could not be followed to an end; empty if they were."""
+        return f"lost at {self.orbits[-1].p:.4g}: {self.ended}" if self.ended.startswith(LOST) else ""
 
     @property
     def kind(self) -> str:

@@ -35,6 +35,11 @@ class Born:
     own: Sequence[Cycles]
     relief: Sequence[tuple[float, Cycles]]
 
+    @property
+    def whole(self) -> bool:
+        """Whether all were followed to an end."""
+        return not any(c.lost for c in (*self.own, *(c for _, c in self.relief)))
+
     def columns(self, across: str) -> dict[str, Array]:
         """Of the relief, a row an orbit. across: name of the second parameter."""
         parts = [{across: np.full(len(c.orbits), value)} | c.columns for value, c in self.relief]
@@ -131,7 +136,8 @@ def sentences_of(c: Cycles, over: Cycle) -> list[str]:
     unit, last = f" {over.unit}" if over.unit else "", c.orbits[-1]
     said = [
         f"Hopf point at {over.parameter} {c.hopf.p:.6g}{unit}, {c.hopf.omega / (2 * np.pi):.6g} Hz, {c.kind}: its "
-        f"limit cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz"
+        f"limit cycle by {over.harmonics} harmonics to {last.p:.4g}{unit}, {last.omega / (2 * np.pi):.6g} Hz",
+        *([f"limit cycle {c.lost}"] if c.lost else []),
     ]
     for one in c.checked.values():
         wide = "" if one.error <= over.accuracy else f", more than the {over.accuracy:.1e} asked for"
@@ -156,5 +162,6 @@ def sentence_of_relief(found: Born, over: Cycle) -> list[str]:
     return [
         f"limit cycles at {over.across.points} values of {range_}: {counts}; motions in time leave {len(every)} of "
         f"their orbits, by {over.across.harmonics} harmonics, by {worst:.1e} of the amplitude at most in {PERIODS} "
-        "periods"
+        "periods",
+        *(f"limit cycle at {over.across.parameter} {value:.4g}{unit} {c.lost}" for value, c in found.relief if c.lost),
     ]

@@ -89,7 +89,7 @@ def squeal_stage(
         files: body of the case -> its modal file.
 
     Returns:
-        The files, sentences and lines of a table, and whether the roots are proved complete.
+        The files, sentences and lines of a table, and whether the roots are proved complete and no limit cycle is lost.
 
     Raises:
         UserError: the case asks for none; nothing slides; a contact that lifts off; what `sliding.of` refuses.
@@ -133,7 +133,7 @@ def _work(
         said += sentence_of_relief(cycles, asked.cycle)
     moves = moving(state, found, varied.bases, settings, folder) if pictures else []
     names = _written(folder, settings.name, found, over, full, said, pictures, (cycles, asked.cycle), moves)
-    complete = found.complete and all(one.complete for one in full)
+    complete = found.complete and all(one.complete for one in full) and cycles.whole
     answer = {"files": names, "lines": [*table_lines(found), *said], "complete": complete}
     store.write_text(stage.product, json.dumps(answer, indent=1) + "\n")
     points.unlink()
