@@ -150,7 +150,8 @@ class Joints:
                 felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
                 moved = np.split(applied(loose[..., by.at], felt), ends[:-1], axis=1)
                 for to, block in zip(own, moved, strict=True):
-                    key, block = (to.contact, by.contact), (to.sign * by.sign) * block.reshape(-1, W * len(a))
+                    block = (to.sign * by.sign) * block.reshape(W * len(self._active[to.contact]), W * len(a))
+                    key = to.contact, by.contact
                     pieces[key] = pieces[key] + block if key in pieces else block
         return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
 

@@ -105,8 +105,8 @@ class Tuned:
                 components[m.name] = subset.mistuned(m, discs[m.name])
         for name, s, masses in heavier:
             for j, mass in enumerate(masses):
-                at = replace(s, at=at_sector(s.at or "", j))
-                components[name] = deviated(components[name], at, np.array([mass]))
+                there = replace(s, at=at_sector(s.at or "", j))
+                components[name] = deviated(components[name], there, np.array([mass]))
         parts, met = tuple(components.values()), tuple(contacts.values())
         return replace(self.whole, components=parts, contacts=met, flow=self._flow(deviations))
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Array, ComplexArray
-from ..harmonic_balance.problem import AtFrequency, Problem
+from ..harmonic_balance.problem import AtFrequency
 from ..harmonic_balance.solver import Point
 from .ring import Tuned, deviated
 from .samples import Asked, read
@@ -110,13 +110,12 @@ def _forced(
     """(size,) R_p of one mode of blade 0, and the change of its coordinates in the first harmonic besides."""
     p = at.problem
     body = next(i for i, m in enumerate(p.assembly.components) if m.name == f"{tuned.body(scatter).name}_0")
-    d = np.zeros(tuned.modes(scatter))
-    d[mode] = STEP
-    more, less = (deviated(p.assembly.components[body], scatter, sign * d) for sign in (1.0, -1.0))
+    own = np.zeros(tuned.modes(scatter))
+    own[mode] = STEP
+    more, less = (deviated(p.assembly.components[body], scatter, sign * own) for sign in (1.0, -1.0))
     by, changed = np.zeros((p.coefficients, p.count)), np.zeros(0, dtype=complex)
-    at_part, own = _where(p, body)
     for h in range(p.harmonics + 1):
-        part, k, s, w = p.parts[h][at_part], p.stiffness[at_part], p.slices[at_part], h * at.Omega
+        part, k, s, w = p.parts[h][body], p.stiffness[body], p.slices[body], h * at.Omega
         index = p.assembly.index(h)
         (M1, K1, C1), (M0, K0, C0) = more.at(index).matrices, less.at(index).matrices
         H1, H0 = more.at(index).loss, less.at(index).loss
@@ -125,9 +124,7 @@ def _forced(
         P = np.linalg.inv(np.eye(part.count) + part.yielding @ k)
         T = part.rows
         A = part.stiff - w**2 * part.M + 1j * w * part.C + T.conj().T @ k @ P @ T
-        driven = np.zeros(len(A), dtype=complex)
-        driven[own] = dS @ q[h][at_part][own]
-        dq = -np.linalg.solve(A, driven)
+        dq = -np.linalg.solve(A, dS @ q[h][body])
         d = -P @ (T @ dq)
         if h:
             by[2 * h - 1, s], by[2 * h, s] = d.real, -d.imag
@@ -135,15 +132,7 @@ def _forced(
             by[0, s] = d.real
         if h == 1:
             changed = dq
-    return (by / p.scale).ravel(), (at_part, changed)
-
-
-def _where(p: Problem, body: int) -> tuple[int, slice]:
-    """Number of the part that a body is eliminated in, and its coordinates there."""
-    if len(p.slices) > 1:
-        return body, slice(None)
-    ends = np.cumsum([0, *(len(m.groups[0].M_r) for m in p.assembly.components)])
-    return 0, slice(int(ends[body]), int(ends[body + 1]))
+    return (by / p.scale).ravel(), (body, changed)
 
 
 STEP = 1e-4

@@ -77,7 +77,8 @@ def _work(
         raise UserError(f"{case_path}: mistuning: {text}") from error
     stage.begin()
     first = next((s for s in what.scatter if s.of == "frequency" and s.deviation), None)
-    lone = first is not None and what.tuned.body(first).sectors == 1 and settings.stuck_ratios is None
+    coupled = settings.stuck_ratios is not None or what.tuned.whole.flow
+    lone = first is not None and what.tuned.body(first).sectors == 1 and not coupled
     near = approximation(what, first) if first and lone and not what.stuck else None
     sentences = [*said(found), *built.messages]
     made = _written(found, near, folder)
