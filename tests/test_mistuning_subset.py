@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import rings
+import scipy.linalg
 import scipy.sparse as sp
 from meshes import body
 from scipy.sparse.linalg import eigsh
@@ -22,13 +23,17 @@ from microslip.system.component import Component, Ring
 N = 5
 PATTERN = np.array([0.3, -1.2, 0.8, 1.1, -0.9])
 MESH = rings.bladed_sector("hexahedron20", N)
+TIP = int(MESH.face_points("top")[0])
 HELD = {"supports": [{"face": "bore"}]}
 
 
 @cache
 def disc(count: int, gauss: bool = True) -> Component:
     output = {"gauss": gauss, "nodal_stress": False}
-    settings = body(**HELD, cyclic={"sectors": N}, modes={"count": count}, reduction="eigenmodes", output=output)
+    tip = {"name": "tip", "point": MESH.points[TIP].tolist()}
+    settings = body(
+        **HELD, cyclic={"sectors": N}, modes={"count": count}, reduction="eigenmodes", output=output, monitors=[tip]
+    )
     return Component("disc", {k: g for (_, k), g in modal_basis(MESH, settings).groups.items()}, sectors=N)
 
 
@@ -82,6 +87,22 @@ def test_frequencies_of_the_whole_ring():
             assert (error[count, size] > -1e-9).all() and error[count, size].max() < 4 * size**2
     assert np.log2(error[4, 0.02].mean() / error[4, 0.01].mean()) == pytest.approx(2, abs=0.15)
     assert (error[12, 0.02] < 0.9 * error[4, 0.02]).all()
+
+
+def test_masses_on_the_tips():
+    """Screws at the tips, against the matrices of the whole ring with these masses: from above, and the nearer the more
+    modes there are."""
+    ring, tuned, _ = whole()
+    kg, masses, error = 0.01 * np.arange(N), np.zeros(3 * ring.mesh.n_points), {}
+    masses.reshape(-1, 3)[ring.nodes[:, TIP]] = kg[:, None]
+    M = tuned.M + sp.diags(masses[tuned.free])
+    exact = np.sqrt(eigsh(tuned.K.tocsc(), 10, M.tocsc(), sigma=0, which="LM", v0=np.ones(M.shape[0]))[0])
+    for count in (4, 12):
+        tip = Tuned(Assembly((disc(count),), (), (), (), Ring(N, 1)), {})
+        group = tip.mistuned([(Scatter("added_mass", values=tuple(kg), at="tip"), kg[:, None])]).components[0].groups[0]
+        error[count] = np.sqrt(scipy.linalg.eigvalsh(group.K_r, group.M_r)[:10]) / exact - 1
+    assert (error[4] > -1e-9).all() and (error[12] < error[4]).all() and error[12].max() < 1e-3
+    assert np.abs(mistuned(disc(4), np.zeros(N)).groups[0].omega[:10] / exact - 1).max() > 0.01
 
 
 def test_the_order_of_the_sectors_turns_with_the_ring():

@@ -43,10 +43,10 @@ def disc(tmp_path_factory: pytest.TempPathFactory) -> Component:
     return Component("disc", {k: g for (_, k), g in read_basis(file).groups.items()}, sectors=N)
 
 
-def theirs(folder, cells: np.ndarray) -> np.ndarray:
+def theirs(folder, cells: np.ndarray, deviation: np.ndarray = DEVIATION) -> np.ndarray:
     """(COUNT,) rad/s of the ring whose sectors are (1 + d)^2 as stiff in some of their cells (bool)."""
     text, n = deck(rings.full_ring(SECTOR, N).mesh, held="bore"), len(cells)
-    for j, d in enumerate(DEVIATION):
+    for j, d in enumerate(deviation):
         own = np.flatnonzero(cells) + j * n + 1
         text += f"*ELSET, ELSET=E{j}\n" + "".join(f"{e},\n" for e in own)
         text += f"*MATERIAL, NAME=M{j}\n*ELASTIC\n{STEEL['young'] * (1 + d) ** 2:.12e}, {STEEL['poisson']:.12e}\n"
@@ -66,12 +66,14 @@ def test_sectors_that_differ(disc: Component, tmp_path) -> None:
     assert np.abs(alike / expected - 1).max() > 5e-3
 
 
-def test_blades_that_differ(disc: Component, tmp_path) -> None:
-    """A modulus for each blade, its disc alike all round: nominal modes (SNM) to 1e-4, from above."""
+@pytest.mark.parametrize("deviation, error", [(DEVIATION, 1e-4), (np.sqrt(1.1) * np.eye(N)[2] - np.eye(N)[2], 3e-4)])
+def test_blades_that_differ(disc: Component, deviation: np.ndarray, error: float, tmp_path) -> None:
+    """A modulus for each blade, its disc alike all round: nominal modes (SNM) to 1e-4, from above. One blade whose
+    modulus is 10 % higher moves frequencies by up to 1.4 %, and nominal modes miss them by 2.2e-4."""
     points = disc.groups[0].stresses["gauss"].points
     of_cells = np.hypot(*SECTOR.points[SECTOR.cells["hexahedron20"]].mean(axis=1)[:, [0, 2]].T) > RIM
     blade = np.repeat(of_cells, len(points) // SECTOR.n_cells)
-    expected = theirs(tmp_path, of_cells)
-    found = subset.mistuned(disc, DEVIATION, blade).groups[0].omega[:COUNT]
-    np.testing.assert_allclose(found, expected, rtol=1e-4)
+    expected = theirs(tmp_path, of_cells, deviation)
+    found = subset.mistuned(disc, deviation, blade).groups[0].omega[:COUNT]
+    np.testing.assert_allclose(found, expected, rtol=error)
     assert (found > expected * (1 - 1e-6)).all()

@@ -176,6 +176,8 @@ def one_plus(
     for (i, j), block in pieces.items():
         if i != j:
             A[begins[i] : begins[i + 1], begins[j] : begins[j + 1]] = block
+    if by_parts:
+        return Dense(A)
     out = np.empty_like(A)
     out[np.ix_(whole.order, whole.order)] = A
     return Dense(out)

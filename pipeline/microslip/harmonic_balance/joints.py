@@ -147,15 +147,15 @@ class Joints:
             by_part.setdefault(one.part, []).append(one)
         W, alone = self.coefficients, self.alone or []
         for i, own in by_part.items():
-            loose = alone[i][1]
-            for to in own:
-                rows = loose[:, to.at][:, self._active[to.contact]]
-                for by in own:
-                    S, a = self.slopes[by.contact], self._active[by.contact]
+            rows = [to.at.start + self._active[to.contact] for to in own]
+            loose, ends = alone[i][1][:, np.concatenate(rows)], np.cumsum([len(r) for r in rows])
+            for by in own:
+                S, a = self.slopes[by.contact], self._active[by.contact]
+                felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
+                moved = np.split(applied(loose[..., by.at], felt), ends[:-1], axis=1)
+                for to, block in zip(own, moved, strict=True):
+                    block = (to.sign * by.sign) * block.reshape(W * len(self._active[to.contact]), W * len(a))
                     key = to.contact, by.contact
-                    felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
-                    block = (to.sign * by.sign) * applied(rows[..., by.at], felt)
-                    block = block.reshape(W * len(self._active[to.contact]), W * len(a))
                     pieces[key] = pieces[key] + block if key in pieces else block
         return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
 

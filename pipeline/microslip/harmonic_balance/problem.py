@@ -33,7 +33,7 @@ NO_NUMBER = "is not a finite number"
 """What is said of a law without a value."""
 
 RELATIVE_AT_MOST = 8
-"""Members up to which all are eliminated together."""
+"""Members up to which all are eliminated together, and contacts of theirs up to which steps solve for all motions."""
 
 
 Tried = list[tuple[Array, Array]]
@@ -342,7 +342,7 @@ class AtFrequency:
     def jacobian(self, slopes: list[Array]) -> Matrix:
         """(size, size) dR/dx for derivatives of the contact forces, those of `forces` or ones found near by."""
         p = self.problem
-        if len(p.slices) == 1:
+        if len(p.slices) == 1 and len(p.sides) <= RELATIVE_AT_MOST:
             return self._of_sides(slopes)
         each = {i: own for g, S in zip(p.groups, slopes, strict=True) for i, own in zip(g.contacts, S, strict=True)}
         ordered = [each[i] for i in sorted(each)]

@@ -13,6 +13,7 @@ from ..data import Array, ModalGroup, UserError
 from ..reduced.coordinates import of_density
 from ..system.assembly import Assembly, Contact, ContactFace, preloaded_contact
 from ..system.component import Component
+from ..system.disc import at_sector
 from ..system.flow import Flow, through
 from . import subset
 from .scatter import MODAL, OF_BLADES, Scatter
@@ -79,12 +80,15 @@ class Tuned:
         """
         components = {m.name: m for m in self.whole.components}
         contacts = {c.name: c for c in self.whole.contacts}
-        discs: dict[str, Array] = {}
+        discs, heavier = dict[str, Array](), list[tuple[str, Scatter, Array]]()
         for s, values in sorted(deviations, key=lambda one: one[0].of != "modal_file"):  # then what differs in them
             _positive(s, values)
             name = self.body(s).name if s.of in OF_BLADES else self._contact(s).name
             if name in components:  # a disc in one piece
-                discs[name] = (1 + discs.get(name, 0.0)) * (1 + values[:, 0]) - 1
+                if s.of == "frequency":
+                    discs[name] = (1 + discs.get(name, 0.0)) * (1 + values[:, 0]) - 1
+                else:
+                    heavier.append((name, s, values[:, 0]))
                 continue
             for at, own in ((f"{name}_{j}", own) for j, own in enumerate(values)):
                 if s.of == "modal_file":
@@ -99,6 +103,10 @@ class Tuned:
         for m in self.sector.components:
             if m.name in discs:
                 components[m.name] = subset.mistuned(m, discs[m.name])
+        for name, s, masses in heavier:
+            for j, mass in enumerate(masses):
+                there = replace(s, at=at_sector(s.at or "", j))
+                components[name] = deviated(components[name], there, np.array([mass]))
         parts, met = tuple(components.values()), tuple(contacts.values())
         return replace(self.whole, components=parts, contacts=met, flow=self._flow(deviations))
 
@@ -109,10 +117,10 @@ class Tuned:
         if s.component is not None and s.component not in names:
             raise UserError(f"{s.of}: there is no body '{s.component}', but {', '.join(names)}")
         body = names[s.component or next(iter(names))]
-        if body.sectors > 1 and s.of != "frequency":
+        if body.sectors > 1 and s.of not in ("frequency", "added_mass"):
             raise UserError(
-                f"{s.of}: '{body.name}' is a sector of a disc in one piece, of which only the frequency scatters, by "
-                "the stiffness of whole sectors; scatter that, or what is in the contacts"
+                f"{s.of}: '{body.name}' is a sector of a disc in one piece, of which the frequency scatters, by the "
+                "stiffness of whole sectors, and added_mass; scatter these, or what is in the contacts"
             )
         return body
 
@@ -209,8 +217,9 @@ def deviated(component: Component, s: Scatter, own: Array) -> Component:
 def _heavier(group: ModalGroup, s: Scatter, mass: float) -> ModalGroup:
     rows = group.monitors.get(s.at or "")
     if rows is None or rows.unit != "m":
+        known = dict.fromkeys(name.partition("@")[0] for name in group.monitors)
         raise UserError(
-            f"added_mass: at: give a monitor of displacements, one of {', '.join(group.monitors) or 'none'}"
+            f"added_mass: at: give a monitor of displacements, one of {', '.join(known) or 'none'}"
         )
     return replace(group, M_r=group.M_r + mass * rows.rows.conj().T @ rows.rows)
 
