@@ -1132,7 +1132,7 @@ def mistuning() -> None:
     import mistuning_study as study
 
     for name, file in study.pictures().items():
-        save(from_file(file), name, colours=LINES)
+        save(from_file(file), name, colours=2 * LINES if name.endswith("sensitivity") else LINES // 2)
     fill("mistuning.md", "amplification", table(*study.amplification()))
     fill("mistuning.md", "first_order", table(*study.first_order()))
 def identification() -> None:

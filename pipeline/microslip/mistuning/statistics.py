@@ -45,7 +45,7 @@ def quantile(values: Array, share: float, confidence: float = CONFIDENCE) -> Qua
         return Quantile(share, np.nan, 0.0, np.inf)
     low, high = (int(scipy.stats.binom.ppf(0.5 + way * confidence / 2, len(x), share)) for way in (-1, 1))
     ends = (float(x[low - 1]) if low else 0.0, float(x[high]) if high < len(x) else np.inf)
-    return Quantile(share, float(np.quantile(x, share)), *ends)
+    return Quantile(share, float(np.clip(np.quantile(x, share), *ends)), *ends)  # of few, between two it lies outside
 
 
 LOW, HIGH, WIDTH = -14.0, 4.0, 0.01

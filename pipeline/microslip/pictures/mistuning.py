@@ -102,7 +102,9 @@ def worst_picture(found: Ensemble, path: Path, title: str) -> Path:
     ring.set_title(f"amplification at {one.top.frequency:.6g} Hz", fontsize=10)
     axes = figure.add_subplot(1, 2, 2)
     plain_axes(axes)
-    drawn: list[tuple[str, Array]] = [(s.of.replace("_", " "), v[:, 0]) for s, v in found.asked.deviations(at)]
+    drawn: list[tuple[str, Array]] = []
+    for s, v in found.asked.deviations(at):
+        drawn.append((s.of.replace("_", " ") + (", first mode" if np.ptp(v, axis=1).any() else ""), v[:, 0]))
     for i, (name, v) in enumerate(drawn):
         width = 0.8 / len(drawn)
         axes.bar(np.arange(N) + (i - 0.5 * (len(drawn) - 1)) * width, 100 * v, width, color=COLOURS[i % 10], label=name)
