@@ -158,7 +158,7 @@ def tractions(
         tangent = _linearised(problem, trial)
         p = tangent.free(p) + tangent.across * bound * tangent.slip
         slip = problem.rigid + np.tensordot(amounts, problem.wanted, 1) + B(p, TANGENTIAL, TANGENTIAL)
-        change, more = _newton(problem, tangent, p, slip, min(0.1, max(error, 1e-3)))
+        change, more = _newton(problem, tangent, p, slip, min(0.2, max(error, 1e-3)))
         p, amounts = p + change, amounts + more
         slip = slip + np.tensordot(more, problem.wanted, 1) + B(change, TANGENTIAL, TANGENTIAL)
         trial = p - problem.push * slip
@@ -231,7 +231,7 @@ def _first(problem: Shear) -> tuple[Array, Array]:
         wanted=_halved(problem.wanted, "edge"),
         sums=problem.sums / 4,
     )
-    p, slip, amounts = tractions(coarse, tolerance=1e-2)
+    p, slip, amounts = tractions(coarse, tolerance=0.1)
     trial = p - coarse.push * slip
     return amounts, np.repeat(np.repeat(trial, 2, 1), 2, 2)[:, : grid.nx, : grid.ny]
 
