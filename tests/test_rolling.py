@@ -207,7 +207,7 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     size = HELD * np.array([[1.0], [1.0], [np.sqrt(32e-6)]])
     error = np.abs(table.forces(*given, G) - np.array([f.x, f.y, f.moment])) / size
     assert (error.max(axis=1) <= 1.2 * table.error[:, 2]).all()
-    assert (table.error[:, 0] < 0.4 * tables[0].error[:, 0]).all()
+    assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
     with pytest.raises(UserError, match="no table of creep forces"):
         ms.read_creep_table(CASE)
 
