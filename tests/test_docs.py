@@ -8,6 +8,7 @@ import importlib
 import inspect
 import re
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -384,3 +385,14 @@ def test_own_model_page(tmp_path: Path) -> None:
     assert coarse == pytest.approx(1020.8, rel=1e-4)
     assert (tmp_path / "build" / "bracket" / "report.html").stat().st_size > 100_000
     assert (tmp_path / "build" / "bracket" / "response.csv").is_file()
+
+
+def test_rolling_page(capsys: pytest.CaptureFixture[str]) -> None:
+    """What its example prints; all keys of its case are keys."""
+    from microslip.rolling.settings import RollingCase
+
+    text = (DOCS / "rolling.md").read_text(encoding="utf-8")
+    for code, printed in re.findall(r"```python\n(.*?)```\n\n    (.*?)\n", text, flags=re.S):
+        exec(compile(code, "rolling.md", "exec"), {})
+        assert capsys.readouterr().out.strip() == printed
+    RollingCase.model_validate(tomllib.loads(re.findall(r"```toml\n(.*?)```", text, flags=re.S)[0]))

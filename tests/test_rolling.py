@@ -15,7 +15,7 @@ from closed_forms.no_slip import extrapolated
 
 import microslip as ms
 from microslip.cli import main
-from microslip.contact.friction import Coulomb
+from microslip.contact.friction import Coulomb, Falling
 from microslip.contact.hertz import Hertz
 from microslip.contact.law import value
 from microslip.contact.point import opposed, slide, weight
@@ -148,6 +148,28 @@ def test_a_strip_slides_sticks_and_slides_again_under_spin() -> None:
     assert any(s[0] and s[-1] and np.abs(np.diff(s.astype(int))).sum() == 2 for s in slides)
 
 
+@pytest.mark.parametrize("distribution", [DISTRIBUTIONS[1], pytest.param(DISTRIBUTIONS[0], marks=pytest.mark.slow)])
+def test_strips_are_point_contacts_element_by_element(distribution: str) -> None:
+    """`PointContact` itself, marched with constant friction: the same forces, power and share that slides, rounded."""
+    load = PATCH | {"distribution": distribution, "elements": (20, 20)}
+    creep = np.array([3e-4, 2e-3, 2e-2]), 2e-4, 0.4
+    fast = ms.creep_forces(*creep, **load)
+    law = ms.forces_by_characteristic(*creep, **load | {"friction": Coulomb(value(MU))}, speed=20.0)
+    for name, one, other in zip(fast._fields, fast, law, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12 * HELD, err_msg=name)
+
+
+@pytest.mark.slow
+def test_friction_that_falls_with_the_speed_makes_a_creep_curve_that_falls() -> None:
+    """Where all slides F = mu(V xi) F_N (3.6-15), and the highest force lies before."""
+    xi = np.array([1e-3, 5e-3, 2e-2, 5e-2])
+    load = PATCH | {"friction": Falling(value(MU), value(0.5)), "elements": (20, 20)}
+    f = ms.forces_by_characteristic(xi, 0, 0, **load, speed=20.0)
+    mu = 1 / (1 + 0.5 * 20 * xi)
+    np.testing.assert_allclose(-f.x[2:] / HELD, mu[2:], rtol=3e-3)
+    assert -f.x[1] > -f.x[2] > -f.x[3]
+
+
 def test_mirrored_creepages_give_mirrored_forces() -> None:
     """y -> -y turns lateral creepage and spin round, and with them F_y and M_z."""
     f = ms.creep_forces([1e-3, 1e-3], [5e-4, -5e-4], [0.2, -0.2], **PATCH)
@@ -207,7 +229,7 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     size = HELD * np.array([[1.0], [1.0], [np.sqrt(32e-6)]])
     error = np.abs(table.forces(*given, G) - np.array([f.x, f.y, f.moment])) / size
     assert (error.max(axis=1) <= 1.2 * table.error[:, 2]).all()
-    assert (table.error[:, 0] < 0.4 * tables[0].error[:, 0]).all()
+    assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
     with pytest.raises(UserError, match="no table of creep forces"):
         ms.read_creep_table(CASE)
 

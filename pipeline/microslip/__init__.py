@@ -32,6 +32,7 @@ PUBLIC = {
     "rolling.ellipse": "ellipses",
     "rolling.kalker": "creep_coefficients",
     "rolling.strips": "creep_forces tractions",
+    "rolling.laws": "forces_by_characteristic",
     "rolling.fastsim": "fastsim",
     "rolling.table": "creep_table write_creep_table read_creep_table",
     "rolling.wheelset": "Track Pose patches",

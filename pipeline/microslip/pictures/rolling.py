@@ -36,7 +36,7 @@ def curve_picture(found: Studied, path: Path, title: str) -> Path:
         axes.plot(x[at], each, "D", markersize=6, color="black", fillstyle="none", label="|F| of exact half-spaces")
     axes.axvline(x[found.shown], color="0.6", linestyle=":", linewidth=1.0)
     axes.set(xlabel=LABELS[found.case.creep.over], ylabel="force on the wheel", title=title)
-    axes.legend(fontsize=9, loc="center right")
+    figure.legend(fontsize=9, loc="outside lower center", ncols=4)
     return save_figure(figure, path)
 
 

@@ -266,7 +266,7 @@ def creep_forces(
     Returns:
         Arrays (n,), N and N m.
     """
-    given = _broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    given = broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     n = len(given[0])
     filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]) for v in given]
     how = {"elements": elements, "distribution": distribution, "coefficients": coefficients, "spin": spin}
@@ -274,7 +274,7 @@ def creep_forces(
     return Forces(*(np.concatenate([np.asarray(p[k]) for p in parts])[:n] for k in range(5)))
 
 
-def _broadcast(*given: ArrayLike) -> list[np.ndarray]:
+def broadcast(*given: ArrayLike) -> list[np.ndarray]:
     return list(np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given)))
 
 
@@ -288,7 +288,7 @@ def tractions(
     The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
     creepages give (errata to (6.5-16)).
     """
-    given = _broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    given = broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
     pose = Poses(*map(np.asarray, poses(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     g = grid(elements, distribution)
