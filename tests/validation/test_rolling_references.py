@@ -16,7 +16,9 @@ import pytest
 import microslip as ms
 from microslip.contact.solids import Solid
 from microslip.rolling.ellipse import combined, ellipses
-from microslip.rolling.wheelset import Track
+from microslip.rolling.half_space import steady_rolling
+from microslip.rolling.half_space_influence import Grid, Pair
+from microslip.rolling.wheelset import Track, across
 
 G, NU = 82e9, 0.28
 STEEL = Solid(2 * G * (1 + NU), NU)
@@ -55,7 +57,6 @@ CURVE = {
     3.2e-3: (-0.9976, -0.9770, 1092),
 }
 """Longitudinal creepage: F_x/(mu F_N) of the half-space and of FASTSIM, and how many elements of the latter slide."""
-
 
 
 def test_creep_curve_of_a_locomotive() -> None:
@@ -117,3 +118,36 @@ def test_manchester_benchmark(row: str) -> None:
     np.testing.assert_allclose(found, force, atol=0.067 if long else 0.02)
     assert 1e-6 * p.pressure == pytest.approx(pressure[0], rel=0.05 if long else 0.02)
     assert p.normal_force == pytest.approx(1e4, rel=6e-3)
+
+
+# F_n N, friction included; M_n N mm; touching, sticking elements; friction power W
+EXACT = """
+9997  4605  1291 943 -0.4677
+10050 376   916  0   -14.45
+10030 80.74 766  0   -43.31
+10020 41.57 658  0   -90.59
+10020 32.16 515  0   -205.6
+"""
+
+
+@pytest.mark.parametrize("row", range(5), ids=lambda i: f"{MANCHESTER.strip().splitlines()[i].split()[0]} mm")
+def test_manchester_benchmark_by_exact_half_spaces(row: int) -> None:
+    """On the profiles themselves and the printed elements of 0.2 mm: forces to 0.2 % of mu F_n, pressure and power to
+    0.3 %, elements to 2 %, moment about the printed point to 3 N mm or 0.2 %. What is
+    left is how both programs read the profiles."""
+    pose, place, _, force, pressure = (
+        [float(v) for v in part.split()] for part in MANCHESTER.strip().splitlines()[row].split("|")
+    )
+    normal, moment, touching, sticking, power = (float(v) for v in EXACT.strip().splitlines()[row].split())
+    track = Track(ms.read_profile(PROFILES / "MBench_S1002_v3.prw"), ms.read_profile(PROFILES / "MBench_UIC60_v3.prr"),
+                  0.46, 0.75, 0.7605326, ELASTIC)  # fmt: skip
+    at = ms.Pose(pose[0] / 1e3, pose[1] / 1e3, pose[2], 2.0, -pose[3])
+    (p,) = ms.patches(track, at, "left", 1e4)
+    y, apart = across(track, at, "left", p)
+    grid = Grid(76, 120, 2e-4, 2e-4)
+    h = p.A * grid.x**2 + np.interp(grid.y - place[0] / 1e3 - p.on_rail, y, apart, left=1.0, right=1.0)
+    c = steady_rolling(h, grid, Pair(G, NU), 0.3, normal, creepages=(p.xi, p.eta, p.phi))
+    assert np.array([-1, 1]) * c.force[:2] / (0.3 * normal) == pytest.approx(force, abs=0.002)
+    assert 1e3 * c.moment == pytest.approx(moment, rel=0.002, abs=3)
+    assert (1e-6 * c.pressure.max(), p.speed * c.work) == pytest.approx((pressure[0], power), rel=0.003)
+    assert (c.touching.sum(), c.sticking.sum()) == pytest.approx((touching, sticking), rel=0.02)
