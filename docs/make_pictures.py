@@ -1176,7 +1176,8 @@ def squeal() -> None:
 
     page, _ = run_case_file(ROOT / "pipeline" / "cases" / "squeal.toml")
     for name in ("map", "cycles", "relief"):
-        save(from_file(page.parent / "pictures" / f"roots_{name}.png"), f"squeal_{name}".removesuffix("s"), colours=LINES // 2)
+        drawn = from_file(page.parent / "pictures" / f"roots_{name}.png")
+        save(drawn, f"squeal_{name}".removesuffix("s"), colours=LINES // 2)
     moving, frames = from_file(page.parent / "pictures" / "root_1_disc.gif"), []
     for i in range(3):  # the other half of the period is its mirror
         moving.seek(i * moving.n_frames // 6)
