@@ -1182,17 +1182,18 @@ def stability() -> None:
 
 
 def squeal() -> None:
-    """The map and the limit cycle of `make squeal`, from the folder in which it works."""
+    """The map and the limit cycles of `make squeal`, from the folder in which it works."""
     from microslip.stages.running import run_case_file
 
     page, _ = run_case_file(ROOT / "pipeline" / "cases" / "squeal.toml")
-    for name, drawn_as in (("roots_map", "squeal_map"), ("roots_cycles", "squeal_cycle")):
-        save(from_file(page.parent / "pictures" / f"{name}.png"), drawn_as)
+    for name in ("map", "cycles", "relief"):
+        drawn = from_file(page.parent / "pictures" / f"roots_{name}.png")
+        save(drawn, f"squeal_{name}".removesuffix("s"), colours=LINES // 2)
     moving, frames = from_file(page.parent / "pictures" / "root_1_disc.gif"), []
     for i in range(3):  # the other half of the period is its mirror
         moving.seek(i * moving.n_frames // 6)
         frames.append(moving.convert("RGB"))
-    save(lettering.side_by_side(frames), "squeal_wave", colours=LINES)
+    save(lettering.side_by_side(frames), "squeal_wave", colours=40)
 
 
 # the cyclic page ---------------------------------------------------------------------------------------------------
