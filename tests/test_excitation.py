@@ -375,7 +375,7 @@ FLOW = {0: 0.01j, 1: 0.004 + 0.02j, 2: -0.01 + 0.005j, 3: 0.002 + 0.01j, 4: 0.03
 """Of six sectors; the two directions of a nodal diameter differ."""
 
 
-@pytest.mark.parametrize("order", [1, -1, 2])
+@pytest.mark.parametrize("order", [-1, 2])
 def test_flow_couples_the_blades_of_a_whole_ring(order: int) -> None:
     """Influence coefficients between lone blades with sliding contacts: the sector in the wave of every harmonic, 1e-9;
     where they are the same in all waves each blade has its own."""

@@ -18,7 +18,7 @@ from microslip.mistuning import ensemble, rare
 from microslip.mistuning.linear import answer, beside
 from microslip.mistuning.peaks import highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sticking, amplitudes, sample
+from microslip.mistuning.samples import Asked, Sliding, Sticking, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening
 from microslip.mistuning.statistics import Envelope, fits, quantile
@@ -254,6 +254,29 @@ def test_peaks_are_between_points() -> None:
     assert found.amplitude == pytest.approx(1.01 / 0.008, rel=1e-4)
 
 
+@pytest.mark.parametrize("stuck", [True, False])
+def test_stress_at_the_worst_node(stuck: bool) -> None:
+    """The von Mises stress of all nodes of all blades at a thousand instants of the peak's cycle, and the gauges'
+    strain, from coordinates whose read-out is the amplitude."""
+    one, s = sector(), Scatter("frequency", 0.01)
+    g = one.components[0].groups[0]
+    gauge = {"root": replace(g.gauges["root"], rows=np.array([[3.0, -2.0]]))}  # its own feels nothing
+    tuned = Tuned(replace(one, components=(replace(one.components[0], groups={0: replace(g, gauges=gauge)}),)), {})
+    asked = Asked(tuned, (s,), np.linspace(284, 290, 5), balance=FINE, stuck=stuck)
+    ring = tuned.mistuned(asked.deviations(0))
+    found, respond = sample(asked, 0), Sticking(ring) if stuck else Sliding(asked.problem(ring))
+    respond(found.top.frequency)
+    q = np.concatenate(respond.coordinates(found.top.frequency)).reshape(6, 2)
+    probe = tuned.sector.components[0].groups[0].monitors["probe"]
+    read = probe.rows[probe.labels.index(tuned.sector.outputs[0].label)]
+    assert np.abs(q @ read).max() == pytest.approx(found.top.amplitude, rel=1e-6)
+    wave = np.exp(1j * np.linspace(0, 2 * np.pi, 1001))
+    xx, yy, zz, *shear = np.einsum("pim,jm,t->ipjt", g.stresses["nodes"].stress, q, wave).real
+    mises = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * sum(t**2 for t in shear)
+    assert found.stress == pytest.approx(np.sqrt(mises.max()), rel=1e-5)
+    assert found.strain == pytest.approx(np.abs(q @ [3.0, -2.0]).max(), rel=1e-6)
+
+
 def test_samples_do_not_depend_on_workers(tuned: Tuned, tmp_path: Path) -> None:
     """One process and two, and a run that goes on after its first samples: the same bits."""
     asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(275, 300, 12), seed=3, stuck=True)
@@ -327,6 +350,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     assert len(rows[8]) == 9
     assert not any(line.startswith("1 of 8") for line in told)
     found = np.genfromtxt(tmp_path / "samples.csv", delimiter=",", names=True)
+    assert (found["stress_Pa"] > 0).all() and (found["strain"] > 0).all()
     assert f"{found['amplification'].max():.4g}" in " ".join(sentences)
     assert all(p.is_file() for p in made)
     for sector, words in (("7", "sectors 0 to 3"), ("two", "no sector"), ("3", "other.h5")):

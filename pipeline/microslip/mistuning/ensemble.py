@@ -23,7 +23,7 @@ from .statistics import Envelope, Quantile, quantile
 
 Report = Callable[[str], None]
 
-COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end"
+COLUMNS = "amplitude", "frequency_Hz", "sector", "localisation", "missed", "unsolved", "at_end", "stress_Pa", "strain"
 """Of a sample, after its number."""
 
 EACH = 4
@@ -167,7 +167,7 @@ def _row(one: Sample) -> list[float]:
     top = one.top
     solved = np.isfinite(top.amplitude)
     return [top.amplitude, top.frequency, top.output, one.localisation if solved else np.nan, top.missed,
-            len(top.failed), top.at_end]  # fmt: skip
+            len(top.failed), top.at_end, one.stress, one.strain]  # fmt: skip
 
 
 def _narrow(found: Ensemble, until: float | None) -> bool:

@@ -14,11 +14,13 @@ from ..harmonic_balance import problem as balance
 from ..harmonic_balance import reduced
 from ..harmonic_balance.forces import Forces
 from ..harmonic_balance.problem import AtFrequency, Problem
+from ..harmonic_balance.reduced import Seen
 from ..harmonic_balance.solver import Point, carried, solve, sweep
 from ..system.assembly import Assembly
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
 from .scatter import Scatter
+from .stressed import worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +60,14 @@ class Asked:
 class Sample:
     """Attributes:
     number. top: see `Highest`; its read-outs are those of the sectors, one each. grid: (f, sectors) amplitudes on the
-        frequencies asked for, NaN where there is no solution.
+        frequencies asked for, NaN where there is no solution. stress, strain: at the highest peak, see `worst`.
     """
 
     number: int
     top: Highest
     grid: Array
+    stress: float = np.nan
+    strain: float = np.nan
 
     @property
     def localisation(self) -> float:
@@ -88,7 +92,8 @@ def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     for row, f in enumerate(asked.frequency):
         if float(f) in places:
             grid[row] = top.amplitudes[places[float(f)]]
-    return Sample(number, top, grid)
+    strained = worst(ring, respond.coordinates(top.frequency)) if np.isfinite(top.amplitude) else ()
+    return Sample(number, top, grid, *strained)
 
 
 class Sliding:
@@ -111,6 +116,12 @@ class Sliding:
             return None
         self.known.append(replace(point, slope=None))
         return np.abs(amplitudes(self.problem, point))
+
+    def coordinates(self, frequency: float) -> list[ComplexArray]:
+        """(m,) first harmonics of the coordinates, part by part, at a frequency that was solved for."""
+        (point,) = self._near(2 * np.pi * frequency, 1)
+        at = self.problem.at(point.Omega)
+        return at.modal(point.x, at.force(point.x))[1]
 
     def _starts(self, Omega: float) -> list[Array]:
         """Where Newton's method may begin: the two that leave least, of those carried on and the tuned ring's."""
@@ -145,6 +156,13 @@ class Sticking:
 
     def __call__(self, frequency: float) -> Array:
         """(w,) m."""
-        found = reduced.seen(self.part, self.k, 2 * np.pi * frequency, 1)
+        found = self._at(frequency)
         force = self.k @ found.reference
         return np.abs(reduced.monitored(self.part, found.modal, force))
+
+    def coordinates(self, frequency: float) -> list[ComplexArray]:
+        """See `Sliding`."""
+        return [self._at(frequency).modal]
+
+    def _at(self, frequency: float) -> Seen:
+        return reduced.seen(self.part, self.k, 2 * np.pi * frequency, 1)

@@ -236,8 +236,9 @@ def said(found: Ensemble) -> list[str]:
 
 def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:
     column = measured(found.asked.tuned.whole).column
-    rows = found.rows
-    head = ["sample", "amplification", *(column(n) if n == "amplitude" else n for n in COLUMNS)]
+    told_of = [n for n in COLUMNS if n not in ("stress_Pa", "strain") or not np.isnan(found.column(n)).all()]
+    rows = found.rows[:, [COLUMNS.index(n) for n in told_of]]
+    head = ["sample", "amplification", *(column(n) if n == "amplitude" else n for n in told_of)]
     cells = (
         [str(i), f"{a:.12g}", *(f"{v:.12g}" for v in row)]
         for i, (a, row) in enumerate(zip(found.amplification, rows, strict=True))
