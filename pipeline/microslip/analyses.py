@@ -568,6 +568,7 @@ def mistune(
     tuned.check(every)
     balance = {"harmonics": harmonics, "samples": points or max(64, 16 * harmonics)}
     asked = Asked(tuned, every, f, seed, balance, stuck)
+    ensemble.ready(asked, samples, rare)
     found = ensemble.run(asked, samples, until, workers, executor=executor, report=report)
     if rare:
         found.rare = ensemble.choose(found, rare, workers, executor=executor, report=report)

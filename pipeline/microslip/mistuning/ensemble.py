@@ -17,7 +17,7 @@ from ..data import Array, UserError
 from ..files import store
 from ..settings.mistakes import whole
 from . import rare
-from .linear import beside
+from .linear import beside, known_of
 from .samples import Asked, Sample, of_ring, sample
 from .statistics import Envelope, Quantile, quantile
 
@@ -116,6 +116,15 @@ def run(
     return found
 
 
+def ready(asked: Asked, samples: int, chosen: int) -> None:
+    """Raise `UserError` before anything is solved, where `choose` could not choose after so many plain samples."""
+    whole("rare", chosen)
+    if chosen:
+        known_of(asked)
+        if samples < BEFORE:
+            raise UserError(f"rare: {samples} plain samples tell too little of the linear ring; ask for {BEFORE}")
+
+
 def choose(
     found: Ensemble, samples: int, workers: int | None = None, file: Path | None = None, inputs: str = "",
     executor: Executor | None = None, report: Report = lambda _: None,
@@ -127,10 +136,8 @@ def choose(
     Raises:
         UserError: fewer plain samples than `BEFORE`; blades whose modes do not scatter.
     """
-    whole("rare", samples, ge=1)
     asked, known = found.asked, found.solved
-    if known.sum() < BEFORE:
-        raise UserError(f"rare: {known.sum()} plain samples tell too little of the linear ring; ask for {BEFORE}")
+    ready(asked, int(known.sum()), samples)
     report(f"{rare.EACH * samples} samples of the linear ring")
     linear = beside(asked)
     before = np.array([linear(asked.deviations(int(i))) for i in np.flatnonzero(known)]).T

@@ -62,9 +62,7 @@ def beside(asked: Asked) -> Beside:
     Raises:
         UserError: blades whose modes do not scatter: the linear ring would be the tuned one in every sample.
     """
-    scatter = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
-    if not scatter:
-        raise UserError("rare: needs blades whose frequency or damping scatters, for the linear ring to tell samples")
+    scatter = known_of(asked)
     whole = asked.tuned.whole
     part, found = whole.joined(1), list[tuple[ComplexArray, ...]]()
     modes, P, problem = *_columns(asked.tuned, scatter, len(part.M)), asked.problem(whole)
@@ -85,6 +83,18 @@ def beside(asked: Asked) -> Beside:
     return Beside(
         hertz, tuple(modes[n] for n in kept), rise[:, kept], G[:, kept][:, :, kept], Y[:, :, kept], eta[:, kept], y
     )
+
+
+def known_of(asked: Asked) -> list[tuple[int, Scatter]]:
+    """Numbers and scatters that the linear ring knows of.
+
+    Raises:
+        UserError: none.
+    """
+    found = [(i, s) for i, s in enumerate(asked.scatter) if s.of in MODAL and asked.tuned.body(s).sectors == 1]
+    if not found:
+        raise UserError("rare: needs blades whose frequency or damping scatters, for the linear ring to tell samples")
+    return found
 
 
 def held(part: Linear, k: Array) -> Linear:

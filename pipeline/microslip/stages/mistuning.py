@@ -21,7 +21,7 @@ from ..data import Array, UserError
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
-from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, run
+from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
 from ..mistuning.samples import Asked
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
@@ -72,6 +72,7 @@ def _work(
     known = _of_samples(inputs)
     try:
         what = asked_of(built, settings, case_path)
+        ready(what, asked.samples, asked.rare)
         found = run(what, asked.samples, asked.until, workers, kept, known, report=stage.report)
         if asked.rare:
             found.rare = choose(found, asked.rare, workers, folder / "rare.npz", known, report=stage.report)
