@@ -71,7 +71,10 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     if found.forces is None:
         return [folder / "patches.csv"]
     store.write_text(folder / "creep.csv", columns_csv(found.columns(), 8))
-    return [folder / "creep.csv", folder / "patches.csv"]
+    head, generalised = found.generalised()
+    cells = ([v if isinstance(v, str) else f"{v:.8g}" for v in row] for row in generalised)
+    store.write_text(folder / "forces.csv", rows_csv(head, cells))
+    return [folder / f"{name}.csv" for name in ("creep", "patches", "forces")]
 
 
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
