@@ -95,6 +95,12 @@ MANCHESTER = """
 6  14.4 -0.00062720 -4.3293718 | 2.5116 -14.3878 0.0084 | -0.004901 0.01437  -1.957e-05 | 0.3236   -0.9462 | 578.5
 10 24   -0.01126431 -4.2436375 | 3.4351 -22.5401 0.0115 | -0.02532  0.02371  -4.883e-05 | 0.7302   -0.6832 | 744
 """
+ON_THE_RAIL = {0: (0.2783, -36.24, 1e4), 1: (829.2, -3070, 1e4), 3: (460.5, -3084, 1e4), 6: (973.1, -2929, 1e4),
+               10: (2196, -2169, 1e4)}  # fmt: skip
+"""F_x, F_y, F_z in track axes, N."""
+
+HEIGHT = {0: 0.1981, 1: 0.1840, 3: 0.1145, 6: -0.1957, 10: -8.2662}
+"""z_ws, mm."""
 
 
 @pytest.mark.parametrize("row", MANCHESTER.strip().splitlines(), ids=lambda row: f"{row.split()[0]} mm")
@@ -118,6 +124,9 @@ def test_manchester_benchmark(row: str) -> None:
     np.testing.assert_allclose(found, force, atol=0.067 if long else 0.02)
     assert 1e-6 * p.pressure == pytest.approx(pressure[0], rel=0.05 if long else 0.02)
     assert p.normal_force == pytest.approx(1e4, rel=6e-3)
+    on_wheel = p.felt(f.x[0], f.y[0], f.moment[0], np.zeros(3))
+    np.testing.assert_allclose(-on_wheel[:3], ON_THE_RAIL[int(pose[0])], atol=(0.067 if long else 0.02) * 3e3)
+    assert 1e3 * (p.axle[1] + 0.46) == pytest.approx(HEIGHT[int(pose[0])], abs=0.02)
 
 
 # F_n N, friction included; M_n N mm; touching, sticking elements; friction power W

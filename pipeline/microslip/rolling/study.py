@@ -24,8 +24,8 @@ STEEPEST = 1.5
 class Studied:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
     of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
-    exact: half-spaces at some states; missed: why
-    there are none. shown: index of the state whose tractions these are."""
+    exact: half-spaces at some states; missed: why there are none. shown: index of the state whose tractions these are.
+    of_pose: of the pose itself, (patches,)."""
 
     case: RollingCase
     track: Track
@@ -36,7 +36,21 @@ class Studied:
     exact: Exact | None
     shown: int
     tractions: Tractions | None
+    of_pose: Forces | None
     missed: str = ""
+
+    def generalised(self) -> tuple[list[str], list[list[str | float]]]:
+        """Head and rows: forces of the pose itself on wheel and rail, patch by patch, in track axes, and moments about
+        the middle of the axle and the origin of the rail's profile."""
+        rows: list[list[str | float]] = []
+        for k, p in enumerate(self.patches):
+            assert self.of_pose is not None
+            x, y, moment = (float(v[k]) for v in self.of_pose[:3])
+            side = 1.0 if self.case.pose.side == "right" else -1.0
+            places = {"wheel": np.array([0.0, *p.axle]), "rail": np.array([0.0, side * self.track.rail_at, 0.0])}
+            for sign, (body, about) in zip((1.0, -1.0), places.items(), strict=True):
+                rows.append([k + 1, body, *map(float, sign * p.felt(x, y, moment, about))])
+        return ["patch", "body", "F_x_N", "F_y_N", "F_z_N", "M_x_Nm", "M_y_Nm", "M_z_Nm"], rows
 
     @property
     def over(self) -> Array:
@@ -65,6 +79,10 @@ class Studied:
         p, told = self.patches[0], []
         if len(self.patches) > 1:
             told.append(f"The wheel touches the rail in {len(self.patches)} patches; the curve is of the most loaded.")
+        wheel = np.sum([row[2:] for row in self.generalised()[1] if row[1] == "wheel"], axis=0)
+        along, across = ("forward", "backward")[int(wheel[0] < 0)], ("right", "left")[int(wheel[1] < 0)]
+        told.append(f"In its pose the wheel feels {abs(wheel[0]):.4g} N {along}, {abs(wheel[1]):.4g} N to the {across} "
+                    f"and {-wheel[2]:.5g} N upward.")  # fmt: skip
         told.append(
             f"The patch is {2e3 * p.a:.3g} mm long and {2e3 * p.b:.3g} mm wide, under {p.normal_force:.5g} N with at "
             f"most {p.pressure / 1e6:.4g} MPa."
@@ -127,7 +145,7 @@ def study(case: RollingCase, folder: Path) -> Studied:
     found = patches(track, case.posed(), case.pose.side, case.vertical_force)
     creep = _creep(case, found[0] if found else None)
     if not found:
-        return Studied(case, track, found, creep, None, None, None, 0, None)
+        return Studied(case, track, found, creep, None, None, None, 0, None, None)
     p, c, m = found[0], case.creep, case.model
     of = p.a, p.b, p.normal_force, case.friction, track.elastic.shear, track.elastic.poisson
     how = m.model_dump(exclude={"exact"})
@@ -141,9 +159,11 @@ def study(case: RollingCase, folder: Path) -> Studied:
         at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
         totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
         reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
+    xi, eta, phi, *axes, pressed = np.array([[q.xi, q.eta, q.phi, q.a, q.b, q.normal_force] for q in found]).T
+    of_pose = creep_forces(xi, eta, phi, axes[0], axes[1], pressed, *of[3:], **how)
     beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y))
     patch = Tractions(*(v[0] for v in drawn))
-    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, missed)
+    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed)
 
 
 def _exact(case: RollingCase, track: Track, p: Patch, creep: Array, size: Array) -> tuple[Exact | None, str]:
@@ -173,6 +193,6 @@ def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float]]]:
     head = ["x_m", "y_m", "z_m", "y_rail_m", "y_wheel_m", "angle_rad", "A_1_per_m", "B_1_per_m", "a_m", "b_m",
             "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
             "spin_1_per_m", "speed_m_per_s", "conformal"]  # fmt: skip
-    return head, [[float(v) for v in (*p[0], *p[1:])] for p in found]
+    return head, [[float(v) for v in (*p[0], *p[1:-1])] for p in found]
 
 

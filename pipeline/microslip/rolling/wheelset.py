@@ -57,7 +57,7 @@ class Patch(NamedTuple):
         place: x, y, z in track axes, m. on_rail, on_wheel: y of the profiles, m. angle: of the rail's surface to the
             horizontal there, rad, positive where it falls to the right. A, B: half curvatures, 1/m. a, b, approach: m.
             pressure: Pa. normal_force: N. xi, eta: creepages; phi: spin, 1/m. speed: of rolling, m/s. conformal:
-            whether the patch is too wide for a half-space.
+            whether the patch is too wide for a half-space. axle: y, z of the axle's middle, m.
     """
 
     place: Array
@@ -76,6 +76,19 @@ class Patch(NamedTuple):
     phi: float
     speed: float
     conformal: bool
+    axle: Array
+
+    def felt(self, force_x: float, force_y: float, moment: float, about: Array) -> Array:
+        """(6,) force and moment about a point (m) that the wheel feels, in track axes (6.5-24 to 6.5-37); the rail
+        feels the opposite.
+
+        Args:
+            force_x, force_y: tangential, N, and moment about the normal, N m, in the axes of the patch.
+        """
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        up, left = np.array([0.0, s, -c]), np.array([0.0, -c, -s])
+        force = np.array([force_x, 0.0, 0.0]) + force_y * left + self.normal_force * up
+        return np.concatenate([force, np.cross(self.place - about, force) + moment * up])
 
 
 STEP = 2e-5
@@ -106,7 +119,8 @@ def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]
             raise UserError("vertical_force: presses the wheel 50 mm into the rail; give it in N")
     down = brentq(missing, 0.0, deep, xtol=1e-12, rtol=1e-10) if missing(0.0) > 0 else 0.0
     found = sorted(_pressed(track, gap, down), key=lambda p: -p.force)
-    return [_patch(track, seen, gap, p, left) for p in found]
+    axle = np.array([pose.lateral, np.nanmin(gap.gap) + down - track.radius])
+    return [_patch(track, seen, gap, p, left, axle) for p in found]
 
 
 def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Array]:
@@ -227,7 +241,7 @@ def _lifted(p: Pressed) -> float:
     return p.force * np.cos(p.angle)
 
 
-def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool) -> Patch:
+def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool, axle: Array) -> Patch:
     """With its creepages, in the axes of `Patch`; mirrored back if it is of the left wheel."""
     index = np.arange(len(gap.y))
     y_w, x, y = (float(np.interp(p.at, index, v)) for v in (gap.on_wheel, gap.x, gap.y))
@@ -243,7 +257,7 @@ def _patch(track: Track, pose: Pose, gap: Gap, p: Pressed, left: bool) -> Patch:
     place = np.array([x, sign * y, z])
     conformal = p.B < CONFORMAL * p.A or p.b > track.radius * 0.1 or p.b * 2 * max(p.B, 0) > 0.3
     return Patch(place, y - track.rail_at, y_w, sign * p.angle, p.A, p.B, p.a, p.b, p.approach, p.pressure, p.force,
-                 xi, sign * eta, sign * phi, V, bool(conformal))  # fmt: skip
+                 xi, sign * eta, sign * phi, V, bool(conformal), axle)  # fmt: skip
 
 
 CONFORMAL = 0.01

@@ -74,7 +74,11 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     for name, columns in made.items():
         if columns:
             store.write_text(folder / name, columns_csv(columns, 8))
-    return [*(folder / name for name, columns in made.items() if columns), folder / "patches.csv"]
+    head, generalised = found.generalised()
+    cells = ([v if isinstance(v, str) else f"{v:.8g}" for v in row] for row in generalised)
+    store.write_text(folder / "forces.csv", rows_csv(head, cells))
+    written = [name for name, columns in made.items() if columns]
+    return [folder / name for name in (*written, "patches.csv", "forces.csv")]
 
 
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
