@@ -116,12 +116,12 @@ class TableOfCase(Model):
 
 
 class RollingCase(Model):
-    """friction: coefficient. vertical_force: N, on this wheel."""
+    """friction: coefficient, above 0. vertical_force: N, on this wheel."""
 
     name: Name
     wheel: Wheel
     rail: Rail
-    friction: Coefficient
+    friction: Annotated[Coefficient, Field(gt=0)]
     vertical_force: NotNegative
     pose: PoseOfCase = PoseOfCase()
     creep: Creep

@@ -226,6 +226,8 @@ def blended(L: Array, creep: Array, a: Array, b: Array, held: Array) -> Array:
 
 
 TINY = 1e-300
+SLIPPERY = 1e-12
+"""What stands for no friction: the march divides by what is held."""
 
 
 def poses(
@@ -234,6 +236,7 @@ def poses(
     coefficients: Coefficients = "table", spin: Spin = "kalker",
 ) -> Poses:  # fmt: skip
     """What `forces` takes, from what `creep_forces` takes, arrays (n,): as pure."""
+    friction = jnp.maximum(friction, SLIPPERY)
     G, g = creep_coefficients(a / b, poisson, coefficients)[:3] * shear, grid(elements, distribution)
     if spin == "book":
         return Poses(xi, eta, phi, phi, a, b, normal_force, friction, G[0], G[1])

@@ -154,11 +154,9 @@ def study(case: RollingCase, folder: Path) -> Studied:
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
     drawn = tractions(xi[shown], eta[shown], phi[shown], *of, **how)
-    reference = None
-    if case.friction:
-        at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
-        totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
-        reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
+    at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
+    totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
+    reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
     xi, eta, phi, *axes, pressed = np.array([[q.xi, q.eta, q.phi, q.a, q.b, q.normal_force] for q in found]).T
     of_pose = creep_forces(xi, eta, phi, axes[0], axes[1], pressed, *of[3:], **how)
     beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y))

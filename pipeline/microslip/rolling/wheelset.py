@@ -222,7 +222,10 @@ def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
 def _summit(gap: Array, i: int) -> tuple[float, float]:
     """Index and value of the least gap, by the parabola through three points."""
     if not 0 < i < len(gap) - 1 or not np.isfinite(gap[i - 1 : i + 2]).all():
-        return float(i), float(gap[i])
+        raise UserError(
+            "wheel, rail: they touch where a profile ends, so that its shape is not known there; give a wider profile, "
+            "or correct radii and positions (at, pose.lateral)"
+        )
     low, middle, high = gap[i - 1 : i + 2]
     bend, lean = low - 2 * middle + high, 0.5 * (high - low)
     shift = -lean / bend if bend > 0 else 0.0
