@@ -439,8 +439,9 @@ def opposed(
 ) -> tuple[tuple[Array, Array], Array]:  # fmt: skip
     """`weight` of both directions of springs behind a slider of constant friction, and whether it slides.
 
-    Two steps of `_secular`, written out without guards: 1e-6 of ``held`` for stiffnesses of a ratio up to 2, exact for
-    equal ones, a tenth of the work of `slide`; where many strips are marched, this is all there is to do.
+    Two steps of `_secular`, written out without guards. For stiffnesses of a ratio up to 2 the force is 1e-4 of
+    ``held`` off at the most, 4e-6 where the trial force is a quarter above it; exact for equal ones. Where many strips
+    are marched, this is all there is to do.
 
     Args:
         trial: along both directions, (n,) N. relative: their stiffness over the larger one. held: (n,) N, above 0.
