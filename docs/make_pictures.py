@@ -1149,6 +1149,15 @@ def identification() -> None:
         fill("mistuning_identification.md", name, table(*getattr(study, name)()))
 
 
+def rolling() -> None:
+    """A wheel on a rail: creep curve and tractions."""
+    from microslip.stages.rolling import rolling_stage
+
+    for file in rolling_stage(ROOT / "pipeline" / "cases" / "wheel-rail.toml", BUILD)[0]:
+        if file.suffix == ".png":
+            save(from_file(file), f"rolling_{file.stem}", colours=LINES)
+
+
 def half_space() -> None:
     """Exact half-spaces that roll: convergence, Kalker's coefficients, wear, timings, one patch with its heat."""
     import half_space_study as study
@@ -1555,6 +1564,7 @@ STUDIES = {
         identification,
         stability,
         squeal,
+        rolling,
         half_space,
         geometry,
         meeting,
