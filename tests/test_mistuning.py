@@ -499,5 +499,4 @@ def test_bad_scatter(tuned: Tuned, given: dict[str, object], words: str) -> None
     with pytest.raises(UserError, match=words):
         s = Scatter(**given)  # type: ignore[arg-type]
         tuned.check((s,))
-        for i in range(40):
-            tuned.mistuned([(s, s.drawn(6, tuned.modes(s), 0, 0, i))])
+        ensemble.ready(Asked(tuned, (s,), np.array([287.3]), balance=FINE), 40, 0)

@@ -18,6 +18,7 @@ from ..files import store
 from ..settings.mistakes import whole
 from . import rare
 from .linear import beside, known_of
+from .ring import positive
 from .samples import Asked, Sample, of_ring, sample
 from .statistics import Envelope, Quantile, quantile
 
@@ -116,8 +117,17 @@ def run(
     return found
 
 
+DRAWN = 100_000
+"""Samples that are drawn before the first one is solved, in some seconds."""
+
+
 def ready(asked: Asked, samples: int, chosen: int) -> None:
-    """Raise `UserError` before anything is solved, where `choose` could not choose after so many plain samples."""
+    """Raise `UserError` before anything is solved, where one of so many samples cannot be, or where `choose` could not
+    choose after them."""
+    whole("samples", samples, ge=0)
+    for number in range(min(samples, DRAWN)):
+        for s, values in asked.deviations(number):
+            positive(s, values)
     whole("rare", chosen)
     if chosen:
         known_of(asked)

@@ -82,7 +82,7 @@ class Tuned:
         contacts = {c.name: c for c in self.whole.contacts}
         discs, heavier = dict[str, Array](), list[tuple[str, Scatter, Array]]()
         for s, values in sorted(deviations, key=lambda one: one[0].of != "modal_file"):  # then what differs in them
-            _positive(s, values)
+            positive(s, values)
             name = self.body(s).name if s.of in OF_BLADES else self._contact(s).name
             if name in components:  # a disc in one piece
                 if s.of == "frequency":
@@ -184,7 +184,8 @@ def _in_place(where: str, side: ContactFace, nominal: ModalGroup, other: ModalGr
         )
 
 
-def _positive(s: Scatter, values: Array) -> None:
+def positive(s: Scatter, values: Array) -> None:
+    """Raise `UserError` for deviations that leave nothing of something."""
     nothing = values.min() < 0 if s.of == "added_mass" else values.min() <= -1
     if s.of != "gap" and nothing:
         sector = int(values.min(axis=1).argmin())
