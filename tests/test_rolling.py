@@ -325,6 +325,12 @@ def test_a_case_makes_its_curve_pictures_and_page(
     said = capsys.readouterr().out
     assert re.search(r"largest creep force is 1 mu F_N", said)
     assert "data:image/png" in (folder / "rolling.html").read_text()
+    meshio = pytest.importorskip("meshio")
+    shown = min(rows, key=lambda row: abs(float(row["longitudinal_creepage"]) - 0.0015))
+    cells = {name: of[0] for name, of in meshio.read(folder / "tractions.vtu").cell_data.items()}
+    sums = [*(cells["area"] @ cells["traction"])[:2], cells["area"] @ cells["pressure"]]
+    expected = [float(shown["F_x_N"]), float(shown["F_y_N"]), patch["normal_force_N"]]
+    np.testing.assert_allclose(sums, expected, rtol=1e-5)
 
 
 WRONG = {

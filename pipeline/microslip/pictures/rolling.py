@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Array
+from ..exchange import vtu
 from ..rolling.strips import Tractions
 from ..rolling.study import Studied
 from .plots import COLOURS, empty_figure, plain_axes, save_figure, single_panel
@@ -66,15 +67,38 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     return save_figure(figure, path)
 
 
+def write_tractions_vtu(t: Tractions, path: Path) -> None:
+    """Elements of a patch as a VTU file, z = 0. Cell data: ``pressure``, ``traction`` (3,) on the wheel, Pa; ``slip``
+    (3,) of the wheel over the speed; ``area`` m2.
+
+    Raises:
+        UserError: no permission, no space.
+    """
+    import meshio
+
+    corners = _corners(t)
+    points = np.append(corners.reshape(-1, 2), np.zeros((corners.size // 2, 1)), axis=1)
+    flat = np.zeros(t.traction_x.size)
+    vectors = {"traction": (t.traction_x, t.traction_y), "slip": (t.slip_x, t.slip_y)}
+    data = {name: np.stack([*(v.ravel() for v in each), flat], axis=1) for name, each in vectors.items()}
+    data |= {"pressure": t.pressure.ravel(), "area": np.broadcast_to(t.area, t.x.shape).ravel()}
+    quads = np.arange(len(points)).reshape(-1, 4)
+    vtu.save(meshio.Mesh(points, {"quad": quads}, cell_data={k: [vtu.single(v)] for k, v in data.items()}), path)
+
+
+def _corners(t: Tractions) -> Array:
+    """(elements, 4, 2) of their rectangles, m."""
+    half = 0.5 * np.abs(np.diff(t.x, axis=1)).mean(axis=1, keepdims=True)
+    tall = 0.5 * t.area / (2 * half)
+    corners = [(t.x + i * half, t.y + j * tall) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return np.stack([np.stack(c, axis=-1) for c in corners], axis=-2).reshape(-1, 4, 2)
+
+
 def _cells(axes: Axes, t: Tractions, values: Array) -> PolyCollection:
     """A rectangle for each element, coloured."""
     from matplotlib.collections import PolyCollection
 
-    half = 0.5 * np.abs(np.diff(t.x, axis=1)).mean(axis=1, keepdims=True)
-    tall = 0.5 * t.area / (2 * half)
-    corners = [(t.x + i * half, t.y + j * tall) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    places = 1e3 * np.stack([np.stack(c, axis=-1) for c in corners], axis=-2).reshape(-1, 4, 2)
-    drawn = PolyCollection(list(places), array=values.ravel(), cmap="viridis")
+    drawn = PolyCollection(list(1e3 * _corners(t)), array=values.ravel(), cmap="viridis")
     axes.add_collection(drawn)
     axes.autoscale_view()
     axes.grid(False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 
 from ..data import UserError
@@ -58,7 +59,9 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> M
         )
     drawn = _pictures(found, folder / "pictures", case.name) if pictures and found.forces is not None else []
     page = folder / "rolling.html"
-    store.write_text(page, rolling_html(f"{case.name}: rolling contact", found, drawn))
+    store.write_text(
+        page, rolling_html(f"{case.name}: rolling contact", found, [p for p in drawn if p.suffix == ".png"])
+    )
     made = [page, *made, *drawn]
     told = {"files": [str(path.relative_to(folder)) for path in made], "sentences": sentences}
     store.write_text(stage.product, json.dumps(told, indent=1) + "\n")
@@ -82,10 +85,14 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
 
 
 def _pictures(found: Studied, folder: Path, name: str) -> list[Path]:
-    from ..pictures.rolling import curve_picture, traction_picture
+    from ..pictures.rolling import curve_picture, traction_picture, write_tractions_vtu
 
     folder.mkdir(parents=True, exist_ok=True)
-    return [
+    drawn = [
         curve_picture(found, folder / "creep.png", f"{name}: creep curve"),
         traction_picture(found, folder / "tractions.png", name),
     ]
+    if found.tractions is not None and find_spec("meshio"):
+        drawn.append(folder.parent / "tractions.vtu")
+        write_tractions_vtu(found.tractions, drawn[-1])
+    return drawn
