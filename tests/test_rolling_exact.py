@@ -59,16 +59,17 @@ def test_a_measured_profile_is_pressed_as_it_is() -> None:
 
 
 def test_states_are_where_the_force_changes() -> None:
-    """Of 31 states up to far beyond saturation; none where friction is left out."""
+    """Of 31 states up to far beyond saturation; none where none are asked for."""
     s = studied("model.exact=6")
     assert s.exact is not None and s.exact.at[0] == 0 and np.median(s.exact.at) < 10
-    assert studied("friction=0.0").exact is None and studied("model.exact=0").exact is None
+    assert studied("model.exact=0").exact is None
     assert "Exact half-spaces" not in " ".join(studied("model.exact=0").sentences())
 
 
-def test_a_patch_that_half_spaces_cannot_hold_is_said() -> None:
-    told = studied("wheel.profile=-0.30001", "creep.points=3").sentences()
-    assert "Exact half-spaces could not be had: the patch is more than 3 times as wide as Hertz' ellipse." in told
+def test_a_patch_that_is_wider_than_the_grid_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(beside, "WIDE", (0.5, 0.9))
+    told = studied("creep.points=3").sentences()
+    assert "Exact half-spaces could not be had: the patch is more than 0.9 times as wide as Hertz' ellipse." in told
 
 
 def test_a_profile_ends_where_it_ends() -> None:
