@@ -189,6 +189,7 @@ def test_totals_are_those_of_the_tractions() -> None:
     np.testing.assert_allclose([(t.traction_x * t.area).sum(), (t.traction_y * t.area).sum(), moment],
                                [f.x[0], f.y[0], f.moment[0]], rtol=1e-10)  # fmt: skip
     assert (t.pressure * t.area).sum() == pytest.approx(PATCH["normal_force"], rel=1e-12)
+    assert (t.power * t.area).sum() == pytest.approx(f.power[0], rel=1e-12)
     assert np.pi * PATCH["a"] * PATCH["b"] == pytest.approx(t.area.sum(), rel=2e-3)
     assert (np.hypot(t.traction_x, t.traction_y) <= (1 + 1e-5) * MU * t.pressure).all()
     assert (np.diff(t.x) > 0).all() and (np.diff(t.y, axis=1) > 0).all()
