@@ -65,12 +65,13 @@ def test_friction_that_falls_with_the_temperature_it_makes() -> None:
 
 
 def test_worn_volume_is_the_coefficient_times_the_work_of_friction() -> None:
-    """Of all patches of the pose, with spin, whatever the friction."""
+    """Of all patches of the pose, with spin, whatever the friction; what spin adds to that of the creepages is told."""
     for friction in ("0.3", '{kind = "falling", mu_0 = 0.4, p_v = 0.5}'):
-        found = studied("wear.coefficient=2e-14", f"friction={friction}", "pose.yaw=0.003")
+        found = studied("wear.coefficient=2e-14", f"friction={friction}")
         worn = found.worn()
         assert found.of_pose is not None and (worn["depth_m"] >= 0).all()
         assert worn["depth_m"] @ worn["width_m"] == pytest.approx(2e-14 * found.of_pose.power.sum(), rel=1e-10)
+        assert any("times the power of the creepages" in s for s in found.warnings())
 
 
 def test_tables_and_page_hold_temperature_and_wear(
@@ -88,7 +89,7 @@ def test_tables_and_page_hold_temperature_and_wear(
     deepest = max(float(row["depth_m"]) for row in csv.DictReader((folder / "wear.csv").open()))
     assert f"at most {hot:.4g} degrees C hot" in said and f"at most {1e9 * deepest:.4g} nm off" in said
     assert not (folder / "exact.csv").exists()
-    (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n1,0.1\n")
+    (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
     assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
 

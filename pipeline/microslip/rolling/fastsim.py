@@ -57,4 +57,5 @@ def fastsim(
     x_, y_ = (t * area).sum(axis=(1, 2))
     moment = ((X * t[1] - Y * t[0]) * area).sum()
     share = slides.sum() / (inside > 0).sum()
-    return Forces(x_, y_, moment, (power * area).sum(), share), Tractions(X, Y, area, p, *t, *slip, power)
+    made = Tractions(X, Y, area, p, t[0], t[1], slip[0], slip[1], power)
+    return Forces(x_, y_, moment, (power * area).sum(), share), made

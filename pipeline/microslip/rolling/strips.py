@@ -313,7 +313,7 @@ def over_elements(pose: Poses, g: Grid, *marched: Array) -> Tractions:
     h = np.diff(at)
     rigid = xi - phi_x * y[..., :1], eta + phi_y * (at[..., 1:] - 0.5 * h)
     work = sum(_work(t, u, h * s) for t, u, s in zip((t_x, t_y), (u_x, u_y), rigid, strict=True))
-    return Tractions(x, y, area, p, t_x, t_y, *slip, work / length)
+    return Tractions(x, y, area, p, t_x, t_y, slip[0], slip[1], work / length)
 
 
 def _work(t: np.ndarray, u: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 STEEPEST = 1.5
 """Coefficient of friction above which a warning is due: nothing that rolls on rails is held so well."""
 
+BALANCED = 0.05
+"""Part of the power of the creepages by which that of friction may differ without a warning."""
 FAST = 5.0
 """V a/(2 kappa) from which on heat flows across the surface alone (Johnson, Contact Mechanics, 12.1)."""
 
@@ -173,8 +175,8 @@ class Studied:
         told = []
         if self.highest > STEEPEST:
             told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
-        if self.case.heat is not None and self.patches:
-            told += self._slow()
+        if self.of_pose is not None and (self.case.heat or self.case.wear):
+            told += [*self._slow(), *self._unbalanced()]
         for k, p in enumerate(self.patches):
             if p.conformal:
                 told.append(
@@ -185,13 +187,24 @@ class Studied:
 
     def _slow(self) -> list[str]:
         """The temperatures are of sources that move fast."""
-        assert self.case.heat is not None
-        p, bodies = self.patches[0], self.case.heat.made().bodies
-        least = min(speed_parameter(p.speed, p.a, body) for body in bodies)
+        p, bodies = self.patches[0], self.case.heat.made().bodies if self.case.heat else ()
+        least = min(speed_parameter(p.speed, p.a, body) for body in bodies) if bodies else FAST
         if least >= FAST:
             return []
         return [f"warning: the heat spreads as fast as the patch moves, V a/(2 kappa) = {least:.2g} is below {FAST:g}: "
                 "temperatures are too high."]  # fmt: skip
+
+    def _unbalanced(self) -> list[str]:
+        """Springs of their own for the spin, or that change along a strip, do not keep the energy."""
+        f = self.of_pose
+        assert f is not None
+        given = -sum(f.x * [p.xi for p in self.patches] + f.y * [p.eta for p in self.patches]
+                     + f.moment * [p.phi for p in self.patches])  # fmt: skip
+        more = f.power.sum() / given
+        if abs(more - 1) <= BALANCED:
+            return []
+        return [f"warning: in its pose friction takes {more:.3g} times the power of the creepages; heat and wear there "
+                'are off by as much, less with model.spin = "book".']  # fmt: skip
 
 
 def study(case: RollingCase, folder: Path) -> Studied:
