@@ -44,7 +44,7 @@ def curve_picture(found: Studied, path: Path, title: str) -> Path:
 def traction_picture(found: Studied, path: Path, title: str) -> Path:
     """Tractions over the patch, and along its middle strip."""
     assert found.tractions is not None
-    t, mu = found.tractions, found.case.friction
+    t, mu = found.tractions, found.highest
     figure = empty_figure(9.6, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
     size = np.hypot(t.traction_x, t.traction_y) / 1e6
@@ -57,7 +57,8 @@ def traction_picture(found: Studied, path: Path, title: str) -> Path:
     figure.colorbar(image, ax=left, shrink=0.85)
     row = t.x.shape[0] // 2
     x, limit = 1e3 * t.x[row], mu * t.pressure[row] / 1e6
-    right.fill_between(x, -limit, limit, color="0.9", label="$\\pm\\mu p$")
+    bound = "$\\pm\\mu p$" if found.case.is_constant else "$\\pm\\mu p$, highest $\\mu$"
+    right.fill_between(x, -limit, limit, color="0.9", label=bound)
     for i, (name, values) in enumerate((("x", t.traction_x), ("y", t.traction_y))):
         right.plot(x, values[row] / 1e6, color=COLOURS[i], label=f"traction along {name}")
     right.set(xlabel="x in mm", ylabel="MPa", title=f"along the strip y = {1e3 * t.y[row, 0]:.3g} mm")

@@ -53,7 +53,9 @@ def fastsim(
     area = np.full_like(p, h * across)
     X, Y = np.broadcast_arrays(x, y[:, None])
     slides = (inside > 0) & (slip != 0).any(axis=0)
+    power = -(t * slip).sum(axis=0)
     x_, y_ = (t * area).sum(axis=(1, 2))
-    moment, power = ((X * t[1] - Y * t[0]) * area).sum(), -((t * slip).sum(axis=0) * area).sum()
+    moment = ((X * t[1] - Y * t[0]) * area).sum()
     share = slides.sum() / (inside > 0).sum()
-    return Forces(x_, y_, moment, power, share), Tractions(X, Y, area, p, *t, *slip)
+    made = Tractions(X, Y, area, p, t[0], t[1], slip[0], slip[1], power)
+    return Forces(x_, y_, moment, (power * area).sum(), share), made

@@ -5,18 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import jax.numpy as jnp
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..contact.keys import FileName, Poisson
+from ..contact.friction import Friction
+from ..contact.keys import FileName, OneOrTwo, Poisson
+from ..contact.settings import AnyFriction, _short
 from ..contact.solids import Solid
+from ..data import UserError
 from ..settings.body import (
-    Coefficient,
     Model,
     Name,
     NotNegative,
     Number,
     Numbers,
     Positive,
+    _finite_vector,
     _tuple,
     load_toml,
     override,
@@ -25,10 +30,13 @@ from ..settings.mistakes import validate
 from .ellipse import combined
 from .kalker import Coefficients
 from .profiles import WIDTH, Profile, circle, polynomial, read_profile
+from .rolled import Heat
 from .strips import Distribution, Spin
 from .table import POINTS
+from .temperature import Conductor
 from .wheelset import Pose, Track
 
+Temperature = Annotated[Number, Field(gt=-273.15)]
 Count = Annotated[int, Field(ge=2, le=400)]
 
 BIGGEST = 5.0
@@ -115,18 +123,76 @@ class TableOfCase(Model):
     points: Annotated[tuple[Count, Count, Count, Count], BeforeValidator(_tuple)] = POINTS
 
 
+class HeatOfCase(Model):
+    """Steel if not given; each a number, or two, of wheel and rail.
+
+    Attributes:
+        conductivity: W/(m K). density: kg/m^3. heat_capacity: J/(kg K). start: temperature before the contact, degrees
+            C. limit: rise above 20 degrees C at which friction would be gone, K; without it friction does not change.
+    """
+
+    conductivity: OneOrTwo = 50.0
+    density: OneOrTwo = 7850.0
+    heat_capacity: OneOrTwo = 450.0
+    start: Temperature | Annotated[tuple[Temperature, Temperature], BeforeValidator(_finite_vector)] = 20.0
+    limit: Positive | None = None
+
+    def made(self) -> Heat:
+        keys = self.conductivity, self.density, self.heat_capacity, self.start
+        *steel, start = ((v, v) if isinstance(v, float) else v for v in keys)
+        wheel, rail = (Conductor(*v) for v in zip(*steel, strict=True))
+        return Heat((wheel, rail), start, self.limit)
+
+
+class WearOfCase(Model):
+    """coefficient: of wheel and rail each, worn volume over frictional work, m3/J."""
+
+    coefficient: Positive
+
+
 class RollingCase(Model):
-    """friction: coefficient, above 0. vertical_force: N, on this wheel."""
+    """friction: coefficient, or a table of a characteristic as in a contact file. vertical_force: N, on this wheel."""
 
     name: Name
     wheel: Wheel
     rail: Rail
-    friction: Annotated[Coefficient, Field(gt=0)]
+    friction: Annotated[AnyFriction, _short("coulomb", "mu", AnyFriction)]
     vertical_force: NotNegative
     pose: PoseOfCase = PoseOfCase()
     creep: Creep
     model: ModelOfCase = ModelOfCase()
     table: TableOfCase | None = None
+    heat: HeatOfCase | None = None
+    wear: WearOfCase | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> RollingCase:
+        if self.friction.heated:
+            raise ValueError(
+                f'friction.kind: "{self.friction.kind}" belongs to contact files, whose [temperature] rolling has not; '
+                "take another kind and give heat.limit"
+            )
+        if self.friction.deviation:
+            raise ValueError("friction.deviation: rolling is steady, and friction random in time is not; remove it")
+        if self.table is not None and not self.is_constant:
+            raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
+        return self
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether one coefficient of friction holds everywhere."""
+        return self.friction.kind == "coulomb" and (self.heat is None or self.heat.limit is None)
+
+    def characteristic(self, folder: Path) -> Friction:
+        """Of files beside the case.
+
+        Raises:
+            UserError: a file that is none, no friction.
+        """
+        found = self.friction.friction(folder / "case.toml", None, None)
+        if not np.max(found.highest(jnp.ones(1))) > 0:
+            raise UserError("friction: is 0 at all speeds; the creep force is a part of it, so give more than 0")
+        return found
 
     def track(self, folder: Path) -> Track:
         """Of files beside the case.

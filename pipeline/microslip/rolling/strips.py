@@ -69,7 +69,7 @@ class Tractions(NamedTuple):
     """Over the elements, (..., ny, nx), x and y ascending.
 
     Attributes: x, y: middles, m. area: m2. pressure, traction_x, traction_y: on body 1, Pa. slip_x, slip_y: of body 1
-        relative to 2 over the speed, s_P.
+        relative to 2 over the speed, s_P. power: of friction over the speed, Pa, whose integral is that of `Forces`.
     """
 
     x: Array
@@ -80,6 +80,7 @@ class Tractions(NamedTuple):
     traction_y: Array
     slip_x: Array
     slip_y: Array
+    power: Array
 
 
 @dataclass(frozen=True)
@@ -294,8 +295,13 @@ def tractions(
     given = broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
     pose = Poses(*map(np.asarray, poses(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
-    g = grid(elements, distribution)
-    *found, length = (np.asarray(v) for v in _marched(pose, elements, distribution))
+    return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))
+
+
+def over_elements(pose: Poses, g: Grid, *marched: Array) -> Tractions:
+    """marched: x, pressure, both tractions and both stretches, (ny, nx, n), from the leading edge on; length of an
+    element (ny, n)."""
+    *found, length = map(np.asarray, marched)
     x, p, t_x, t_y, u_x, u_y = (np.moveaxis(v, -1, 0)[..., ::-1] for v in found)
     length = length.T[..., None]
     y = np.broadcast_to((pose.b[:, None] * g.y)[..., None], x.shape)
@@ -303,12 +309,29 @@ def tractions(
     rigid = xi - phi_x * y, eta + phi_y * x
     slip = [r - _slope(u) / length for r, u in zip(rigid, (u_x, u_y), strict=True)]
     area = np.broadcast_to(length * (pose.b[:, None] * g.width)[..., None], x.shape)
-    return Tractions(x, y, area, p, t_x, t_y, *slip)
+    at = np.concatenate([x[..., :1] - 0.5 * length, x, x[..., -1:] + 0.5 * length], axis=-1)
+    h = np.diff(at)
+    rigid = xi - phi_x * y[..., :1], eta + phi_y * (at[..., 1:] - 0.5 * h)
+    work = sum(_work(t, u, h * s) for t, u, s in zip((t_x, t_y), (u_x, u_y), rigid, strict=True))
+    return Tractions(x, y, area, p, t_x, t_y, slip[0], slip[1], work / length)
+
+
+def _work(t: np.ndarray, u: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Per element, half of that of the steps to and from it, and all of what is done at the edges."""
+    slid = np.diff(_ended(u)) - moved
+    work = 0.5 * (_ended(t)[..., 1:] + _ended(t)[..., :-1]) * slid
+    work[..., [0, -1]] *= 2
+    return 0.5 * (work[..., 1:] + work[..., :-1])
+
+
+def _ended(v: np.ndarray) -> np.ndarray:
+    """With the edges, half an element away, where nothing is left."""
+    return np.pad(v, [(0, 0)] * (v.ndim - 1) + [(1, 1)])
 
 
 def _slope(u: np.ndarray) -> np.ndarray:
-    """Per element, x ascending; nothing is left of u at both edges, half an element away."""
-    ends = np.pad(u, [(0, 0)] * (u.ndim - 1) + [(1, 1)])
+    """Per element, x ascending."""
+    ends = _ended(u)
     slope = 0.5 * (ends[..., 2:] - ends[..., :-2])
     slope[..., 0], slope[..., -1] = 0.5 * (u[..., 0] + u[..., 1]), -0.5 * (u[..., -1] + u[..., -2])
     return slope

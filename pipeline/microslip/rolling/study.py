@@ -5,19 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from ..contact.solids import Solid
 from ..data import Array, UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
+from .rolled import rolled, sources
 from .settings import RollingCase
-from .strips import Forces, Tractions, creep_forces, tractions
+from .strips import Forces, Tractions
+from .temperature import speed_parameter
+from .wear import strip_depth
 from .wheelset import Patch, Track, across, patches
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
 STEEPEST = 1.5
 """Coefficient of friction above which a warning is due: nothing that rolls on rails is held so well."""
+
+BALANCED = 0.05
+"""Part of the power of the creepages by which that of friction may differ without a warning."""
+FAST = 5.0
+"""V a/(2 kappa) from which on heat flows across the surface alone (Johnson, Contact Mechanics, 12.1)."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +34,8 @@ class Studied:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
     of the curve. forces: (n,) of it. reference: some of its indices, |F|/(mu F_N) of the published FASTSIM there.
     exact: half-spaces at some states; missed: why there are none. shown: index of the state whose tractions these are.
-    of_pose: of the pose itself, (patches,)."""
+    of_pose, pose_tractions: of the pose itself, (patches,). highest: coefficient of friction. hottest: of the patch,
+    (n + patches,) degrees C, of the curve and of the pose, if asked."""
 
     case: RollingCase
     track: Track
@@ -38,6 +48,9 @@ class Studied:
     tractions: Tractions | None
     of_pose: Forces | None
     missed: str = ""
+    highest: float = 0.0
+    hottest: Array | None = None
+    pose_tractions: Tractions | None = None
 
     def generalised(self) -> tuple[list[str], list[list[str | float]]]:
         """Head and rows: forces of the pose itself on wheel and rail, patch by patch, in track axes, and moments about
@@ -60,16 +73,17 @@ class Studied:
     @property
     def held(self) -> float:
         """mu F_N of the patch that carries most, N."""
-        return self.case.friction * self.patches[0].normal_force
+        return self.highest * self.patches[0].normal_force
 
     def columns(self) -> dict[str, Array]:
         """Of the table of the curve."""
-        f, m = self.forces, self.held
+        f, m, n = self.forces, self.held, self.creep.shape[1]
         assert f is not None
+        hot = {} if self.hottest is None else {"largest_temperature_C": self.hottest[:n]}
         return {
             "longitudinal_creepage": self.creep[0], "lateral_creepage": self.creep[1], "spin_1_per_m": self.creep[2],
             "F_x_N": f.x, "F_y_N": f.y, "M_z_Nm": f.moment, "F_x_over_mu_F_N": f.x / m, "F_y_over_mu_F_N": f.y / m,
-            "friction_power_W": f.power * self.patches[0].speed, "share_sliding": f.sliding,
+            "friction_power_W": f.power * self.patches[0].speed, "share_sliding": f.sliding, **hot,
         }  # fmt: skip
 
     def sentences(self) -> list[str]:
@@ -97,7 +111,42 @@ class Studied:
             told.append(
                 f"FASTSIM as published, at {len(i)} points of the curve, is at most {100 * off:.2g} % of mu F_N away."
             )
-        return [*told, *self._beside_exact(), *self.warnings()]
+        else:
+            told.append(
+                f"mu is the highest coefficient, {self.highest:.4g}; FASTSIM and exact half-spaces know none that "
+                "changes, so that neither stands beside this curve."
+            )
+        return [*told, *self._beside_exact(), *self._heated(), *self._worn(), *self.warnings()]
+
+    def _heated(self) -> list[str]:
+        if self.hottest is None:
+            return []
+        n = self.creep.shape[1]
+        at = int(self.hottest[:n].argmax())
+        return [f"The patch is at most {self.hottest[at]:.4g} degrees C hot, at {self.over[at]:.4g} of the curve, and "
+                f"{self.hottest[n]:.4g} degrees C in its pose."]  # fmt: skip
+
+    def worn(self) -> dict[str, Array]:
+        """Of the table of wear: what a passage in the pose takes off wheel and rail each (6.8-6), strip by strip; no
+        columns where it is not asked. y: to the left of the middle of the patch."""
+        t, wear = self.pose_tractions, self.case.wear
+        if t is None or wear is None:
+            return {}
+        speed = np.array([p.speed for p in self.patches])
+        q, dx = sources(t, speed)
+        work = np.stack([strip_depth(s.T, d, 1.0, v) for s, d, v in zip(q, dx, speed, strict=True)])
+        patch = np.broadcast_to(np.arange(1, len(work) + 1)[:, None], work.shape)
+        columns = {"patch": patch, "y_m": t.y[..., 0], "width_m": t.area[..., 0] / dx, "work_J_per_m2": work,
+                   "depth_m": wear.coefficient * work}  # fmt: skip
+        return {name: values.ravel() for name, values in columns.items()}
+
+    def _worn(self) -> list[str]:
+        worn = self.worn()
+        if not worn:
+            return []
+        deepest, volume = worn["depth_m"].max(), worn["depth_m"] @ worn["width_m"]
+        return [f"A passage in its pose takes at most {1e9 * deepest:.4g} nm off wheel and rail each, and "
+                f"{1e12 * volume:.4g} mm3 a kilometre."]  # fmt: skip
 
     def _beside_exact(self) -> list[str]:
         """How far the strips are from the exact answer on this very case."""
@@ -124,8 +173,10 @@ class Studied:
     def warnings(self) -> list[str]:
         """What a person should doubt."""
         told = []
-        if self.case.friction > STEEPEST:
-            told.append(f"warning: friction is {self.case.friction:g}; steel on steel has 0.05 to 0.6.")
+        if self.highest > STEEPEST:
+            told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
+        if self.of_pose is not None and (self.case.heat or self.case.wear):
+            told += [*self._slow(), *self._unbalanced()]
         for k, p in enumerate(self.patches):
             if p.conformal:
                 told.append(
@@ -133,6 +184,27 @@ class Studied:
                     "radii of curvature, so that neither body is a half-space and the numbers are a guess."
                 )
         return told
+
+    def _slow(self) -> list[str]:
+        """The temperatures are of sources that move fast."""
+        p, bodies = self.patches[0], self.case.heat.made().bodies if self.case.heat else ()
+        least = min(speed_parameter(p.speed, p.a, body) for body in bodies) if bodies else FAST
+        if least >= FAST:
+            return []
+        return [f"warning: the heat spreads as fast as the patch moves, V a/(2 kappa) = {least:.2g} is below {FAST:g}: "
+                "temperatures are too high."]  # fmt: skip
+
+    def _unbalanced(self) -> list[str]:
+        """Springs of their own for the spin, or that change along a strip, do not keep the energy."""
+        f = self.of_pose
+        assert f is not None
+        given = -sum(f.x * [p.xi for p in self.patches] + f.y * [p.eta for p in self.patches]
+                     + f.moment * [p.phi for p in self.patches])  # fmt: skip
+        more = f.power.sum() / given
+        if abs(more - 1) <= BALANCED:
+            return []
+        return [f"warning: in its pose friction takes {more:.3g} times the power of the creepages; heat and wear there "
+                'are off by as much, less with model.spin = "book".']  # fmt: skip
 
 
 def study(case: RollingCase, folder: Path) -> Studied:
@@ -146,33 +218,46 @@ def study(case: RollingCase, folder: Path) -> Studied:
     creep = _creep(case, found[0] if found else None)
     if not found:
         return Studied(case, track, found, creep, None, None, None, 0, None, None)
-    p, c, m = found[0], case.creep, case.model
-    of = p.a, p.b, p.normal_force, case.friction, track.elastic.shear, track.elastic.poisson
-    how = m.model_dump(exclude={"exact"})
-    xi, eta, phi = creep
-    forces = creep_forces(xi, eta, phi, *of, **how)
+    p, c, friction = found[0], case.creep, case.characteristic(folder)
+    highest = float(np.max(friction.highest(jnp.ones(1))))
     over = creep[list(UNITS).index(c.over)]
     shown = int(np.abs(over - (0.5 * (c.start + c.stop) if c.shown is None else c.shown)).argmin())
-    drawn = tractions(xi[shown], eta[shown], phi[shown], *of, **how)
-    at = np.unique(np.linspace(0, creep.shape[1] - 1, 13).astype(int))
-    totals = [fastsim(xi[i], eta[i], phi[i], *of)[0] for i in at]
-    reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (case.friction * p.normal_force)
-    xi, eta, phi, *axes, pressed = np.array([[q.xi, q.eta, q.phi, q.a, q.b, q.normal_force] for q in found]).T
-    of_pose = creep_forces(xi, eta, phi, axes[0], axes[1], pressed, *of[3:], **how)
-    beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y))
-    patch = Tractions(*(v[0] for v in drawn))
-    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed)
+    given, speed = _states(track, found, creep)
+    n = len(over)
+    kept = np.array([shown, *range(n, len(speed))])
+    heat = case.heat.made() if case.heat else None
+    states = rolled(given, friction, speed, kept, heat, **case.model.model_dump(exclude={"exact"}))
+    forces, of_pose = (Forces(*(v[part] for v in states.forces)) for part in (slice(n), slice(n, None)))
+    reference, beside, missed = None, None, ""
+    if case.is_constant:
+        at = np.unique(np.linspace(0, n - 1, 13).astype(int))
+        totals = [fastsim(*s[:6], highest, *s[6:])[0] for s in given[:, at].T]  # type: ignore[call-arg]
+        reference = at, np.array([np.hypot(f.x, f.y) for f in totals]) / (highest * p.normal_force)
+        beside, missed = _exact(case, track, p, creep, np.hypot(forces.x, forces.y), highest)
+    patch, of_patches = (Tractions(*(v[part] for v in states.tractions)) for part in (0, slice(1, None)))
+    return Studied(case, track, found, creep, forces, reference, beside, shown, patch, of_pose, missed, highest,
+                   states.hottest, of_patches)  # fmt: skip
 
 
-def _exact(case: RollingCase, track: Track, p: Patch, creep: Array, size: Array) -> tuple[Exact | None, str]:
+def _states(track: Track, found: list[Patch], creep: Array) -> tuple[Array, Array]:
+    """(8, n + patches) what `rolled` is given, of the curve and of the pose, and their speeds, m/s."""
+    of_pose = [np.array([q.xi, q.eta, q.phi]) for q in found]
+    patches = [found[0]] * creep.shape[1] + found
+    axes = np.array([[q.a, q.b, q.normal_force, track.elastic.shear, track.elastic.poisson] for q in patches]).T
+    return np.vstack([np.column_stack([creep, *of_pose]), axes]), np.array([q.speed for q in patches])
+
+
+def _exact(
+    case: RollingCase, track: Track, p: Patch, creep: Array, size: Array, friction: float
+) -> tuple[Exact | None, str]:  # fmt: skip
     """At so many states of the curve as the case wants, in equal steps of the (n,) force; why not if there is none."""
     way = np.cumsum(np.abs(np.diff(size, prepend=size[:1])))
     at = np.unique(np.searchsorted(way, np.linspace(0, way[-1], case.model.exact)))
-    if not len(at) or not case.friction:
+    if not len(at):
         return None, ""
     bodies = Solid(case.wheel.young, case.wheel.poisson), Solid(case.rail.young, case.rail.poisson)
     try:
-        return exact(bodies, p, across(track, case.posed(), case.pose.side, p), case.friction, creep, at), ""
+        return exact(bodies, p, across(track, case.posed(), case.pose.side, p), friction, creep, at), ""
     except UserError as error:
         return None, str(error)
 
@@ -192,5 +277,3 @@ def rows_of_patches(found: list[Patch]) -> tuple[list[str], list[list[float]]]:
             "approach_m", "largest_pressure_Pa", "normal_force_N", "longitudinal_creepage", "lateral_creepage",
             "spin_1_per_m", "speed_m_per_s", "conformal"]  # fmt: skip
     return head, [[float(v) for v in (*p[0], *p[1:-1])] for p in found]
-
-

@@ -6,6 +6,7 @@ import json
 from importlib.util import find_spec
 from pathlib import Path
 
+from ..contact.friction import OfTable
 from ..data import UserError
 from ..files import store
 from ..files.tables import columns_csv, rows_csv
@@ -31,6 +32,7 @@ def rolling_stage(
     case, raw = load_rolling(case_path, assignments)
     stage = Stage(root / case.name / "rolling.json", ("stages.rolling",), force, report)
     files = [case_path.parent / s.profile for s in (case.wheel, case.rail) if isinstance(s.profile, str)]
+    files += [case_path.parent / case.friction.file] if isinstance(case.friction, OfTable) else []
     profiles = [store.hash_file(file) for file in files if file.is_file()]
     inputs = {"case": raw, "profiles": profiles, "pictures": pictures}
     stage.make(inputs, lambda: _work(stage, case, case_path, pictures))
@@ -73,7 +75,7 @@ def _tables(found: Studied, folder: Path) -> list[Path]:
     store.write_text(folder / "patches.csv", rows_csv(head, ([f"{v:.8g}" for v in row] for row in rows)))
     if found.forces is None:
         return [folder / "patches.csv"]
-    made = {"creep.csv": found.columns(), "exact.csv": found.beside()}
+    made = {"creep.csv": found.columns(), "exact.csv": found.beside(), "wear.csv": found.worn()}
     for name, columns in made.items():
         if columns:
             store.write_text(folder / name, columns_csv(columns, 8))

@@ -1,0 +1,120 @@
+"""Friction characteristics, temperature and wear of a rolling case (Sextro 6.5, 6.7, 6.8)."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from microslip.cli import main
+from microslip.rolling.rolled import COLD
+from microslip.rolling.settings import load_rolling
+from microslip.rolling.study import Studied, study
+from microslip.rolling.temperature import falling
+
+CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "wheel-rail.toml"
+FEW = ("creep.points=3", "creep.stop=0.02", "model.exact=0")
+
+
+def studied(*changes: str) -> Studied:
+    return study(load_rolling(CASE, [*FEW, "creep.spin=0.0", *changes])[0], CASE.parent)
+
+
+def test_friction_that_falls_with_the_speed_of_sliding() -> None:
+    """Where all slides F = mu(V xi) F_N (3.6-15); constant models stand beside it no more, and the reader is told."""
+    found = studied('friction={kind = "falling", mu_0 = 0.4, p_v = 0.5}')
+    assert found.forces is not None
+    mu = 0.4 / (1 + 0.5 * found.patches[0].speed * found.over[1:])
+    np.testing.assert_allclose(-found.forces.x[1:], mu * found.patches[0].normal_force, rtol=5e-3)
+    assert found.reference is None and found.exact is None
+    assert any("highest coefficient, 0.4;" in s for s in found.sentences())
+
+
+def test_temperature_where_all_slides_is_the_integral_of_the_book() -> None:
+    """(6.7-11) by quadrature under q = mu p V xi, hottest on the middle strip; unlike bodies, that meet unlike warm."""
+    found = studied("heat.conductivity=[50, 20]", "heat.start=[40, 10]")
+    p, xi = found.patches[0], found.over[-1]
+    root = np.sqrt(np.array([50.0, 20.0]) * 7850 * 450)
+    start = root @ [40, 10] / root.sum()
+    q = 0.3 * 2 * p.normal_force / (np.pi * p.a * p.b) * p.speed * xi  # parabolic pressure of the strips
+
+    def rise(way: float) -> float:  # from the leading edge; w^2 is the way to the source
+        inside = lambda w: 2 * (1 - ((way - w * w) / p.a - 1) ** 2)  # noqa: E731
+        return q / root.sum() / np.sqrt(np.pi * p.speed) * quad(inside, 0, np.sqrt(way))[0]
+
+    exact = start + max(rise(w) for w in np.linspace(0.5, 2, 151) * p.a)
+    assert found.hottest is not None
+    assert found.hottest[2] - start == pytest.approx(exact - start, rel=1e-2)
+    assert found.hottest[0] < start + 0.02 * (exact - start)
+
+
+def test_friction_that_falls_with_the_temperature_it_makes() -> None:
+    """Both belong together: less force than cold, less heat, and at the hottest place no less than mu(T) holds."""
+    cold, warm = studied("heat.limit=1e9"), studied("heat.limit=300")
+    assert cold.forces is not None and warm.forces is not None
+    assert cold.hottest is not None and warm.hottest is not None
+    assert cold.forces.x[2] == pytest.approx(-cold.held, rel=1e-3)
+    least = float(falling(warm.hottest[2] - COLD, 1.0, 300))
+    assert least < -warm.forces.x[2] / warm.held < 0.97 and warm.hottest[2] < 0.95 * cold.hottest[2]
+    power = warm.forces.power[2] / cold.forces.power[2]
+    assert power == pytest.approx(warm.forces.x[2] / cold.forces.x[2], rel=2e-3)
+
+
+def test_worn_volume_is_the_coefficient_times_the_work_of_friction() -> None:
+    """Of all patches of the pose, with spin, whatever the friction; what spin adds to that of the creepages is told."""
+    for friction in ("0.3", '{kind = "falling", mu_0 = 0.4, p_v = 0.5}'):
+        found = studied("wear.coefficient=2e-14", f"friction={friction}")
+        worn = found.worn()
+        assert found.of_pose is not None and (worn["depth_m"] >= 0).all()
+        assert worn["depth_m"] @ worn["width_m"] == pytest.approx(2e-14 * found.of_pose.power.sum(), rel=1e-10)
+        assert any("times the power of the creepages" in s for s in found.warnings())
+
+
+def test_tables_and_page_hold_temperature_and_wear(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A measured characteristic beside the case; the largest temperature of the page is that of the table."""
+    shutil.copy(CASE, tmp_path / "case.toml")
+    (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.4\n0.1,0.3\n1,0.2\n")
+    monkeypatch.chdir(tmp_path)
+    given = ('friction={kind="table", file="mu.csv"}', "heat={}", "wear.coefficient=1e-14", *FEW)
+    sets = [word for setting in given for word in ("--set", setting)]
+    assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
+    folder, said = tmp_path / "build" / "wheel-rail", capsys.readouterr().out
+    hot = max(float(row["largest_temperature_C"]) for row in csv.DictReader((folder / "creep.csv").open()))
+    deepest = max(float(row["depth_m"]) for row in csv.DictReader((folder / "wear.csv").open()))
+    assert f"at most {hot:.4g} degrees C hot" in said and f"at most {1e9 * deepest:.4g} nm off" in said
+    assert not (folder / "exact.csv").exists()
+    (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
+    assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
+    assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
+
+
+WRONG = {
+    "heated by what is not there": ('friction={kind="heated", mu_0=0.4}', "heat.limit"),
+    "random in time": ('friction={kind="falling", mu_0=0.4, p_v=1.0, deviation=0.1}', "friction.deviation"),
+    "no file": ('friction={kind="table", file="mu.csv"}', "mu.csv"),
+    "no friction": ('friction={kind="falling", mu_0=0, p_v=1.0}', "friction: is 0"),
+    "lighter than nothing": ("heat.density=-1", "heat.density"),
+    "below absolute zero": ("heat.start=-300", "heat.start"),
+    "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
+    "a table of constant friction": ("table={}; heat.limit=300", "table"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_bad_input_is_one_sentence(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(CASE, tmp_path / "case.toml")
+    monkeypatch.chdir(tmp_path)
+    settings, named = WRONG[what]
+    sets = [word for setting in settings.split("; ") for word in ("--set", setting)]
+    assert main(["roll", "case.toml", *sets, "-q"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert named in said and len(said.splitlines()) == 1
+    assert not (tmp_path / "build" / "wheel-rail" / "rolling.html").exists()
