@@ -235,6 +235,8 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     error = np.abs(table.forces(*given, G) - np.array([f.x, f.y, f.moment])) / size
     assert (error.max(axis=1) <= 1.2 * table.error[:, 2]).all()
     assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
+    one = [float(np.ravel(v)[0]) for v in given]
+    np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
     with pytest.raises(UserError, match="no table of creep forces"):
         ms.read_creep_table(CASE)
 
