@@ -220,6 +220,27 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
     np.testing.assert_array_equal(slides, theta < 1)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"normal_force": [1e5, -1e5]}, "normal_force: is -100000 in state 1"), ({"a": 0.0}, "a: is 0 in"),
+        ({"friction": -0.3}, "friction: is -0.3"), ({"poisson": 0.7}, "it must be 0 to 0.5"),
+        ({"shear": np.nan}, "shear: is nan"), ({"xi": np.inf}, "xi: is inf"), ({"spin": "none"}, "'kalker' or 'book'"),
+        ({"elements": (0, 20)}, "two whole numbers"), ({"elements": 20}, "two whole numbers"),
+    ],
+)  # fmt: skip
+def test_states_that_are_none_are_refused(wrong: dict, said: str) -> None:
+    for model in (ms.creep_forces, ms.tractions):
+        with pytest.raises(UserError, match=said):
+            model(**{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
+
+
+def test_all_of_a_patch_slides_and_not_more() -> None:
+    """The shares of the strips make one, however few they are, elements given as a list too."""
+    f = ms.creep_forces([1.0, 0.0], [0.0, -1.0], 0.0, **PATCH, elements=[20, 20])
+    np.testing.assert_allclose(f.sliding, 1, rtol=1e-13)
+
+
 # --- tables --------------------------------------------------------------------------------------------------------
 
 
