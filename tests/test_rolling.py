@@ -366,6 +366,7 @@ WRONG = {
     "nothing to run over": ("creep.stop=0.0", "creep"),
     "no friction": ("friction=0", "friction"),
     "off the edge of the rail": ("rail.width=0.002", "profile ends"),
+    "noise in mm": ("wheel.noise=0.01", "wheel.noise"),
     "a key that is none": ("creep.form=1", "creep.form"),
     "a table that is none": ('wheel.profile="case.toml"', "case.toml"),
 }
