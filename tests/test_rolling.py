@@ -210,6 +210,27 @@ def test_the_short_return_is_that_of_the_point_contact() -> None:
     np.testing.assert_array_equal(slides, theta < 1)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"normal_force": [1e5, -1e5]}, "normal_force: is -100000 in state 1"), ({"a": 0.0}, "a: is 0 in"),
+        ({"friction": -0.3}, "friction: is -0.3"), ({"poisson": 0.7}, "it must be 0 to 0.5"),
+        ({"shear": np.nan}, "shear: is nan"), ({"xi": np.inf}, "xi: is inf"), ({"spin": "none"}, "'kalker' or 'book'"),
+        ({"elements": (0, 20)}, "two whole numbers"), ({"elements": 20}, "two whole numbers"),
+    ],
+)  # fmt: skip
+def test_states_that_are_none_are_refused(wrong: dict, said: str) -> None:
+    for model in (ms.creep_forces, ms.tractions):
+        with pytest.raises(UserError, match=said):
+            model(**{"xi": 1e-3, "eta": 0.0, "phi": 0.1, **PATCH, **wrong})
+
+
+def test_all_of_a_patch_slides_and_not_more() -> None:
+    """The shares of the strips make one, however few they are, elements given as a list too."""
+    f = ms.creep_forces([1.0, 0.0], [0.0, -1.0], 0.0, **PATCH, elements=[20, 20])
+    np.testing.assert_allclose(f.sliding, 1, rtol=1e-13)
+
+
 # --- tables --------------------------------------------------------------------------------------------------------
 
 
@@ -225,6 +246,8 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     error = np.abs(table.forces(*given, G) - np.array([f.x, f.y, f.moment])) / size
     assert (error.max(axis=1) <= 1.2 * table.error[:, 2]).all()
     assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
+    one = [float(np.ravel(v)[0]) for v in given]
+    np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
     with pytest.raises(UserError, match="no table of creep forces"):
         ms.read_creep_table(CASE)
 
@@ -333,6 +356,7 @@ WRONG = {
     "nothing to run over": ("creep.stop=0.0", "creep"),
     "no friction": ("friction=0", "friction"),
     "off the edge of the rail": ("rail.width=0.002", "profile ends"),
+    "noise in mm": ("wheel.noise=0.01", "wheel.noise"),
     "a key that is none": ("creep.form=1", "creep.form"),
     "a table that is none": ('wheel.profile="case.toml"', "case.toml"),
 }
@@ -364,12 +388,14 @@ def test_what_should_be_doubted_is_told(
     shutil.copy(CASE, tmp_path / "case.toml")
     monkeypatch.chdir(tmp_path)
     few = ["--set", "creep.points=3", "--set", "model.exact=0", "--no-pictures", "-q"]
-    assert main(["roll", "case.toml", "--set", "vertical_force=0", *few[:-1]]) == 0
-    assert "all forces are zero" in capsys.readouterr().out
     close = ["--set", "friction=1.6", "--set", "wheel.profile=-0.301", "--set", "pose.lateral=0"]
     assert main(["roll", "case.toml", *close, *few[:-1]]) == 0
     said = capsys.readouterr().out
     assert "friction is 1.6" in said and "conform" in said
+    assert main(["roll", "case.toml", "--set", "vertical_force=0", *few[:-1]]) == 0
+    assert "all forces are zero" in capsys.readouterr().out
+    left = {p.name for p in (tmp_path / "build" / "wheel-rail").iterdir()}
+    assert left.isdisjoint({"creep.csv", "exact.csv", "forces.csv"}) and "patches.csv" in left
 
 
 @pytest.mark.slow

@@ -50,7 +50,7 @@ class Section(Model):
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
     width: Positive = WIDTH
-    noise: NotNegative = 0.0
+    noise: Annotated[NotNegative, Field(le=1e-3)] = 0.0
     at: Positive = 0.75
     young: Positive = 2.1e11
     poisson: Poisson = 0.28

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..contact.law import program
 from ..contact.point import opposed
+from ..data import UserError
 from .kalker import Coefficients, creep_coefficients
 
 Array = Any
@@ -184,7 +185,7 @@ def forces(pose: Poses, elements: tuple[int, int] = (20, 20), distribution: Dist
         power = sum_.power + 0.5 * (t[0] * left[0] + t[1] * left[1])
         across = pose.b * width
         area = length * across
-        slid = sum_.sliding * area / (jnp.pi * pose.a * pose.b)
+        slid = sum_.sliding * area / (2 * pose.a * pose.b * float(g.chord @ g.width))
         added = *(f * area for f in sum_[:3]), power * across, slid
         return Forces(*(s + f for s, f in zip(total, added, strict=True))), None
 
@@ -269,8 +270,12 @@ def creep_forces(
 
     Returns:
         Arrays (n,), N and N m.
+
+    Raises:
+        UserError: a value or a word that no state of rolling has.
     """
-    given = broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    elements = _known(elements, distribution, coefficients, spin)
+    given = _states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     n = len(given[0])
     filled = [np.concatenate([v, np.repeat(v[-1:], -n % BLOCK)]) for v in given]
     how = {"elements": elements, "distribution": distribution, "coefficients": coefficients, "spin": spin}
@@ -280,6 +285,34 @@ def creep_forces(
 
 def broadcast(*given: ArrayLike) -> list[np.ndarray]:
     return list(np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given)))
+
+
+BOUNDS = {
+    "xi": (-np.inf, np.inf, "finite"), "eta": (-np.inf, np.inf, "finite"), "phi": (-np.inf, np.inf, "finite"),
+    "a": (TINY, np.inf, "positive"), "b": (TINY, np.inf, "positive"), "normal_force": (TINY, np.inf, "positive"),
+    "friction": (0.0, np.inf, "0 or more"), "shear": (TINY, np.inf, "positive"), "poisson": (0.0, 0.5, "0 to 0.5"),
+}  # fmt: skip
+"""Least and most of what `creep_forces` takes."""
+
+
+def _states(*given: ArrayLike) -> list[np.ndarray]:
+    filled = broadcast(*given)
+    for v, (name, (least, most, must)) in zip(filled, BOUNDS.items(), strict=True):
+        good = np.isfinite(v) & (v >= least) & (v <= most)
+        if not good.all():
+            i = int(np.argmin(good))
+            raise UserError(f"{name}: is {v[i]:g} in state {i}; it must be {must}")
+    return filled
+
+
+def _known(elements: Any, distribution: str, coefficients: str, spin: str) -> tuple[int, int]:
+    given = {"distribution": (distribution, Distribution), "coefficients": (coefficients, Coefficients)}
+    for name, (word, words) in {**given, "spin": (spin, Spin)}.items():
+        if word not in get_args(words):
+            raise UserError(f"{name}: is {word!r}; give {' or '.join(map(repr, get_args(words)))}")
+    if np.shape(elements) != (2,) or min(elements) < 2 or any(n != int(n) for n in elements):
+        raise UserError(f"elements: is {elements}; give two whole numbers of 2 or more, along and across")
+    return int(elements[0]), int(elements[1])
 
 
 def tractions(
@@ -292,7 +325,8 @@ def tractions(
     The slip is s_M - u' with the slope of u through the neighbours, so that friction takes as much power as the
     creepages give (errata to (6.5-16)).
     """
-    given = broadcast(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
+    elements = _known(elements, distribution, coefficients, spin)
+    given = _states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
     pose = Poses(*map(np.asarray, poses(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))

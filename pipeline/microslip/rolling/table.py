@@ -78,7 +78,8 @@ class CreepTable:
         flat = np.hypot(x / b, y / a)
         polar = np.arctan2(flat, np.abs(turn))
         at = [r / (1 + r), np.arctan2(turned * y * np.sqrt(b), np.abs(x) * np.sqrt(a)), polar, np.log(ratio)]
-        found = np.moveaxis(self._between(np.stack(at, axis=-1)), -1, 0) * np.stack([forward, turned, turned])
+        found = np.moveaxis(self._between(np.stack(at, axis=-1)), -1, 0).reshape(3, *x.shape)
+        found = found * np.stack([forward, turned, turned])
         return found * held * np.stack([np.ones_like(area), np.ones_like(area), np.sqrt(area)])
 
 

@@ -47,7 +47,10 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> M
         found = study(case, case_path.parent)
     except UserError as error:
         raise UserError(f"{case_path}: {error}") from error
+    former = json.loads(stage.product.read_text())["files"] if stage.product.is_file() else []
     stage.begin()
+    for name in former:  # what this run does not write again would be of another case
+        (folder / name).unlink(missing_ok=True)
     sentences = found.sentences()
     made = _tables(found, folder)
     if case.table is not None:
