@@ -77,7 +77,8 @@ def _marched(
     sum_ = sum_._replace(power=sum_.power + 0.5 * work / length)
     x, y, moment, power, slides = (v.reshape(ny, n).sum(axis=0) for v in sum_)
     fields = (jnp.moveaxis(v.reshape(-1, ny, n), 1, 0) for v in found)
-    return Forces(x, y, moment, power, slides / (jnp.pi * pose.a * pose.b)), (*fields, length.reshape(ny, n))
+    slides = slides / (2 * pose.a * pose.b * float(g.chord @ g.width))
+    return Forces(x, y, moment, power, slides), (*fields, length.reshape(ny, n))
 
 
 def rolled_by_characteristic(
