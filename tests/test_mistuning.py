@@ -16,13 +16,14 @@ from microslip.harmonic_balance import problem as balance
 from microslip.harmonic_balance.solver import newton, solve
 from microslip.mistuning import ensemble, rare
 from microslip.mistuning.linear import answer, beside
-from microslip.mistuning.peaks import highest
+from microslip.mistuning.peaks import Highest, highest
 from microslip.mistuning.ring import Tuned
-from microslip.mistuning.samples import Asked, Sliding, Sticking, amplitudes, sample
+from microslip.mistuning.samples import Asked, Sample, Sliding, Sticking, amplitudes, sample
 from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
+from microslip.stages.mistuning import unsure
 from microslip.system.assembly import Assembly
 
 RUB = {
@@ -254,6 +255,14 @@ def test_peaks_are_between_points() -> None:
     assert found.amplitude == pytest.approx(1.01 / 0.008, rel=1e-4)
 
 
+@pytest.mark.parametrize(("low", "end", "words"), [(0.9, False, None), (0.4, False, "to 40 %"), (0.4, True, "an end")])
+def test_a_tuned_ring_without_a_peak_is_said(low: float, end: bool, words: str | None) -> None:
+    """Amplifications are over the tuned ring's peak: a warning where that is at an end of the band, or by a jump."""
+    top = Highest(0, 2.0, 1.0, 0.0, np.array([1.0, 2.0, 3.0]), np.array([[low], [1.0], [0.95]]), (), end)
+    said = unsure(Sample(-1, top, top.amplitudes))
+    assert said == [] if words is None else words in said[0]
+
+
 @pytest.mark.parametrize("stuck", [True, False])
 def test_stress_at_the_worst_node(stuck: bool) -> None:
     """The von Mises stress of all nodes of all blades at a thousand instants of the peak's cycle, and the gauges'
@@ -352,6 +361,7 @@ def test_a_case_leaves_its_samples(tmp_path: Path) -> None:
     found = np.genfromtxt(tmp_path / "samples.csv", delimiter=",", names=True)
     assert (found["stress_Pa"] > 0).all() and (found["strain"] > 0).all()
     assert f"{found['amplification'].max():.4g}" in " ".join(sentences)
+    assert any("tuned ring is highest at an end" in s for s in sentences)  # its peak is at 392 Hz
     assert all(p.is_file() for p in made)
     for sector, words in (("7", "sectors 0 to 3"), ("two", "no sector"), ("3", "other.h5")):
         path.write_text(CASE.format(file=ms.sample(), samples=4, sector=sector))

@@ -23,7 +23,7 @@ from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
-from ..mistuning.samples import Asked
+from ..mistuning.samples import Asked, Sample
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
 from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
@@ -202,6 +202,7 @@ def said(found: Ensemble) -> list[str]:
     count = int(found.solved.sum())
     told = [
         f"The tuned ring of {N} sectors reaches {sized(top.amplitude)} at {top.frequency:.6g} Hz.",
+        *unsure(found.tuned),
     ]
     if not count:
         return [*told, "No sample has a solution."]
@@ -233,6 +234,28 @@ def said(found: Ensemble) -> list[str]:
             f"warning: {unsolved} samples have frequencies without a solution; they are counted in samples.csv."
         )
     return told
+
+
+def unsure(tuned: Sample) -> list[str]:
+    """Warnings, where the tuned ring's peak, by which all amplifications are divided, is none or lies beside a jump."""
+    top = tuned.top
+    if top.at_end:
+        return [
+            "warning: the tuned ring is highest at an end of the band, so amplifications are over no peak of it; widen "
+            "the sweep."
+        ]
+    at = int(np.abs(top.frequencies - top.frequency).argmin())
+    lower = top.amplitudes[[at - 1, at + 1], top.output].min() / top.amplitude
+    if lower >= JUMP:
+        return []
+    return [
+        f"warning: beside its peak the tuned ring falls to {100 * lower:.0f} % from one point to the next: it jumps, "
+        "or the sweep is coarse, and the peak may be higher yet; give the sweep more points."
+    ]
+
+
+JUMP = 0.6
+"""Amplitude beside a peak over the peak's below which the two are no resonance seen by some points."""
 
 
 def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:
