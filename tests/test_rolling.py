@@ -359,6 +359,14 @@ WRONG = {
     "noise in mm": ("wheel.noise=0.01", "wheel.noise"),
     "a key that is none": ("creep.form=1", "creep.form"),
     "a table that is none": ('wheel.profile="case.toml"', "case.toml"),
+    "heated by what is not there": ('friction={kind="heated", mu_0=0.4}', "heat.limit"),
+    "random in time": ('friction={kind="falling", mu_0=0.4, p_v=1.0, deviation=0.1}', "friction.deviation"),
+    "no file of friction": ('friction={kind="table", file="mu.csv"}', "mu.csv"),
+    "friction that vanishes": ('friction={kind="falling", mu_0=0, p_v=1.0}', "friction: is 0"),
+    "lighter than nothing": ("heat.density=-1", "heat.density"),
+    "below absolute zero": ("heat.start=-300", "heat.start"),
+    "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
+    "a table of constant friction": ("table={}; heat.limit=300", "table"),
 }
 
 
@@ -368,8 +376,9 @@ def test_bad_input_is_one_sentence(
 ) -> None:
     shutil.copy(CASE, tmp_path / "case.toml")
     monkeypatch.chdir(tmp_path)
-    setting, named = WRONG[what]
-    assert main(["roll", "case.toml", "--set", setting, "-q"]) == 2
+    settings, named = WRONG[what]
+    sets = [word for setting in settings.split("; ") for word in ("--set", setting)]
+    assert main(["roll", "case.toml", *sets, "-q"]) == 2
     said = capsys.readouterr().err.strip()
     assert named in said and len(said.splitlines()) == 1
     assert not (tmp_path / "build" / "wheel-rail" / "rolling.html").exists()

@@ -92,29 +92,3 @@ def test_tables_and_page_hold_temperature_and_wear(
     (tmp_path / "mu.csv").write_text("speed,mu\n0.01,0.2\n0.1,0.15\n1,0.1\n")
     assert main(["roll", "case.toml", *sets, "--no-pictures"]) == 0
     assert f"{hot:.4g} degrees C hot" not in capsys.readouterr().out
-
-
-WRONG = {
-    "heated by what is not there": ('friction={kind="heated", mu_0=0.4}', "heat.limit"),
-    "random in time": ('friction={kind="falling", mu_0=0.4, p_v=1.0, deviation=0.1}', "friction.deviation"),
-    "no file": ('friction={kind="table", file="mu.csv"}', "mu.csv"),
-    "no friction": ('friction={kind="falling", mu_0=0, p_v=1.0}', "friction: is 0"),
-    "lighter than nothing": ("heat.density=-1", "heat.density"),
-    "below absolute zero": ("heat.start=-300", "heat.start"),
-    "wear that adds": ("wear.coefficient=-1", "wear.coefficient"),
-    "a table of constant friction": ("table={}; heat.limit=300", "table"),
-}
-
-
-@pytest.mark.parametrize("what", WRONG)
-def test_bad_input_is_one_sentence(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shutil.copy(CASE, tmp_path / "case.toml")
-    monkeypatch.chdir(tmp_path)
-    settings, named = WRONG[what]
-    sets = [word for setting in settings.split("; ") for word in ("--set", setting)]
-    assert main(["roll", "case.toml", *sets, "-q"]) == 2
-    said = capsys.readouterr().err.strip()
-    assert named in said and len(said.splitlines()) == 1
-    assert not (tmp_path / "build" / "wheel-rail" / "rolling.html").exists()

@@ -24,7 +24,7 @@ from .peaks import told_by
 from .ring import Deviations, Tuned
 from .samples import Asked
 from .scatter import MODAL, Scatter
-from .sensitivity import softening
+from .sensitivity import number, softening
 
 LEAST = 0.02
 """Share of the strongest mode's sensitivity, at any frequency, below which deviations of a mode are left out."""
@@ -127,8 +127,7 @@ def _columns(tuned: Tuned, scatter: list[tuple[int, Scatter]], size: int) -> tup
 
 def _rise(at: AtFrequency, tuned: Tuned, s: Scatter, mode: int) -> complex:
     """ds/dp of a mode by its deviation."""
-    group, parts = tuned.body(s).groups[0], at.problem.assembly.components
-    body = next(i for i, m in enumerate(parts) if m.name == f"{tuned.body(s).name}_0")
+    group, body = tuned.body(s).groups[0], number(at.problem, tuned, s, 0)
     V = np.eye(len(group.M_r)) if group.to_diagonal is None else group.to_diagonal
     return complex(V[:, mode] @ softening(at, body, s, mode, 1) @ V[:, mode])
 

@@ -68,7 +68,7 @@ def sensitivities(asked: Asked, scatter: Scatter, point: Point) -> tuple[float, 
     now, modes = Linearised.of(asked.problem(asked.tuned.whole), point), asked.tuned.modes(scatter)
     p, pushed = now.at.problem, now.pushes()
     out = np.zeros((asked.tuned.sectors, modes))
-    bodies = [_number(p, asked.tuned, scatter, j) for j in range(asked.tuned.sectors)]
+    bodies = [number(p, asked.tuned, scatter, j) for j in range(asked.tuned.sectors)]
     where = [_where(p, body) for body in bodies]
     for h in range(p.harmonics + 1):
         for mode in range(modes):
@@ -153,7 +153,7 @@ class Linearised:
         return A.astype(complex), P @ T
 
 
-def _number(p: Problem, tuned: Tuned, scatter: Scatter, sector: int) -> int:
+def number(p: Problem, tuned: Tuned, scatter: Scatter, sector: int) -> int:
     """Of a sector's body among the parts."""
     name = f"{tuned.body(scatter).name}_{sector}"
     return next(i for i, m in enumerate(p.assembly.components) if m.name == name)
