@@ -80,7 +80,7 @@ class Material:
         return np.interp(temperature, self.temperature_table[:, 0], self.temperature_table[:, 1])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """A volume mesh with named faces.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import scipy.sparse as sp
 
-from ..data import Mesh, UserError
+from ..data import Indices, Mesh, UserError
 from ..settings.body import BodySettings
 from .compute import prepared
 
@@ -17,13 +17,17 @@ class Unreduced:
     """A body at rest on its n free degrees of freedom.
 
     Attributes:
-        M, C, K: (n, n). rows: interface -> (6, n) its motion along n, t1, t2 and about them.
+        M, C, K: (n, n). rows: interface -> (6, n) its motion along n, t1, t2 and about them. free: (n,) degrees of
+            freedom of the mesh, 3 times the node plus the axis, that are not held. mass: kg.
     """
 
     M: sp.csr_matrix
     C: sp.csr_matrix
     K: sp.csr_matrix
     rows: Mapping[str, sp.csr_matrix]
+    mesh: Mesh
+    free: Indices
+    mass: float
 
 
 def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
@@ -46,4 +50,5 @@ def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
     upper = b.model.free.matrix(b.model.K0)
     K = (upper + sp.triu(upper, 1).T).tocsr()
     C = ((damping.alpha or 0.0) * M + (damping.beta or 0.0) * K).tocsr()
-    return Unreduced(M, C, K, {name: p.B.tocsr()[:, free] for name, p in b.rows.patches.items()})
+    rows = {name: p.B.tocsr()[:, free] for name, p in b.rows.patches.items()}
+    return Unreduced(M, C, K, rows, mesh, free, b.mass)
