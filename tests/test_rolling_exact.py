@@ -54,7 +54,7 @@ def test_a_measured_profile_is_pressed_as_it_is() -> None:
     curvature, and a wheel that goes the other way on the other side says the same."""
     profiles = ROOT / "tests" / "validation" / "profiles"
     files = [f"wheel.profile='{profiles}/MBench_S1002_v3.prw'", f"rail.profile='{profiles}/MBench_UIC60_v3.prr'"]
-    s = studied("model.exact=2", "rail.at=0.7605326", *files)
+    s = studied("model.exact=2", "rail.at=0.7605326", "wheel.at=0.75", *files)
     assert s.exact is not None and s.exact.pressure / s.patches[0].pressure == pytest.approx(1.106, abs=0.005)
 
 

@@ -72,13 +72,17 @@ def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:
     return Profile(y, sum((c * y ** (k + 2) for k, c in enumerate(coefficients)), np.zeros_like(y)))
 
 
+def has_arc(radius: float, width: float) -> bool:
+    return 0 < width < 1.8 * abs(radius)
+
+
 def circle(radius: float, width: float = WIDTH) -> Profile:
     """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
 
     Raises:
         UserError: an arc as wide as its circle.
     """
-    if not 0 < width < 1.8 * abs(radius):
+    if not has_arc(radius, width):
         raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
     return Profile(y, np.sign(radius) * (abs(radius) - np.sqrt(radius**2 - y**2)))

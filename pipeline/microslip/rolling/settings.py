@@ -29,7 +29,7 @@ from ..settings.body import (
 from ..settings.mistakes import validate
 from .ellipse import combined
 from .kalker import Coefficients
-from .profiles import WIDTH, Profile, circle, polynomial, read_profile
+from .profiles import WIDTH, Profile, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
 from .table import POINTS
@@ -39,6 +39,9 @@ from .wheelset import Pose, Track
 Temperature = Annotated[Number, Field(gt=-273.15)]
 Count = Annotated[int, Field(ge=2, le=400)]
 
+SUFFIXES = {"wheel": (".prw", ".whl"), "rail": (".prr", ".ban")}
+MIDDLES = {"wheel": "axle", "rail": "track"}
+
 BIGGEST = 5.0
 """m: a wheel's radius above this is given in another unit."""
 
@@ -46,7 +49,7 @@ BIGGEST = 5.0
 class Section(Model):
     """A cross-section. Attributes: profile: radius of a circle, m (convex positive, hollow negative), coefficients of
     y^2, y^3, ... (1/m, ...), or a file. width: of a circle or polynomial, m. noise: of a measured profile, m. at: of
-    the profile's origin from the middle of the track or axle, m."""
+    the profile's origin from the middle of the track or axle, m; there is no usual one where a profile is measured."""
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
     width: Positive = WIDTH
@@ -54,6 +57,14 @@ class Section(Model):
     at: Positive = 0.75
     young: Positive = 2.1e11
     poisson: Poisson = 0.28
+
+    @model_validator(mode="after")
+    def _is_an_arc(self) -> Section:
+        if isinstance(self.profile, float) and not has_arc(self.profile, self.width):
+            raise ValueError(
+                f"a profile of radius {self.profile:g} m has no arc {self.width:g} m wide; correct profile or width"
+            )
+        return self
 
     def made(self, folder: Path, outward: float) -> Profile:
         """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
@@ -167,6 +178,7 @@ class RollingCase(Model):
 
     @model_validator(mode="after")
     def _fits(self) -> RollingCase:
+        self._stands()
         if self.friction.heated:
             raise ValueError(
                 f'friction.kind: "{self.friction.kind}" belongs to contact files, whose [temperature] rolling has not; '
@@ -177,6 +189,21 @@ class RollingCase(Model):
         if self.table is not None and not self.is_constant:
             raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
         return self
+
+    def _stands(self) -> None:
+        """Files are of the body that names them, and where they stand is given: a few mm move the contact."""
+        bodies = {"wheel": self.wheel, "rail": self.rail}
+        for name, other in (("wheel", "rail"), ("rail", "wheel")):
+            file = bodies[name].profile
+            if isinstance(file, str) and Path(file).suffix.lower() in SUFFIXES[other]:
+                raise ValueError(f"{name}.profile: {file} is the profile of a {other}; exchange wheel and rail")
+        measured = [name for name, body in bodies.items() if isinstance(body.profile, str)]
+        for name, body in bodies.items():
+            if measured and "at" not in body.model_fields_set:
+                raise ValueError(
+                    f"{name}.at: is missing, and with the measured profile of the {measured[0]} there is no usual one; "
+                    f"give the distance of the {name}'s profile from the middle of the {MIDDLES[name]}, m"
+                )
 
     @property
     def is_constant(self) -> bool:

@@ -109,6 +109,7 @@ def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]
     gap = _gap(track, seen)
     if not vertical > 0:
         return []
+
     def missing(down: float) -> float:
         return float(vertical ** (2 / 3) - sum(_lifted(p) for p in _pressed(track, gap, down)) ** (2 / 3))
 
