@@ -15,7 +15,7 @@ from ..basis import write_basis
 from ..data import Array, Mesh, ModalBasis, UserError
 from ..files import store
 from ..mesh import UNITS
-from ..mesh.inp import files_of
+from ..mesh.cards import files_of
 from ..settings.body import BodySettings, MatrixFiles
 from .job import Job
 from .meshing import load_mesh, mesh_stage, touched_files
