@@ -486,17 +486,26 @@ def mistune(
 def roll(
     case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:
-    """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions.
+    """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions; with [vehicle] how
+    unround wheels wear over their circumference, and which waves grow.
 
     Args:
         case: a case.toml with [wheel] and [rail], the folder that holds it, its name, or its products.
     """
+    from .stages.places import is_vehicle
     from .stages.rolling import rolling_stage
+    from .stages.vehicle import vehicle_stage
 
-    case = _case_file(case)
+    case, ended = _case_file(case), ""
+    given = (case, Path("build"), list(set_), force)
     with progress(f"roll {case}", quiet) as report:
-        made, sentences = rolling_stage(case, Path("build"), list(set_), force, report, not no_pictures)
+        if is_vehicle(case):
+            made, sentences, ended = vehicle_stage(*given, report, not no_pictures)
+        else:
+            made, sentences = rolling_stage(*given, report, not no_pictures)
     _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if ended:
+        raise NotConverged(f"the run ended early, because {ended}; {made[0]} holds what was found")
 
 
 def _share(text: str) -> float:

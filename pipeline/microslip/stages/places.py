@@ -71,6 +71,11 @@ def is_rolling(path: Path) -> bool:
     return _keys(path) >= {"wheel", "rail"}
 
 
+def is_vehicle(path: Path) -> bool:
+    """True for a case of rolling contact with a vehicle."""
+    return _keys(path) >= {"wheel", "rail", "vehicle"}
+
+
 def is_case(path: Path) -> bool:
     """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
     keys = _keys(path)

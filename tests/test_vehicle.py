@@ -1,0 +1,231 @@
+"""A small vehicle on unround wheels: its equations, hunting, balance of energy, wear by jumps, bad input."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microslip.cli import main
+from microslip.rolling.kalker import creep_coefficients
+from microslip.rolling.table import creep_table
+from microslip.rolling.wheelset import Pose, patches
+from microslip.vehicle import motion, wearing
+from microslip.vehicle.creep import linear, of_strips, of_table
+from microslip.vehicle.settings import VehicleCase, load_vehicle
+
+CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
+PLACES = 48
+
+
+@pytest.fixture(scope="module")
+def case() -> VehicleCase:
+    return load_vehicle(CASE, [f"running.places={PLACES}", "running.orders=6", "running.speeds=[]"])[0]
+
+
+@pytest.fixture(scope="module")
+def vehicle(case: VehicleCase) -> motion.Vehicle:
+    return case.made(CASE.parent)
+
+
+@pytest.fixture(scope="module")
+def rolling(case: VehicleCase, vehicle: motion.Vehicle) -> wearing.Rolling:
+    t = wearing.tread(vehicle, PLACES, case.wear.coefficient, case.how)
+    return wearing.Rolling.of(vehicle, linear, t, case.shape())
+
+
+def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: motion.Vehicle) -> None:
+    """Force, place, creepages of a turned wheelset against `rolling.wheelset.patches` under the same vertical force."""
+    x = motion.steady(vehicle)
+    x[0], x[3] = 2.1e-3, 4e-3
+    t = motion.at(vehicle.over, vehicle.reach, x[0])
+    x[2] = float(t.roll[0])
+    found = motion.contacts(vehicle, x, np.zeros(2))
+    track = case.track_of(CASE.parent)
+    for k, side in enumerate(("right", "left")):
+        pose = Pose(x[0], x[3], x[2], vehicle.speed, float(x[12]))
+        p = patches(track, pose, side, float(found.vertical[k]))[0]
+        assert float(found.normal_force[k]) == pytest.approx(p.normal_force, rel=1e-4)
+        np.testing.assert_allclose([found.a[k], found.b[k]], [p.a, p.b], rtol=2e-3)
+        np.testing.assert_allclose(found.on_wheel[k], p.on_wheel, atol=2e-5)
+        np.testing.assert_allclose([found.xi[k], found.eta[k]], [p.xi, p.eta], atol=2e-6)
+        assert float(found.phi[k]) == pytest.approx(p.phi, rel=1e-3)
+
+
+def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
+    """Slow, without suspension across and along: omega = V sqrt(conicity/(r l)), conicity the slope of the difference
+    of the rolling radii; the spin turns the wave a little."""
+    free = np.array(vehicle.stiffness)
+    free[[0, 2, 0, 2, 3], [0, 2, 2, 0, 3]] = 0.0
+    o, step = vehicle.over, 2 * vehicle.reach / (vehicle.over.a.shape[1] - 1)
+    middle = o.a.shape[1] // 2
+    conicity = 0.5 * np.gradient(o.radius[0] - o.radius[1], step)[middle]
+    wave = 2.0 * np.sqrt(conicity / (o.radius[0, middle] * o.across[0, middle]))
+    slow = vehicle._replace(speed=2.0, stiffness=free, damping=0 * free + np.diag([0, 1e5, 0, 0, 1e5, 1e5]))
+    assert motion.hunting(slow).imag == pytest.approx(wave, rel=0.05)
+
+
+def by_hand(v: motion.Vehicle) -> complex:
+    """Root of lateral motion and yaw alone, as textbooks write them, with Kalker's coefficients."""
+    o, i = v.over, v.over.a.shape[1] // 2
+    a, b, r, arm, slope = (float(f[0, i]) for f in (o.a, o.b, o.radius, o.across, o.slope))
+    step = 2 * v.reach / (o.a.shape[1] - 1)
+    cone = 0.5 * np.gradient(o.radius[0] - o.radius[1], step)[i]
+    turn = 0.5 * np.gradient(o.slope[0] + o.slope[1], step)[i]  # of the rails' slopes with y
+    roll = np.gradient(o.roll, step, axis=1)[0, i]
+    c11, c22, c23, c33 = np.asarray(creep_coefficients(a / b, v.poisson)) * v.shear
+    c, V, W = np.sqrt(a * b), v.speed, v.load
+    f11, f22, f23, f33 = 2 * c**2 * c11, 2 * c**2 * c22, 2 * c**3 * c23, 2 * c**4 * c33
+    M = np.diag([v.mass[0, 0] + 0 * roll, v.mass[3, 3]])
+    C = np.array([[f22 / V + v.damping[0, 0], f23 / V], [-f23 / V, f11 * arm**2 / V + f33 / V + v.damping[3, 3]]])
+    K = np.array([
+        [v.stiffness[0, 0] - W * turn, -f22],
+        [f11 * arm * cone / r, v.stiffness[3, 3] + W * arm * slope + f23],
+    ])  # fmt: skip
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    values = np.linalg.eigvals(A)
+    return complex(max((s for s in values if s.imag > 0), key=lambda s: s.real))
+
+
+def test_a_small_push_grows_by_the_root_above_the_critical_speed_and_dies_out_below(vehicle: motion.Vehicle) -> None:
+    """Of the motion in time, by its own integration, against the roots."""
+    critical = motion.critical_speed(vehicle, 20.0, 200.0)
+    assert critical is not None
+    for factor in (0.95, 1.05):
+        v = vehicle._replace(speed=factor * critical)
+        values, shapes = motion.roots(v)
+        root = motion.hunting(v)
+        shape = np.real(shapes[:, np.abs(values - root).argmin()])
+        x = motion.steady(v)
+        flat = np.zeros((2 * motion.steps_of_a_turn(v, PLACES), 2))
+        at = x + 1e-5 * shape / np.abs(shape[0])
+        sizes, time = [], 0.0
+        for _ in range(40):
+            one = motion.turned(v, linear, at, flat, flat, len(flat) // 2 // PLACES)
+            sizes.append((time, at - x))
+            at, time = np.asarray(one.end), time + float(one.time)
+        left = np.linalg.inv(shapes)[np.abs(values - root).argmin()]
+        part = np.array([np.log(np.abs(left @ d)) for _, d in sizes])
+        rate = np.polyfit([t for t, _ in sizes], part, 1)[0]
+        assert rate == pytest.approx(root.real, rel=0.02) and (rate > 0) is (factor > 1)
+
+
+def test_energy_of_a_turn_balances(rolling: wearing.Rolling) -> None:
+    """What pull and torque bring is stored, rubbed and damped away; the rest falls with the step."""
+    v = rolling.vehicle._replace(torque=500.0)
+    x = motion.steady(v)
+    off = []
+    for fine in (1, 2):
+        out, rise = motion.resampled(rolling.shape, 2 * fine * rolling.steps)
+        one = motion.turned(v, linear, x, out, rise, fine * rolling.steps // PLACES)
+        stored = float(motion.energy(v, one.end, out[0]) - motion.energy(v, x, out[0]))
+        pull, torque, friction, damped = map(float, one.work)
+        off.append(abs(pull + torque - friction - damped - stored) / max(friction, abs(stored)))
+    assert off[0] < 1e-4 and off[1] < 0.3 * off[0] + 1e-7
+
+
+@pytest.mark.slow
+def test_the_table_goes_the_way_of_the_strips(rolling: wearing.Rolling) -> None:
+    """A turn with forces read from a table and with the strips themselves: apart by the error of the table at most."""
+    how = {"elements": (8, 8)}
+    table = creep_table(rolling.vehicle.poisson, points=(33, 33, 25, 9), checked=2000, **how)
+    x = motion.steady(rolling.vehicle)
+    x[0] += 1e-3
+    out, rise = motion.resampled(rolling.shape, 2 * rolling.steps)
+    ends = []
+    for creep in (of_strips(**how), of_table(table)):
+        ends.append(motion.turned(rolling.vehicle, creep, x, out, rise, rolling.steps // PLACES))
+    strips, read = (np.asarray(e.states) for e in ends)
+    v, time = rolling.vehicle, float(ends[0].time)
+    pushed = 2 * float(table.error[1, 2]) * v.friction * v.each  # both wheels, the largest error all the time
+    assert np.abs(strips - read)[:, 0].max() < 0.5 * pushed / v.mass[0, 0] * time**2
+    assert np.abs(strips[:, 0] - read[:, 0]).max() < 0.02 * np.ptp(strips[:, 0])
+
+
+def test_worn_volume_is_the_coefficient_times_the_work(rolling: wearing.Rolling) -> None:
+    """Per jump, the work from the creep forces, the volume from the strips of the tread."""
+    found = list(wearing.jumps(rolling, 1e5, 1e-9, 2e4))
+    for _, jump in found[1:]:
+        np.testing.assert_allclose(jump.volume, rolling.tread.coefficient * jump.work, rtol=1e-10)
+    assert found[-1][0].turns == pytest.approx(1e5)
+
+
+def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
+    """Radii after as many turns, by jumps of a half, a quarter, ... of them."""
+    far, ends = 4e6, []
+    for count in (2, 4, 8, 32):
+        *_, (last, _) = wearing.jumps(rolling, far, 1.0, far / count, fixed=True)
+        ends.append(last.radius[:, 0])
+    off = [np.abs(e - ends[-1]).max() for e in ends[:-1]]
+    order = -np.polyfit(np.log([2, 4, 8]), np.log(off), 1)[0]
+    assert order == pytest.approx(2, abs=0.35)
+
+
+def test_three_crests_wear_as_the_figure_says(rolling: wearing.Rolling) -> None:
+    """Fig. 6.9-1: wear shows three maxima, shifted against those of the wheel, and three more of the creepage."""
+    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    worn = np.fft.rfft(rolling.tread.seen(now.taken, now.one.on)[:, 0])
+    size = np.abs(worn[1:])
+    assert set(np.argsort(-size)[:2] + 1) == {3, 6}
+    shift = np.rad2deg(np.angle(worn[3] / np.fft.rfft(now.radius[:, 0])[3])) / 3
+    assert 5 < abs(shift) < 60
+
+
+def test_a_round_wheel_stays_round(rolling: wearing.Rolling) -> None:
+    """And wears alike on both sides."""
+    flat = replace(rolling, shape=np.zeros_like(rolling.shape))
+    *_, (last, jump) = wearing.jumps(flat, 1e6, 1e-7, 1e5)
+    assert np.ptp(last.radius, axis=0).max() < 1e-12
+    assert jump.volume[0] == pytest.approx(jump.volume[1], rel=1e-6)
+
+
+# --- the command line ----------------------------------------------------------------------------------------------
+
+SHORT = ("running.places=48", "running.orders=6", "running.speeds=[]", 'running.creep="linear"', "running.turns=1e5")
+
+
+def asked(*changes: str) -> list[str]:
+    return ["roll", str(CASE), *(w for c in (*SHORT, *changes) for w in ("--set", c)), "--no-pictures", "-q"]
+
+
+def test_a_case_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(asked()) == 0
+    folder = tmp_path / "build" / "unround-wheel"
+    rows = list(csv.DictReader((folder / "growth.csv").open()))
+    assert float(rows[-1]["turns"]) == 1e5 and (folder / "unround.html").is_file()
+    for row in rows[1:]:
+        assert float(row["right_volume_m3"]) == pytest.approx(7e-13 * float(row["right_friction_work_J"]), rel=1e-8)
+    assert len(list(csv.DictReader((folder / "circumference.csv").open()))) == 48
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ("running.speed=130", "running.speed"),
+        ("unround=[{order=3, amplitude=4e-3}]", "unround"),
+        ("running.places=30", "running.places"),
+        ("running.reach=0.04", "pose.lateral"),
+    ],
+)
+def test_bad_input(
+    change: str, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile: exit 2."""
+    monkeypatch.chdir(tmp_path)
+    assert main(asked(change)) == 2
+    assert key in capsys.readouterr().err and not (tmp_path / "build" / "unround-wheel" / "growth.csv").exists()
+
+
+def test_a_run_that_ends_keeps_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The wheel leaves its rail after wear has gone on for a while: exit 1, tables of what was found."""
+    monkeypatch.chdir(tmp_path)
+    assert main(asked("wear.coefficient=1e-9", "wear.tolerance=1e-5", "running.turns=1e6")) == 1
+    rows = list(csv.DictReader((tmp_path / "build" / "unround-wheel" / "growth.csv").open()))
+    assert 1 < len(rows) and float(rows[-1]["turns"]) < 1e6
+    assert "ended early" in capsys.readouterr().err
