@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import scipy.sparse as sp
 
 from ..data import Mesh, UserError
+from ..fem.cyclic import CyclicUpper
 from ..settings.body import BodySettings
 from .compute import prepared
 
@@ -41,9 +42,10 @@ def unreduced(mesh: Mesh, settings: BodySettings) -> Unreduced:
             f"{settings.name}: the unreduced matrices of a body have no damping by modes, no sector and no speed; "
             "write alpha and beta in [damping]"
         )
-    free = b.model.free.free
-    M = sp.kron(b.model.M_full, sp.eye(3)).tocsr()[free][:, free]
-    upper = b.model.free.matrix(b.model.K0)
+    free = b.model.free
+    assert not isinstance(free, CyclicUpper)
+    M = free.congruent(sp.kron(b.model.M_full, sp.eye(3)).tocsr())
+    upper = free.matrix(b.model.K0)
     K = (upper + sp.triu(upper, 1).T).tocsr()
     C = ((damping.alpha or 0.0) * M + (damping.beta or 0.0) * K).tocsr()
-    return Unreduced(M, C, K, {name: p.B.tocsr()[:, free] for name, p in b.rows.patches.items()})
+    return Unreduced(M, C, K, {name: free.rows(p.B.tocsr()) for name, p in b.rows.patches.items()})
