@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sector
+import test_bdf
+import test_cdb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from instanced import Placed
@@ -22,7 +24,7 @@ from microslip.fem.discretise import discretise
 from microslip.fem.links import linked
 from microslip.fem.operators import isotropic, mass, stiffness
 from microslip.fem.tied import tied_upper
-from microslip.mesh import boundary_facets, part_numbers
+from microslip.mesh import boundary_facets, part_numbers, read_mesh
 from microslip.modal.compute import modal_basis
 
 BEAM = meshes.brick("hexahedron20", (2, 2, 3), (0.02, 0.024, 0.05), to=meshes.shaken(0.0004))
@@ -230,3 +232,50 @@ def test_a_support_on_what_an_equation_gives_is_refused_with_its_line(tmp_path, 
     code = main(["import", "part.inp"]) or main(["modes", "part", "-q"])
     said = capsys.readouterr().err
     assert code == 2 and "that a support holds" in said and "part.inp, line " in said
+
+
+def test_constraints_of_nastran_and_ansys_are_those_of_abaqus(tmp_path):
+    """RBE2 as a kinematic coupling, RBE3 as a distributing one, MPC and CE as an equation, CERIG as a coupling."""
+    n = BEAM.node_id
+    top, side = (n[BEAM.face_points(f)] for f in ("z1", "x1"))
+    fixed = (3 * BEAM.face_points("z0")[:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(side, np.union1d(top, n[BEAM.face_points("z0")]))
+    abaqus = [
+        *decks.mesh_lines(BEAM, 1.0, ("z1",)), "*NODE", "901, 0.005, 0.006, 0.07", "902, 0.03, 0.02, 0.02",
+        "*NSET, NSET=FREE", *(f"{i}," for i in free), "*SURFACE, NAME=F, TYPE=NODE", "FREE",
+        "*KINEMATIC COUPLING, REF NODE=901", "z1, 1, 3", "*COUPLING, REF NODE=902, SURFACE=F", "*DISTRIBUTING",
+        "*EQUATION", "2", f"{free[0]}, 1, 2., {free[1]}, 2, -1.", "2", "901, 5, 1., 902, 4, -0.5",
+    ]  # fmt: skip
+    (tmp_path / "a.inp").write_text("\n".join(abaqus) + "\n")
+    one = linked(read_mesh(tmp_path / "a.inp", "m"))[0]
+    grid = ["GRID,901,,0.005,0.006,0.07", "GRID,902,,0.03,0.02,0.02"]
+    cards = [
+        *grid, *_listed("RBE2,1,901,123456", top), *_listed("RBE3,2,,902,123456,1.0,123", free),
+        f"MPC,3,{free[0]},1,2.0,{free[1]},2,-1.0", "MPC,3,901,5,1.0,902,4,-0.5",
+    ]  # fmt: skip
+    bulk = test_bdf.bulk(BEAM).replace("ENDDATA\n", "\n".join([*cards, "ENDDATA"]) + "\n")
+    (tmp_path / "a.bdf").write_text(bulk)
+    two = linked(read_mesh(tmp_path / "a.bdf", "m"))[0]
+    ours, theirs = solved(one, fixed, 6), solved(two, fixed, 6)
+    np.testing.assert_allclose(theirs, ours, rtol=1e-6)  # cards of bulk data have ten digits
+    np.testing.assert_allclose(ours, null_space_modes(one, fixed, 6), rtol=1e-7)
+    extra = f"{901:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in (0.005, 0.006, 0.07))
+    text = test_cdb.archive(BEAM, ("z1",), scale=1.0).replace("N,R5.3,LOC", extra + "\nN,R5.3,LOC")
+    ce = [
+        "CE,R5.0,DEFI,       2,       1,  0.0",
+        f"CE,R5.0,NODE,{free[0]},UX,2.0,{free[1]},UY,-1.0",
+        "CERIG,901,Z1,UXYZ",
+    ]
+    (tmp_path / "a.cdb").write_text(text.replace("FINISH", "\n".join([*ce, "FINISH"])))
+    three = linked(read_mesh(tmp_path / "a.cdb", "m"))[0]
+    short = [line for line in abaqus[:-2] if not line.startswith(("*COUPLING", "*DISTRIBUTING"))]
+    (tmp_path / "b.inp").write_text("\n".join(short) + "\n")
+    four = linked(read_mesh(tmp_path / "b.inp", "m"))[0]
+    np.testing.assert_allclose(solved(three, fixed, 6), solved(four, fixed, 6), rtol=1e-9)
+
+
+def _listed(head: str, nodes) -> list[str]:
+    """A card of bulk data, eight fields a line."""
+    words = [*head.split(","), *(str(i) for i in nodes)]
+    lines = [",".join(words[:9])]
+    return [*lines, *(",".join(["+", *words[i : i + 8]]) for i in range(9, len(words), 8))]

@@ -232,6 +232,10 @@ class Mesh:
             return np.unique(np.concatenate([f.ravel() for f in self.faces[name].values()]))
         return np.unique(self.point_sets[name])
 
+    def set_points(self, name: str) -> Indices:
+        """Sorted indices of all points of a set, those beside its whole facets too, or of a face of that name."""
+        return np.unique(self.point_sets[name]) if name in self.point_sets else self.face_points(name)
+
 
 @dataclass(frozen=True)
 class MatrixTerm:

@@ -102,7 +102,7 @@ def _members(mesh: Mesh, link: RigidLink | AverageLink) -> Indices:
     if not isinstance(link.members, str):
         found = link.members
     elif link.members in mesh.faces or link.members in mesh.point_sets:
-        found = mesh.face_points(link.members)
+        found = mesh.set_points(link.members)
     else:
         raise UserError(f"{link.where} names '{link.members}', which is no face and no set of nodes of the mesh")
     if not len(found := found[found != link.reference]):
@@ -179,7 +179,7 @@ def _tied_face(mesh: Mesh, link: FaceTie, rows: _Rows, number: int) -> tuple[Mes
             inside = " on the surface" if name in mesh.inner else ""
             raise UserError(f"{link.where} names the {needed} '{name}', which is no face{inside} of the mesh")
     master = mesh.face_points(link.master)
-    slaves = np.setdiff1d(mesh.face_points(link.slave), master)
+    slaves = np.setdiff1d(mesh.set_points(link.slave), master)
     if not len(slaves):
         raise UserError(f"{link.where}: every node of '{link.slave}' is one of '{link.master}' already; remove the tie")
     size = _facet_size(mesh, link.master)

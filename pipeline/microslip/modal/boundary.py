@@ -38,7 +38,7 @@ def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
         moves = mesh.ties.sets.get(support.face, nodes) if mesh.ties is not None else nodes
         if not len(moves) or support.face in {*mesh.faces, *mesh.point_sets}:
             require_face(mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
-            nodes = mesh.face_points(support.face)
+            nodes = mesh.set_points(support.face)
         fixed += [3 * nodes + AXES[c] for c in support.directions]
         ways = [AXES[c] for c in support.directions] + support.turns
         fixed += [3 * mesh.n_points + 6 * moves + way for way in ways]
