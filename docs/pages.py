@@ -202,7 +202,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "temperature.file": ("*, K", "CSV lines x, y, z, T; linear between, nearest outside"),
     "supports.face": ("", "face, or set of points, that is held"),
     "supports.directions": ("", "body directions in which it is held"),
-    "supports.rotations": ("", "hold the rotations of its nodes too (matrices only)"),
+    "supports.rotations": ("", "hold rotations of its nodes too, all or some (matrices, reference nodes)"),
     "rotation.axis": ("", "direction of the rotor axis"),
     "rotation.point": ("*", "a point of the axis"),
     "cyclic.sectors": ("", "N, how many of this body make the ring"),

@@ -17,7 +17,7 @@ class Card:
 
     Attributes:
         keyword: in capitals, without the star. parameters: in capitals -> as written. lines: of data, without
-            comments. where: ``line 12``, or with the file's name where that is an included one.
+            comments. where: ``part.inp, line 12``.
     """
 
     keyword: str
@@ -61,7 +61,7 @@ def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[s
         text = ordinary(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
-    name = f"{path.name}, " if within else ""
+    name = f"{path.name}, "
     for number, line in enumerate(text.splitlines(), 1):
         line = line.strip()
         if not line.startswith("*"):
@@ -82,7 +82,7 @@ def _included(path: Path, line: str, where: str, within: tuple[Path, ...], home:
     try:
         yield from _lines(beside(path, target, home), (*within, path.resolve()), home)
     except Damaged as error:
-        raise Damaged(str(error) if re.match(r"(\S+, )?line \d", str(error)) else f"{where}: {error}") from None
+        raise Damaged(str(error) if re.match(r"[^,]+, line \d", str(error)) else f"{where}: {error}") from None
 
 
 def beside(path: Path, target: str, home: Path) -> Path:

@@ -18,6 +18,8 @@ from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
 from .cards import Card, data_of, fields, read_cards
 from .deck import Cells, Deck, DeckConstants
+from .deck_links import KEYWORDS as LINKS
+from .deck_links import links_of
 from .instances import local_system, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, refuse_twice
@@ -39,8 +41,8 @@ _REFUSED = {
     "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
 }  # fmt: skip
 _HELD = {
-    "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
-    "ZASYMM": "xy",
+    "ENCASTRE": "xyzabc", "PINNED": "xyz", "XSYMM": "xbc", "YSYMM": "yac", "ZSYMM": "zab", "XASYMM": "yza",
+    "YASYMM": "xzb", "ZASYMM": "xyc",
 }  # fmt: skip
 
 
@@ -80,12 +82,14 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
     for card in cards:
         if card.keyword in _REFUSED:
             raise Damaged(f"{card.where}: the file {_REFUSED[card.keyword]}; write out every node and cell")
+        if "INPUT" in card.parameters and card.keyword in (*LINKS, *_READERS):
+            card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters.pop("INPUT")))]
+        if card.keyword in LINKS:
+            deck.links.append((card, ""))
         if card.keyword not in _READERS:
-            if card.keyword not in _SILENT:
+            if card.keyword not in _SILENT and card.keyword not in LINKS:
                 deck.ignored.append(card.keyword)
             continue
-        if "INPUT" in card.parameters:
-            card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters["INPUT"]))]
         _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
 
 
@@ -352,7 +356,7 @@ def _zeros(words: list[str]) -> str:
     last = int(words[2]) if words[2] else first
     if first < 1 or (first <= 3 and words[3] and float(words[3]) != 0):
         raise ValueError
-    return "xyz"[first - 1 : last]
+    return "xyzabc"[first - 1 : last]
 
 
 _SILENT = {
@@ -404,6 +408,8 @@ def _assembled(deck: Deck) -> RawMesh:
         if len(members):
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
+    raw.links, left_out = links_of(deck, numbering, points)
+    deck.not_held += left_out
     add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : _CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..data import Array, Indices
+from ..data import Array, Indices, Link
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -53,6 +53,7 @@ class RawMesh:
             unit, NaN where none is given, or None.
         cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
         supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
+        links: constraints between nodes, by positions in `points`, tolerances in the file's unit.
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
     """
 
@@ -67,6 +68,7 @@ class RawMesh:
     cell_id: list[Indices] = field(default_factory=list)
     supports: dict[str, str] = field(default_factory=dict)
     not_held: list[str] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
     unended: str = ""
 
     def add_points(self, name: str, positions: Indices) -> None:

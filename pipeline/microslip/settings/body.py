@@ -430,7 +430,13 @@ class Support(Model):
 
     face: FaceName
     directions: Directions = "xyz"
-    rotations: bool = False
+    rotations: bool | Directions = False
+
+    @property
+    def turns(self) -> list[int]:
+        """Rotations about x, y, z that are held too, as 3, 4, 5: of reference nodes and of nodes of matrices."""
+        axes = self.rotations if isinstance(self.rotations, str) else "xyz" * self.rotations
+        return [3 + "xyz".index(c) for c in axes]
 
 
 class Cyclic(Model):

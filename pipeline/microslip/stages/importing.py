@@ -117,7 +117,10 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
     lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
     for name, directions in mesh.supports.items():
         lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
-        lines += [f'{mark}directions = "{directions}"'] if directions != "xyz" else []
+        moves = "".join(c for c in directions if c in "xyz")
+        turns = "".join("xyz"["abc".index(c)] for c in directions if c in "abc")
+        lines += [f'{mark}directions = "{moves}"'] if moves != "xyz" else []
+        lines += [f"{mark}rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
     named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
     if mark:
         lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
@@ -127,10 +130,39 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
 
 def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
-    from ..modal.rigid import free_motions
+    from ..fem.discretise import discretise
+    from ..fem.tied import tied_upper
+    from ..modal.rigid import free_motions, left_by
 
-    fixed = [3 * mesh.point_sets[n] + "xyz".index(c) for n, directions in mesh.supports.items() for c in directions]
-    return free_motions(mesh.points, mesh.points.mean(axis=0), np.concatenate(fixed)).shape[1] == 0
+    none = np.zeros(0, dtype=np.int64)
+    held = [(mesh.point_sets.get(n, none), ways) for n, ways in mesh.supports.items()]
+    fixed = np.concatenate([3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz"])
+    if mesh.ties is None:
+        return free_motions(mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+    first, sets = 3 * mesh.n_points, mesh.ties.sets
+    moves = [first + 6 * sets.get(n, none) + "xyzabc".index(c) for n, ways in mesh.supports.items() for c in ways]
+    free = tied_upper(discretise(mesh).pattern, np.concatenate([fixed, *moves]), mesh.ties)
+    return left_by(free, mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+
+
+def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
+    """The mesh with the equations of its constraints, and these in words.
+
+    Raises:
+        UserError: with file and line, what is wrong with one.
+    """
+    if mesh.links is None:
+        return mesh, []
+    from ..fem.discretise import discretise
+    from ..fem.links import linked
+    from ..fem.tied import tied_upper
+
+    try:
+        mesh, told = linked(mesh)
+        tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
+    except UserError as error:
+        raise UserError(f"{file}: {error}") from None
+    return mesh, told if len(told) <= 12 else [*told[:10], f"and {len(told) - 10} constraints more"]
 
 
 def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
@@ -213,9 +245,11 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     except UserError as error:
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
         told.append(f"warning: {error}")
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    told += ties
     held, said = _supports(mesh)
     told += said
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
