@@ -308,8 +308,8 @@ class Geometry(Model):
 class Meshing(Model):
     """Target element size (length_unit) and local sizes by face name.
 
-    integration: of the stiffness; "reduced" is of bricks of 20 nodes, 8 points instead of 27, for what hardly changes its
-    volume.
+    integration: of the stiffness; "reduced" is of bricks of 20 nodes, 8 points instead of 27, for what hardly changes
+    its volume.
     """
 
     size: Annotated[Positive | None, _LENGTH] = None

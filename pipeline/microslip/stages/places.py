@@ -71,6 +71,11 @@ def is_rolling(path: Path) -> bool:
     return _keys(path) >= {"wheel", "rail"}
 
 
+def is_tyre(path: Path) -> bool:
+    """True for a case of a tyre whose slip jumps."""
+    return _keys(path) >= {"tyre", "jumps"}
+
+
 def is_vehicle(path: Path) -> bool:
     """True for a case of rolling contact with a vehicle."""
     return _keys(path) >= {"wheel", "rail", "vehicle"}
