@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 
 from microslip.cli import main
+from microslip.files.tables import columns_csv
 from microslip.rolling.table import creep_table
 from microslip.rolling.wheelset import Pose, patches
 from microslip.vehicle import motion, wearing
 from microslip.vehicle.creep import linear, of_strips, of_table
-from microslip.vehicle.settings import VehicleCase, load_vehicle
+from microslip.vehicle.kinematics import recorded
+from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
 
 CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
 PLACES = 48
@@ -44,7 +47,7 @@ def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: 
     t = motion.at(vehicle.over, vehicle.reach, x[0])
     x[2] = float(t.roll[0])
     found = motion.contacts(vehicle, x, np.zeros(2))
-    track = case.track_of(CASE.parent)
+    track = track_of(case, CASE.parent)
     for k, side in enumerate(("right", "left")):
         pose = Pose(x[0], x[3], x[2], vehicle.speed, float(x[12]))
         p = patches(track, pose, side, float(found.vertical[k]))[0]
@@ -211,3 +214,82 @@ def test_a_run_that_ends_keeps_what_it_has(
     rows = list(csv.DictReader((tmp_path / "build" / "unround-wheel" / "growth.csv").open()))
     assert 1 < len(rows) and float(rows[-1]["turns"]) < 1e6
     assert "ended early" in capsys.readouterr().err
+
+
+# --- kinematics of another program ---------------------------------------------------------------------------------
+
+
+def table(rolling: wearing.Rolling, turns: int = 2) -> tuple[dict[str, np.ndarray], wearing.Now]:
+    """What the package's own vehicle would write of its right wheel, and that running."""
+    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    on, n = now.one.on, turns * PLACES + 1
+    pick = np.arange(n) % PLACES
+    columns = {
+        "time_s": float(now.one.time) * np.arange(n) / PLACES, "angle_rad": 2 * np.pi * np.arange(n) / PLACES,
+        "speed_m_per_s": np.asarray(on.speed)[pick, 0], "lateral_m": np.asarray(now.one.states)[pick, 0],
+        "normal_force_N": np.asarray(on.normal_force)[pick, 0],
+        "longitudinal_creepage": np.asarray(on.xi)[pick, 0], "lateral_creepage": np.asarray(on.eta)[pick, 0],
+        "spin_1_per_m": np.asarray(on.phi)[pick, 0],
+    }  # fmt: skip
+    return columns, now
+
+
+def written(folder: Path, columns: dict[str, np.ndarray]) -> Path:
+    """A case with the table beside it."""
+    (folder / "run.csv").write_text(columns_csv(columns, 12))
+    whole = tomllib.loads(CASE.read_text())
+    parts = [f"[{name}]\n" + "\n".join(f"{k} = {v}" for k, v in whole[name].items()) for name in ("wheel", "rail")]
+    (folder / "case.toml").write_text(
+        'name = "given"\nfriction = 0.3\n[kinematics]\nfile = "run.csv"\nturns = 1e5\nplaces = 48\n'
+        "[wear]\ncoefficient = 7e-13\n" + "\n".join(parts)
+    )
+    return folder / "case.toml"
+
+
+def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
+    rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Depth where the contact runs, 1e5 turns of it; its volume is the coefficient times the work."""
+    columns, now = table(rolling)
+    monkeypatch.chdir(tmp_path)
+    case = written(tmp_path, columns)
+    assert main(["roll", str(case), "--no-pictures", "-q"]) == 0
+    rows = list(csv.DictReader((tmp_path / "build" / "given" / "circumference.csv").open()))
+    depth = np.array([float(r["depth_m"]) for r in rows])
+    own = 1e5 * rolling.tread.seen(now.taken, now.one.on)[:, 0]
+    np.testing.assert_allclose(depth, own, rtol=5e-3)
+    assert max(float(r["standard_error_m"]) for r in rows) < 1e-6 * depth.max()
+    found = recorded(load_kinematics(case)[0], tmp_path)
+    np.testing.assert_allclose(found.tread.volume(found.taken), 7e-13 * found.work, rtol=1e-10)
+
+
+def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:
+    """A table that no wheel can have written."""
+    keep = np.ones(len(columns["time_s"]), bool)
+    changed = {k: v.copy() for k, v in columns.items()}
+    if kind == "gap":
+        keep[30:40] = False
+    elif kind == "lateral_m":
+        changed["lateral_m"][50:] += 5e-3
+    elif kind == "normal_force_N":
+        changed["normal_force_N"][20] = -1.0
+    elif kind == "time_s":
+        changed["time_s"][10] = changed["time_s"][8]
+    elif kind == "column":
+        del changed["spin_1_per_m"]
+    elif kind == "turn":
+        keep[40:] = False
+    elif kind == "profiles":
+        changed["lateral_m"] += 0.05
+    return {k: v[keep] for k, v in changed.items()}
+
+
+@pytest.mark.parametrize("kind", ["gap", "lateral_m", "normal_force_N", "time_s", "column", "turn", "profiles"])
+def test_kinematics_that_no_wheel_has(
+    kind: str, rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """One sentence, exit 2, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["roll", str(written(tmp_path, cut(table(rolling)[0], kind))), "--no-pictures", "-q"]) == 2
+    assert kind in capsys.readouterr().err and not (tmp_path / "build" / "given" / "circumference.csv").exists()

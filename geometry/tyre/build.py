@@ -21,8 +21,8 @@ DEFAULTS = {  # mm and degrees
     "contact_angle": 40.0,
 }
 SIZE = 4.0  # mm
-COARSE = 4
-"""Times as long are elements away from the ground."""
+FINE, COARSE = 0.5, 4
+"""Times as long round the axle are elements near the ground, and away from it."""
 
 
 def draw(parameters: dict, mesh: dict) -> None:
@@ -71,7 +71,7 @@ def divide(p: dict, size: float) -> None:
         else:
             near = box[1, 2] < 0.99 * low
             angle = p["contact_angle"] if near else (360 - p["contact_angle"]) / 3
-            count = ceil(radians(angle) * p["outer_radius"] / (size if near else COARSE * size))
+            count = ceil(radians(angle) * p["outer_radius"] / (FINE * size if near else COARSE * size))
         gmsh.model.mesh.setTransfiniteCurve(curve, count + 1)
     for _, surface in gmsh.model.getEntities(2):
         gmsh.model.mesh.setTransfiniteSurface(surface)

@@ -492,16 +492,18 @@ def roll(
     Args:
         case: a case.toml with [wheel] and [rail], or with [tyre], the folder that holds it, its name, or its products.
     """
-    from .stages.places import is_tyre, is_vehicle
+    from .stages.places import is_kinematics, is_tyre, is_vehicle
     from .stages.rolling import rolling_stage
     from .stages.tyre import tyre_stage
-    from .stages.vehicle import vehicle_stage
+    from .stages.vehicle import kinematics_stage, vehicle_stage
 
     case, ended = _case_file(case), ""
     given = (case, Path("build"), list(set_), force)
     with progress(f"roll {case}", quiet) as report:
         if is_vehicle(case):
             made, sentences, ended = vehicle_stage(*given, report, not no_pictures)
+        elif is_kinematics(case):
+            made, sentences = kinematics_stage(*given, report, not no_pictures)
         elif is_tyre(case):
             made, sentences = tyre_stage(*given, report, not no_pictures)
         else:

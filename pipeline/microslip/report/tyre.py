@@ -10,8 +10,8 @@ from .page import Album, Piece, number, page, say, table
 
 READ_AS = (
     "A row of point contacts along the middle of the patch, each with its share of the static pressure, is passed by "
-    "the material (Sextro, 6.10). Time constants are of the exponential that fits the force best; the normal force follows "
-    "from the static state, large displacements and contact by Newton's method."
+    "the material (Sextro, 6.10). Time constants are of the exponential that fits the force best; the normal force "
+    "follows from the static state, large displacements and contact by Newton's method."
 )
 
 

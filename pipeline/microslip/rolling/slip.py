@@ -23,8 +23,8 @@ class TyreOfCase(Model):
 
     Attributes:
         body: whose modal file is taken or made. contact: the closure by which it stands. interface: on the same face,
-            t2 along rolling. friction: coefficient. stiffness: of the row along rolling, per area, Pa/m. elements: of the
-            row. speed: m/s. rigid: whether the wheel is; else its mode that yields most along rolling gives way.
+            t2 along rolling. friction: coefficient. stiffness: of the row along rolling, per area, Pa/m. elements: of
+            the row. speed: m/s. rigid: whether the wheel is; else its mode that yields most along rolling gives way.
     """
 
     body: Name
@@ -134,7 +134,8 @@ class Studied:
         rigid = replace(self.brush, compliance=0.0)
         for name, brush in (("", self.brush), ("rigid_", rigid)):
             for way in ("up", "down"):
-                found = [jump(brush, *((0.0, s) if way == "up" else (s, 0.0)), self.row.force) for s in targets]
+                ends = [(0.0, s) if way == "up" else (s, 0.0) for s in targets]
+                found = [jump(brush, first, last, self.row.force) for first, last in ends]
                 columns[f"{name}{way}_fitted_s"] = np.array([fitted(*f) for f in found])
                 columns[f"{name}{way}_reached_s"] = np.array([reached(*f) for f in found])
         return columns
