@@ -53,7 +53,7 @@ def test_compliance_of_the_wheel_adds_to_the_time() -> None:
     time, force = jump(soft, 0.0, 1e-6, 40.0, lengths=300.0)
     damper = BRUSH.stiffness * BRUSH.length / 2 / BRUSH.speed
     assert fitted(time, force) == pytest.approx(soft.compliance * damper, rel=2e-2)
-    assert force[-1] == pytest.approx(BRUSH.stiffness * 1e-6 * BRUSH.length / 2, rel=1e-6)
+    assert force[-1] == pytest.approx(BRUSH.stiffness * 1e-6 * BRUSH.length / 2, rel=1e-3)
 
 
 def test_a_load_that_falls_lets_go_at_once_what_it_does_not_hold() -> None:

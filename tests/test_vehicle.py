@@ -279,12 +279,12 @@ def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:
         del changed["spin_1_per_m"]
     elif kind == "turn":
         keep[40:] = False
-    elif kind == "profiles":
+    elif kind == "wheel, rail":
         changed["lateral_m"] += 0.05
     return {k: v[keep] for k, v in changed.items()}
 
 
-@pytest.mark.parametrize("kind", ["gap", "lateral_m", "normal_force_N", "time_s", "column", "turn", "profiles"])
+@pytest.mark.parametrize("kind", ["gap", "lateral_m", "normal_force_N", "time_s", "column", "turn", "wheel, rail"])
 def test_kinematics_that_no_wheel_has(
     kind: str, rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

@@ -164,10 +164,11 @@ class Studied:
             f"After a jump of the slip from 0 the force follows with a time constant of {up[0]:.3g} s at a target of "
             f"{c['slip'][0]:g} and {up[-1]:.3g} s at {c['slip'][-1]:g}.",
             f"After a jump back to 0 it is {down.min():.3g} to {down.max():.3g} s.",
-            f"On a rigid wheel 1 - 1/e of a small jump is done after {c['rigid_up_reached_s'][0] / pass_time:.4f} of "
-            "that time (closed form for springs that all stick: 1 - exp(-1/2) = 0.3935).",
-            f"The mode at {self.frequency:.4g} Hz gives way by {1e6 * b.compliance:.3g} um/N along rolling and makes a "
-            f"small jump {c['up_reached_s'][0] / c['rigid_up_reached_s'][0]:.3g} times as slow.",
+            "On a rigid wheel 1 - 1/e of the smallest jump is done after "
+            f"{c['rigid_up_reached_s'][0] / pass_time:.4f} of that time (closed form for springs that all stick: "
+            "1 - exp(-1/2) = 0.3935).",
+            f"The mode at {self.frequency:.4g} Hz gives way by {1e6 * b.compliance:.3g} um/N along rolling and makes "
+            f"the smallest jump {c['up_reached_s'][0] / c['rigid_up_reached_s'][0]:.3g} times as slow.",
         ]
 
 

@@ -89,9 +89,7 @@ def _sound(k: Kinematics, path: Path) -> None:
         )
     if not (k.normal_force > 0).all():
         at = int(np.argmin(k.normal_force > 0))
-        raise UserError(
-            f"{path}: the wheel is off the rail at {k.time[at]:.6g} s (normal_force_N); cut the table there"
-        )
+        raise UserError(f"{path}: normal_force_N: the wheel leaves the rail at {k.time[at]:.6g} s; end the table there")
     if not (k.speed > 0).all():
         raise UserError(f"{path}: speed_m_per_s must be greater than 0")
     if k.turns < 1:
@@ -168,8 +166,8 @@ class Recorded:
         n = int(orders.argmax())
         told = [
             f"After {self.case.kinematics.turns:.4g} turns, by {len(self.on)} of the file, {1e6 * depth.mean():.4g} um "
-            f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of friction, "
-            f"{self.work.mean():.4g} J a turn.",
+            f"are worn where the contact runs, {1e9 * volume:.4g} mm3 in all: the coefficient times the work of "
+            f"friction, {self.work.mean():.4g} J a turn.",
             f"Over the circumference it differs by {1e6 * np.ptp(depth):.4g} um; order {n + 1} is largest, "
             f"{1e6 * orders[n]:.3g} um.",
         ]
@@ -180,7 +178,7 @@ class Recorded:
             ]
         return [
             *told,
-            f"Turns of the file differ: the standard error of the depth is {1e6 * error.max():.2g} um at most.",
+            f"Turns of the file differ: its standard error is at most {1e6 * error.max():.2g} um.",
         ]
 
 
