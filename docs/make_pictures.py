@@ -1158,6 +1158,29 @@ def rolling() -> None:
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
 
 
+def unround_wheels() -> None:
+    """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
+    from PIL import Image
+
+    from microslip.stages.vehicle import vehicle_stage
+
+    made, _, _ = vehicle_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)
+    parts = [from_file(file) for file in made if file.suffix == ".png"]
+    whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
+    for k, part in enumerate(parts):
+        whole.paste(part, ((whole.width - part.width) // 2, sum(p.height for p in parts[:k])))
+    save(whole, "unround_wheels", colours=LINES)
+
+
+def tyre() -> None:
+    """A rubber wheel whose slip jumps."""
+    from microslip.stages.tyre import tyre_stage
+
+    for file in tyre_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)[0]:
+        if file.suffix == ".png":
+            save(from_file(file), "tyre", colours=LINES)
+
+
 def half_space() -> None:
     """Exact half-spaces that roll: convergence, Kalker's coefficients, wear, timings, one patch with its heat."""
     import half_space_study as study
@@ -1565,6 +1588,8 @@ STUDIES = {
         stability,
         squeal,
         rolling,
+        unround_wheels,
+        tyre,
         half_space,
         geometry,
         meeting,

@@ -211,7 +211,7 @@ def run(
     """
     from .basis import read_basis
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case, is_rolling, meant
+    from .stages.places import is_case, is_rolling, is_tyre, meant
     from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system
     from .stages.summary import frequency_lines
@@ -220,7 +220,7 @@ def run(
 
     path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
-    if is_rolling(path):
+    if is_rolling(path) or is_tyre(path):
         return roll(path, no_pictures=no_pictures, set_=set_, force=force, quiet=quiet)
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
@@ -487,20 +487,25 @@ def roll(
     case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:
     """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions; with [vehicle] how
-    unround wheels wear over their circumference, and which waves grow.
+    unround wheels wear over their circumference, and which waves grow; a tyre whose slip jumps.
 
     Args:
-        case: a case.toml with [wheel] and [rail], the folder that holds it, its name, or its products.
+        case: a case.toml with [wheel] and [rail], or with [tyre], the folder that holds it, its name, or its products.
     """
-    from .stages.places import is_vehicle
+    from .stages.places import is_kinematics, is_tyre, is_vehicle
     from .stages.rolling import rolling_stage
-    from .stages.vehicle import vehicle_stage
+    from .stages.tyre import tyre_stage
+    from .stages.vehicle import kinematics_stage, vehicle_stage
 
     case, ended = _case_file(case), ""
     given = (case, Path("build"), list(set_), force)
     with progress(f"roll {case}", quiet) as report:
         if is_vehicle(case):
             made, sentences, ended = vehicle_stage(*given, report, not no_pictures)
+        elif is_kinematics(case):
+            made, sentences = kinematics_stage(*given, report, not no_pictures)
+        elif is_tyre(case):
+            made, sentences = tyre_stage(*given, report, not no_pictures)
         else:
             made, sentences = rolling_stage(*given, report, not no_pictures)
     _say("\n".join([*sentences, *map(str, made)]), quiet)

@@ -17,7 +17,7 @@ from ..data import (
 )
 from ..fem.contact import coupled_points
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import discretise
+from ..fem.discretise import REDUCED, discretise, whole
 from ..fem.operators import spin_projector
 from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
@@ -109,14 +109,17 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
     if settings.cyclic:  # before what relies on the number of sectors
         cut_faces(mesh, settings, axis, point)
     pairs = contact_pairs(mesh, settings, known_materials(mesh, settings))
-    d = discretise(mesh, coupled=[coupled_points(p) for p in pairs])
+    degree = REDUCED if settings.mesh.integration == "reduced" else None
+    if degree and not set(mesh.cells) <= set(REDUCED):
+        raise UserError('mesh.integration: "reduced" is of bricks of 20 nodes alone; write "full" or mesh with bricks')
+    d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
     held = fixed_dofs(mesh, settings)
     fixed = held[held < 3 * mesh.n_points]
     sector = make_sector(d, settings, held, axis, point) if settings.cyclic else None
     free = tied_upper(d.pattern, held, mesh.ties) if sector is None else sector.static
     rows = body_rows(mesh, settings)
     materials = materials_of(d, settings)
-    mass, centre, inertia = inertia_of(d, [m.density for m in materials])
+    mass, centre, inertia = inertia_of(whole(d), [m.density for m in materials])
     turning = settings.free and any(settings.rotation.speeds_rpm)
     if turning and sector is None and not len(fixed):  # such a body turns about its centre of mass
         point = point + (centre - point) @ spin_projector(axis / np.linalg.norm(axis))

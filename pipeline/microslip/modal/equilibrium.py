@@ -17,7 +17,7 @@ from ..data import Array, Indices, Material, NotConverged, UserError
 from ..elasticity import pushed, strain_tensor
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation, FreeUpper
+from ..fem.discretise import Discretisation, FreeUpper, whole
 from ..fem.operators import (
     displacement_gradient,
     engineering,
@@ -117,7 +117,7 @@ def make_model(
             factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
         if any(np.any(m.expansion) for m in own):
             strain = [(t - reference)[..., None] * m.expansion for m, t in zip(own, at, strict=True)]
-    M = mass(d, [m.density for m in own])
+    M = mass(whole(d), [m.density for m in own])
     K = stiffness(d, [m.elasticity for m in own], factor)
     return BodyModel(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..vehicle.kinematics import Recorded
 from ..vehicle.study import WHEELS, Studied
 from .plots import COLOURS, empty_figure, plain_axes, save_figure
 
@@ -42,6 +43,20 @@ def circumference_picture(found: Studied, path: Path, title: str) -> Path:
 
 def _mean(found: Studied) -> float:
     return 1e6 * float(found.history[-1][0].radius[:, found.wheel].mean())
+
+
+def recorded_picture(found: Recorded, path: Path, title: str) -> Path:
+    """Normal force and wear over the circumference, by given kinematics."""
+    columns = found.circumference()
+    figure = empty_figure(8.0, 4.6)
+    force, worn = figure.subplots(2, 1, sharex=True)
+    for axes in (force, worn):
+        plain_axes(axes)
+    force.plot(columns["angle_deg"], 1e-3 * columns["normal_force_N"], color=COLOURS[1])
+    force.set(ylabel="normal force in kN", title=f"{title}: {found.case.kinematics.turns:g} turns")
+    worn.plot(columns["angle_deg"], 1e6 * columns["depth_m"], color=COLOURS[2])
+    worn.set(ylabel="worn in µm", xlabel="angle from the mark in degrees", xlim=(0, 360), xticks=range(0, 361, 60))
+    return save_figure(figure, path)
 
 
 def growth_picture(found: Studied, path: Path, title: str) -> Path:

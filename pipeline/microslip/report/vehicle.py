@@ -18,7 +18,11 @@ READ_AS = (
 
 def vehicle_html(title: str, found: Studied, pictures: Sequence[Path]) -> str:
     """The page."""
-    told = found.sentences()
+    return recorded_html(title, found.sentences(), pictures, READ_AS)
+
+
+def recorded_html(title: str, told: Sequence[str], pictures: Sequence[Path], note: str = "") -> str:
+    """The page of sentences and pictures, as of wear by given kinematics."""
     lead, warnings = ([s for s in told if s.startswith("warning") is w] for w in (False, True))
     pieces = [say(*lead, tone="lead"), say(*warnings, tone="warn"), *Album({p.name: p for p in pictures}).begun("")]
-    return page(title, [piece for piece in [*pieces, say(READ_AS, tone="note")] if piece])
+    return page(title, [piece for piece in [*pieces, say(note, tone="note")] if piece])

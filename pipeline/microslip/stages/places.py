@@ -71,6 +71,16 @@ def is_rolling(path: Path) -> bool:
     return _keys(path) >= {"wheel", "rail"}
 
 
+def is_kinematics(path: Path) -> bool:
+    """True for a case of wear by given kinematics."""
+    return _keys(path) >= {"wheel", "rail", "kinematics"}
+
+
+def is_tyre(path: Path) -> bool:
+    """True for a case of a tyre whose slip jumps."""
+    return _keys(path) >= {"tyre", "jumps"}
+
+
 def is_vehicle(path: Path) -> bool:
     """True for a case of rolling contact with a vehicle."""
     return _keys(path) >= {"wheel", "rail", "vehicle"}

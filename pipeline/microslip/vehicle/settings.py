@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..contact.keys import FileName
 from ..contact.solids import Solid
 from ..data import Array
 from ..rolling.ellipse import combined
@@ -78,6 +79,33 @@ class WearOfVehicle(WearOfCase):
     tolerance: Positive = 1e-7
 
 
+class KinematicsOfCase(Model):
+    """file: what another program wrote of a wheel's running, see `kinematics.read_kinematics`. side: of the wheel.
+    turns: over which it wears. places: over the circumference."""
+
+    file: FileName
+    side: Literal["right", "left"] = "right"
+    turns: Annotated[Positive, Field(le=1e9)]
+    places: Annotated[int, Field(ge=24, le=1440)] = 180
+
+
+class KinematicsCase(Model):
+    """friction: coefficient."""
+
+    name: Name
+    friction: Positive
+    wheel: Wheel
+    rail: Rail
+    kinematics: KinematicsOfCase
+    wear: WearOfCase
+    model: ModelOfCase = ModelOfCase(exact=0)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """As `strips.creep_forces`."""
+        return self.model.model_dump(exclude={"exact"})
+
+
 class VehicleCase(Model):
     """friction: coefficient."""
 
@@ -108,23 +136,13 @@ class VehicleCase(Model):
         """As `strips.creep_forces`."""
         return self.model.model_dump(exclude={"exact"})
 
-    def track_of(self, folder: Path) -> Track:
-        """Of files beside the case.
-
-        Raises:
-            UserError: profiles that are none.
-        """
-        elastic = combined(*(Solid(s.young, s.poisson) for s in (self.wheel, self.rail)))
-        rail = self.rail.made(folder, 1.0).turned(self.rail.inclination)
-        return Track(self.wheel.made(folder, -1.0), rail, self.wheel.radius, self.wheel.at, self.rail.at, elastic)
-
     def made(self, folder: Path) -> Vehicle:
         """Of files beside the case.
 
         Raises:
             UserError: profiles that are none, or do not reach.
         """
-        track = self.track_of(folder)
+        track = track_of(self, folder)
         elastic = track.elastic
         each = 0.5 * self.vehicle.load
         found = touching(track, each, self.running.reach)
@@ -153,6 +171,27 @@ class VehicleCase(Model):
             sides = {"right": [0], "left": [1], "both": [0, 1]}[u.wheel]
             out[:, sides] += u.amplitude * np.cos(u.order * (angle - u.angle))[:, None]
         return out
+
+
+def track_of(case: VehicleCase | KinematicsCase, folder: Path) -> Track:
+    """Of files beside the case.
+
+    Raises:
+        UserError: profiles that are none.
+    """
+    elastic = combined(*(Solid(s.young, s.poisson) for s in (case.wheel, case.rail)))
+    rail = case.rail.made(folder, 1.0).turned(case.rail.inclination)
+    return Track(case.wheel.made(folder, -1.0), rail, case.wheel.radius, case.wheel.at, case.rail.at, elastic)
+
+
+def load_kinematics(path: Path, assignments: list[str] | None = None) -> tuple[KinematicsCase, dict[str, Any]]:
+    """Read and check a case of given kinematics (SI units).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    raw = override(load_toml(path), assignments or [], path)
+    return validate(KinematicsCase, raw, path), raw
 
 
 def load_vehicle(path: Path, assignments: list[str] | None = None) -> tuple[VehicleCase, dict[str, Any]]:

@@ -23,8 +23,9 @@ class Touch(NamedTuple):
     Attributes:
         height: z at which the wheelset touches without load, both wheels alike, m; at their nominal height it is 0.
         roll: rad, that makes it so. arm: dz of a wheel per roll, m. slope: tan of the rail's angle, positive where it
-            falls to the right. across: y of the contact from the middle of the axle, m. radius: m. on_wheel: y of the
-            wheel's profile, m. a, b: half axes under `load`, m. spring: of vertical force over approach, N/m^1.5.
+            falls to the right. across: y of the contact from the middle of the axle, m. radius: there, from the axle,
+            m. on_wheel: y of the wheel's profile, m. a, b: half axes under `load`, m. spring: of vertical force over
+            approach, N/m^1.5.
     """
 
     height: Array
@@ -101,7 +102,7 @@ def _one(track: Track, load: float, y: float, roll: float, side: str) -> tuple[P
 
 def _touch(track: Track, p: Patch, roll: float, y: float) -> tuple[float, ...]:
     slope, c = float(np.tan(p.angle)), float(np.cos(p.angle))
-    across, radius = float(p.place[1]) - y, float(p.place[2] - p.axle[1])
+    across, radius = float(p.place[1]) - y, track.radius + float(track.wheel.height(p.on_wheel))
     height = float(p.axle[1]) + track.radius - p.approach / c
     spring = p.normal_force * c / (p.approach / c) ** 1.5
     return tuple(Touch(height, roll, across + radius * slope, slope, across, radius, p.on_wheel, p.a, p.b, spring))

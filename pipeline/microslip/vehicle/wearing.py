@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import Array, UserError
+from ..data import Array
 from ..rolling.strips import creep_forces, tractions
 from ..rolling.wear import deposited
 from .motion import LEAST, Contacts, Q, Turn, Vehicle, resampled, steady, steps_of_a_turn, turned
@@ -23,12 +23,14 @@ STRIP = 2.5e-4
 @dataclass(frozen=True, eq=False)
 class Tread:
     """Attributes: y: (n,) middles of strips on the wheel's profile, m. way: from place to place over the wheel, m.
-    coefficient: worn volume over frictional work, m3/J. how: as `strips.creep_forces`."""
+    coefficient: worn volume over frictional work, m3/J. how: as `strips.creep_forces`. sides: of the wheels, 1 right,
+    -1 left."""
 
     y: Array
     way: float
     coefficient: float
     how: dict[str, Any]
+    sides: tuple[int, ...] = (1, -1)
 
     def taken(self, on: Contacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels, places, n) m that passing each place once takes off (6.8-6); on: (places, wheels)."""
@@ -37,17 +39,21 @@ class Tread:
         depth = self.coefficient * (t.power * t.area).sum(axis=-1) / width
         middle = np.asarray(on.on_wheel).T.ravel()
         loaded = np.asarray(on.vertical).T.ravel() > 0
-        outward = np.repeat([-1, 1], on.xi.shape[0])  # the strips' y runs to the left, the profile's to the field side
+        outward = np.repeat(
+            [-s for s in self.sides], on.xi.shape[0]
+        )  # the strips' y runs to the left, the profile's to the field side
         found = [
             deposited(d[::s], w[::s], m, self.y) if touches else np.zeros_like(self.y)
             for d, w, m, s, touches in zip(depth, width, middle, outward, loaded, strict=True)
         ]
-        return np.reshape(found, (2, -1, len(self.y)))
+        return np.reshape(found, (len(self.sides), -1, len(self.y)))
 
     def work(self, on: Contacts, friction: float, shear: float, poisson: float) -> Array:
         """(wheels,) J of friction in a turn, from the forces."""
         power = creep_forces(*_flat(on), friction, shear, poisson, **self.how).power
-        return np.asarray((power * (np.asarray(on.vertical).T.ravel() > 0)).reshape(2, -1).sum(axis=1) * self.way)
+        return np.asarray(
+            (power * (np.asarray(on.vertical).T.ravel() > 0)).reshape(len(self.sides), -1).sum(axis=1) * self.way
+        )
 
     def volume(self, depth: Array) -> Array:
         """(wheels,) m3."""
@@ -61,6 +67,11 @@ class Tread:
         middle, b = (np.asarray(v).mean(axis=0)[:, None] for v in (on.on_wheel, on.b))
         weight = np.maximum(1 - ((self.y - middle) / b) ** 2, 0)
         return np.asarray(np.einsum("wy,wpy->pw", weight / weight.sum(axis=1, keepdims=True), depth))
+
+
+def spread(middle: Array, half: float) -> Array:
+    """(n,) middles of strips wherever contacts about these places (m), of a half width of `half` (m), can run."""
+    return np.arange(middle.min() - half - STRIP, middle.max() + half + 2 * STRIP, STRIP)
 
 
 def _flat(on: Contacts) -> tuple[Array, Array, Array, Array, Array, Array]:
@@ -246,13 +257,6 @@ def orders_of(radius: Array, most: int) -> Array:
 
 
 def tread(v: Vehicle, places: int, coefficient: float, how: dict[str, Any]) -> Tread:
-    """Strips wherever a contact can run.
-
-    Raises:
-        UserError: the contact moves over the wheel in leaps.
-    """
-    reach, b = np.asarray(v.over.on_wheel), 2 * float(v.over.b.max())
-    y = np.arange(reach.min() - b, reach.max() + b, STRIP)
-    if len(y) > 4000:
-        raise UserError("wheel: the contact runs over more than a metre of its profile; correct profile or reach")
+    """Strips wherever a contact can run."""
+    y = spread(np.asarray(v.over.on_wheel), 2 * float(v.over.b.max()))
     return Tread(y, 2 * np.pi * float(v.over.radius.mean()) / places, coefficient, how)

@@ -1,0 +1,133 @@
+"""Unsteady rolling: the row of point contacts, and the rubber wheel under it (Sextro, 6.10)."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microslip.basis import read_basis
+from microslip.cli import main
+from microslip.data import UserError
+from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
+from microslip.rolling.half_space import rolled, shifted, steady_rolling
+from microslip.rolling.half_space_influence import Grid, Pair
+from microslip.stages.job import open_job
+from microslip.stages.modal import modes_stage
+
+ROOT = Path(__file__).parents[1]
+BRUSH = Brush(parabola(20), 0.012, 2e4, 1.0, 0.04)
+PASS = BRUSH.length / BRUSH.speed
+
+
+def test_a_small_jump_takes_the_time_of_the_closed_form() -> None:
+    """All sticks: F/F_end = tau (2 - tau), tau = V t/(2a), so that 1 - 1/e is done at tau = 1 - exp(-1/2); second
+    order in the elements."""
+    off = []
+    for n in (10, 20, 40):
+        time, force = jump(replace(BRUSH, share=parabola(n)), 0.0, 1e-6, 40.0)
+        tau = np.minimum(time / PASS, 1)
+        np.testing.assert_allclose(force, BRUSH.stiffness * 1e-6 * BRUSH.length / 2 * tau * (2 - tau), rtol=1e-12)
+        off.append(reached(time, force) / PASS - (1 - np.exp(-0.5)))
+    assert off[1] == pytest.approx(0, abs=3e-4) and off[2] < 0.5 * off[0]
+
+
+def test_up_jumps_are_faster_the_further_they_go_and_down_jumps_hardly_differ() -> None:
+    """Fig. 6.10-5, whose points are not printed: a rigid wheel, and one whose mode gives way."""
+    for brush in (BRUSH, replace(BRUSH, compliance=2e-5, frequency=1200.0)):
+        targets = (0.01, 0.1, 0.2, 0.4)
+        up, down = (
+            np.array([fitted(*jump(brush, *ends, 40.0)) for ends in pairs])
+            for pairs in ([(0.0, s) for s in targets], [(s, 0.0) for s in targets])
+        )
+        assert (np.diff(up) < 0).all() and up[-1] < 0.7 * up[0]
+        assert np.ptp(down) < 0.2 * down.mean()
+
+
+def test_compliance_of_the_wheel_adds_to_the_time() -> None:
+    """A wheel so soft that the row is a damper, F = d (V s - w'), d = k a/V: exponential with c d."""
+    soft = replace(BRUSH, compliance=4e-3)
+    time, force = jump(soft, 0.0, 1e-6, 40.0, lengths=300.0)
+    damper = BRUSH.stiffness * BRUSH.length / 2 / BRUSH.speed
+    assert fitted(time, force) == pytest.approx(soft.compliance * damper, rel=2e-2)
+    assert force[-1] == pytest.approx(BRUSH.stiffness * 1e-6 * BRUSH.length / 2, rel=1e-3)
+
+
+def test_a_load_that_falls_lets_go_at_once_what_it_does_not_hold() -> None:
+    """All slides: the force is mu F_N after one step; with slip that sticks it stays."""
+    n = 300
+    normal = np.concatenate([np.full(n, 40.0), np.full(n, 20.0)])
+    slides, sticks = BRUSH.carried(np.full(2 * n, 1.0), normal), BRUSH.carried(np.full(2 * n, 1e-4), normal)
+    assert slides[n - 1] == pytest.approx(40, rel=1e-12) and slides[n] == pytest.approx(20, rel=1e-12)
+    assert sticks[n] == pytest.approx(sticks[n - 1], rel=0.02)
+
+
+def test_numbers_that_are_none_of_a_brush() -> None:
+    for change in ({"speed": 0.0}, {"friction": -1.0}, {"share": np.ones(20)}):
+        with pytest.raises(UserError, match=next(iter(change))):
+            replace(BRUSH, **change)
+
+
+@pytest.mark.slow
+def test_a_shift_of_cattaneo_becomes_steady_rolling_of_carter() -> None:
+    """Half-spaces of one row: pressed and shifted, then rolled under the same force; the reference prints no number of
+    the way, so its two ends are tried: the shift at first, and what `steady_rolling` finds, after 4 a."""
+    half, n, R, mu = 1e-3, 40, 0.5, 0.3
+    grid, pair = Grid(int(1.3 * n), 1, 2 * half / n, 0.2), Pair(82e9, 0.28)
+    h, load = grid.x**2 / (2 * R), 35780.0
+    force = -0.64 * mu * load
+    now = shifted(h, grid, pair, mu, force=load, tangential=(force, None))
+    steady = steady_rolling(h, grid, pair, mu, force=load, tangential=(force, None))
+    symmetric = now.traction[0]
+    np.testing.assert_allclose(symmetric, symmetric[::-1], atol=1e-3 * np.abs(symmetric).max())
+    off, way = [], []
+    for k in range(2 * n):
+        now = rolled(now, h, mu, force=load, tangential=(force, None))
+        off.append(np.abs(now.traction[0] - steady.traction[0]).max() / (mu * now.pressure.max()))
+        way.append(now.motion[0])
+        assert now.force[0] == pytest.approx(force, rel=1e-5), k
+    assert off[-1] < 0.02 and off[0] > 0.2
+    assert way[-1] == pytest.approx(steady.motion[0], rel=0.02)
+
+
+# --- the wheel -----------------------------------------------------------------------------------------------------
+
+
+def pressed(tmp_path: Path, *changes: str) -> float:
+    """N by which a coarse wheel is pressed when it is lowered by 0.5 mm."""
+    given = ("mesh.size=8.0", "closures=[{name='ground', face='tread', against='ground', point=[0.0, 0.0, -50.0], "
+             "normal=[0.0, 0.0, 1.0], interference=0.5}]", "modes.count=1", "output.gauss=false",
+             "output.nodal_stress=false", "output.shapes=false")  # fmt: skip
+    basis = read_basis(modes_stage(open_job(ROOT / "geometry" / "tyre", [*given, *changes], tmp_path))[0])
+    return float(basis.groups[0, 0].contacts["ground"].normal_force)
+
+
+@pytest.mark.slow
+def test_rubber_that_keeps_its_volume_does_not_lock(tmp_path: Path) -> None:
+    """To Poisson's ratio 0.4999 the force at one shear modulus goes straight to its limit, as 1/K does; with all points
+    the same coarse bricks become stiffer and stiffer."""
+    forces = {}
+    for rule in ("reduced", "full"):
+        for nu in (0.49, 0.499, 0.4999):
+            changes = (f"material.poisson={nu}", f"material.young={2 * (1 + nu) * 1e6}", f'mesh.integration="{rule}"')
+            forces[rule, nu] = pressed(tmp_path / f"{rule}{nu}", *changes)
+    far, near, last = (forces["reduced", nu] for nu in (0.49, 0.499, 0.4999))
+    assert (last - near) / (near - far) == pytest.approx(0.1, abs=0.05)
+    assert forces["full", 0.4999] > 1.1 * last
+
+
+@pytest.mark.slow
+def test_a_tyre_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its table of time constants; a contact that is none."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "geometry").symlink_to(ROOT / "geometry")
+    case = str(ROOT / "pipeline" / "cases" / "slip-jump.toml")
+    assert main(["roll", case, "--no-pictures", "-q"]) == 0
+    rows = list(csv.DictReader((tmp_path / "build" / "slip-jump" / "constants.csv").open()))
+    up = [float(r["up_fitted_s"]) for r in rows]
+    down = [float(r["down_fitted_s"]) for r in rows]
+    assert up == sorted(up, reverse=True) and max(down) < 1.2 * min(down)
+    assert main(["roll", case, "--set", 'tyre.contact="road"', "-q"]) == 2
