@@ -181,7 +181,7 @@ def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
 def test_the_impact_oscillator_of_the_book_is_chaotic_and_does_not_come_to_rest() -> None:
     """Section 4.2 with a rigid arm. Fig. 4.2-2 h, 23.63 rad/s, is chaotic in the book and here. In Fig. 4.2-3, 9.845
     rad/s, the arm comes to rest at its stop; with the printed damper it does not: beta c_N0 / (2 sqrt(c_N0 m)) = 0.018
-    leaves an impact exp(-0.018 pi) = 0.945 of its speed or more: the push turns before the leaps end, ten in a period."""
+    leaves an impact exp(-0.018 pi) = 0.945 of its speed or more: the push turns before leaps end, ten in a period."""
     chaos = orbit.run(equations.of(hitting(BOOK), 23.63), 60, 40)
     assert chaos.said.startswith("chaotic") and chaos.repeats == 0
     leaping = orbit.run(equations.of(hitting(BOOK), 9.845), 10, 8)
