@@ -145,6 +145,12 @@ def test_what_is_named_exists(column: int) -> None:
     assert not missing
 
 
+def test_errata_name_code_that_exists() -> None:
+    text = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    named = [n for n in re.findall(r"`([^`]+)`", text) if re.fullmatch(r"[a-z_]+(\.\w+)+", n)]
+    assert len(named) > 20 and not [n for n in named if not is_code(n)]
+
+
 def test_names_that_do_not_exist_are_found() -> None:
     bad = ["contact.layer.Layer.moduli", "contact.lawyer", "test_nothing", "ms.none", "geometry/blade/third.toml"]
     bad += ["make ringlet", "microslip contact 3.7-9", "microslip respond rung", "microslip answer ring"]
