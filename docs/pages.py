@@ -489,8 +489,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.ground.direction": ("degrees", "of the velocity, from t1 towards t2"),
     "contacts.ground.rpm": ("rpm", "instead of the velocity: material that turns about the axis of the body which the "
                             "contact is against ([squeal](squeal.md))"),
-    "contacts.ground.inertia": ("", "of the [material that runs through](squeal.md#the-terms-of-the-material-that-runs-through); "
-                                "false leaves it out"),
+    "contacts.ground.inertia": ("", "of the [material that runs through]"
+                                "(squeal.md#the-terms-of-the-material-that-runs-through); false leaves it out"),
     "contacts.ground.axis": ("", "along another axis, in the axes of the case"),
     "contacts.ground.point": ("m", "through this point"),
     "contacts.ground.pushes": ("", "whether the slope of a wave pushes the body along the ground; the book: false"),
