@@ -1412,10 +1412,12 @@ def book_mode() -> None:
 
 
 def book_figures() -> None:
-    """Figures of the book that a formula draws."""
+    """Figures of the book that a formula draws, and those of rolling contact."""
     import figure_study as study
+    import rolling_study as rolled
 
-    save(drawn(study.picture(figure(10.5, 5.2), plain)), "book_figures", colours=LINES)
+    for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
+        save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
 
 
 def patches() -> None:

@@ -126,7 +126,8 @@ def is_command(text: str) -> bool:
         return verb == "docs/make_pictures.py" and set(rest) <= names
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
-    return holds(tree(PACKAGE / "cli.py").body, verb) is not None and rest[0] in known
+    there = rest[0] in known or (ROOT / rest[0]).is_file()
+    return there and holds(tree(PACKAGE / "cli.py").body, verb) is not None
 
 
 def exists(name: str) -> bool:
