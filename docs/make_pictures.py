@@ -1135,6 +1135,8 @@ def mistuning() -> None:
         save(from_file(file), name, colours=2 * LINES if name.endswith("sensitivity") else LINES // 2)
     fill("mistuning.md", "amplification", table(*study.amplification()))
     fill("mistuning.md", "first_order", table(*study.first_order()))
+
+
 def identification() -> None:
     """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
     import identification_study as study
@@ -1432,6 +1434,15 @@ def book_mode() -> None:
     save(from_file(found.parent / "pictures" / "book.png"), "book_compared")
 
 
+def book_figures() -> None:
+    """Figures of the book that a formula draws, and those of rolling contact."""
+    import figure_study as study
+    import rolling_study as rolled
+
+    for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
+        save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+
+
 def patches() -> None:
     """Contacts between bodies: a pin in its hole by Hertz and on springs."""
     import patch_study as study
@@ -1623,6 +1634,7 @@ STUDIES = {
         followed,
         accuracy,
         book_mode,
+        book_figures,
         patches,
         results,
         ring,

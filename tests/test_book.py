@@ -126,7 +126,8 @@ def is_command(text: str) -> bool:
         return verb == "docs/make_pictures.py" and set(rest) <= names
     figures = {p.stem.removeprefix("fig-") for p in (CASES / "contact").glob("fig-*.toml")}
     known = figures if verb == "contact" else cases | bodies | {"CASE"}
-    return holds(tree(PACKAGE / "cli.py").body, verb) is not None and rest[0] in known
+    there = rest[0] in known or (ROOT / rest[0]).is_file()
+    return there and holds(tree(PACKAGE / "cli.py").body, verb) is not None
 
 
 def exists(name: str) -> bool:
@@ -143,6 +144,12 @@ def exists(name: str) -> bool:
 def test_what_is_named_exists(column: int) -> None:
     missing = [(row[0], n) for row in rows() for n in re.findall(r"`([^`]+)`", row[column]) if not exists(n)]
     assert not missing
+
+
+def test_errata_name_code_that_exists() -> None:
+    text = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    named = [n for n in re.findall(r"`([^`]+)`", text) if re.fullmatch(r"[a-z_]+(\.\w+)+", n)]
+    assert len(named) > 20 and not [n for n in named if not is_code(n)]
 
 
 def test_names_that_do_not_exist_are_found() -> None:
