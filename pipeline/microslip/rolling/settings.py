@@ -29,15 +29,16 @@ from ..settings.body import (
 from ..settings.mistakes import validate
 from .ellipse import combined
 from .kalker import Coefficients
-from .profiles import WIDTH, Profile, circle, has_arc, polynomial, read_profile
+from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
-from .table import POINTS
+from .table import ELEMENTS, POINTS
 from .temperature import Conductor
 from .wheelset import Pose, Track
 
 Temperature = Annotated[Number, Field(gt=-273.15)]
 Count = Annotated[int, Field(ge=2, le=400)]
+Fineness = Annotated[int, Field(ge=4, le=100)]
 
 SUFFIXES = {"wheel": (".prw", ".whl"), "rail": (".prr", ".ban")}
 MIDDLES = {"wheel": "axle", "rail": "track"}
@@ -47,13 +48,20 @@ BIGGEST = 5.0
 
 
 class Section(Model):
-    """A cross-section. Attributes: profile: radius of a circle, m (convex positive, hollow negative), coefficients of
-    y^2, y^3, ... (1/m, ...), or a file. width: of a circle or polynomial, m. noise: of a measured profile, m. at: of
-    the profile's origin from the middle of the track or axle, m; there is no usual one where a profile is measured."""
+    """A cross-section.
+
+    Attributes:
+        profile: radius of a circle, m (convex positive, hollow negative), coefficients of y^2, y^3, ... (1/m, ...), or
+            a file. width: of a circle or polynomial, m. noise: of a measured profile, m. mirror: axes that run the
+            other way in its file. between: y of it that are kept, m, after that. at: of the profile's origin from the
+            middle of the track or axle, m; there is no usual one where a profile is measured.
+    """
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
     width: Positive = WIDTH
     noise: Annotated[NotNegative, Field(le=1e-3)] = 0.0
+    mirror: Mirror = ""
+    between: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] | None = None
     at: Positive = 0.75
     young: Positive = 2.1e11
     poisson: Poisson = 0.28
@@ -69,7 +77,9 @@ class Section(Model):
     def made(self, folder: Path, outward: float) -> Profile:
         """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
         if isinstance(self.profile, str):
-            return read_profile(folder / self.profile, self.noise)
+            return read_profile(
+                folder / self.profile, self.noise, mirror=self.mirror, between=self.between or EVERYWHERE
+            )
         if isinstance(self.profile, tuple):
             return polynomial(self.profile, self.width)
         return circle(outward * self.profile, self.width)
@@ -129,9 +139,11 @@ class ModelOfCase(Model):
 
 
 class TableOfCase(Model):
-    """points: of a table of creep forces on its axes, see `table.CreepTable`."""
+    """points: of a table of creep forces, of the size below and above saturation, azimuth, polar angle, a/b; see
+    `table.CreepTable`. elements: of the strips it is made with."""
 
-    points: Annotated[tuple[Count, Count, Count, Count], BeforeValidator(_tuple)] = POINTS
+    points: Annotated[tuple[Fineness, Fineness, Fineness, Fineness, Fineness], BeforeValidator(_tuple)] = POINTS
+    elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = ELEMENTS
 
 
 class HeatOfCase(Model):
@@ -186,6 +198,8 @@ class RollingCase(Model):
             )
         if self.friction.deviation:
             raise ValueError("friction.deviation: rolling is steady, and friction random in time is not; remove it")
+        if self.table is not None and self.model.spin == "book":
+            raise ValueError('table: is made with model.spin = "kalker"; take that, or remove the table')
         if self.table is not None and not self.is_constant:
             raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
         return self
