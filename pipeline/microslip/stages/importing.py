@@ -249,6 +249,7 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    told += [f"note: {text}" for text in mesh.remarks]
     told += ties
     held, said = _supports(mesh)
     told += said
