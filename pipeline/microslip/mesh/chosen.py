@@ -54,9 +54,18 @@ def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mes
             raise UserError(f"{link.where} ties these instances to others; take those in too")
         if there.any():
             own.append(_moved(link, mesh.n_points, part.n_points, number))
-    links = replace(mesh.links, items=tuple(own)) if own else None
+    used = {n - part.n_points for link in own for n in _references(link) if n >= part.n_points}
+    sets = {name: s for name, s in mesh.links.sets.items() if np.isin(s, list(used)).all()}
+    links = replace(mesh.links, items=tuple(own), sets=sets) if own else None
     known = {*part.point_sets, *(links.sets if links else ())}
     return replace(part, links=links, supports={n: d for n, d in mesh.supports.items() if n in known})
+
+
+def _references(link: Link) -> list[int]:
+    """Nodes of a link that may be reference nodes."""
+    if isinstance(link, FaceTie):
+        return []
+    return link.nodes.tolist() if isinstance(link, Equation) else [link.reference]
 
 
 def _moved(link: Link, before: int, after: int, number: Indices) -> Link:
