@@ -146,6 +146,7 @@ MEANING: dict[str, tuple[str, str]] = {
     ),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
+    "geometry.instances": ("", "those instances of the deck that are this body; all if not given"),
     "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .npz, .op4, DMIG cards, .sti"),
     "geometry.matrices.mass": ("", "M, likewise"),
     "geometry.matrices.damping": ("", "C, likewise; instead of [damping]"),

@@ -181,6 +181,16 @@ class Ties:
     sets: Mapping[str, Indices] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Joint:
+    """Two faces that a file lets touch. `where`: its place there. friction: the coefficient, None without one."""
+
+    where: str
+    slave: str
+    master: str
+    friction: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A volume mesh with named faces.
@@ -199,6 +209,8 @@ class Mesh:
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
         supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
+        remarks: what of the file is read as something else or not used, in words. instances: name -> points.
+        joints: faces that the file lets touch. preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
     """
 
@@ -215,6 +227,10 @@ class Mesh:
     supports: Mapping[str, str] = field(default_factory=dict)
     not_held: tuple[str, ...] = ()
     unended: str = ""
+    remarks: tuple[str, ...] = ()
+    instances: Mapping[str, Indices] = field(default_factory=dict)
+    joints: tuple[Joint, ...] = ()
+    preloads: tuple[tuple[str, float], ...] = ()
     links: Links | None = None
     ties: Ties | None = None
 

@@ -75,7 +75,7 @@ class Deck:
     links: list[tuple[Card, str]] = field(default_factory=list)
     system: Array | None = None
     ignored: list[str] = field(default_factory=list)
-    replaced: dict[str, int] = field(default_factory=dict)
+    instances: dict[str, Indices] = field(default_factory=dict)
 
     def place(self, word: str, space: str = "") -> tuple[Space, str]:
         """The instance that a word is in, and the word without it: ``Blade-1.Tip``, ``17``, ``Tip``."""

@@ -135,7 +135,8 @@ def _direction(word: str) -> int:
 
 def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
     for line in card.lines:
-        kind, *words = fields(line)
+        kind, *words = [*fields(line), ""]
+        words = [word for word in words if word]
         if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK") or len(words) < 2:
             reading.left_out.append(f"{card.where}: *MPC of the kind {kind}")
             continue

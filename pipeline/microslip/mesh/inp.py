@@ -18,9 +18,11 @@ from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
 from .cards import Card, data_of, fields, read_cards
 from .deck import Cells, Deck, DeckConstants
+from .deck_joints import KEYWORDS as JOINTS
+from .deck_joints import joints_of, preloads_of, unused_loads
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
-from .instances import local_system, outline, place, placement, places
+from .instances import local_system, numbered, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, refuse_twice
 from .supports import Constraints, add_supports
@@ -62,9 +64,55 @@ def read_inp(path: Path) -> RawMesh:
     whole.spaces[""] = spaces[-1]
     _read(path, whole, found.rest)
     raw = _assembled(whole)
+    raw.remarks = [*numbered([card.parameters["NAME"] for card, _ in parts], spaces), *_replaced(raw, whole)]
+    whole.ignored += unused_loads(whole)
+    if whole.ignored:
+        raw.remarks.append(f"read and not used: {', '.join('*' + word for word in dict.fromkeys(whole.ignored))}")
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw
+
+
+_AS = {
+    "C3D8R": "reduced integration becomes full", "C3D8RH": "reduced integration becomes full",
+    "C3D8I": "incompatible modes are left out", "C3D8H": "the hybrid form becomes that of displacements",
+    "C3D20R": "reduced integration becomes full, a little stiffer on coarse meshes",
+    "C3D20RH": "reduced integration becomes full, a little stiffer on coarse meshes",
+    "C3D10M": "the modified form becomes the plain one", "C3D10I": "the improved stress is left out",
+    "C3D10HS": "the hybrid form becomes that of displacements",
+}  # fmt: skip
+"""Solids that are taken as their plain sisters, and what that changes."""
+
+
+def _replaced(raw: RawMesh, deck: Deck) -> list[str]:
+    """Which cells are taken as others, and how far first-order ones lock in bending."""
+    count: dict[str, int] = {}
+    for cells in deck.solids:
+        count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
+    told = []
+    for written, number in count.items():
+        plain = re.match(r"C3D\d+", written)
+        if written in _AS and plain:
+            told.append(f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}")
+    bricks = [nodes for kind, nodes in raw.blocks if kind == "hexahedron"]
+    if bricks:
+        told.append(
+            f"first-order bricks lock: where one layer of them bends, stiffness is {locking(raw, bricks):.2g} times "
+            "too large, with m layers the excess falls as 1/m2; export second-order cells (C3D20)"
+        )
+    return told
+
+
+def locking(raw: RawMesh, bricks: list[Indices]) -> float:
+    """How many times too stiff one layer of fully integrated bricks is in bending, of the median brick.
+
+    (1 / (1 - nu) + a^2 / 2) / (1 + nu), a the length over the height (R. D. Cook and others, Concepts and Applications
+    of Finite Element Analysis, parasitic shear), here with nu = 0 and its longest over its shortest side.
+    """
+    x = raw.points[np.concatenate(bricks)]
+    sides = np.stack([np.linalg.norm(x[:, j] - x[:, 0], axis=1) for j in (1, 3, 4)])
+    with np.errstate(all="ignore"):  # flat cells are told elsewhere
+        return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
 
 
 def _part(path: Path, parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck:
@@ -82,12 +130,12 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
     for card in cards:
         if card.keyword in _REFUSED:
             raise Damaged(f"{card.where}: the file {_REFUSED[card.keyword]}; write out every node and cell")
-        if "INPUT" in card.parameters and card.keyword in (*LINKS, *_READERS):
+        if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *_READERS):
             card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters.pop("INPUT")))]
-        if card.keyword in LINKS:
+        if card.keyword in (*LINKS, *JOINTS):
             deck.links.append((card, ""))
         if card.keyword not in _READERS:
-            if card.keyword not in _SILENT and card.keyword not in LINKS:
+            if card.keyword not in (*_SILENT, *LINKS, *JOINTS):
                 deck.ignored.append(card.keyword)
             continue
         _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
@@ -409,6 +457,8 @@ def _assembled(deck: Deck) -> RawMesh:
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
+    raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     deck.not_held += left_out
     add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:

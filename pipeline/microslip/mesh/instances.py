@@ -113,6 +113,12 @@ def places(parts: list[tuple[str, Deck]]) -> list[Space]:
     return [Space(k * nodes, k * cells, prefix) for k, prefix in enumerate([*named, ""])]
 
 
+def numbered(names: list[str], spaces: list[Space]) -> list[str]:
+    """Where the numbers of instances are, in words."""
+    moved = [f"{name} + {space.nodes}" for name, space in zip(names, spaces, strict=False) if space.nodes]
+    return [f"numbers of nodes: as in the part, those of {', '.join(moved)}"] if moved else []
+
+
 def _power(numbers: Iterable[Indices]) -> int:
     """The power of ten above all numbers."""
     return int(10 ** len(str(int(joined(numbers).max(initial=0)))))
@@ -122,6 +128,7 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     """Add a part to the whole as the instance `name`."""
     key = name.upper()
     whole.spaces[key] = space
+    whole.instances[name] = joined(part.node_id) + space.nodes
     whole.node_id += [ids + space.nodes for ids in part.node_id]
     whole.points += [points @ at.turn.T + at.shift for points in part.points]
     for into, cells in ((whole.solids, part.solids), (whole.facets, part.facets)):
@@ -139,5 +146,3 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.surfaces += [(space.prefix + surface[0], *surface[1:3], key) for surface in part.surfaces]
     whole.links += [(card, key) for card, _ in part.links]
     whole.ignored += part.ignored
-    for kind, count in part.replaced.items():
-        whole.replaced[kind] = whole.replaced.get(kind, 0) + count

@@ -295,6 +295,7 @@ class Geometry(Model):
     build: str | None = None
     cad: str | None = None
     mesh: str | None = None
+    instances: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
     matrices: MatrixFiles | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
@@ -302,6 +303,8 @@ class Geometry(Model):
     @model_validator(mode="after")
     def _one_source(self) -> Geometry:
         only_one(self, "build", "cad", "mesh", "matrices")
+        if self.instances and self.mesh is None:
+            raise ValueError("instances: are those of a deck; give it as mesh")
         return self
 
 

@@ -7,7 +7,9 @@ import os
 import re
 import shlex
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from ..data import Mesh, UserError
 from ..exchange.measured import holds_modes, read_measured
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
+from ..mesh.chosen import of_instances
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -40,12 +43,13 @@ class Imported:
     told: tuple[str, ...]
 
 
-def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
+def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[str] = ()) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
             body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
+        instances: those of a deck that are the body, all if none.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -61,7 +65,7 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     if target.exists():
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
     kind = file.suffix.lower()
-    made = _matrices if kind in MATRICES else _cad if kind in CAD else _mesh
+    made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
     lines, told = made(file, target.parent, unit)
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
@@ -237,7 +241,7 @@ def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
 _END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
 
 
-def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) -> tuple[list[str], list[str]]:
     system = usual_system(unit)
     told = []
     try:
@@ -245,15 +249,20 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     except UserError as error:
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
         told.append(f"warning: {error}")
+    joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
+    mesh = of_instances(mesh, instances) if instances else mesh
     mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
-    told += ties
+    told += [f"note: {text}" for text in mesh.remarks]
+    told += [*ties, *(joints if not instances else ())]
     held, said = _supports(mesh)
     told += said
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
-    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}", "", "[material]"]
+    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
+    lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
+    lines += ["", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
         lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]

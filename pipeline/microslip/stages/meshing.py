@@ -15,6 +15,7 @@ import numpy as np
 from ..data import Indices, Material, Mesh, UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
+from ..mesh.chosen import of_instances
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
@@ -179,6 +180,11 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     """
     path = path or job.mesh_file
     mesh, told = _read_with_materials(job, path)
+    if names := job.settings.geometry.instances:
+        try:
+            mesh = of_instances(mesh, names)
+        except UserError as error:
+            raise UserError(f"{job.path}: geometry.instances: {path} {error}") from None
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
     mesh = _linked(path, mesh)
