@@ -183,8 +183,8 @@ MEANING: dict[str, tuple[str, str]] = {
     "mesh.size": ("*", "size of the elements; chosen from the body where it is not given"),
     "mesh.integration": (
         "",
-        'of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near a Poisson\'s ratio of '
-        "0.5",
+        'of the stiffness; `"reduced"` takes 8 points in bricks of 20 nodes, which do not lock near a Poisson\'s ratio '
+        "of 0.5",
     ),
     "mesh.order": ("", "order of the elements; 1 is far too stiff in bending"),
     "mesh.local": ("*", "table: name of a face = size there"),
