@@ -5,16 +5,24 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from meshes import pipe
+from scipy.sparse.linalg import spsolve
 
 from microslip.basis import read_basis
 from microslip.cli import main
 from microslip.data import UserError
+from microslip.elasticity import isotropic
+from microslip.fem.discretise import REDUCED, discretise, face_blocks
+from microslip.fem.loads import pressure
+from microslip.fem.operators import stiffness
 from microslip.rolling.brush import Brush, fitted, jump, parabola, reached
 from microslip.rolling.half_space import rolled, shifted, steady_rolling
 from microslip.rolling.half_space_influence import Grid, Pair
+from microslip.rolling.slip import row
 from microslip.stages.job import open_job
 from microslip.stages.modal import modes_stage
 
@@ -71,6 +79,21 @@ def test_numbers_that_are_none_of_a_brush() -> None:
             replace(BRUSH, **change)
 
 
+def test_the_row_of_a_patch_finds_the_ellipse_through_pressures_that_swing() -> None:
+    """Length and shares of Hertz' pressure of which points of a mesh are a fifth off, to and fro."""
+    x = np.linspace(-8e-3, 8e-3, 49)
+    p = 2e5 * np.sqrt(np.maximum(1 - ((x - 5e-4) / 6e-3) ** 2, 0)) * (1 + 0.2 * np.cos(np.pi * np.arange(49)))
+    points = np.array([[v, y, 0.0] for v in x for y in (-5e-3, 5e-3)])
+    load = 0.02 * np.pi / 2 * 6e-3 * 2e5
+    state = SimpleNamespace(points=points, areas=np.ones(98), pressure=np.repeat(p, 2), normal_force=load)
+    found = row(state, np.array([1.0, 0.0, 0.0]), 20)  # type: ignore[arg-type]
+    assert found.length == pytest.approx(12e-3, rel=0.03) and found.force == load
+    edge = np.linspace(-1, 1, 21)
+    exact = np.diff(np.arcsin(edge) + edge * np.sqrt(1 - edge**2)) / np.pi
+    np.testing.assert_allclose(found.share, exact, atol=3e-3)
+    assert found.share.sum() == pytest.approx(1, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_a_shift_of_cattaneo_becomes_steady_rolling_of_carter() -> None:
     """Half-spaces of one row: pressed and shifted, then rolled under the same force; the reference prints no number of
@@ -96,9 +119,37 @@ def test_a_shift_of_cattaneo_becomes_steady_rolling_of_carter() -> None:
 # --- the wheel -----------------------------------------------------------------------------------------------------
 
 
+def bore(n: int, poisson: float, degree: dict[str, int] | None) -> float:
+    """Relative error of the radial displacement at the bore of a thick pipe under inner pressure, plane strain (Lame):
+    n bricks along the radius of a quarter."""
+    a, b, shear, load = 1.0, 2.0, 1.0, 1e-3
+    mesh = pipe("hexahedron20", (n, 2 * n, 1), a, b, 0.5, np.pi / 2)
+    d = discretise(mesh, degree)
+    K = d.pattern.full(stiffness(d, isotropic(2 * (1 + poisson) * shear, poisson)))
+    f = pressure(face_blocks(mesh, "x0"), mesh.n_points, load).ravel()
+    x, y, _ = mesh.points.T
+    fixed = np.column_stack([np.abs(x) < 1e-9, np.abs(y) < 1e-9, np.ones(len(x), bool)]).ravel()
+    u = np.zeros(len(f))
+    u[~fixed] = spsolve(K[~fixed][:, ~fixed].tocsc(), f[~fixed])
+    at = np.abs(np.hypot(x, y) - a) < 1e-9
+    radial = (u.reshape(-1, 3)[at, :2] * mesh.points[at, :2]).sum(axis=1).mean()
+    exact = load * a**2 / (2 * shear * (b**2 - a**2)) * ((1 - 2 * poisson) * a + b**2 / a)
+    return abs(radial / exact - 1)
+
+
+def test_a_thick_pipe_that_keeps_its_volume_is_that_of_lame() -> None:
+    """With eight points the error is the same at Poisson's ratios of 0.49 and 0.4999, and of fourth order; with all
+    points it is 57 % at two elements and 0.4999."""
+    found = {nu: [bore(n, nu, REDUCED) for n in (1, 2, 4)] for nu in (0.49, 0.4999)}
+    for errors in found.values():
+        assert -np.polyfit(np.log([1, 2, 4]), np.log(errors), 1)[0] > 3
+    np.testing.assert_allclose(found[0.49], found[0.4999], rtol=0.02)
+    assert bore(2, 0.4999, None) > 0.5 and found[0.4999][1] < 3e-4
+
+
 def pressed(tmp_path: Path, *changes: str) -> float:
     """N by which a coarse wheel is pressed when it is lowered by 0.5 mm."""
-    given = ("mesh.size=8.0", "closures=[{name='ground', face='tread', against='ground', point=[0.0, 0.0, -50.0], "
+    given = ("closures=[{name='ground', face='tread', against='ground', point=[0.0, 0.0, -50.0], "
              "normal=[0.0, 0.0, 1.0], interference=0.5}]", "modes.count=1", "output.gauss=false",
              "output.nodal_stress=false", "output.shapes=false")  # fmt: skip
     basis = read_basis(modes_stage(open_job(ROOT / "geometry" / "tyre", [*given, *changes], tmp_path))[0])
@@ -107,16 +158,26 @@ def pressed(tmp_path: Path, *changes: str) -> float:
 
 @pytest.mark.slow
 def test_rubber_that_keeps_its_volume_does_not_lock(tmp_path: Path) -> None:
-    """To Poisson's ratio 0.4999 the force at one shear modulus goes straight to its limit, as 1/K does; with all points
-    the same coarse bricks become stiffer and stiffer."""
-    forces = {}
-    for rule in ("reduced", "full"):
-        for nu in (0.49, 0.499, 0.4999):
-            changes = (f"material.poisson={nu}", f"material.young={2 * (1 + nu) * 1e6}", f'mesh.integration="{rule}"')
-            forces[rule, nu] = pressed(tmp_path / f"{rule}{nu}", *changes)
-    far, near, last = (forces["reduced", nu] for nu in (0.49, 0.499, 0.4999))
-    assert (last - near) / (near - far) == pytest.approx(0.1, abs=0.05)
-    assert forces["full", 0.4999] > 1.1 * last
+    """At a Poisson's ratio of 0.4999 elements of 7 mm differ from those of 5 mm by less than a tenth of what all points
+    add to them; that falls as the mesh is refined."""
+    forces = {
+        (rule, size): pressed(
+            tmp_path / f"{rule}{size}", f"mesh.size={size}", "material.poisson=0.4999", "material.young=2.9998e6",
+            f'mesh.integration="{rule}"',
+        )
+        for rule, size in (("reduced", 7.0), ("reduced", 5.0), ("full", 7.0), ("full", 5.0))
+    }  # fmt: skip
+    best = forces["reduced", 5.0]
+    excess = [forces["full", size] - best for size in (7.0, 5.0)]
+    assert abs(forces["reduced", 7.0] - best) < 0.1 * excess[0]
+    assert excess[1] < 0.7 * excess[0]
+    assert 0.6 < np.log(excess[0] / excess[1]) / np.log(7 / 5) < 4
+
+
+def test_rubber_of_no_compressibility_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """Poisson's ratio 0.5 has no stiffness matrix; bricks of another kind have no reduced rule."""
+    assert main(["modes", str(ROOT / "geometry" / "tyre"), "--set", "material.poisson=0.5", "-q"]) == 2
+    assert "material.poisson" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -129,5 +190,5 @@ def test_a_tyre_from_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
     rows = list(csv.DictReader((tmp_path / "build" / "slip-jump" / "constants.csv").open()))
     up = [float(r["up_fitted_s"]) for r in rows]
     down = [float(r["down_fitted_s"]) for r in rows]
-    assert up == sorted(up, reverse=True) and max(down) < 1.2 * min(down)
+    assert np.diff(up).max() < 1e-3 * up[0] and up[-1] < 0.4 * up[0] and max(down) < 1.1 * min(down)
     assert main(["roll", case, "--set", 'tyre.contact="road"', "-q"]) == 2

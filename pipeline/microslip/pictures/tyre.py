@@ -18,8 +18,10 @@ def tyre_picture(found: Studied, path: Path, title: str) -> Path:
     for axes in (patch, steady, one, constants):
         plain_axes(axes)
     r, b = found.row, found.brush
-    patch.plot(1e3 * r.x, 1e-3 * r.pressure, color=COLOURS[0])
-    half = 0.55e3 * r.length
+    patch.plot(1e3 * r.x, 1e-3 * r.pressure, ".", color="0.6", label="points of the mesh")
+    patch.plot(1e3 * r.smooth[:, 0], 1e-3 * r.smooth[:, 1], color=COLOURS[0], label="of the row")
+    patch.legend(fontsize=8)
+    half = 0.7e3 * r.length
     patch.set(xlabel="x in mm, rolling to the right", ylabel="kPa", xlim=(-half, half), title="pressure of the patch")
     slips, forces = found.steady
     steady.plot(100 * slips, forces, color=COLOURS[0])

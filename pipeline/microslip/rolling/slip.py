@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
+from scipy.optimize import minimize_scalar
 
 from ..data import Array, ContactState, ModalGroup, UserError
 from ..settings.body import Model, Name, NotNegative, Positive, _tuple, load_toml, override
@@ -73,10 +75,12 @@ def load_tyre(path: Path, assignments: list[str] | None = None) -> tuple[TyreCas
 @dataclass(frozen=True)
 class Row:
     """The middle of the patch along rolling. Attributes: x: (k,) places, m. pressure: (k,) Pa, the mean over the width.
-    share: (n,) of elements, from the leading edge on. length: m. force: of the patch, N. area: m2."""
+    smooth: (l, 2) places and the smooth pressure that fits it. share: (n,) of elements, from the leading edge on.
+    length: m. force: of the patch, N. area: m2."""
 
     x: Array
     pressure: Array
+    smooth: Array
     share: Array
     length: float
     force: float
@@ -86,6 +90,9 @@ class Row:
 def row(state: ContactState, along: Array, elements: int) -> Row:
     """Of a static contact, pressures of points that lie side by side taken together.
 
+    Within an element of the mesh a pressure at points swings, so the row has the smooth one that fits best: the root
+    of 1 - xi^2 times a parabola, between ends that fit best, with the same force.
+
     Args:
         along: (3,) direction of rolling.
 
@@ -94,20 +101,37 @@ def row(state: ContactState, along: Array, elements: int) -> Row:
     """
     if not state.normal_force > 0:
         raise UserError("tyre.contact: the wheel does not touch the ground; give more interference")
-    at = np.round(state.points @ along, 7)
-    x, where = np.unique(at, return_inverse=True)
+    x, where = np.unique(np.round(state.points @ along, 7), return_inverse=True)
     areas = np.bincount(where, state.areas)
     p = np.bincount(where, state.areas * state.pressure) / areas
     near = np.flatnonzero(p > 1e-6 * p.max())
     if near[0] == 0 or near[-1] == len(x) - 1:
         raise UserError("tyre.contact: the patch reaches the end of its face and is cut off; make the face longer")
-    ends = x[near[0] - 1], x[near[-1] + 1]
-    edges = np.linspace(ends[0], ends[1], elements + 1)
-    fine = np.linspace(ends[0], ends[1], 200 * elements + 1)
-    sums = np.add.reduceat(np.interp(0.5 * (fine[1:] + fine[:-1]), x, p), np.arange(0, 200 * elements, 200))
-    width = state.normal_force / (np.interp(fine, x, p).mean() * (ends[1] - ends[0]))
-    length = float(edges[-1] - edges[0])
-    return Row(x, p, sums[::-1] / sums.sum(), length, state.normal_force, length * float(width))
+    middle = float(areas @ (x * p) / (areas @ p))
+    reach = max(x[near[-1] + 1] - middle, middle - x[near[0] - 1])
+    half = minimize_scalar(
+        lambda a: _fitted(x - middle, p, areas, a)[1], bounds=(0.5 * reach, reach), method="bounded"
+    ).x
+    shape, _ = _fitted(x - middle, p, areas, half)
+    fine = np.linspace(-1, 1, 200 * elements + 1)
+    fit = shape(fine)
+    sums = np.add.reduceat(0.5 * (fit[1:] + fit[:-1]), np.arange(0, 200 * elements, 200))
+    length = 2 * float(half)
+    width = float(areas.sum()) / (x[-1] - x[0])
+    scale = state.normal_force / (sums.sum() / (200 * elements) * length * width)
+    smooth = np.column_stack([middle + half * fine, scale * fit])
+    return Row(x, p, smooth, sums[::-1] / sums.sum(), length, state.normal_force, length * width)
+
+
+def _fitted(x: Array, p: Array, weight: Array, half: float) -> tuple[Callable[[Array], Array], float]:
+    """Pressure over xi = x/half, and the sum of its squared errors."""
+    xi = x / half
+    root = np.sqrt(np.maximum(1 - xi**2, 0))
+    basis = root[:, None] * xi[:, None] ** np.arange(3)
+    by = np.sqrt(weight)
+    found = np.linalg.lstsq(by[:, None] * basis, by * p, rcond=None)[0]
+    error = float((weight * (basis @ found - p) ** 2).sum())
+    return lambda t: np.maximum(np.sqrt(np.maximum(1 - t**2, 0)) * np.polyval(found[::-1], t), 0.0), error
 
 
 @dataclass(frozen=True)
@@ -160,7 +184,7 @@ class Studied:
         up, down = c["up_fitted_s"], c["down_fitted_s"]
         return [
             f"The wheel stands with {r.force:.4g} N on a patch {1e3 * r.length:.3g} mm long, at most "
-            f"{r.pressure.max() / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s.",
+            f"{r.smooth[:, 1].max() / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s.",
             f"After a jump of the slip from 0 the force follows with a time constant of {up[0]:.3g} s at a target of "
             f"{c['slip'][0]:g} and {up[-1]:.3g} s at {c['slip'][-1]:g}.",
             f"After a jump back to 0 it is {down.min():.3g} to {down.max():.3g} s.",
