@@ -120,7 +120,7 @@ def is_command(text: str) -> bool:
     program, verb, *rest = shlex.split(text)
     cases, bodies = {p.stem for p in CASES.glob("*.toml")}, {p.parent.name for p in BODIES.glob("*/body.toml")}
     if program == "make":
-        return not rest and verb.removesuffix("-modes") in cases | bodies
+        return not rest and (verb in cases | bodies or verb.removesuffix("-modes") in bodies)
     if program == "python":
         names = {n.name for n in tree(ROOT / verb).body if isinstance(n, ast.FunctionDef)}
         return verb == "docs/make_pictures.py" and set(rest) <= names
