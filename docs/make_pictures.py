@@ -590,7 +590,7 @@ def contact() -> None:
     PICTURES.mkdir(exist_ok=True)
     response_picture(result, BUILD / "response.png")
     save(from_file(BUILD / "response.png"), "blade_response")
-    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes", smooth=True))
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes"))
 
 
 def mode_sheet(studio: views.Studio, chosen: Sequence[int], factor: float) -> Any:
@@ -880,7 +880,7 @@ def counted_once() -> None:
     shares_by_count()
     groups = {m: made(f"blade-{m}", "blade", *LIGHT, f'reduction="{m}"') for m in METHODS}
     law_by_method(groups)
-    save(drawn(counted_picture(found)), "counted_once", smooth=True)
+    save(drawn(counted_picture(found)), "counted_once")
 
 
 def short(value: float) -> str:
@@ -1091,7 +1091,7 @@ def own() -> None:
     basis = read_basis(folder / "build" / "bracket" / "basis.h5")
     save(from_file(folder / "bracket" / "surfaces.png"), "bracket_surfaces")
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
-    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes"))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
     upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
     with_studio(upper, lambda s: save(mode_sheet(s, (6, 7), 0.35), "joint", smooth=True))

@@ -39,39 +39,14 @@ def of_strips(**how: Any) -> Creep:
 
 def of_table(table: CreepTable) -> Creep:
     """What `CreepTable.forces` reads, in a compiled loop; poisson is that of the table."""
-    scales, values = jnp.asarray(table.coefficients), jnp.asarray(table.values)
-    ends = [(float(v[0]), float(v[-1]), len(v)) for v in (table.size, table.azimuth, table.polar)]
-    ends.append((float(jnp.log(table.ratio[0])), float(jnp.log(table.ratio[-1])), len(table.ratio)))
+    widest = float(table.ratio[-1])
 
     def forces(
         xi: Array, eta: Array, phi: Array, a: Array, b: Array, force: Array, friction: Array, shear: Array, _: Array
     ) -> tuple[Array, Array, Array]:  # fmt: skip
-        area, held = a * b, friction * force
-        ratio = jnp.clip(jnp.log(a / b), ends[3][0], ends[3][1])
-        scale = jnp.stack([jnp.interp(ratio, jnp.log(jnp.asarray(table.ratio)), c) for c in scales])
-        r = shear * area / held * scale * jnp.stack([xi, eta, jnp.sqrt(area) * phi])
-        r = jnp.sqrt(jnp.sum(r**2, axis=0) + 1e-30)
-        forward, turned = jnp.where(xi < 0, -1.0, 1.0), jnp.where(phi < 0, -1.0, 1.0)
-        flat = jnp.sqrt((xi / b) ** 2 + (eta / a) ** 2)
-        azimuth = jnp.arctan2(turned * eta * jnp.sqrt(b), jnp.abs(xi) * jnp.sqrt(a))
-        x, y, moment = _straight(values, ends, (r / (1 + r), azimuth, jnp.arctan2(flat, jnp.abs(phi)), ratio))
-        return forward * held * x, turned * held * y, turned * held * jnp.sqrt(area) * moment
+        ratio, c = jnp.clip(a / b, 1 / widest, widest), jnp.sqrt(a * b)
+        wide = jnp.sqrt(ratio)
+        x, y, moment = table.read(xi, eta, phi, c * wide, c / wide, friction * force, shear, jnp)
+        return x, y, moment
 
     return forces
-
-
-def _straight(values: Array, ends: list[tuple[float, float, int]], at: tuple[Array, ...]) -> Array:
-    """(3, n) of (3, ...) values on equal steps, straight between them."""
-    lows, shares = [], []
-    for (low, high, count), v in zip(ends, at, strict=True):
-        place = jnp.clip((v - low) / (high - low), 0.0, 1.0) * (count - 1)
-        lows.append(jnp.clip(jnp.floor(place).astype(int), 0, count - 2))
-        shares.append(place - lows[-1])
-    total: Array = 0.0
-    for corner in range(2 ** len(at)):
-        up = [corner >> k & 1 for k in range(len(at))]
-        weight: Array = 1.0
-        for share, one in zip(shares, up, strict=True):
-            weight = weight * (share if one else 1 - share)
-        total = total + weight * values[(slice(None), *(low + one for low, one in zip(lows, up, strict=True)))]
-    return total
