@@ -386,21 +386,21 @@ def _spun(
     Raises:
         UserError: it turns differently under two contacts; see `spin.turned`.
     """
-    spins = dict[str, Spin]()
+    spins = dict[str, tuple[Spin, bool]]()
     for c in settings.contacts:
-        if c.ground is None or c.ground.rpm is None or not c.ground.inertia or c.against == GROUND:
+        if c.ground is None or c.ground.rpm is None or c.against == GROUND:
             continue
         where, name = f"{path}: contacts.{c.interface}.ground", settings.ends(c)[1][0]
         b = _body(bodies, name, path, f"contacts.{c.interface}")
         spin = c.ground.spin(*_axis(b), place_of(b))
-        if name in spins:
-            if not spin.same(spins[name]):
-                raise UserError(
-                    f"{where}: turns the material of '{name}' otherwise than another contact does; write the same rpm, "
-                    "axis and point in both"
-                )
+        other, inert = spins.setdefault(name, (spin, c.ground.inertia))
+        if not spin.same(other) or inert != c.ground.inertia:
+            raise UserError(
+                f"{where}: turns the material of '{name}' otherwise than another contact does; write the same rpm, "
+                "axis, point and inertia in both"
+            )
+        if other is not spin or not inert:
             continue
-        spins[name] = spin
         try:
             components[name] = turned(components[name], spin, b.basis.mesh, b.mass)
         except UserError as error:

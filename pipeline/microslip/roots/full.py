@@ -50,7 +50,7 @@ def _turned(body: Unreduced, spin: Spin | None) -> Unreduced:
     """The body with its material running through its standing shape; itself without a spin."""
     if spin is None:
         return body
-    D, B = (sp.kron(A, sp.eye(3)).tocsr()[body.free][:, body.free] for A in spin.matrices(body.mesh, body.mass))
+    D, B = (body.congruent(sp.kron(A, sp.eye(3)).tocsr()) for A in spin.matrices(body.mesh, body.mass))
     return replace(body, C=body.C + spin.rate * (D - D.T), K=body.K - spin.rate**2 * B)
 
 

@@ -27,6 +27,10 @@ SYMMETRIC = 0.1
 """Largest size of D + D^H, an integral over the surface that is zero where it is one of revolution, over that of D."""
 
 
+SLOW = 0.1
+"""Speed over the lowest frequency of a body at rest up to which its stress by the speed does not count (1 % of K)."""
+
+
 @dataclass(frozen=True)
 class Spin:
     """rate: rad/s. axis: (3,) unit vector n. point: (3,) p, m; both in the body's axes."""
@@ -42,7 +46,6 @@ class Spin:
             np.allclose(self.rate * self.axis, other.rate * other.axis, rtol=1e-9, atol=0)
             and np.abs(apart).max() <= 1e-9 * (1 + np.abs(self.point).max())
         )
-
 
     def matrices(self, mesh: Mesh, mass: float) -> tuple[sp.csr_matrix, sp.csr_matrix]:
         """(n, n) D and B of each Cartesian component of the nodes' motion. mass: kg of the mesh."""
@@ -85,10 +88,13 @@ def _refuse(g: ModalGroup, spin: Spin) -> None:
         raise UserError(
             f"its modal file is at {own:.6g} rpm, but its material turns with {rpm:.6g}; take one at that speed or rest"
         )
+    if not g.speed and 0 < SLOW * g.omega.min() < abs(spin.rate):
+        raise UserError(
+            f"its modal file is at rest, but at {rpm:.6g} rpm the centrifugal stress stiffens it (its lowest frequency "
+            f"is {g.omega.min() / (2 * np.pi):.4g} Hz); take one at that speed"
+        )
     if not g.speed and (g.omega == 0).any():
         raise UserError(
             "it is free, and at rest nothing holds its tilt against its own inertia; take a modal file at "
             f"{rpm:.6g} rpm, whose centrifugal stress does"
         )
-
-
