@@ -127,7 +127,7 @@ def geometry() -> None:
     for body in ("blade", "shroud", "pendulum", "half-pipe"):
         still = AT_REST if body == "shroud" else ()
         basis = made(body, body, *LIGHT, *still)
-        with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body))
+        with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body, colours=2 * LINES))
         group = basis.groups[0, 0]
         lowest = group.frequency[group.kind.index("normal")]
         size = " x ".join(f"{v:.4g}" for v in np.ptp(basis.mesh.points, axis=0) * 1e3)
@@ -880,7 +880,7 @@ def counted_once() -> None:
     shares_by_count()
     groups = {m: made(f"blade-{m}", "blade", *LIGHT, f'reduction="{m}"') for m in METHODS}
     law_by_method(groups)
-    save(drawn(counted_picture(found)), "counted_once")
+    save(drawn(counted_picture(found)), "counted_once", colours=LINES)
 
 
 def short(value: float) -> str:
