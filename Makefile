@@ -43,7 +43,9 @@ $(CASES): %: $(READY)
 disc-brake: $(READY) ## does the published disc brake squeal: roots, and how many grow at which speeds
 	@$(RUN) stability geometry/disc-brake
 
-$(BODIES): %: build/%/report.html
+tyre: $(READY) slip-jump
+
+$(filter-out tyre,$(BODIES)): %: build/%/report.html
 pendulum: pendulum-friction-two-modes pendulum-friction-three-modes pendulum-friction
 $(BODIES:%=%-mesh): %-mesh: meshes/%.msh
 $(BODIES:%=%-modes): %-modes: build/%/basis.h5

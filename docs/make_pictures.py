@@ -1084,6 +1084,7 @@ def own() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     shown = play("your_own_model.md", folder)
     commands = {"import": "import bracket", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
+    commands["joint"] = "import joint/joint.inp bolted"
     for name, command in ((n, f"$ microslip {c}") for n, c in commands.items()):
         part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
         fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
@@ -1092,6 +1093,9 @@ def own() -> None:
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
+    upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
+    with_studio(upper, lambda s: save(mode_sheet(s, (6, 7), 0.35), "joint", smooth=True))
+    save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
     mast = read_basis(folder / "build" / "mast" / "basis.h5")
     save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
 
@@ -1135,6 +1139,8 @@ def mistuning() -> None:
         save(from_file(file), name, colours=2 * LINES if name.endswith("sensitivity") else LINES // 2)
     fill("mistuning.md", "amplification", table(*study.amplification()))
     fill("mistuning.md", "first_order", table(*study.first_order()))
+
+
 def identification() -> None:
     """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
     import identification_study as study
@@ -1156,6 +1162,29 @@ def rolling() -> None:
     for file in rolling_stage(ROOT / "pipeline" / "cases" / "wheel-rail.toml", BUILD)[0]:
         if file.suffix == ".png":
             save(from_file(file), f"rolling_{file.stem}", colours=LINES)
+
+
+def unround_wheels() -> None:
+    """A wheel with three lobes: wear over its circumference, and growth by order over distance and speed."""
+    from PIL import Image
+
+    from microslip.stages.vehicle import vehicle_stage
+
+    made, _, _ = vehicle_stage(ROOT / "pipeline" / "cases" / "unround-wheel.toml", BUILD)
+    parts = [from_file(file) for file in made if file.suffix == ".png"]
+    whole = Image.new("RGB", (max(p.width for p in parts), sum(p.height for p in parts)), "white")
+    for k, part in enumerate(parts):
+        whole.paste(part, ((whole.width - part.width) // 2, sum(p.height for p in parts[:k])))
+    save(whole, "unround_wheels", colours=LINES)
+
+
+def tyre() -> None:
+    """A rubber wheel whose slip jumps."""
+    from microslip.stages.tyre import tyre_stage
+
+    for file in tyre_stage(ROOT / "pipeline" / "cases" / "slip-jump.toml", BUILD)[0]:
+        if file.suffix == ".png":
+            save(from_file(file), "tyre", colours=LINES)
 
 
 def half_space() -> None:
@@ -1409,6 +1438,15 @@ def book_mode() -> None:
     save(from_file(found.parent / "pictures" / "book.png"), "book_compared")
 
 
+def book_figures() -> None:
+    """Figures of the book that a formula draws, and those of rolling contact."""
+    import figure_study as study
+    import rolling_study as rolled
+
+    for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
+        save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+
+
 def patches() -> None:
     """Contacts between bodies: a pin in its hole by Hertz and on springs."""
     import patch_study as study
@@ -1565,6 +1603,8 @@ STUDIES = {
         stability,
         squeal,
         rolling,
+        unround_wheels,
+        tyre,
         half_space,
         geometry,
         meeting,
@@ -1598,6 +1638,7 @@ STUDIES = {
         followed,
         accuracy,
         book_mode,
+        book_figures,
         patches,
         results,
         ring,

@@ -396,3 +396,16 @@ def test_rolling_page(capsys: pytest.CaptureFixture[str]) -> None:
         exec(compile(code, "rolling.md", "exec"), {})
         assert capsys.readouterr().out.strip() == printed
     RollingCase.model_validate(tomllib.loads(re.findall(r"```toml\n(.*?)```", text, flags=re.S)[0]))
+
+
+def test_pages_on_unround_wheels_and_tyres() -> None:
+    """All keys of their cases are keys."""
+    from microslip.rolling.slip import TyreCase
+    from microslip.vehicle.settings import KinematicsCase, VehicleCase
+
+    blocks = [
+        re.findall(r"```toml\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), flags=re.S)
+        for page in ("unround_wheels.md", "tyre.md")
+    ]
+    for block, model in zip(sum(blocks, []), (KinematicsCase, VehicleCase, TyreCase), strict=True):
+        model.model_validate(tomllib.loads(block))

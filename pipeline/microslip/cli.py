@@ -211,7 +211,7 @@ def run(
     """
     from .basis import read_basis
     from .stages.job import holds_a_case_alone, open_job, system_file
-    from .stages.places import is_case, is_rolling, meant
+    from .stages.places import is_case, is_rolling, is_tyre, meant
     from .stages.response import Wanted
     from .stages.running import run_body, run_case_file, run_system
     from .stages.summary import frequency_lines
@@ -220,7 +220,7 @@ def run(
 
     path = meant(path)
     path = path / "case.toml" if holds_a_case_alone(path) else path
-    if is_rolling(path):
+    if is_rolling(path) or is_tyre(path):
         return roll(path, no_pictures=no_pictures, set_=set_, force=force, quiet=quiet)
     if (system := system_file(path)) is not None:
         with progress(f"run {system}", quiet) as report:
@@ -486,17 +486,31 @@ def mistune(
 def roll(
     case: Path, /, *, no_pictures: NoPictures = False, set_: Set = (), force: Force = False, quiet: Quiet = False
 ) -> None:
-    """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions.
+    """A wheel on a rail, or any two bodies that roll on each other: patches, creep curve, tractions; with [vehicle] how
+    unround wheels wear over their circumference, and which waves grow; a tyre whose slip jumps.
 
     Args:
-        case: a case.toml with [wheel] and [rail], the folder that holds it, its name, or its products.
+        case: a case.toml with [wheel] and [rail], or with [tyre], the folder that holds it, its name, or its products.
     """
+    from .stages.places import is_kinematics, is_tyre, is_vehicle
     from .stages.rolling import rolling_stage
+    from .stages.tyre import tyre_stage
+    from .stages.vehicle import kinematics_stage, vehicle_stage
 
-    case = _case_file(case)
+    case, ended = _case_file(case), ""
+    given = (case, Path("build"), list(set_), force)
     with progress(f"roll {case}", quiet) as report:
-        made, sentences = rolling_stage(case, Path("build"), list(set_), force, report, not no_pictures)
+        if is_vehicle(case):
+            made, sentences, ended = vehicle_stage(*given, report, not no_pictures)
+        elif is_kinematics(case):
+            made, sentences = kinematics_stage(*given, report, not no_pictures)
+        elif is_tyre(case):
+            made, sentences = tyre_stage(*given, report, not no_pictures)
+        else:
+            made, sentences = rolling_stage(*given, report, not no_pictures)
     _say("\n".join([*sentences, *map(str, made)]), quiet)
+    if ended:
+        raise NotConverged(f"the run ended early, because {ended}; {made[0]} holds what was found")
 
 
 def _share(text: str) -> float:
@@ -714,7 +728,7 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
             A part may be a folder with a body.toml that is there already.
         unit: of lengths, where the file does not tell.
     """
-    from .stages.importing import import_file
+    from .stages.decks import import_deck
     from .stages.parts import import_apart, import_parts
 
     parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
@@ -724,7 +738,7 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
     made = (
         import_apart(file, folder)
         if apart
-        else (import_file(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
+        else (import_deck(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
     )
     for line in made.told:
         print(line)

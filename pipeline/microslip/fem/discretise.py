@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -157,6 +157,20 @@ class FreeUpper:
     indices: Indices
     gather: Indices
 
+    @property
+    def own(self) -> Indices:
+        """(m,) the degree of freedom that each unknown is."""
+        return self.free
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.free)
+
+    def congruent(self, A: sp.csr_matrix) -> sp.csr_matrix:
+        """(m, m) matrix on the unknowns, from (3n, 3n)."""
+        return A[self.free][:, self.free]
+
     def matrix(self, values: Array) -> sp.csr_matrix:
         """CSR upper triangle of an operator (p, 3, 3)."""
         n = len(self.free)
@@ -234,6 +248,17 @@ def discretise(mesh: Mesh, degree: Mapping[str, int] | None = None, coupled: Seq
     )
     pattern, positions = _pattern(mesh.n_points, [b.cells for b in blocks], coupled)
     return Discretisation(mesh, blocks, pattern, positions)
+
+
+REDUCED = {"hexahedron20": 3}
+"""Degree of the rule by which a nearly incompressible brick does not lock: 2 x 2 x 2 points."""
+
+
+def whole(d: Discretisation) -> Discretisation:
+    """The same with the default rule of each cell type, as masses need it."""
+    if all(len(b.at) == len(quadrature(b.cell_type)[0]) for b in d.blocks):
+        return d
+    return replace(d, blocks=tuple(_block(d.mesh, b.cell_type, None, b.region, b.cells) for b in d.blocks))
 
 
 def _by_region(cells: Indices, region: Indices | None) -> Iterator[tuple[int, Indices]]:

@@ -17,7 +17,7 @@ from ..data import Array, Indices, Material, NotConverged, UserError
 from ..elasticity import pushed, strain_tensor
 from ..fem.contact import ContactPair, Grip
 from ..fem.cyclic import CyclicUpper
-from ..fem.discretise import Discretisation, FreeUpper
+from ..fem.discretise import Discretisation, FreeUpper, whole
 from ..fem.operators import (
     displacement_gradient,
     engineering,
@@ -31,6 +31,7 @@ from ..fem.operators import (
     tangent_tensor,
     tangent_tensor_slope,
 )
+from ..fem.tied import Tied
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
 from ..units import rpm_text
 from .closing import Closing
@@ -58,7 +59,7 @@ class BodyModel:
     M: Array
     M_full: sp.csr_matrix
     K0: Array
-    free: FreeUpper | CyclicUpper
+    free: FreeUpper | Tied | CyclicUpper
     fixed: Indices
     dead_load: Array
     axis: Array
@@ -100,7 +101,7 @@ class StaticState:
 
 
 def make_model(
-    d: Discretisation, material: Material | Sequence[Material], free: FreeUpper | CyclicUpper, fixed: Indices,
+    d: Discretisation, material: Material | Sequence[Material], free: FreeUpper | Tied | CyclicUpper, fixed: Indices,
     axis: Array, point: Array, temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
 ) -> BodyModel:  # fmt: skip
     """Assemble what does not depend on speed.
@@ -116,7 +117,7 @@ def make_model(
             factor = [m.modulus_factor(t) for m, t in zip(own, at, strict=True)]
         if any(np.any(m.expansion) for m in own):
             strain = [(t - reference)[..., None] * m.expansion for m, t in zip(own, at, strict=True)]
-    M = mass(d, [m.density for m in own])
+    M = mass(whole(d), [m.density for m in own])
     K = stiffness(d, [m.elasticity for m in own], factor)
     return BodyModel(
         d, tuple(own), factor, strain, M, d.pattern.full(M), K, free, fixed,
@@ -325,7 +326,7 @@ def _newton_at(
         if _stands(steps) and closing.settled:
             if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
                 break  # in balance, but turned inside out
-            whole = isinstance(free, FreeUpper)  # else a sector, whose neighbours count by nodal diameter (`sector`)
+            whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
             K = _tangent(model, H, stress)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)

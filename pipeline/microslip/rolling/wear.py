@@ -39,11 +39,12 @@ def strip_depth(source: Array, dx: float, coefficient: float, speed: float) -> A
     return depth_along(source, dx, coefficient, speed)[0]
 
 
-def deposited(depth: Array, dy: float, middle: float, y: Array) -> Array:
+def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array:
     """Depths of strips brought to strips elsewhere; what is worn off stays the same.
 
     Args:
-        depth: (m,) m, on strips of width dy (m) about `middle` (m). y: (n,) middles of evenly spaced strips, m.
+        depth: (m,) m, on strips of width dy (m, of all or of each) about `middle` (m). y: (n,) middles of evenly spaced
+            strips, m.
 
     Returns:
         (n,) m.
@@ -53,11 +54,12 @@ def deposited(depth: Array, dy: float, middle: float, y: Array) -> Array:
     """
     width = y[1] - y[0]
     ends = np.append(y - width / 2, y[-1] + width / 2)
-    own = middle + dy * (np.arange(len(depth) + 1) - len(depth) / 2)
+    own = np.append(0, np.cumsum(np.broadcast_to(dy, depth.shape)))
+    own = middle + own - own[-1] / 2
     worn = np.flatnonzero(depth)
     if worn.size and not (ends[0] <= own[worn[0]] and own[worn[-1] + 1] <= ends[-1]):
         raise UserError("y: the contact wears beyond the ends of the profile; take a wider one")
-    area = np.append(0, np.cumsum(depth)) * dy
+    area = np.append(0, np.cumsum(depth * dy))
     return np.diff(np.interp(ends, own, area)) / width
 
 

@@ -295,6 +295,7 @@ class Geometry(Model):
     build: str | None = None
     cad: str | None = None
     mesh: str | None = None
+    instances: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
     matrices: MatrixFiles | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
@@ -302,14 +303,21 @@ class Geometry(Model):
     @model_validator(mode="after")
     def _one_source(self) -> Geometry:
         only_one(self, "build", "cad", "mesh", "matrices")
+        if self.instances and self.mesh is None:
+            raise ValueError("instances: are those of a deck; give it as mesh")
         return self
 
 
 class Meshing(Model):
-    """Target element size (length_unit) and local sizes by face name."""
+    """Target element size (length_unit) and local sizes by face name.
+
+    integration: of the stiffness; "reduced" is of bricks of 20 nodes, 8 points instead of 27, for what hardly changes
+    its volume.
+    """
 
     size: Annotated[Positive | None, _LENGTH] = None
     order: Annotated[Literal[1, 2], BeforeValidator(_whole)] = 2
+    integration: Literal["full", "reduced"] = "full"
     local: dict[str, Positive] = Field(default_factory=dict)
 
 
@@ -430,7 +438,13 @@ class Support(Model):
 
     face: FaceName
     directions: Directions = "xyz"
-    rotations: bool = False
+    rotations: bool | Directions = False
+
+    @property
+    def turns(self) -> list[int]:
+        """Rotations about x, y, z that are held too, as 3, 4, 5: of reference nodes and of nodes of matrices."""
+        axes = self.rotations if isinstance(self.rotations, str) else "xyz" * self.rotations
+        return [3 + "xyz".index(c) for c in axes]
 
 
 class Cyclic(Model):

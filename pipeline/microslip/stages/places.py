@@ -71,6 +71,21 @@ def is_rolling(path: Path) -> bool:
     return _keys(path) >= {"wheel", "rail"}
 
 
+def is_kinematics(path: Path) -> bool:
+    """True for a case of wear by given kinematics."""
+    return _keys(path) >= {"wheel", "rail", "kinematics"}
+
+
+def is_tyre(path: Path) -> bool:
+    """True for a case of a tyre whose slip jumps."""
+    return _keys(path) >= {"tyre", "jumps"}
+
+
+def is_vehicle(path: Path) -> bool:
+    """True for a case of rolling contact with a vehicle."""
+    return _keys(path) >= {"wheel", "rail", "vehicle"}
+
+
 def is_case(path: Path) -> bool:
     """True for a case file (it has a sweep, or bodies of which another thing is asked), False for a body file."""
     keys = _keys(path)

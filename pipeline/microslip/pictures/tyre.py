@@ -1,0 +1,47 @@
+"""A tyre whose slip jumps: its patch, a jump with the exponential that fits it, time constants over the slip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..rolling.brush import fitted, jump
+from ..rolling.slip import Studied
+from .plots import COLOURS, empty_figure, plain_axes, save_figure
+
+
+def tyre_picture(found: Studied, path: Path, title: str) -> Path:
+    """Four panels."""
+    figure = empty_figure(9.6, 6.4)
+    (patch, steady), (one, constants) = figure.subplots(2, 2)
+    for axes in (patch, steady, one, constants):
+        plain_axes(axes)
+    r, b = found.row, found.brush
+    patch.plot(1e3 * r.x, 1e-3 * r.pressure, ".", color="0.6", label="points of the mesh")
+    patch.plot(1e3 * r.smooth[:, 0], 1e-3 * r.smooth[:, 1], color=COLOURS[0], label="of the row")
+    patch.legend(fontsize=8)
+    half = 0.7e3 * r.length
+    patch.set(xlabel="x in mm, rolling to the right", ylabel="kPa", xlim=(-half, half), title="pressure of the patch")
+    slips, forces = found.steady
+    steady.plot(100 * slips, forces, color=COLOURS[0])
+    steady.set(xlabel="slip in %", ylabel="force over normal force", ylim=(0, None), title="steady rolling")
+    shown = found.case.jumps.shown
+    for i, (first, last) in enumerate(((0.0, shown), (shown, 0.0))):
+        time, force = jump(b, first, last, r.force, 4.0)
+        constant = fitted(time, force)
+        one.plot(time, force / r.force, color=COLOURS[i], label=f"slip {100 * first:g} to {100 * last:g} %")
+        fit = force[-1] + (force[0] - force[-1]) * np.exp(-time / constant)
+        one.plot(time, fit / r.force, ":", color=COLOURS[i], label=f"exponential of {constant:.3g} s")
+    one.set(xlabel="time in s", ylabel="force over normal force", title="a jump and back")
+    one.legend(fontsize=8)
+    c = found.constants
+    for i, (way, name) in enumerate((("up", "from 0 to the slip"), ("down", "from the slip to 0"))):
+        constants.plot(100 * c["slip"], c[f"{way}_fitted_s"], "o-", markersize=3, color=COLOURS[i], label=name)
+        constants.plot(
+            100 * c["slip"], c[f"rigid_{way}_fitted_s"], "--", color=COLOURS[i], label=f"{name}, rigid wheel"
+        )
+    constants.set(xlabel="slip in %", ylabel="time constant in s", ylim=(0, None), title="time constants")
+    constants.legend(fontsize=8)
+    figure.suptitle(title)
+    return save_figure(figure, path)

@@ -1,0 +1,135 @@
+"""A row of point contacts that is passed by material while slip and load change: unsteady rolling (Sextro, 6.10).
+
+Elements lie in a row along rolling; material enters at the first one. What an element remembers moves on to the next
+one while the wheel rolls by its length, so the step of time is that of an element, and convection is exact. The wheel's
+structure is one mode, that gives way along rolling under the force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..data import Array, UserError
+
+
+@dataclass(frozen=True)
+class Brush:
+    """Attributes:
+    share: (n,) of the normal force on each element, their sum 1, from the leading edge on. length: of the row, m.
+    stiffness: of all elements together, N/m. friction: coefficient. speed: of rolling, m/s. compliance: of the mode,
+    m/N; frequency: of it, rad/s; damping: ratio of it.
+
+    Raises:
+        UserError: a number that is none of a brush.
+    """
+
+    share: Array
+    length: float
+    stiffness: float
+    friction: float
+    speed: float
+    compliance: float = 0.0
+    frequency: float = np.inf
+    damping: float = 0.05
+
+    def __post_init__(self) -> None:
+        for key in ("length", "stiffness", "friction", "speed", "frequency"):
+            if not getattr(self, key) > 0:
+                raise UserError(f"{key}: {getattr(self, key):g}; it must be greater than 0")
+        if not (np.min(self.share) >= 0 and abs(np.sum(self.share) - 1) < 1e-9):
+            raise UserError("share: must be 0 or more everywhere and have the sum 1")
+
+    @property
+    def step(self) -> float:
+        """s, in which the wheel rolls by an element."""
+        return self.length / len(self.share) / self.speed
+
+    @property
+    def spring(self) -> float:
+        """N/m of an element."""
+        return self.stiffness / len(self.share)
+
+    def carried(self, slip: ArrayLike, force: ArrayLike) -> Array:
+        """(t,) tangential force after each step, N, from rest of the springs.
+
+        Args:
+            slip: (t,) slip over the speed of rolling, in each step. force: (t,) normal force, N.
+        """
+        slip, force = np.broadcast_arrays(np.asarray(slip, float), np.asarray(force, float))
+        u, mode = np.zeros(len(self.share)), np.zeros(3)
+        out = np.empty(len(slip))
+        for i, (s, normal) in enumerate(zip(slip, force, strict=True)):
+            rigid = s * self.speed * self.step
+            moved = np.concatenate([[0.0], u[:-1]])
+            way = np.ones(len(u))
+            way[0] = 0.5  # the first element is reached in the middle
+            limit = self.friction * normal * self.share / self.spring
+            mode, u = self._balanced(mode, moved + way * rigid, way, limit)
+            out[i] = self.spring * u.sum()
+        return out
+
+    def _balanced(self, mode: Array, far: Array, way: Array, limit: Array) -> tuple[Array, Array]:
+        """Mode (w, its velocity and acceleration) and stretches at the end of a step: Newmark's method, and Newton's on
+        the one unknown dw, as the force falls with it piecewise straight."""
+        if self.compliance == 0:
+            return mode, np.clip(far, -limit, limit)
+        h, c = self.step, self.compliance
+        w0, v0, a0 = mode
+        soft = 0.0 if np.isinf(self.frequency) else 1 / self.frequency**2
+        loss = 0.0 if np.isinf(self.frequency) else 2 * self.damping / self.frequency
+        mass = soft * 4 / h**2 + loss * 2 / h + 1  # of w over c, by the mean acceleration
+        known = soft * (4 / h * v0 + a0) + loss * v0  # of what dw = w - w0 does not change
+        dw = 0.0
+        for _ in range(100):
+            free = far - way * dw
+            u = np.clip(free, -limit, limit)
+            slope = -self.spring * (way * (np.abs(free) < limit)).sum()
+            left = mass * dw - known + w0 - c * self.spring * u.sum()
+            change = -left / (mass - c * slope)
+            dw += change
+            if abs(change) <= 1e-13 * max(abs(dw), 1e-9):
+                break
+        u = np.clip(far - way * dw, -limit, limit)
+        if not soft:
+            return np.array([w0 + dw, dw / h, 0.0]), u
+        v = 2 / h * dw - v0
+        return np.array([w0 + dw, v, 2 / h * (v - v0) - a0]), u
+
+
+def parabola(elements: int) -> Array:
+    """(n,) shares of a parabolic pressure (6.4-29)."""
+    edge = 1 - 2 * np.arange(elements + 1) / elements
+    return 0.75 * -np.diff(edge - edge**3 / 3)
+
+
+def jump(brush: Brush, before: float, after: float, force: float, lengths: float = 12.0) -> tuple[Array, Array]:
+    """Time after a jump of the slip (s), and the force, N, both from the moment of the jump on; steady before it."""
+    n = int(np.ceil(lengths * len(brush.share)))
+    slip = np.concatenate([np.full(n, before), np.full(n, after)])
+    found = brush.carried(slip, force)[n - 1 :]
+    return brush.step * np.arange(n + 1), found
+
+
+def reached(time: Array, force: Array) -> float:
+    """s after which 1 - 1/e of the change of the force is done; straight between steps."""
+    done = (force - force[0]) / (force[-1] - force[0])
+    i = int(np.argmax(done >= 1 - np.exp(-1)))
+    low, high = done[i - 1], done[i]
+    return float(time[i - 1] + (1 - np.exp(-1) - low) / (high - low) * (time[i] - time[i - 1]))
+
+
+def fitted(time: Array, force: Array) -> float:
+    """s, time constant of the exponential that fits the force best (Sextro Fig. 6.10-4); its ends are those of the
+    force."""
+    from scipy.optimize import minimize_scalar
+
+    done = (force - force[0]) / (force[-1] - force[0])
+
+    def error(constant: float) -> float:
+        return float(((done - 1 + np.exp(-time / constant)) ** 2).sum())
+
+    about = reached(time, force)
+    return float(minimize_scalar(error, bounds=(0.2 * about, 5 * about), method="bounded").x)

@@ -1,0 +1,204 @@
+"""The case of a small vehicle on unround wheels; every key, checked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..contact.keys import FileName
+from ..contact.solids import Solid
+from ..data import Array
+from ..rolling.ellipse import combined
+from ..rolling.settings import ModelOfCase, Rail, TableOfCase, WearOfCase, Wheel
+from ..rolling.wheelset import Track
+from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
+from ..settings.mistakes import validate
+from ..system.lumped import Body, Link, System
+from .motion import Vehicle
+from .touch import touching
+
+Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
+Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
+
+
+class VehicleOfCase(Model):
+    """A wheelset and its primary suspension to a frame that moves straight on.
+
+    Attributes:
+        load: of the axle on both rails, its own weight included, N. mass: of the wheelset, kg. inertia: of roll, spin
+            and yaw, kg m2. suspension_stiffness, suspension_damping: of each side, along x, y, z, N/m and N s/m.
+            suspension_at: of each side from the middle, m.
+    """
+
+    load: Positive
+    mass: Positive
+    inertia: Inertia
+    suspension_stiffness: Three
+    suspension_damping: Three = (0.0, 0.0, 0.0)
+    suspension_at: Positive = 1.0
+
+
+class TrackOfCase(Model):
+    """What of a rail moves with a wheel. Attributes: mass: kg. stiffness: N/m. damping: N s/m. Of each rail."""
+
+    mass: Positive
+    stiffness: Positive
+    damping: NotNegative
+
+
+class RunningOfCase(Model):
+    """speed: m/s. turns: of the wheels. torque: on the axle, N m. reach: lateral, m, for which contacts are known.
+    places: over the circumference. creep: forces of the motion. speeds: at which growth is looked for, m/s."""
+
+    speed: Positive
+    turns: Annotated[Positive, Field(le=1e9)]
+    torque: Number = 0.0
+    reach: Annotated[Positive, Field(le=0.05)] = 0.006
+    places: Annotated[int, Field(ge=24, le=1440)] = 180
+    creep: Literal["table", "strips", "linear"] = "table"
+    speeds: Annotated[tuple[Positive, ...], BeforeValidator(_tuple)] = ()
+    orders: Annotated[int, Field(ge=1, le=100)] = 20
+
+
+class Unround(Model):
+    """A wave of a wheel's radius. Attributes: order: waves over the circumference. amplitude: m. angle: of the first
+    crest after the mark, rad."""
+
+    wheel: Literal["right", "left", "both"] = "both"
+    order: Annotated[int, Field(ge=1, le=100)]
+    amplitude: Annotated[Positive, Field(le=5e-3)]
+    angle: Number = 0.0
+
+
+class WearOfVehicle(WearOfCase):
+    """tolerance: of the radius, of each jump over many turns, m."""
+
+    tolerance: Positive = 1e-7
+
+
+class KinematicsOfCase(Model):
+    """file: what another program wrote of a wheel's running, see `kinematics.read_kinematics`. side: of the wheel.
+    turns: over which it wears. places: over the circumference."""
+
+    file: FileName
+    side: Literal["right", "left"] = "right"
+    turns: Annotated[Positive, Field(le=1e9)]
+    places: Annotated[int, Field(ge=24, le=1440)] = 180
+
+
+class KinematicsCase(Model):
+    """friction: coefficient."""
+
+    name: Name
+    friction: Positive
+    wheel: Wheel
+    rail: Rail
+    kinematics: KinematicsOfCase
+    wear: WearOfCase
+    model: ModelOfCase = ModelOfCase(exact=0)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """As `strips.creep_forces`."""
+        return self.model.model_dump(exclude={"exact"})
+
+
+class VehicleCase(Model):
+    """friction: coefficient."""
+
+    name: Name
+    friction: Positive
+    wheel: Wheel
+    rail: Rail
+    vehicle: VehicleOfCase
+    track: TrackOfCase
+    running: RunningOfCase
+    unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
+    wear: WearOfVehicle
+    model: ModelOfCase = ModelOfCase(exact=0)
+    table: TableOfCase = TableOfCase(points=(33, 33, 25, 9))
+
+    @model_validator(mode="after")
+    def _fits(self) -> VehicleCase:
+        most = max((u.order for u in self.unround), default=1)
+        if self.running.places < 8 * max(most, self.running.orders):
+            raise ValueError(
+                f"running.places: {self.running.places} do not show waves of order {max(most, self.running.orders)}; "
+                "give eight times as many at the least"
+            )
+        return self
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """As `strips.creep_forces`."""
+        return self.model.model_dump(exclude={"exact"})
+
+    def made(self, folder: Path) -> Vehicle:
+        """Of files beside the case.
+
+        Raises:
+            UserError: profiles that are none, or do not reach.
+        """
+        track = track_of(self, folder)
+        elastic = track.elastic
+        each = 0.5 * self.vehicle.load
+        found = touching(track, each, self.running.reach)
+        M, C, K = self.lumped().matrices()
+        _, spin, _ = self.vehicle.inertia
+        return Vehicle(M, C, K, spin, self.vehicle.load, self.running.torque, self.running.speed, found.over,
+                       found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
+
+    def lumped(self) -> System:
+        """Wheelset, suspension and rails, the coordinates those of `motion`."""
+        v, t, r = self.vehicle, self.track, self.wheel.radius
+        bodies = [Body("wheelset", v.mass, (0, 0, -r), v.inertia, "y z rx rz")]
+        bodies += [
+            Body(name, t.mass, (0, y, 0), free="z") for name, y in (("right", self.rail.at), ("left", -self.rail.at))
+        ]
+        k, c = v.suspension_stiffness, v.suspension_damping
+        links = [Link("ground", "wheelset", k, c, at=(0, y, -r)) for y in (v.suspension_at, -v.suspension_at)]
+        links += [Link("ground", name, t.stiffness, t.damping, axis=(0, 0, 1)) for name in ("right", "left")]
+        return System(self.name, bodies, links)
+
+    def shape(self) -> Array:
+        """(places, 2) deviations of the new radii, right wheel first, m."""
+        angle = 2 * np.pi * np.arange(self.running.places) / self.running.places
+        out = np.zeros((len(angle), 2))
+        for u in self.unround:
+            sides = {"right": [0], "left": [1], "both": [0, 1]}[u.wheel]
+            out[:, sides] += u.amplitude * np.cos(u.order * (angle - u.angle))[:, None]
+        return out
+
+
+def track_of(case: VehicleCase | KinematicsCase, folder: Path) -> Track:
+    """Of files beside the case.
+
+    Raises:
+        UserError: profiles that are none.
+    """
+    elastic = combined(*(Solid(s.young, s.poisson) for s in (case.wheel, case.rail)))
+    rail = case.rail.made(folder, 1.0).turned(case.rail.inclination)
+    return Track(case.wheel.made(folder, -1.0), rail, case.wheel.radius, case.wheel.at, case.rail.at, elastic)
+
+
+def load_kinematics(path: Path, assignments: list[str] | None = None) -> tuple[KinematicsCase, dict[str, Any]]:
+    """Read and check a case of given kinematics (SI units).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    raw = override(load_toml(path), assignments or [], path)
+    return validate(KinematicsCase, raw, path), raw
+
+
+def load_vehicle(path: Path, assignments: list[str] | None = None) -> tuple[VehicleCase, dict[str, Any]]:
+    """Read and check a case of a vehicle (SI units).
+
+    Raises:
+        UserError: with every mistake named by file and key.
+    """
+    raw = override(load_toml(path), assignments or [], path)
+    return validate(VehicleCase, raw, path), raw

@@ -1,0 +1,212 @@
+"""What a case of a small vehicle asks: how its wheels wear over their circumference, and which orders grow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Array, UserError
+from ..rolling.table import CreepTable, creep_table
+from .creep import Creep, linear, of_strips, of_table
+from .motion import Vehicle, critical_speed, hunting, roots, steady
+from .settings import VehicleCase
+from .wearing import Jump, LeavesTheRail, Now, Rolling, growth, jumps, orders_of, tread
+
+WHEELS = ("right", "left")
+SMALL = 1e-6
+"""m, amplitude of each order by which growth is looked for."""
+FASTEST = 200.0
+"""m/s up to which a critical speed is looked for."""
+
+
+@dataclass(frozen=True)
+class Studied:
+    """Attributes: history: running and the jump to it, from new wheels on. ended: why it ends early, or nothing.
+    speeds, grown: (n,) m/s and (n, orders) share per turn by which the waves of the wheel that is looked at grow.
+    wheel: its index. critical: speed of hunting, m/s. table: of creep forces, if one was used."""
+
+    case: VehicleCase
+    vehicle: Vehicle
+    rolling: Rolling
+    history: list[tuple[Now, Jump]]
+    ended: str
+    speeds: Array
+    grown: Array
+    wheel: int
+    critical: float | None
+    table: CreepTable | None
+
+    @property
+    def orders(self) -> int:
+        return self.case.running.orders
+
+    @property
+    def way(self) -> float:
+        """m that a turn rolls."""
+        return self.rolling.tread.way * self.case.running.places
+
+    def amplitudes(self) -> Array:
+        """(jumps, orders, wheels) of the radii that the contacts see, m."""
+        return np.array([orders_of(now.radius, self.orders) for now, _ in self.history])
+
+    def circumference(self) -> dict[str, Array]:
+        """Of the table over the circumference: of the first turn, and what is worn at the end."""
+        first, last = self.history[0][0], self.history[-1][0]
+        on, t = first.one.on, self.rolling.tread
+        columns = {"angle_deg": 360 * np.arange(self.case.running.places) / self.case.running.places}
+        per_km = 1e3 / self.way
+        for k, name in enumerate(WHEELS):
+            columns |= {
+                f"{name}_radius_m": first.radius[:, k], f"{name}_radius_at_end_m": last.radius[:, k],
+                f"{name}_normal_force_N": np.asarray(on.normal_force)[:, k],
+                f"{name}_longitudinal_creepage": np.asarray(on.xi)[:, k],
+                f"{name}_lateral_creepage": np.asarray(on.eta)[:, k],
+                f"{name}_depth_m_per_km": per_km * t.seen(first.taken, on)[:, k],
+                f"{name}_depth_at_end_m": t.seen(last.depth, on)[:, k],
+            }  # fmt: skip
+        return columns
+
+    def growing(self) -> dict[str, Array]:
+        """Of the table over the distance."""
+        turns = np.array([now.turns for now, _ in self.history])
+        columns = {"turns": turns, "distance_km": 1e-3 * turns * self.way}
+        columns["jump_turns"] = np.array([j.size for _, j in self.history])
+        columns["error_m"] = np.array([j.error for _, j in self.history])
+        for k, name in enumerate(WHEELS):
+            columns[f"{name}_volume_m3"] = np.array([j.volume[k] for _, j in self.history])
+            columns[f"{name}_friction_work_J"] = np.array([j.work[k] for _, j in self.history])
+        found = self.amplitudes()
+        for k, name in enumerate(WHEELS):
+            columns |= {f"{name}_order_{n + 1}_m": found[:, n, k] for n in range(self.orders)}
+        return columns
+
+    def over_speed(self) -> dict[str, Array]:
+        """Of the table of growth; no columns where it is not asked."""
+        if not len(self.speeds):
+            return {}
+        columns = {"speed_m_per_s": self.speeds}
+        return columns | {f"order_{n + 1}_per_1000_km": 1e6 / self.way * self.grown[:, n] for n in range(self.orders)}
+
+    def sentences(self) -> list[str]:
+        """What a reader came for."""
+        now, _ = self.history[-1]
+        km = 1e-3 * now.turns * self.way
+        found, told = self.amplitudes(), []
+        for k, name in enumerate(WHEELS):
+            first, last = found[0, :, k], found[-1, :, k]
+            if not first.max() > 1e-9:
+                continue
+            n = int(first.argmax())
+            told.append(
+                f"Order {n + 1} of the {name} wheel goes from {1e6 * first[n]:.4g} to {1e6 * last[n]:.4g} um in "
+                f"{km:.5g} km ({now.turns:.4g} turns)."
+            )
+            m = int((last - first).argmax())
+            if last[m] - first[m] > 1e-9:
+                told.append(f"Of the others order {m + 1} grows most, to {1e6 * last[m]:.3g} um." if m != n else "")
+        told += self._shifted()
+        error = sum(j.error for _, j in self.history)
+        told.append(
+            f"{len(self.history) - 1} jumps: their errors, each less than its difference to a jump of first order, "
+            f"are together below {1e6 * error:.2g} um of the radius."
+        )
+        told.append(self._hunts())
+        if self.table is not None:
+            told.append(f"Creep forces of the motion are read from a table, {100 * self.table.error[:, 0].max():.2g} % "
+                        "of mu F_N off in the mean; those of the wear are not.")  # fmt: skip
+        return [s for s in [*told, f"warning: it ends there: {self.ended}." if self.ended else ""] if s]
+
+    def _shifted(self) -> list[str]:
+        """How the waves of what is worn lie beside those of the wheel (Fig. 6.9-1)."""
+        k, now = self.wheel, self.history[0][0]
+        worn = np.fft.rfft(self.rolling.tread.seen(now.taken, now.one.on)[:, k])
+        shape = np.fft.rfft(now.radius[:, k])
+        n = int(np.abs(shape[1:]).argmax()) + 1
+        if not np.abs(shape[n]) > 1e-9:
+            return []
+        behind = np.rad2deg(np.angle(shape[n] / worn[n])) / n
+        double = np.abs(worn[2 * n]) / np.abs(worn[n])
+        return [
+            f"A new {WHEELS[k]} wheel with {n} crests wears most {abs(behind):.3g} degrees "
+            f"{'behind' if behind > 0 else 'before'} them; waves of order {2 * n} of the wear are {double:.2g} times "
+            f"those of order {n}."
+        ]
+
+    def _hunts(self) -> str:
+        root = hunting(self.vehicle)
+        state = "dies out" if root.real < 0 else "grows"
+        told = f"Lateral motion {state} by exp({root.real:.3g} t) at {self.vehicle.speed:g} m/s"
+        if self.critical is None:
+            return f"{told}; no critical speed of hunting was found up to {FASTEST:g} m/s."
+        return f"{told}; the critical speed of hunting is {self.critical:.4g} m/s."
+
+
+def study(case: VehicleCase, folder: Path, report: Callable[[str], None] = lambda _: None) -> Studied:
+    """Wear of a case whose files stand in a folder.
+
+    Raises:
+        UserError: profiles that do not reach, a vehicle that has no running that comes back on new wheels.
+    """
+    report("contacts over the lateral displacement")
+    v = case.made(folder)
+    if roots(v)[0].real.max() > 0:
+        raise UserError(
+            f"running.speed: the wheelset hunts at {v.speed:g} m/s, its critical speed of hunting is "
+            f"{critical_speed(v, 1.0, FASTEST) or 0:.4g} m/s; run slower or hold it by a stiffer suspension"
+        )
+    creep, table = _creep(case, v, report)
+    t = tread(v, case.running.places, case.wear.coefficient, case.how)
+    r = Rolling.of(v, creep, t, case.shape())
+    report("wear by jumps over many turns")
+    history, ended = _worn(case, r, report)
+    wheel = int(np.abs(r.shape).max(axis=0).argmax())
+    grown = [_grown(case, v, creep, speed, wheel, report) for speed in case.running.speeds]
+    speeds = [s for s, g in zip(case.running.speeds, grown, strict=True) if g is not None]
+    table_of = np.array([g for g in grown if g is not None]).reshape(len(speeds), case.running.orders)
+    critical = critical_speed(v, 1.0, FASTEST)
+    return Studied(case, v, r, history, ended, np.array(speeds), table_of, wheel, critical, table)
+
+
+def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tuple[Creep, CreepTable | None]:
+    if case.running.creep == "linear":
+        return linear, None
+    if case.running.creep == "strips":
+        return of_strips(**case.how), None
+    report("table of creep forces")
+    table = creep_table(float(v.poisson), points=case.table.points, checked=2000, **case.how)
+    return of_table(table), table
+
+
+def _worn(case: VehicleCase, r: Rolling, report: Callable[[str], None]) -> tuple[list[tuple[Now, Jump]], str]:
+    history: list[tuple[Now, Jump]] = []
+    turns = case.running.turns
+    try:
+        for now, jump in jumps(r, turns, case.wear.tolerance, min(1e3, turns)):
+            history.append((now, jump))
+            report(f"{now.turns:.0f} of {turns:.0f} turns")
+    except LeavesTheRail as stop:
+        if not history:
+            raise UserError(f"running, unround: already on new wheels {stop}; run slower or give less") from stop
+        return history, str(stop)
+    return history, ""
+
+
+def _grown(
+    case: VehicleCase, v: Vehicle, creep: Creep, speed: float, wheel: int, report: Callable[[str], None]
+) -> Array | None:  # fmt: skip
+    """(orders,) per turn; None where it does not run."""
+    report(f"growth at {speed:g} m/s")
+    at = v._replace(speed=speed)
+    if roots(at)[0].real.max() > 0 or not np.isfinite(steady(at)).all():
+        report(f"warning: the wheelset hunts at {speed:g} m/s, which is left out")
+        return None
+    t = tread(at, case.running.places, case.wear.coefficient, case.how)
+    try:
+        r = Rolling.of(at, creep, t, np.zeros((case.running.places, 2)))
+        return growth(r, np.arange(1, case.running.orders + 1), SMALL, wheel)
+    except LeavesTheRail as stop:
+        report(f"warning: at {speed:g} m/s {stop}; it is left out")
+        return None

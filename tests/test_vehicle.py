@@ -1,0 +1,295 @@
+"""A small vehicle on unround wheels: its equations, hunting, balance of energy, wear by jumps, bad input."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microslip.cli import main
+from microslip.files.tables import columns_csv
+from microslip.rolling.table import creep_table
+from microslip.rolling.wheelset import Pose, patches
+from microslip.vehicle import motion, wearing
+from microslip.vehicle.creep import linear, of_strips, of_table
+from microslip.vehicle.kinematics import recorded
+from microslip.vehicle.settings import VehicleCase, load_kinematics, load_vehicle, track_of
+
+CASE = Path(__file__).parents[1] / "pipeline" / "cases" / "unround-wheel.toml"
+PLACES = 48
+
+
+@pytest.fixture(scope="module")
+def case() -> VehicleCase:
+    return load_vehicle(CASE, [f"running.places={PLACES}", "running.orders=6", "running.speeds=[]"])[0]
+
+
+@pytest.fixture(scope="module")
+def vehicle(case: VehicleCase) -> motion.Vehicle:
+    return case.made(CASE.parent)
+
+
+@pytest.fixture(scope="module")
+def rolling(case: VehicleCase, vehicle: motion.Vehicle) -> wearing.Rolling:
+    t = wearing.tread(vehicle, PLACES, case.wear.coefficient, case.how)
+    return wearing.Rolling.of(vehicle, linear, t, case.shape())
+
+
+@pytest.mark.slow
+def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: motion.Vehicle) -> None:
+    """Force, place, creepages of a turned wheelset against `rolling.wheelset.patches` under the same vertical force."""
+    x = motion.steady(vehicle)
+    x[0], x[3] = 2.1e-3, 4e-3
+    t = motion.at(vehicle.over, vehicle.reach, x[0])
+    x[2] = float(t.roll[0])
+    found = motion.contacts(vehicle, x, np.zeros(2))
+    track = track_of(case, CASE.parent)
+    for k, side in enumerate(("right", "left")):
+        pose = Pose(x[0], x[3], x[2], vehicle.speed, float(x[12]))
+        p = patches(track, pose, side, float(found.vertical[k]))[0]
+        assert float(found.normal_force[k]) == pytest.approx(p.normal_force, rel=1e-4)
+        np.testing.assert_allclose([found.a[k], found.b[k]], [p.a, p.b], rtol=2e-3)
+        np.testing.assert_allclose(found.on_wheel[k], p.on_wheel, atol=2e-5)
+        np.testing.assert_allclose([found.xi[k], found.eta[k]], [p.xi, p.eta], atol=1.2e-5)  # yaw^2/2 is 8e-6
+        assert float(found.phi[k]) == pytest.approx(p.phi, rel=1e-3)
+
+
+def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
+    """Slow, without suspension across and along: omega = V sqrt(conicity/(r l)), conicity the slope of the difference
+    of the rolling radii; the spin turns the wave a little."""
+    free = np.array(vehicle.stiffness)
+    free[[0, 2, 0, 2, 3], [0, 2, 2, 0, 3]] = 0.0
+    o, step = vehicle.over, 2 * vehicle.reach / (vehicle.over.a.shape[1] - 1)
+    middle = o.a.shape[1] // 2
+    conicity = 0.5 * np.gradient(o.radius[0] - o.radius[1], step)[middle]
+    wave = 2.0 * np.sqrt(conicity / (o.radius[0, middle] * o.across[0, middle]))
+    slow = vehicle._replace(speed=2.0, stiffness=free, damping=0 * free + np.diag([0, 1e5, 0, 0, 1e5, 1e5]))
+    assert motion.hunting(slow).imag == pytest.approx(wave, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_small_push_grows_by_the_root_above_the_critical_speed_and_dies_out_below(vehicle: motion.Vehicle) -> None:
+    """Of the motion in time, by its own integration, against the roots."""
+    critical = motion.critical_speed(vehicle, 20.0, 200.0)
+    assert critical is not None
+    for factor in (0.95, 1.05):
+        v = vehicle._replace(speed=factor * critical)
+        values, shapes = motion.roots(v)
+        root = motion.hunting(v)
+        shape = np.real(shapes[:, np.abs(values - root).argmin()])
+        x = motion.steady(v)
+        flat = np.zeros((2 * motion.steps_of_a_turn(v, PLACES), 2))
+        at = x + 1e-5 * shape / np.abs(shape[0])
+        sizes, time = [], 0.0
+        for _ in range(40):
+            one = motion.turned(v, linear, at, flat, flat, len(flat) // 2 // PLACES)
+            sizes.append((time, at - x))
+            at, time = np.asarray(one.end), time + float(one.time)
+        left = np.linalg.inv(shapes)[np.abs(values - root).argmin()]
+        part = np.array([np.log(np.abs(left @ d)) for _, d in sizes])
+        rate = np.polyfit([t for t, _ in sizes], part, 1)[0]
+        assert rate == pytest.approx(root.real, rel=2e-3) and (rate > 0) == (factor > 1)
+
+
+@pytest.mark.slow
+def test_energy_of_a_turn_balances(rolling: wearing.Rolling) -> None:
+    """What pull and torque bring is stored, rubbed and damped away; the rest falls with the step."""
+    v = rolling.vehicle._replace(torque=500.0)
+    x = motion.steady(v)
+    off = []
+    for fine in (1, 2):
+        out, rise = motion.resampled(rolling.shape, 2 * fine * rolling.steps)
+        one = motion.turned(v, linear, x, out, rise, fine * rolling.steps // PLACES)
+        stored = float(motion.energy(v, one.end, out[0]) - motion.energy(v, x, out[0]))
+        pull, torque, friction, damped = map(float, one.work)
+        off.append(abs(pull + torque - friction - damped - stored) / max(friction, abs(stored)))
+    assert off[0] < 1e-4 and off[1] < 0.3 * off[0] + 1e-7
+
+
+@pytest.mark.slow
+def test_the_table_goes_the_way_of_the_strips(rolling: wearing.Rolling) -> None:
+    """A turn with forces read from a table and with the strips themselves: apart by the error of the table at most."""
+    how = {"elements": (8, 8)}
+    table = creep_table(rolling.vehicle.poisson, points=(33, 33, 25, 9), checked=2000, **how)
+    x = motion.steady(rolling.vehicle)
+    x[0] += 1e-3
+    out, rise = motion.resampled(rolling.shape, 2 * rolling.steps)
+    ends = []
+    for creep in (of_strips(**how), of_table(table)):
+        ends.append(motion.turned(rolling.vehicle, creep, x, out, rise, rolling.steps // PLACES))
+    strips, read = (np.asarray(e.states) for e in ends)
+    v, time = rolling.vehicle, float(ends[0].time)
+    pushed = 2 * float(table.error[1, 2]) * v.friction * v.each  # both wheels, the largest error all the time
+    assert np.abs(strips - read)[:, 0].max() < 0.5 * pushed / v.mass[0, 0] * time**2
+    assert np.abs(strips[:, 0] - read[:, 0]).max() < 0.02 * np.ptp(strips[:, 0])
+
+
+def test_worn_volume_is_the_coefficient_times_the_work(rolling: wearing.Rolling) -> None:
+    """Per jump, the work from the creep forces, the volume from the strips of the tread."""
+    found = list(wearing.jumps(rolling, 1e5, 1e-9, 2e4))
+    for _, jump in found[1:]:
+        np.testing.assert_allclose(jump.volume, rolling.tread.coefficient * jump.work, rtol=1e-10)
+    assert found[-1][0].turns == pytest.approx(1e5)
+
+
+@pytest.mark.slow
+def test_jumps_are_of_second_order(rolling: wearing.Rolling) -> None:
+    """Radii after as many turns, by jumps of a half, a quarter, ... of them."""
+    far, ends = 4e6, []
+    for count in (2, 4, 8, 32):
+        *_, (last, _) = wearing.jumps(rolling, far, 1.0, far / count, fixed=True)
+        ends.append(last.radius[:, 0])
+    off = [np.abs(e - ends[-1]).max() for e in ends[:-1]]
+    order = -np.polyfit(np.log([2, 4, 8]), np.log(off), 1)[0]
+    assert order == pytest.approx(2, abs=0.35)
+
+
+def test_three_crests_wear_as_the_figure_says(rolling: wearing.Rolling) -> None:
+    """Fig. 6.9-1: wear shows three maxima, shifted against those of the wheel, and three more of the creepage."""
+    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    worn = np.fft.rfft(rolling.tread.seen(now.taken, now.one.on)[:, 0])
+    size = np.abs(worn[1:])
+    assert set(np.argsort(-size)[:2] + 1) == {3, 6}
+    shift = np.rad2deg(np.angle(worn[3] / np.fft.rfft(now.radius[:, 0])[3])) / 3
+    assert 5 < abs(shift) < 60
+
+
+def test_a_round_wheel_stays_round(rolling: wearing.Rolling) -> None:
+    """And wears alike on both sides."""
+    flat = replace(rolling, shape=np.zeros_like(rolling.shape))
+    *_, (last, jump) = wearing.jumps(flat, 1e6, 1e-7, 1e5)
+    assert np.ptp(last.radius, axis=0).max() < 1e-5 * np.abs(last.radius).max()
+    assert jump.volume[0] == pytest.approx(jump.volume[1], rel=1e-6)
+
+
+# --- the command line ----------------------------------------------------------------------------------------------
+
+SHORT = ("running.places=48", "running.orders=6", "running.speeds=[]", 'running.creep="linear"', "running.turns=1e5")
+
+
+def asked(*changes: str) -> list[str]:
+    return ["roll", str(CASE), *(w for c in (*SHORT, *changes) for w in ("--set", c)), "--no-pictures", "-q"]
+
+
+def test_a_case_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(asked()) == 0
+    folder = tmp_path / "build" / "unround-wheel"
+    rows = list(csv.DictReader((folder / "growth.csv").open()))
+    assert float(rows[-1]["turns"]) == 1e5 and (folder / "unround.html").is_file()
+    for row in rows[1:]:
+        assert float(row["right_volume_m3"]) == pytest.approx(7e-13 * float(row["right_friction_work_J"]), rel=1e-8)
+    assert len(list(csv.DictReader((folder / "circumference.csv").open()))) == 48
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ("running.speed=160", "running.speed"),
+        pytest.param("unround=[{order=3, amplitude=4e-3}]", "unround", marks=pytest.mark.slow),
+        ("running.places=30", "running.places"),
+        ("running.reach=0.04", "pose.lateral"),
+    ],
+)
+def test_bad_input(
+    change: str, key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A vehicle that hunts, a wheel that leaves its rail, too few places, a reach beyond the profile: exit 2."""
+    monkeypatch.chdir(tmp_path)
+    assert main(asked(change)) == 2
+    assert key in capsys.readouterr().err and not (tmp_path / "build" / "unround-wheel" / "growth.csv").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_keeps_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The wheel leaves its rail after wear has gone on for a while: exit 1, tables of what was found."""
+    monkeypatch.chdir(tmp_path)
+    assert main(asked("wear.coefficient=1e-9", "wear.tolerance=1e-5", "running.turns=1e6")) == 1
+    rows = list(csv.DictReader((tmp_path / "build" / "unround-wheel" / "growth.csv").open()))
+    assert 1 < len(rows) and float(rows[-1]["turns"]) < 1e6
+    assert "ended early" in capsys.readouterr().err
+
+
+# --- kinematics of another program ---------------------------------------------------------------------------------
+
+
+def table(rolling: wearing.Rolling, turns: int = 2) -> tuple[dict[str, np.ndarray], wearing.Now]:
+    """What the package's own vehicle would write of its right wheel, and that running."""
+    now = wearing.running(rolling, np.zeros((2, PLACES, len(rolling.tread.y))), 0.0)
+    on, n = now.one.on, turns * PLACES + 1
+    pick = np.arange(n) % PLACES
+    columns = {
+        "time_s": float(now.one.time) * np.arange(n) / PLACES, "angle_rad": 2 * np.pi * np.arange(n) / PLACES,
+        "speed_m_per_s": np.asarray(on.speed)[pick, 0], "lateral_m": np.asarray(now.one.states)[pick, 0],
+        "normal_force_N": np.asarray(on.normal_force)[pick, 0],
+        "longitudinal_creepage": np.asarray(on.xi)[pick, 0], "lateral_creepage": np.asarray(on.eta)[pick, 0],
+        "spin_1_per_m": np.asarray(on.phi)[pick, 0],
+    }  # fmt: skip
+    return columns, now
+
+
+def written(folder: Path, columns: dict[str, np.ndarray]) -> Path:
+    """A case with the table beside it."""
+    (folder / "run.csv").write_text(columns_csv(columns, 12))
+    whole = tomllib.loads(CASE.read_text())
+    parts = [f"[{name}]\n" + "\n".join(f"{k} = {v}" for k, v in whole[name].items()) for name in ("wheel", "rail")]
+    (folder / "case.toml").write_text(
+        'name = "given"\nfriction = 0.3\n[kinematics]\nfile = "run.csv"\nturns = 1e5\nplaces = 48\n'
+        "[wear]\ncoefficient = 7e-13\n" + "\n".join(parts)
+    )
+    return folder / "case.toml"
+
+
+def test_wear_by_a_file_is_that_of_the_vehicle_that_wrote_it(
+    rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Depth where the contact runs, 1e5 turns of it; its volume is the coefficient times the work."""
+    columns, now = table(rolling)
+    monkeypatch.chdir(tmp_path)
+    case = written(tmp_path, columns)
+    assert main(["roll", str(case), "--no-pictures", "-q"]) == 0
+    rows = list(csv.DictReader((tmp_path / "build" / "given" / "circumference.csv").open()))
+    depth = np.array([float(r["depth_m"]) for r in rows])
+    own = 1e5 * rolling.tread.seen(now.taken, now.one.on)[:, 0]
+    np.testing.assert_allclose(depth, own, rtol=5e-3)
+    assert max(float(r["standard_error_m"]) for r in rows) < 1e-6 * depth.max()
+    found = recorded(load_kinematics(case)[0], tmp_path)
+    np.testing.assert_allclose(found.tread.volume(found.taken), 7e-13 * found.work, rtol=1e-10)
+
+
+def cut(columns: dict[str, np.ndarray], kind: str) -> dict[str, np.ndarray]:
+    """A table that no wheel can have written."""
+    keep = np.ones(len(columns["time_s"]), bool)
+    changed = {k: v.copy() for k, v in columns.items()}
+    if kind == "gap":
+        keep[30:40] = False
+    elif kind == "lateral_m":
+        changed["lateral_m"][50:] += 5e-3
+    elif kind == "normal_force_N":
+        changed["normal_force_N"][20] = -1.0
+    elif kind == "time_s":
+        changed["time_s"][10] = changed["time_s"][8]
+    elif kind == "column":
+        del changed["spin_1_per_m"]
+    elif kind == "turn":
+        keep[40:] = False
+    elif kind == "wheel, rail":
+        changed["lateral_m"] += 0.05
+    return {k: v[keep] for k, v in changed.items()}
+
+
+@pytest.mark.parametrize("kind", ["gap", "lateral_m", "normal_force_N", "time_s", "column", "turn", "wheel, rail"])
+def test_kinematics_that_no_wheel_has(
+    kind: str, rolling: wearing.Rolling, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """One sentence, exit 2, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["roll", str(written(tmp_path, cut(table(rolling)[0], kind))), "--no-pictures", "-q"]) == 2
+    assert kind in capsys.readouterr().err and not (tmp_path / "build" / "given" / "circumference.csv").exists()
