@@ -23,7 +23,7 @@ from .curves import read_table
 from .heights import Heights
 from .keys import Columns, FileName
 from .kinds import Kind, beside
-from .law import Array, number, settings, value
+from .law import Array, number, settings, value, values
 
 if TYPE_CHECKING:
     from .settings import Temperature
@@ -354,7 +354,7 @@ def lubricated(
         UserError: an approach without contact, or a film that is not positive.
     """
     u, v = np.atleast_1d(np.asarray(approach, float)), np.abs(np.atleast_1d(np.asarray(speed, float)))
-    force = np.asarray(heights.volume(jnp.asarray(u)))
+    force = values(heights, "volume", u)
     if not film > 0:
         raise UserError(f"film: {film:g}; a smallest film thickness above 0 is needed, the integral diverges without")
     if not np.all(force > 0):

@@ -17,7 +17,7 @@ from jax.scipy.stats import norm as normal_distribution
 from numpy.typing import ArrayLike
 
 from ..errors import UserError
-from .law import Array, number, settings, table
+from .law import Array, number, settings, table, values
 
 
 class Heights:
@@ -257,9 +257,9 @@ def tabulated(x: ArrayLike, area: ArrayLike, name: str = "height distribution") 
     x, area = np.asarray(x, float), np.asarray(area, float)
     if x.ndim != 1 or x.shape != area.shape or len(x) < 2:
         raise UserError(f"{name}: needs two or more nodes, as many x as areas; got {x.shape} and {area.shape}")
-    for what, values in (("x", x), ("area", area)):
-        if not np.all(np.isfinite(values)):
-            raise UserError(f"{name}: {what}[{np.argmin(np.isfinite(values))}] is not a finite number; leave it out")
+    for what, given in (("x", x), ("area", area)):
+        if not np.all(np.isfinite(given)):
+            raise UserError(f"{name}: {what}[{np.argmin(np.isfinite(given))}] is not a finite number; leave it out")
     if np.any(np.diff(x) < 0):
         i = int(np.argmax(np.diff(x) < 0))
         raise UserError(f"{name}: x[{i + 1}] = {x[i + 1]:g} lies below x[{i}] = {x[i]:g}; sort the nodes")
@@ -300,10 +300,10 @@ def sampled(
         UserError: as `tabulated`.
     """
     x = np.linspace(start, end, count)
-    values = np.asarray(area(x), float)
-    if cut and values.shape == x.shape:
-        values = (values - values[0]) / (values[-1] - values[0])
-    return tabulated(x, values, "height distribution given as a function")
+    shares = np.asarray(area(x), float)
+    if cut and shares.shape == x.shape:
+        shares = (shares - shares[0]) / (shares[-1] - shares[0])
+    return tabulated(x, shares, "height distribution given as a function")
 
 
 def as_table(heights: Heights, count: int = 257) -> Tabulated:
@@ -315,7 +315,7 @@ def as_table(heights: Heights, count: int = 257) -> Tabulated:
         raise UserError("height distribution: a smooth surface has no table; use Penalty, or a roughness of 0")
     per_panel = max(2, round((count - 1) / (len(edges) - 1)) + 1)
     x = np.unique(np.concatenate([np.linspace(a, b, per_panel) for a, b in zip(edges, edges[1:], strict=False)]))
-    area = np.array(heights.area(jnp.asarray(x)))
+    area = values(heights, "area", x)
     area[0], area[-1] = 0.0, 1.0  # the tails before the first and after the last break are below rounding
     return tabulated(x, area)
 

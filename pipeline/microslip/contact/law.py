@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, dataclass_transform
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..settings.mistakes import bounded
 
@@ -87,6 +88,24 @@ seldom = partial(
     compiler_options={"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0} if KNOWN else {},
 )
 """The same of what is called some dozens of times: compiled in a quarter of the time, half as fast."""
+
+
+@partial(program, static_argnames="what")
+def _values(made: Any, what: str, x: Array) -> Array:
+    return getattr(made, what)(x)
+
+
+def values(made: Any, what: str, x: ArrayLike) -> np.ndarray:
+    """A method of heights, or of a normal law, that are the same everywhere, at approaches of any shape.
+
+    One program for as many approaches as the next power of two: it is not compiled, operation by operation, for each
+    shape.
+    """
+    x = np.asarray(x, dtype=float)
+    padded = np.zeros(1 << max(x.size - 1, 63).bit_length())
+    padded[: x.size] = x.ravel()
+    return np.array(_values(made, what, padded))[: x.size].reshape(x.shape)
+
 
 Array = jax.Array
 """A jax array of doubles; one value or one per point where a setting is meant."""

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..data import Array
 from ..errors import UserError
 from .heights import Heights
+from .law import values
 
 NODES = 2048
 """Intervals of the slip depth in which the curve is laid out before it is refined: folds are found to 1e-6 of w."""
@@ -55,7 +55,7 @@ class MonotoneSlip:
             if not np.all(value > 0 if strict else value >= 0) or (np.isinf(value).any() and name != "strength"):
                 bound = "greater than 0" if strict else "0 or more"
                 raise UserError(f"{name}: {value.min():g}; it must be {bound} and finite")
-        if float(self.heights.area(jnp.zeros(()))) > 1e-12 and np.any(np.asarray(self.roughness) > 0):
+        if float(values(self.heights, "area", 0.0)) > 1e-12 and np.any(np.asarray(self.roughness) > 0):
             raise UserError("height distribution: begins below x = 0, where the contact is open; take Cut(...) of it")
 
     # normal ------------------------------------------------------------------------------------------------------
@@ -63,12 +63,12 @@ class MonotoneSlip:
     def normal_force(self, u: ArrayLike) -> Array:
         """F_N*(u_x*) = R_Z* f(u_x*/R_Z*) (3.3-24, 3.8-27)."""
         u, R, rough = self._scaled(u)
-        return np.where(rough, R * np.asarray(self.heights.volume(jnp.asarray(u / R))), np.maximum(u, 0.0))
+        return np.where(rough, R * values(self.heights, "volume", u / R), np.maximum(u, 0.0))
 
     def area(self, u: ArrayLike) -> Array:
         """h*(u_x*): share of the area in contact; of a smooth surface all of it where u_x* > 0."""
         u, R, rough = self._scaled(u)
-        return np.where(rough, np.asarray(self.heights.area(jnp.asarray(u / R))), np.where(u > 0, 1.0, 0.0))
+        return np.where(rough, values(self.heights, "area", u / R), np.where(u > 0, 1.0, 0.0))
 
     def approach(self, force: ArrayLike) -> Array:
         """u_x* under a normal force F_N*, by bisection; (3.3-24) solved for any heights.

@@ -20,7 +20,7 @@ slider that Newton's step does not bring closer goes on so for a while, longer e
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import jax
@@ -89,6 +89,7 @@ class _Solving(NamedTuple):
     periodic: Array
 
 
+@partial(jax.jit, static_argnames="count")
 def periodic(
     law: Law, path: Array, period: float | Array, count: int = 2, periodicity: float | Array = 0.0
 ) -> Periodic:  # fmt: skip

@@ -21,7 +21,7 @@ from ..settings.body import NotNegative, Number
 from .friction import Coulomb, OfCoulomb
 from .heights import Heights, as_table
 from .kinds import LawKind
-from .law import Array, Law, Step, norm, number, ratio, settings, static, value
+from .law import Array, Law, Step, norm, number, ratio, settings, static, value, values
 from .normal import Normal, Preload
 from .partial_slip import NormalContact
 from .point import PointContact, Stretch, dragged, let_go, met, slide, touching, weight
@@ -209,7 +209,7 @@ class Strips(Sliders):
             UserError: settings per point, or a force that does not press.
         """
         loads = np.asarray(force, dtype=float)
-        parts = [np.squeeze(p) for p in (self.at, self.shares, self.depth, self.stiffness_0)]
+        parts = [np.squeeze(np.asarray(p)) for p in (self.at, self.shares, self.depth, self.stiffness_0)]
         if parts[0].ndim > 1 or parts[2].ndim or parts[3].ndim:
             raise UserError("strips: settings differ from point to point; solve for the approach of each point apart")
         if not (loads > 0).all():
@@ -338,7 +338,7 @@ def segalman(count: int, exponent: float, ratio_last: float, smallest: float = 1
 def _columns(shares: np.ndarray, displacements: np.ndarray) -> tuple[Array, Array]:
     """Shares of the stiffness and of the strength from stiffnesses and the displacements at which sliders let go."""
     strengths = shares * displacements
-    return tuple(jnp.asarray(part / part.sum())[:, None] for part in (shares, strengths))  # type: ignore[return-value]
+    return tuple(jnp.asarray((part / part.sum())[:, None]) for part in (shares, strengths))  # type: ignore[return-value]
 
 
 def _counted(count: int) -> None:
@@ -374,9 +374,9 @@ def rough_strips(
     if float(table.x[0]) < 0:
         raise UserError("height distribution: begins below x = 0, where the contact is open; take Cut(...) of it")
     edges = _edges(np.asarray(table.x), np.asarray(table.area_at), count)
-    area = np.array(heights.area(jnp.asarray(edges)))
+    area = values(heights, "area", edges)
     area[0] = 0.0  # level parts at the highest peak belong to the first strip
-    within = np.diff(edges * area - np.asarray(heights.volume(jnp.asarray(edges))))  # integral of x over the area
+    within = np.diff(edges * area - values(heights, "volume", edges))  # integral of x over the area
     return _strips(within / np.diff(area), np.diff(area), roughness, stiffness_0, stiffness_t, mu)
 
 
@@ -416,7 +416,7 @@ def _strips(
     at: np.ndarray, shares: np.ndarray, depth: float, stiffness_0: float, stiffness_t: float, mu: float
 ) -> Strips:
     depth_, c_N0, c_R0, friction = (jnp.asarray(x, dtype=float) for x in (depth, stiffness_0, stiffness_t, mu))
-    return Strips(jnp.asarray(at)[:, None], jnp.asarray(shares)[:, None], depth_, c_N0, c_R0, friction)
+    return Strips(jnp.asarray(at[:, None]), jnp.asarray(shares[:, None]), depth_, c_N0, c_R0, friction)
 
 
 def _edges(x: np.ndarray, area: np.ndarray, count: int) -> np.ndarray:

@@ -19,7 +19,7 @@ from . import settings as S
 from .composed import ContactModel, compose
 from .friction import FASTEST, OfLubricated, lubricated, smoothed
 from .jenkins import Jenkins
-from .law import history
+from .law import history, values
 from .layer import Layer, quasi_static_error
 from .normal import Preload, Rough
 from .point import PointContact
@@ -98,7 +98,7 @@ def _working(c: ContactModel) -> tuple[float, float] | None:
         return float(c.law.approach(motion.normal_force)), motion.normal_force
     if motion.normal_force is not None:
         return approach_under(c, motion.normal_force), motion.normal_force
-    return motion.normal[0], float(c.normal.force(jnp.array([motion.normal[0]]))[0])
+    return motion.normal[0], float(values(c.normal, "force", motion.normal[0]))
 
 
 def approach_under(c: ContactModel, force: float) -> float:
@@ -130,8 +130,7 @@ def _normal(c: ContactModel, working: tuple[float, float] | None, found: _Findin
         found.told.append(("normal force, constant", f"{float(c.normal.constant):.4g} N"))
         return
     u = np.linspace(*_reach(c, working), 401)
-    laws = (c.normal.force, c.normal.stiffness, c.normal.share)
-    force, stiffness, share = (np.array(f(jnp.asarray(u))) for f in laws)
+    force, stiffness, share = (values(c.normal, what, u) for what in ("force", "stiffness", "share"))
     table = {"approach_m": u, "force_N": force, "normal_stiffness_N/m": stiffness}
     if c.stiffness is not None:
         for name, k in zip(("t1", "t2"), c.stiffness.tangential, strict=True):
@@ -142,22 +141,22 @@ def _normal(c: ContactModel, working: tuple[float, float] | None, found: _Findin
 
 
 def _at_working_point(c: ContactModel, working: tuple[float, float], found: _Findings) -> None:
-    u = jnp.array([working[0]])
-    share = float(c.normal.share(u)[0])
+    u = working[0]
+    share = float(values(c.normal, "share", u))
     found.told.append(("working point", f"{_engineering(working[0], 'm')}, {_engineering(working[1], 'N')}"))
-    found.told.append(("normal stiffness there", _engineering(float(c.normal.stiffness(u)[0]), "N/m")))
+    found.told.append(("normal stiffness there", _engineering(float(values(c.normal, "stiffness", u)), "N/m")))
     if c.stiffness is not None:
         found.told.append(("tangential stiffness there", _engineering(c.stiffness.tangential[0] * share, "N/m")))
     if c.roughness is not None:
-        touching = 100 * float(_area(c, np.array(u))[0])
+        touching = 100 * float(_area(c, np.array(u)))
         found.told.append(("share of the area in contact there", f"{touching:.4g} %"))
 
 
 def _area(c: ContactModel, u: np.ndarray) -> np.ndarray:
     """Share of the nominal area in contact at approaches (m), between 0 and 1."""
     if c.heights is None or c.roughness is None:
-        return np.clip(np.array(c.normal.share(jnp.asarray(u))), 0.0, 1.0)
-    return np.array(c.heights.area(jnp.asarray(u / c.roughness)))
+        return np.clip(values(c.normal, "share", u), 0.0, 1.0)
+    return values(c.heights, "area", u / c.roughness)
 
 
 def _reach(c: ContactModel, working: tuple[float, float] | None) -> tuple[float, float]:
@@ -246,7 +245,7 @@ def _point(c: ContactModel, u: np.ndarray, force: np.ndarray, slip: np.ndarray, 
 
     In the book's form the stretch stays when the contact opens: P slides in contact, and moves with M in the open.
     """
-    share = np.array(c.normal.share(jnp.asarray(u[:, 0])))
+    share = values(c.normal, "share", u[:, 0])
     assert c.stiffness is not None
     place = np.array(u[:, 1:])
     if isinstance(c.law, MassContact) and c.law.printed:
@@ -282,7 +281,7 @@ def _amplitudes(c: ContactModel, working: tuple[float, float]) -> tuple[float, .
     assert motion is not None and c.friction is not None and c.stiffness is not None
     if motion.amplitudes or motion.drift:
         return motion.amplitudes
-    share = float(c.normal.share(jnp.array([working[0]]))[0])
+    share = float(values(c.normal, "share", working[0]))
     mu = float(c.friction.coefficient(jnp.zeros(1), jnp.array([working[1]]))[0])
     if working[1] <= 0 or share <= 0 or mu <= 0:
         return ()

@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import __version__
-from ..contact.law import settings
+from ..contact.law import program, settings
 from ..data import Array, UserError
 from ..files.store import complete_or_absent
 
@@ -147,11 +147,15 @@ def refined(
     return parts, left
 
 
+@program
+def _at(spline: Spline, s: jax.Array, t: jax.Array) -> jax.Array:
+    return spline.at(s, t)
+
+
 def _on_grid(coefficients: Array, s: Array) -> Array:
     """(m, p, p) spline values on the grid of s along both axes."""
     S, T = (x.ravel() for x in np.meshgrid(s, s, indexing="ij"))
-    values = Spline(jnp.asarray(coefficients)[None]).at(jnp.asarray(S), jnp.asarray(T))
-    return np.asarray(values).reshape(-1, len(s), len(s))
+    return np.asarray(_at(Spline(jnp.asarray(coefficients[None])), S, T)).reshape(-1, len(s), len(s))
 
 
 def in_chunks(function: Callable[..., Sequence[Any]], *of: Array, size: int = 512) -> tuple[Array, ...]:

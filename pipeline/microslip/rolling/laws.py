@@ -16,7 +16,7 @@ from ..contact.law import program, settings
 from ..contact.normal import Preload
 from ..contact.point import PointContact
 from .kalker import Coefficients
-from .strips import Array, Distribution, Forces, Poses, Spin, Tractions, broadcast, grid, over_elements, poses
+from .strips import Array, Distribution, Forces, Poses, Spin, Tractions, broadcast, grid, over_elements, posed
 
 
 @settings
@@ -94,7 +94,7 @@ def rolled_by_characteristic(
     *state, V = broadcast(*given, speed)
     highest = np.full_like(V, np.max(friction.highest(jnp.ones(1))))
     of = (*state[:6], highest, *state[6:])
-    pose = poses(*of, elements=elements, distribution=distribution, **how)  # type: ignore[misc]
+    pose = posed(*of, elements=elements, distribution=distribution, **how)  # type: ignore[misc]
     nx, ny = elements
     share = jnp.ones((len(V), ny, nx)) if left is None else left[..., ::-1]
     share = jnp.transpose(share, (2, 1, 0)).reshape(nx, -1)

@@ -248,6 +248,10 @@ def poses(
     return Poses(xi, eta, phi * turned / x, phi * turned / y, a, b, normal_force, friction, x, y)
 
 
+posed = program(poses, static_argnames=("elements", "distribution", "coefficients", "spin"))
+"""`poses`, compiled."""
+
+
 @partial(program, static_argnames=("elements", "distribution", "coefficients", "spin"))
 def _rolled(*given: Array, elements: tuple[int, int], distribution: Distribution, **how: Any) -> Forces:
     pose = poses(*given, elements=elements, distribution=distribution, **how)
@@ -328,7 +332,7 @@ def tractions(
     elements = _known(elements, distribution, coefficients, spin)
     given = _states(xi, eta, phi, a, b, normal_force, friction, shear, poisson)
     how = {"coefficients": coefficients, "spin": spin}
-    pose = Poses(*map(np.asarray, poses(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
+    pose = Poses(*map(np.asarray, posed(*given, elements=elements, distribution=distribution, **how)))  # type: ignore
     return over_elements(pose, grid(elements, distribution), *_marched(pose, elements, distribution))
 
 
