@@ -1084,6 +1084,7 @@ def own() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     shown = play("your_own_model.md", folder)
     commands = {"import": "import bracket", "modes": "modes bracket", "two": "modes two", "mast": "modes mast"}
+    commands["joint"] = "import joint/joint.inp bolted"
     for name, command in ((n, f"$ microslip {c}") for n, c in commands.items()):
         part = next(p for p in shown.split("\n$ ") if f"$ {p}".startswith(command) or p.startswith(command))
         fill("your_own_model.md", name, "```\n" + "\n".join(part.strip().splitlines()[1:]) + "\n```")
@@ -1092,6 +1093,9 @@ def own() -> None:
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
+    upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
+    with_studio(upper, lambda s: save(mode_sheet(s, (6, 7), 0.35), "joint", smooth=True))
+    save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
     mast = read_basis(folder / "build" / "mast" / "basis.h5")
     save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
 
@@ -1135,6 +1139,8 @@ def mistuning() -> None:
         save(from_file(file), name, colours=2 * LINES if name.endswith("sensitivity") else LINES // 2)
     fill("mistuning.md", "amplification", table(*study.amplification()))
     fill("mistuning.md", "first_order", table(*study.first_order()))
+
+
 def identification() -> None:
     """Blades that are found from modes and from gauges: accuracy, coverage, the error of the model."""
     import identification_study as study
@@ -1432,6 +1438,15 @@ def book_mode() -> None:
     save(from_file(found.parent / "pictures" / "book.png"), "book_compared")
 
 
+def book_figures() -> None:
+    """Figures of the book that a formula draws, and those of rolling contact."""
+    import figure_study as study
+    import rolling_study as rolled
+
+    for name, drawing in (("book_figures", study), ("book_rolling", rolled)):
+        save(drawn(drawing.picture(figure(10.5, 5.2), plain)), name, colours=LINES)
+
+
 def patches() -> None:
     """Contacts between bodies: a pin in its hole by Hertz and on springs."""
     import patch_study as study
@@ -1623,6 +1638,7 @@ STUDIES = {
         followed,
         accuracy,
         book_mode,
+        book_figures,
         patches,
         results,
         ring,

@@ -146,6 +146,7 @@ MEANING: dict[str, tuple[str, str]] = {
     ),
     "geometry.cad": ("", "a STEP, BREP or IGES file"),
     "geometry.mesh": ("", "a mesh file (.inp, .msh, .med, .unv, .vtu, ...) with named sets"),
+    "geometry.instances": ("", "those instances of the deck that are this body; all if not given"),
     "geometry.matrices.stiffness": ("", "K: FILE or FILE#NAME; .mtx, .mat, .h5, .npz, .op4, DMIG cards, .sti"),
     "geometry.matrices.mass": ("", "M, likewise"),
     "geometry.matrices.damping": ("", "C, likewise; instead of [damping]"),
@@ -207,7 +208,7 @@ MEANING: dict[str, tuple[str, str]] = {
     "temperature.file": ("*, K", "CSV lines x, y, z, T; linear between, nearest outside"),
     "supports.face": ("", "face, or set of points, that is held"),
     "supports.directions": ("", "body directions in which it is held"),
-    "supports.rotations": ("", "hold the rotations of its nodes too (matrices only)"),
+    "supports.rotations": ("", "hold rotations of its nodes too, all or some (matrices, reference nodes)"),
     "rotation.axis": ("", "direction of the rotor axis"),
     "rotation.point": ("*", "a point of the axis"),
     "cyclic.sectors": ("", "N, how many of this body make the ring"),
@@ -494,6 +495,8 @@ MEANING_CASE: dict[str, tuple[str, str]] = {
     "contacts.ground.direction": ("degrees", "of the velocity, from t1 towards t2"),
     "contacts.ground.rpm": ("rpm", "instead of the velocity: material that turns about the axis of the body which the "
                             "contact is against ([squeal](squeal.md))"),
+    "contacts.ground.inertia": ("", "of the [material that runs through](squeal.md#the-material-that-runs-through); "
+                                "false leaves it out"),
     "contacts.ground.axis": ("", "along another axis, in the axes of the case"),
     "contacts.ground.point": ("m", "through this point"),
     "contacts.ground.pushes": ("", "whether the slope of a wave pushes the body along the ground; the book: false"),

@@ -381,6 +381,19 @@ def test_microslip_begins_at_once_and_ends_alike() -> None:
     assert np.abs(finer - micro).max() < 5e-3 * plain[0].real
 
 
+def test_microslip_damps_small_torsion_too() -> None:
+    """Fig. 5.2-6, phi_x alone: with roughness b > 0 at any amplitude, without it from where the outermost point slides;
+    the same resultant in full slip, mu F_N times the mean distance of the points."""
+    u_G, points = equilibrium(patch(rough(12)), 780.0)[0], patch(rough(12)).points
+    limit = MU * 780.0 / (C_R0 * float(Polynomial().area(jnp.asarray(u_G / R_Z))))
+    u = np.zeros((4, 6, 3))
+    u[:, 0, 0], u[:, 3, 1] = u_G, np.array([0.05, 0.5, 0.99, 1e4]) * limit / np.hypot(*points.T).max()
+    plain, micro = (book.book_patch(patch(rough(12)), k).stiffness(u)[:, 3, 3] for k in (0, 16))
+    assert np.all(plain[:3].imag == 0) and np.all(micro[:3].imag > 0)
+    moment = 4 / np.pi * MU * 780.0 * np.hypot(*points.T).mean()
+    assert [k[3].imag * u[3, 3, 1] for k in (plain, micro)] == pytest.approx([moment, moment], rel=5e-3)
+
+
 def test_strips_under_one_pressure_are_the_strips_of_the_contact_room() -> None:
     """Two ways to cut the same rough surface, with as many parts."""
     u = np.zeros((3, 6, 3))

@@ -111,7 +111,7 @@ def test_pictures_and_table(files: Path, tmp_path: Path) -> None:
     assert {p.name for p in (tmp_path / "out").iterdir()} == expected
 
 
-@pytest.mark.skipif(can_draw() is not None, reason="PyVista cannot draw here")
+@pytest.mark.skipif("can_draw() is not None", reason="PyVista cannot draw here")
 def test_a_measured_body_is_drawn_by_its_points_with_the_signs_of_the_other(tmp_path: Path) -> None:
     from microslip.pictures.comparison import _factors, draw_comparison
 

@@ -23,7 +23,6 @@ from microslip.mistuning.scatter import Scatter
 from microslip.mistuning.sensitivity import Linearised, sensitivities, softening
 from microslip.mistuning.statistics import Envelope, fits, quantile
 from microslip.mistuning.weibull import exponent
-from microslip.stages.mistuning import unsure
 from microslip.system.assembly import Assembly
 
 RUB = {
@@ -255,12 +254,39 @@ def test_peaks_are_between_points() -> None:
     assert found.amplitude == pytest.approx(1.01 / 0.008, rel=1e-4)
 
 
-@pytest.mark.parametrize(("low", "end", "words"), [(0.9, False, None), (0.4, False, "to 40 %"), (0.4, True, "an end")])
-def test_a_tuned_ring_without_a_peak_is_said(low: float, end: bool, words: str | None) -> None:
+@pytest.mark.parametrize(
+    ("missed", "end", "words"), [(0.002, False, None), (0.03, False, "3 % higher"), (0.03, True, "at an end")]
+)
+def test_a_tuned_ring_without_a_peak_is_said(tuned: Tuned, missed: float, end: bool, words: str | None) -> None:
     """Amplifications are over the tuned ring's peak: a warning where that is at an end of the band, or by a jump."""
-    top = Highest(0, 2.0, 1.0, 0.0, np.array([1.0, 2.0, 3.0]), np.array([[low], [1.0], [0.95]]), (), end)
-    said = unsure(Sample(-1, top, top.amplitudes))
+    top = Highest(0, 2.0, 1.0, missed, np.array([1.0, 2.0, 3.0]), np.array([[0.4], [1.0], [0.95]]), (), end)
+    asked = Asked(tuned, (), np.zeros(0))
+    none = np.zeros((0, len(ensemble.COLUMNS)))
+    said = ensemble.Ensemble(asked, Sample(-1, top, top.amplitudes), none, Envelope.empty(3, 1.0)).unsure
     assert said == [] if words is None else words in said[0]
+
+
+def test_python_warns_as_the_command_line_does() -> None:
+    """A band without the tuned ring's peak; and known deviations, as given, are one ring whatever is asked for."""
+    pattern = Scatter("frequency", values=(0.0, 0.01))
+    with pytest.warns(UserWarning, match="end of the band"):
+        found = ms.mistune(sector(), pattern, np.linspace(280, 284, 5), samples=7, stuck=True)
+    assert len(found) == 1
+    with pytest.raises(UserError, match="nothing scatters"):
+        Scatter("frequency", 0.0)
+
+
+def test_fewer_samples_than_are_kept_are_the_first(tuned: Tuned, tmp_path: Path) -> None:
+    """Without solving them again, and more of them go on from all."""
+    asked = Asked(tuned, (Scatter("frequency", 0.01),), np.linspace(284, 290, 13), stuck=True)
+    file = tmp_path / "kept.npz"
+    all_of = ensemble.run(asked, 6, workers=1, file=file).rows
+    told = list[str]()
+    few = ensemble.run(asked, 2, workers=1, file=file, report=told.append)
+    assert np.array_equal(few.rows, all_of[:2]) and told == ["the tuned ring"]
+    assert few.envelope.samples(6) == 6
+    assert np.array_equal(ensemble.run(asked, 6, workers=1, file=file, report=told.append).rows, all_of)
+    assert told == ["the tuned ring"] * 2
 
 
 @pytest.mark.parametrize("stuck", [True, False])

@@ -120,8 +120,7 @@ def test_part_of_a_sector():
     r = np.hypot(points[:, 0], points[:, 2])
     upper = r > 0.16
     tuned, up, down, both = (
-        mistuned(disc(4), 0.01 * PATTERN, part).groups[0].K_r
-        for part in (np.zeros(len(r), bool), upper, ~upper, None)
+        mistuned(disc(4), 0.01 * PATTERN, part).groups[0].K_r for part in (np.zeros(len(r), bool), upper, ~upper, None)
     )
     assert np.allclose(up + down - tuned, both, atol=1e-9 * np.abs(both).max())
     assert not np.allclose(up, both, atol=1e-3 * np.abs(both - tuned).max())

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -33,6 +34,7 @@ from microslip.results import read_response
 PAGE = (Path(__file__).parents[1] / "docs" / "own_law.md").read_text(encoding="utf-8")
 
 
+@cache
 def run_page() -> tuple[dict[str, Any], str]:
     """Names that the page's blocks define, and what they print."""
     module = sys.modules["own_law"] = ModuleType("own_law")  # dataclasses look their module up
@@ -42,9 +44,6 @@ def run_page() -> tuple[dict[str, Any], str]:
         for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.S):
             exec(block, names)
     return names, printed.getvalue()
-
-
-NAMES, PRINTED = run_page()
 
 
 def cases() -> Iterator[Any]:
@@ -61,7 +60,7 @@ def cases() -> Iterator[Any]:
 
 @pytest.mark.parametrize("test, given", list(cases()))
 def test_the_pages_law_satisfies_the_contract(test: Callable[..., None], given: dict[str, Any]) -> None:
-    test(example=NAMES["pad"], **given)
+    test(example=run_page()[0]["pad"], **given)
 
 
 @pytest.fixture
@@ -114,7 +113,7 @@ def test_a_law_of_another_package_is_named_in_a_case(
     found = read_response(tmp_path / "build/three-masses/response.h5")
     for series, normal in zip(found.series, (10.0, 1000.0), strict=True):
         swing = np.abs(series.arrays["contacts/rub/force"][:, 1, 1:3]).max()
-        assert swing <= 4 / np.pi * float(NAMES["Pad"](1e4, 5e3, 0.3, 40.0).hold(normal))
+        assert swing <= 4 / np.pi * float(run_page()[0]["Pad"](1e4, 5e3, 0.3, 40.0).hold(normal))
     law, table = tmp_path / "site" / "pads.py", tmp_path / "build/three-masses/response.csv"
     before = table.read_text()
     law.write_text(law.read_text().replace("return self.mu * pressed", "return 0.5 * self.mu * pressed"))
@@ -154,14 +153,15 @@ def test_the_contract_is_there() -> None:
 
 def test_what_the_page_prints() -> None:
     shown = re.search(r"```\n\n((?:    [\d(].*\n)+)", PAGE)
-    assert shown and [line.strip() for line in shown[1].splitlines()] == PRINTED.splitlines()
+    assert shown and [line.strip() for line in shown[1].splitlines()] == run_page()[1].splitlines()
 
 
 def test_a_law_without_a_cone_fails_the_contract() -> None:
     """The contract would notice: the same pad that limits each tangential axis on its own."""
-    jnp, Pad = NAMES["jnp"], NAMES["Pad"]
+    names, _ = run_page()
+    jnp, Pad = names["jnp"], names["Pad"]
 
-    @NAMES["settings"]
+    @names["settings"]
     class Box(Pad):  # type: ignore[misc, valid-type]
         def step(self, u, v, dt, state):
             before, spring, slipped = state
@@ -171,7 +171,7 @@ def test_a_law_without_a_cone_fails_the_contract() -> None:
             slipped = slipped + (trial - force) / self.tangential
             return jnp.concatenate([pressed[None], force]).T, jnp.stack([u.T[1:], force, slipped])
 
-    box = NAMES["Example"](Box(2.4e8, 0.9e8, 0.3, 4e3), normal=1e-5, tangential=1e-5)
+    box = names["Example"](Box(2.4e8, 0.9e8, 0.3, 4e3), normal=1e-5, tangential=1e-5)
     cone = contract.test_friction_stays_in_its_cone.hypothesis.inner_test
     with pytest.raises(AssertionError):  # paths of our own: which ones hypothesis tries depends on what is imported
         for seed in range(10):

@@ -237,7 +237,8 @@ def test_all_of_a_patch_slides_and_not_more() -> None:
 def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     """States of any sign and size, against the model itself: within the error that the file tells, and the finer the
     table, the nearer."""
-    tables = [ms.creep_table(NU, points=(n, n, n, 5), checked=2000) for n in (5, 13)]
+    points = (5, 5, 5, 5, 4), (9, 9, 11, 11, 7)
+    tables = [ms.creep_table(NU, points=n, elements=(20, 20), checked=2000) for n in points]
     table = ms.read_creep_table(ms.write_creep_table(tmp_path / "t.h5", tables[1]))
     random = np.random.default_rng(5)
     given = [random.normal(size=400) * s for s in (2e-3, 2e-3, 0.4)] + [8e-3, 4e-3, 82e3, MU]
@@ -248,6 +249,8 @@ def test_a_table_tells_its_error_and_is_read_with_it(tmp_path: Path) -> None:
     assert (table.error[:, 0] < 0.5 * tables[0].error[:, 0]).all()
     one = [float(np.ravel(v)[0]) for v in given]
     np.testing.assert_allclose(table.forces(*one, G), table.forces(*given, G)[:, 0], rtol=1e-12)
+    with pytest.raises(UserError, match="a/b is 6"):
+        table.forces(1e-3, 0, 0, 6e-3, 1e-3, 82e3, MU, G)
     with pytest.raises(UserError, match="no table of creep forces"):
         ms.read_creep_table(CASE)
 
@@ -310,6 +313,22 @@ def test_profiles_are_read_with_their_header(tmp_path: Path) -> None:
     assert one.height(0.02) == pytest.approx(0.4 / 600, rel=1e-6)
 
 
+def test_profiles_of_miniprof(tmp_path: Path) -> None:
+    """Keys before the points, columns of angle and curvature, points marked as left out; y or z the other way."""
+    y = np.linspace(-30, 30, 61)
+    rows = [f"{a:.4f}\t{-(a**2) / 600:.6f}\t0.1 -0.003" for a in y]
+    rows[7] = '" ' + rows[7]
+    points = "\n".join(rows)
+    head = 'Filename=r.ban\nXOffset=0.0000\n"ColumnDef=X,Y,A"\nRefPoint1=0.0, 0.0\nColumnDef=X,Y,A,C\n\n'
+    (tmp_path / "r.ban").write_text(head + points)
+    found = ms.read_profile(tmp_path / "r.ban", mirror="yz", between=(-0.02, 0.03))
+    assert len(found.y) == 50 and found.y[0] == -0.02  # one of 51 is left out
+    np.testing.assert_allclose(found.height([-0.0185, 0.0205]), np.array([-0.0185, 0.0205]) ** 2 / 0.6, atol=1e-9)
+    (tmp_path / "r.ban").write_text(head.replace("0.0000", "1.5") + points)
+    with pytest.raises(UserError, match="XOffset"):
+        ms.read_profile(tmp_path / "r.ban")
+
+
 def test_an_inclined_circle_is_the_same_circle() -> None:
     """A rail canted by 1:40 about its axis keeps its curvature; the highest point stays the origin."""
     arc = ms.circle(0.3).turned(0.025)
@@ -350,9 +369,12 @@ WRONG = {
     "a wheel in millimetres": ("wheel.radius=460", "wheel.radius"),
     "pulled off": ("vertical_force=-1", "vertical_force"),
     "no overlap": ("rail.at=0.9", "overlap"),
-    "no file": ('rail.profile="none.prr"', "none.prr"),
+    "no file": ('rail.profile="none.prr"; rail.at=0.76; wheel.at=0.75', "none.prr"),
     "friction in percent": ("friction=30", "friction"),
     "flat": ("rail.width=1.0", "radius"),
+    "no radius": ("wheel.profile=0", "wheel: a profile of radius 0 m"),
+    "a measured profile that stands anywhere": ('rail.profile="UIC60.prr"; wheel.at=0.75', "rail.at"),
+    "files exchanged": ('rail.profile="S1002.prw"; rail.at=0.75; wheel.at=0.75', "exchange wheel and rail"),
     "nothing to run over": ("creep.stop=0.0", "creep"),
     "no friction": ("friction=0", "friction"),
     "off the edge of the rail": ("rail.width=0.002", "profile ends"),

@@ -34,6 +34,15 @@ def test_friction_that_falls_with_the_speed_of_sliding() -> None:
     assert any("highest coefficient, 0.4;" in s for s in found.sentences())
 
 
+def test_what_is_rounding_is_no_force() -> None:
+    """A wheel in the middle that rolls freely without spin, and creepage along rolling alone."""
+    found = studied("pose.lateral=0.0", "creep.lateral=0.0")
+    felt = np.array([row[2:] for row in found.generalised()[1]], float)
+    assert (felt[:, [0, 1, 4, 5]] == 0).all() and felt[0, 2] == pytest.approx(-1e5)
+    assert (found.columns()["F_y_N"] == 0).all() and (found.columns()["M_z_Nm"] == 0).all()
+    assert "feels 0 N forward, 0 N to the right" in found.sentences()[0]
+
+
 def test_temperature_where_all_slides_is_the_integral_of_the_book() -> None:
     """(6.7-11) by quadrature under q = mu p V xi, hottest on the middle strip; unlike bodies, that meet unlike warm."""
     found = studied("heat.conductivity=[50, 20]", "heat.start=[40, 10]")

@@ -213,6 +213,7 @@ def test_kalkers_linear_theory_as_creepage_vanishes() -> None:
         ("grid", {"force": 40 * LOAD}),
         ("creepages", {"force": LOAD, "creepages": (0, np.nan, 0)}),
         ("creepages", {"force": LOAD, "creepages": (0, 1e-3)}),
+        ("creepages", {"force": LOAD, "creepages": (0, 0, 1e9)}),
         ("friction", {"force": LOAD, "friction": np.ones(7)}),
         ("distance", {"force": LOAD, "distance": np.nan}),
     ],

@@ -178,6 +178,16 @@ def test_the_impact_oscillator_of_the_book_at_its_frequencies() -> None:
         assert (found.repeats, found.impacts * found.repeats) == (periods, impacts) and found.error < 1e-4
 
 
+def test_the_impact_oscillator_of_the_book_is_chaotic_and_does_not_come_to_rest() -> None:
+    """Section 4.2 with a rigid arm. Fig. 4.2-2 h, 23.63 rad/s, is chaotic in the book and here. In Fig. 4.2-3, 9.845
+    rad/s, the arm comes to rest at its stop; with the printed damper it does not: beta c_N0 / (2 sqrt(c_N0 m)) = 0.018
+    leaves an impact exp(-0.018 pi) = 0.945 of its speed or more: the push turns before leaps end, ten in a period."""
+    chaos = orbit.run(equations.of(hitting(BOOK), 23.63), 60, 40)
+    assert chaos.said.startswith("chaotic") and chaos.repeats == 0
+    leaping = orbit.run(equations.of(hitting(BOOK), 9.845), 10, 8)
+    assert 8 < leaping.impacts < 12 and not classification.chatter(leaping, 0)
+
+
 def test_a_motion_that_settles_from_side_to_side_comes_back_after_its_own_period() -> None:
     """With the multiplier m < 0 of two periods, after four less of the start is seen, |m^2 - 1|, than after two,
     |m - 1|."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -536,7 +537,7 @@ def mistune(
 
     Returns:
         An `Ensemble`: ``amplification`` of each sample, ``quantile(0.95)`` with its interval, ``envelope``,
-        ``rare``.
+        ``rare``. Python warns where the band or the sweep leaves peaks unsure (``unsure``).
 
     Raises:
         UserError: no ring; a scatter of what is not there, or that leaves nothing of it.
@@ -572,4 +573,6 @@ def mistune(
     found = ensemble.run(asked, samples, until, workers, executor=executor, report=report)
     if rare:
         found.rare = ensemble.choose(found, rare, workers, executor=executor, report=report)
+    for said in found.unsure:
+        warnings.warn(f"mistune: {said}", stacklevel=2)
     return found

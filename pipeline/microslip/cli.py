@@ -728,7 +728,7 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
             A part may be a folder with a body.toml that is there already.
         unit: of lengths, where the file does not tell.
     """
-    from .stages.importing import import_file
+    from .stages.decks import import_deck
     from .stages.parts import import_apart, import_parts
 
     parts = [file, *(p for p in more if p.is_file() or (p / "body.toml").is_file() or p is not more[-1])]
@@ -738,7 +738,7 @@ def import_(file: Path, /, *more: Path, unit: str = "mm", apart: Apart = False) 
     made = (
         import_apart(file, folder)
         if apart
-        else (import_file(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
+        else (import_deck(file, folder, unit) if len(parts) == 1 else import_parts(parts, folder, unit))
     )
     for line in made.told:
         print(line)

@@ -81,6 +81,117 @@ class Material:
 
 
 @dataclass(frozen=True)
+class Equation:
+    """Sum of factors times displacements is zero. `where`: its place in the file, of every link.
+
+    Attributes:
+        nodes, directions, factors: (t,) of its terms; a node beyond the mesh's points is a reference node, directions 3
+            to 5 are its rotations. first: whether it gives the displacement of the first term, or of any.
+    """
+
+    where: str
+    nodes: Indices
+    directions: Indices
+    factors: Array
+    first: bool = True
+
+
+@dataclass(frozen=True)
+class RigidLink:
+    """Nodes that follow a reference node as a rigid body: u = u_r + theta_r x (x - x_r), in some directions.
+
+    Attributes:
+        reference: node. members: nodes, or the face or point set that has them. directions: out of x, y, z.
+    """
+
+    where: str
+    reference: int
+    members: Indices | str
+    directions: str = "xyz"
+
+
+@dataclass(frozen=True)
+class AverageLink:
+    """A reference node that follows nodes in the mean: the rigid motion that fits theirs best, by weights.
+
+    Attributes:
+        reference: node. members: nodes, or the face or point set that has them. weights: (m,) of the members, or one
+            for all. directions: which of the reference node's x, y, z and rotations a, b, c follow.
+    """
+
+    where: str
+    reference: int
+    members: Indices | str
+    weights: Array
+    directions: str = "xyzabc"
+
+
+@dataclass(frozen=True)
+class FaceTie:
+    """Nodes of one face that stay where they are on another one.
+
+    Attributes:
+        slave, master: face, the slave also a point set. tolerance: m; None: a twentieth of the master's facets.
+    """
+
+    where: str
+    slave: str
+    master: str
+    tolerance: float | None = None
+
+
+Link = Equation | RigidLink | AverageLink | FaceTie
+
+
+@dataclass(frozen=True)
+class Links:
+    """The constraints of a deck, and the nodes without cells that they refer to.
+
+    Attributes:
+        items: those of the deck. references: (k, 3) m, node n_points + j is the j-th. reference_id: (k,) numbers in
+            the file. sets: name -> reference nodes, counted from 0.
+    """
+
+    items: tuple[Link, ...]
+    references: Array
+    reference_id: Indices
+    sets: Mapping[str, Indices] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Linear equations C (u, q) = 0 between the displacements u of points and the motions q of reference nodes.
+
+    Attributes:
+        rows: (r, 3n + 6k) C; of a reference node three translations, m, then three rotations. dependent: (r,) column
+            that a row gives, -1 where any may be chosen. of: (r,) number of the link that a row is of.
+        told: what each link is and where it stands. otherwise: (links,) what becomes of a row whose dependent
+            displacement something else gives: ``refuse``, ``leave out``, or give ``another``.
+        references: (k, 3) m. numbers: (n + k,) of points and reference nodes in the file. sets: name -> reference
+            nodes.
+    """
+
+    rows: csr_matrix
+    dependent: Indices
+    of: Indices
+    told: tuple[str, ...]
+    otherwise: tuple[str, ...]
+    references: Array
+    numbers: Indices
+    sets: Mapping[str, Indices] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two faces that a file lets touch. `where`: its place there. friction: the coefficient, None without one."""
+
+    where: str
+    slave: str
+    master: str
+    friction: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """A volume mesh with named faces.
 
@@ -98,6 +209,9 @@ class Mesh:
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
         supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
+        remarks: what of the file is read as something else or not used, in words. instances: name -> points.
+        joints: faces that the file lets touch. preloads: of its bolts: where it stands, force in the file's unit.
+        links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
     """
 
     points: Annotated[Array, Stored("node axis", "m", "reference positions", at="xyz")]
@@ -113,6 +227,12 @@ class Mesh:
     supports: Mapping[str, str] = field(default_factory=dict)
     not_held: tuple[str, ...] = ()
     unended: str = ""
+    remarks: tuple[str, ...] = ()
+    instances: Mapping[str, Indices] = field(default_factory=dict)
+    joints: tuple[Joint, ...] = ()
+    preloads: tuple[tuple[str, float], ...] = ()
+    links: Links | None = None
+    ties: Ties | None = None
 
     @property
     def n_points(self) -> int:
@@ -127,6 +247,10 @@ class Mesh:
         if name in self.faces:
             return np.unique(np.concatenate([f.ravel() for f in self.faces[name].values()]))
         return np.unique(self.point_sets[name])
+
+    def set_points(self, name: str) -> Indices:
+        """Sorted indices of all points of a set, those beside its whole facets too, or of a face of that name."""
+        return np.unique(self.point_sets[name]) if name in self.point_sets else self.face_points(name)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from microslip.case.assemble import build
 from microslip.harmonic_balance.reduced import stuck
 from microslip.stages.job import open_job
 from microslip.stages.meshing import load_mesh, mesh_stage
+from microslip.system.assembly import stuck_modes
 
 ROOT = Path(__file__).parents[2]
 JENKINS = ["harmonics=1", *(f'contacts.{side}.law={{kind="jenkins", slides_along="t2"}}' for side in ("right", "left"))]
@@ -58,6 +59,21 @@ def test_sticking_frequencies(blade):
     sticking = stuck(pressed.joined(1), pressed.stiffness)
     for printed in (120.0, 320.0, 470.0):
         assert np.abs(sticking / printed - 1).min() < 0.035
+
+
+def test_the_first_two_bend_and_the_third_twists(blade):
+    """Figs. 5.3-5 and 5.3-6: 120 and 320 Hz "belong to bending and the third resonance frequency at 470 Hz belongs to
+    torsional vibrations", seen where the accelerometer is, over the section: mean and half difference of its ends."""
+    settings, _ = load_case(ROOT / "pipeline/cases/blade.toml")
+    pressed = build(settings, {"blade": blade}, "case").pressed(780.0)
+    part, points = pressed.joined(1), blade.mesh.points
+    values, shapes = stuck_modes(part, pressed.stiffness)
+    rear, front = (np.linalg.norm(points - [0.0025, y, 0.285], axis=1).argmin() for y in (-0.0385, 0.0385))
+    rear, front = (blade.groups[0, 0].phi[node, 0] @ shapes for node in (rear, front))
+    bends, twists = np.abs(front + rear) / 2, np.abs(front - rear) / 2
+    for printed, more, less in ((120.0, bends, twists), (320.0, bends, twists), (470.0, twists, bends)):
+        mode = np.abs(np.sqrt(values) / (2 * np.pi) / printed - 1).argmin()
+        assert less[mode] < 0.05 * more[mode]
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
@@ -154,6 +154,42 @@ def test_fig_6_5_1_carters_strips_and_half_spaces() -> None:
     assert np.sqrt(np.mean((carter - exact)[np.abs(x) < 0.95] ** 2)) == pytest.approx(0.024, abs=0.004)
     assert 2 * d - 1 == pytest.approx(-0.176, abs=1e-3)
     assert x[sticks].min() == pytest.approx(-0.21, abs=0.03)
+
+
+def turned(distribution: Distribution, poisson: float, slopes: bool) -> float:
+    """rad: largest difference between the traction's direction along y = 0, where all slides under a creepage and a
+    spin that turns it by a radian, and (6.5-17), integrated from (6.5-19) on. slopes: with p_x' and p_y', which the
+    book leaves out."""
+    patch = CIRCLE | {"poisson": poisson}
+    C = np.asarray(ms.creep_coefficients(1.0, poisson))[:2]
+    xi, phi = 6 * HELD / (C[0] * G * A**2), 3.6 * HELD / (C[1] * G * A**3)
+    t = ms.tractions(xi, 0, phi, **patch, distribution=distribution, spin="book", elements=(320, 5))
+    unit = (
+        16 / (3 * np.pi) if distribution == "constant" else 0.75 * np.pi
+    )  # mu p/k = unit mu F_N (a^2 - x^2)/(C G a^3)
+
+    def rate(way: float, angle: Array) -> list[float]:
+        x, c, s = A - way, np.cos(angle[0]), np.sin(angle[0])
+        p, slope = (unit * HELD * f / (C * G * A**3) for f in (A**2 - x**2, -2 * x))
+        more = s * c * (slope[0] - slope[1]) if slopes else 0.0
+        return [-(phi * x * c - xi * s + more) / (p[0] * s**2 + p[1] * c**2)]
+
+    way = A - t.x[0, 2, ::-1]
+    begun = 1e-3 * A, [np.arctan2(-C[1] * phi * A, -C[0] * xi)]
+    exact = solve_ivp(rate, (begun[0], way[-1]), begun[1], "Radau", way, rtol=1e-9, atol=1e-10).y[0]
+    found = np.arctan2(t.traction_y[0, 2, ::-1], t.traction_x[0, 2, ::-1])
+    assert np.ptp(np.unwrap(found)) > 1
+    inner = (way > 0.02 * A) & (way < 1.98 * A)  # the first elements are those of the start
+    return float(np.abs(np.angle(np.exp(1j * (found - exact)))[inner]).max())
+
+
+@pytest.mark.parametrize(("distribution", "off"), [("constant", 0.025), ("non-constant", 0.035)])
+def test_6_5_17_the_direction_of_sliding(distribution: Distribution, off: float) -> None:
+    """With equal springs (nu = 0) the marched point contacts turn by (6.5-17) to .01 rad, of first order in the 320
+    elements. With unequal ones (nu = .25) the slopes p' that (6.5-14) leaves out are worth .025 and .035 rad."""
+    assert turned(distribution, 0.0, slopes=False) < 0.01
+    assert turned(distribution, 0.25, slopes=True) < 0.01
+    assert turned(distribution, 0.25, slopes=False) == pytest.approx(off, abs=2e-3)
 
 
 # 6.6 ---------------------------------------------------------------------------------------------------------------

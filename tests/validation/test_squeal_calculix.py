@@ -125,7 +125,7 @@ def ours(bases: dict[str, ModalBasis], mu: float) -> Spectrum:
     contact = {
         "interface": "pin:rubs", "against": "disc:rubs", "patch": "nodal", "normal_force": 0.5 * STIFF * PRESSED * area,
         "normal_stiffness": STIFF * area, "tangential_stiffness": 1.0, "includes": "surface", "friction": mu,
-        "law": {"kind": "rate", "slope": 1e9}, "ground": {"rpm": 1e6},
+        "law": {"kind": "rate", "slope": 1e9}, "ground": {"rpm": 1e6, "inertia": False},
     }  # fmt: skip
     case = {
         "name": "pin-on-disc", "bodies": [{"name": "disc"}, {"name": "pin"}], "damping": "modal",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
+import scipy.sparse as sp
 
 from .. import elements
 from ..data import Array, Indices, Mesh
@@ -117,6 +118,37 @@ def modal_mass(mesh: Mesh, phi: Array) -> tuple[Array, float]:
             total += u.conj().T @ (np.repeat(dm.ravel(), 3)[:, None] * u)
             mass += float(dm.sum())
     return total, mass
+
+
+@lru_cache(maxsize=4)
+def convected(
+    mesh: Mesh, axis: tuple[float, ...], point: tuple[float, ...], mass: float
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """(n, n) integrals of rho N_i N_j' and of rho N_i' N_j', where N' = w . grad N is what a field changes by per
+    radian as the material turns through it: w = axis x (x - point). They act on each Cartesian component alike.
+
+    Args:
+        axis: unit vector. point: of it, m. mass: kg of the whole mesh.
+    """
+    n, whole = mesh.n_points, 0.0
+    D, B = sp.csr_matrix((n, n)), sp.csr_matrix((n, n))
+    for cell_type, cells in mesh.cells.items():
+        N, dN, weights = tables(cell_type)
+        x, rho = mesh.points[cells], _density(mesh, cell_type)
+        d, b = np.zeros((2, *cells.shape, cells.shape[1]))
+        for q, weight in enumerate(weights):
+            jacobian = np.einsum("dk,eki->edi", dN[q], x)
+            w = np.cross(np.array(axis), np.einsum("k,eki->ei", N[q], x) - np.array(point))
+            moved = np.linalg.solve(jacobian.transpose(0, 2, 1), w[..., None])[..., 0] @ dN[q]
+            dm = rho * weight * np.linalg.det(jacobian)
+            whole += float(dm.sum())
+            d += np.einsum("e,i,ej->eij", dm, N[q], moved)
+            b += np.einsum("e,ei,ej->eij", dm, moved, moved)
+        rows, columns = np.repeat(cells, cells.shape[1], axis=1), np.tile(cells, cells.shape[1])
+        D, B = (
+            A + sp.csr_matrix((part.ravel(), (rows.ravel(), columns.ravel())), (n, n)) for A, part in ((D, d), (B, b))
+        )
+    return D * (mass / whole), B * (mass / whole)
 
 
 def cell_volumes(mesh: Mesh) -> float:

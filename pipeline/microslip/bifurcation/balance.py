@@ -122,6 +122,10 @@ class Balance:
     def unknowns(self, orbit: Harmonics) -> Array:
         return np.append(orbit.c, orbit.omega) if self.free else orbit.c.ravel()
 
+    def way(self, c: Array) -> Array:
+        """A direction of orbits, (2 H + 1, n), in the unknowns."""
+        return np.append(c, 0.0) if self.free else c.ravel()
+
     def orbit(self, x: Array, p: float) -> Harmonics:
         """Of unknowns."""
         c = x[: self.reference.c.size].reshape(self.reference.c.shape)

@@ -15,8 +15,9 @@ from ..continuation import NewtonSettings, Settings, branch_off, follow, newton
 from ..data import Array, ComplexArray
 from ..harmonic_balance.accuracy import SAFETY
 from . import equilibria, floquet, flow
-from .balance import Balance, Harmonics, summed
+from .balance import Harmonics, summed
 from .branches import LOST
+from .condensed import equations
 from .diagram import Asked, diagram
 from .dynamics import Dynamics
 from .equilibria import Hopf
@@ -31,7 +32,7 @@ PERIODS = 5
 FINE = 1e-9
 """Relative tolerance of that motion."""
 
-MOST = 60
+MOST = 150
 """Harmonics up to which an orbit is refined."""
 
 FASTEST = 4.0
@@ -139,10 +140,10 @@ def _born_at(
     way /= np.sqrt(np.mean((way[1:3] / np.asarray(system.scale)) ** 2) * system.count)
     rest = np.zeros_like(way)
     rest[0] = hopf.x
-    problem = Balance(system, Harmonics(rest + OFF * way, hopf.omega, hopf.p))
+    problem = equations(system, Harmonics(rest + OFF * way, hopf.omega, hopf.p))
     low, high = sorted(ends)
     asked = Settings(low=low, high=high, step=0.02, step_max=0.2, points=points)
-    first = branch_off(problem, problem.unknowns(problem.reference), hopf.p, (np.append(way, 0.0), 0.0), asked)
+    first = branch_off(problem, problem.unknowns(problem.reference), hopf.p, (problem.way(way), 0.0), asked)
     orbits, ended = list[Harmonics](), ""
     for state in follow(problem, first, asked):
         for one in state.found:
@@ -186,7 +187,7 @@ def refined(
     while error > accuracy and (H := orbit.count + max(orbit.count // 2, 2)) <= most:
         c = np.zeros((2 * H + 1, system.count))
         c[: len(orbit.c)] = orbit.c
-        problem = Balance(system, replace(orbit, c=c))
+        problem = equations(system, replace(orbit, c=c))
         found = newton(problem, problem.unknowns(problem.reference), orbit.p, NewtonSettings(last_resort=False))
         if not found.converged:
             return orbit, np.inf

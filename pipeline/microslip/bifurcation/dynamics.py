@@ -28,6 +28,8 @@ class Dynamics:
             change of p is. frequency: rad/s of what drives it, a function of p in jax; None: nothing does, and f does
             not depend on the angle.
         outputs: names of what is read, and unit. read: of x (..., n) and p: (..., w); None: the coordinates.
+        bends: (n, r) orthonormal, of the coordinates that f is not linear in: its derivative over all orthogonal to
+            them depends on p alone; None: not known.
     """
 
     rate: Rate
@@ -38,6 +40,7 @@ class Dynamics:
     outputs: tuple[str, ...] = ()
     read: Callable[[Array, float], Array] | None = None
     unit: str = ""
+    bends: Array | None = None
 
     @property
     def count(self) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.linalg
 
 from .. import sliding
 from ..data import Array, NotConverged, UserError
@@ -112,14 +113,25 @@ def dynamics(make: Make, low: float, high: float, frequency: float | None = None
         return sliding.rate(equations.at(p), z, angle)
 
     m, n = len(middle.push), middle.order
-    shown = make(0.5 * (low + high)).outputs
 
     def read(x: Array, p: float) -> Array:
         return x[..., :m] @ np.asarray(equations.at(jnp.asarray(p)).output).T
 
     labels = [f"q{i + 1}" for i in range(m)] + [f"v{i + 1}" for i in range(m)] + [f"x{i + 1}" for i in range(n - 2 * m)]
-    names = tuple(f"{w.monitor} {w.label}" for w in shown)
-    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, read if names else None, "m")
+    names = tuple(f"{w.monitor} {w.label}" for w in make(0.5 * (low + high)).outputs)
+    shown = read if names else None
+    return Dynamics(rate, tuple(labels), size(middle), high - low, driven, names, shown, "m", bends(equations))
+
+
+def bends(equations: Over) -> Array:
+    """(n, r) what moves the points of contacts, as displacements and as velocities, and what their laws remember."""
+    every = jax.tree_util.tree_unflatten(equations.tree, equations.series)
+    m = every.push.shape[-1]
+    moved = np.concatenate([np.zeros((1, m)), *(np.asarray(p.moved).reshape(-1, m) for p in every.points)])
+    _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
+    ways = ways[sizes > EXACT * max(sizes[0], 1e-300)].T
+    memory = np.eye(equations.at(jnp.asarray(equations.low)).order - 2 * m)
+    return np.asarray(scipy.linalg.block_diag(ways, ways, memory))
 
 
 def size(s: sliding.Sliding) -> Array:

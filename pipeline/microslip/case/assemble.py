@@ -28,6 +28,7 @@ from ..system.component import Component, Ring
 from ..system.ground import Ground
 from ..system.nodal import Nodal, nodal, static_compliance
 from ..system.pairing import Pairing, Place, facing, in_ring
+from ..system.spin import Spin, turned
 from .compliance import Face, Springs, counted_once, residual_share, static_answer
 from .driving import as_asked, damped, flow_of, loads_of, messages_of, on_springs, with_field
 from .points import (
@@ -65,6 +66,11 @@ class Loaded:
     def group(self) -> ModalGroup:
         """The first one: of all of a body that is not cyclic."""
         return self.groups[min(self.groups)]
+
+    @property
+    def mass(self) -> float:
+        """kg, or 0 where it is not known."""
+        return self.basis.mass if self.settings.mass is None else self.settings.mass
 
     @property
     def has_residual(self) -> bool:
@@ -235,7 +241,7 @@ def build(settings: CaseSettings, bases: Mapping[str, ModalBasis], path: Path | 
     settings = settings.model_copy(update={"contacts": tuple(_described(c, path) for c in settings.contacts)})
     bodies = load_bodies(settings, bases, path)
     settings = thrown(settings, {name: b.basis for name, b in bodies.items()}, path)
-    components = {name: _component(settings, b) for name, b in bodies.items()}
+    components = _spun({name: _component(settings, b) for name, b in bodies.items()}, settings, bodies, path)
     contacts, springs, made, messages = [], [], [], list[str]()
     fitted: dict[int, Callable[[float], Contact]] = {}
     for i, c in enumerate(settings.contacts):
@@ -363,9 +369,43 @@ def _ground(c: ContactSettings, loaded: list[Loaded], face: Interface) -> Ground
     """How the other side of a contact moves; about the axis of its body, where nothing else is said."""
     if c.ground is None:
         return None
-    other = place_of(loaded[-1])
-    axis, point = other.turn @ loaded[-1].basis.rotation_axis, other.turn @ loaded[-1].basis.rotation_point
-    return c.ground.ground(axis, point + other.shift, face, place_of(loaded[0]))
+    return c.ground.ground(*_axis(loaded[-1]), face, place_of(loaded[0]))
+
+
+def _axis(b: Loaded) -> tuple[Array, Array]:
+    """Direction and a point of the axis of a body, in the axes of the case."""
+    place = place_of(b)
+    return place.turn @ b.basis.rotation_axis, place.turn @ b.basis.rotation_point + place.shift
+
+
+def _spun(
+    components: dict[str, Component], settings: CaseSettings, bodies: Mapping[str, Loaded], path: Path | str
+) -> dict[str, Component]:
+    """The components, with the inertia of the material that runs through those which ground that turns is of.
+
+    Raises:
+        UserError: it turns differently under two contacts; see `spin.turned`.
+    """
+    spins = dict[str, tuple[Spin, bool]]()
+    for c in settings.contacts:
+        if c.ground is None or c.ground.rpm is None or c.against == GROUND:
+            continue
+        where, name = f"{path}: contacts.{c.interface}.ground", settings.ends(c)[1][0]
+        b = _body(bodies, name, path, f"contacts.{c.interface}")
+        spin = c.ground.spin(*_axis(b), place_of(b))
+        other, inert = spins.setdefault(name, (spin, c.ground.inertia))
+        if not spin.same(other) or inert != c.ground.inertia:
+            raise UserError(
+                f"{where}: turns the material of '{name}' otherwise than another contact does; write the same rpm, "
+                "axis, point and inertia in both"
+            )
+        if other is not spin or not inert:
+            continue
+        try:
+            components[name] = turned(components[name], spin, b.basis.mesh, b.mass)
+        except UserError as error:
+            raise UserError(f"{where}: '{name}': {error}; or leave its inertia out: inertia = false") from error
+    return components
 
 
 def memory_of(settings: CaseSettings, points: int, coordinates: int) -> float:

@@ -29,6 +29,7 @@ from ..system.excitation import Turning, base_order, harmonic_of, magnets, patte
 from ..system.ground import Ground, spectrum, turning
 from ..system.pairing import Place
 from ..system.pressure import field_loads, load_face, on_face, read_field, with_pressure
+from ..system.spin import Spin
 from ..units import from_rpm
 from .keys import Address, Order
 
@@ -108,7 +109,8 @@ class GroundOfCase(Model):
     spectrum: more of them. pushes: whether the slope of a wave turns the normal force, so that it pushes the body along
     the ground; false, as the book has it, leaves that out. rpm: instead of the velocity, of material that turns about
     the axis of the body that the contact is against, and runs through that body while its shape stands; axis: direction
-    and point: m, in the axes of the case, where it turns about another one.
+    and point: m, in the axes of the case, where it turns about another one. inertia: of the material that runs through
+    (see `system.spin`); false leaves that out, as for a body whose shape is not one of revolution.
     """
 
     velocity: Number = 0.0
@@ -119,6 +121,7 @@ class GroundOfCase(Model):
     waviness: Annotated[tuple[WaveOfCase, ...], BeforeValidator(_tuple)] = ()
     spectrum: SpectrumOfCase | None = None
     pushes: bool = True
+    inertia: bool = True
 
     @model_validator(mode="after")
     def _moves(self) -> GroundOfCase:
@@ -127,6 +130,8 @@ class GroundOfCase(Model):
             raise ValueError("rpm: ground that turns has no velocity, direction or waves; leave these out, or rpm")
         if self.rpm is None and (self.axis or self.point):
             raise ValueError("axis and point belong to ground that turns; add rpm")
+        if self.rpm is None and not self.inertia:
+            raise ValueError("inertia: is that of material that turns; add rpm, or leave it out")
         if self.rpm == 0:
             raise ValueError("rpm: 0 does not move; give the speed at which it slides")
         if self.rpm is None and not self.velocity and not self.waviness and self.spectrum is None:
@@ -141,14 +146,18 @@ class GroundOfCase(Model):
                 first body, which stands at `place`.
         """
         if self.rpm is not None:
-            n = np.asarray(axis if self.axis is None else self.axis, dtype=float)
-            rate = place.turn.T @ n * (float(from_rpm(self.rpm)) / float(np.linalg.norm(n)))
-            centre = place.turn.T @ (np.asarray(point if self.point is None else self.point) - place.shift)
-            return turning(rate, centre, face.origin, face.rotation)
+            spin = self.spin(axis, point, place)
+            return turning(spin.rate * spin.axis, spin.point, face.origin, face.rotation)
         waves = [(w.amplitude, w.length, float(np.radians(w.phase))) for w in self.waviness]
         if (s := self.spectrum) is not None:
             waves += spectrum(s.height, s.longest, s.shortest, s.exponent, s.waves, s.seed)
         return Ground(self.velocity, float(np.radians(self.direction)), tuple(waves), self.pushes)
+
+    def spin(self, axis: Array, point: Array, place: Place) -> Spin:
+        """How it turns, in the axes of a body that stands at `place`; see `ground`."""
+        n = np.asarray(axis if self.axis is None else self.axis, dtype=float)
+        centre = place.turn.T @ (np.asarray(point if self.point is None else self.point) - place.shift)
+        return Spin(float(from_rpm(self.rpm or 0.0)), place.turn.T @ n / float(np.linalg.norm(n)), centre)
 
 
 class ExcitationOfCase(Model):

@@ -259,7 +259,10 @@ class ScatterOfCase(Model):
     def _one_of_three(self) -> ScatterOfCase:
         if (self.of == "modal_file") != bool(self.others):
             raise ValueError("others: belong to modal_file, which needs them; give { 3 = 'repaired.h5' }")
-        if sum(map(bool, (self.deviation, self.values, self.file, self.others))) != 1:
+        given = sum(map(bool, (self.deviation, self.values, self.file, self.others)))
+        if not given:
+            raise ValueError("deviation: nothing scatters; give one above zero, or values or a file of known ones")
+        if given > 1:
             raise ValueError("deviation: give one of deviation, values, file and others")
         if bad := [key for key in self.others if not key.isdecimal()]:
             raise ValueError(f"others.{bad[0]}: is no sector; count them from 0")

@@ -17,9 +17,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..data import Array, Indices, Mesh, UserError
+from ..data import Array, Indices, Mesh, Ties, UserError
 from ..frames import rotation
-from .discretise import FreeUpper, Pattern, free_upper
+from ..mesh import part_numbers
+from .discretise import FreeUpper, Pattern
+from .tied import Tied, congruence, tied_upper
 
 _CLOSE = 1e-3  # share of the distance to the nearest other node within which two nodes are one
 
@@ -60,8 +62,11 @@ def pair_cut_faces(mesh: Mesh, left: str, right: str, axis: Array, point: Array,
         )
     x, y = mesh.points[a] - point, mesh.points[b] - point
     R = rotation(axis, 2 * np.pi / sectors)
-    spacing = float(np.median(_nearest(y, y, 2)[0][:, 1])) if len(y) > 1 else 1.0
-    distance, nearest = _nearest(y, x @ R.T)
+    part = part_numbers(mesh)  # nodes of tied parts may lie on each other
+    apart = 10 * float(np.ptp(mesh.points, axis=0).max()) * part[:, None]
+    turned, there = np.hstack([x @ R.T, apart[a]]), np.hstack([y, apart[b]])
+    spacing = float(np.median(_nearest(there, there, 2)[0][:, 1])) if len(y) > 1 else 1.0
+    distance, nearest = _nearest(there, turned)
     if len(a) != len(b) or len(np.unique(nearest)) < len(b) or distance.max() > _CLOSE * spacing:
         raise UserError(_no_match(x, y, left, right, axis, sectors, float(distance.max()), spacing))
     return CutFaces(sectors, a, b[nearest], R)
@@ -155,7 +160,7 @@ class SectorUnknowns:
         the cut faces; right ones are `block` (b, b) times the left ones times the phase.
     """
 
-    apart: FreeUpper
+    apart: FreeUpper | Tied
     cut: CutFaces
     stay: sp.csr_matrix
     turn: sp.csr_matrix
@@ -168,34 +173,58 @@ class SectorUnknowns:
         return (self.stay + self.cut.phase(harmonic) * self.turn).tocsr()
 
 
-def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces) -> SectorUnknowns:
+def sector_unknowns(pattern: Pattern, fixed: Indices, cut: CutFaces, ties: Ties | None = None) -> SectorUnknowns:
     """Eliminate the right cut face.
 
     Raises:
         UserError: a support holds one of a pair of nodes and not the other, or a direction that turning mixes.
     """
-    apart = free_upper(pattern, fixed)
+    apart = tied_upper(pattern, fixed, ties)
     free_left, free_right = _free_pairs(apart, cut)
     position = np.full(3 * pattern.n, -1, dtype=np.int64)
-    position[apart.free] = np.arange(len(apart.free))
+    plain = np.flatnonzero(apart.own >= 0)
+    position[apart.own[plain]] = plain
     l, r = position[3 * cut.left[:, None] + np.arange(3)], position[3 * cut.right[:, None] + np.arange(3)]
     pair, i, j = np.nonzero(free_right[:, :, None] & free_left[:, None, :] & (np.abs(cut.rotation) > 1e-14)[None])
     rows, columns, values = r[pair, i], l[pair, j], cut.rotation[i, j]
-    f = len(apart.free)
+    f = apart.size
     keep = np.ones(f, dtype=bool)
     keep[r[free_right]] = False
     number = np.cumsum(keep) - 1
     m = int(keep.sum())
     stay = sp.csr_matrix((np.ones(m), (np.flatnonzero(keep), np.arange(m))), shape=(f, m))
     turn = sp.csr_matrix((values, (rows, number[columns])), shape=(f, m))
+    _refuse_tied(apart, cut, stay, turn)
     left, right = l[free_left], r[free_right]
     block = sp.csr_matrix((values, (rows, columns)), shape=(f, f))[right][:, left].tocsr()
     return SectorUnknowns(apart, cut, stay, turn, left, right, block)
 
 
-def _free_pairs(apart: FreeUpper, cut: CutFaces) -> tuple[Array, Array]:
+def _refuse_tied(apart: FreeUpper | Tied, cut: CutFaces, stay: sp.csr_matrix, turn: sp.csr_matrix) -> None:
+    """Refuse ties that do not go on in the next sector: what follows others on the right face must be what does so on
+    the left one, turned and in any phase."""
+    if isinstance(apart, FreeUpper):
+        return
+    phase = np.exp(0.7j)
+    place = np.full(3 * (int(max(cut.left.max(), cut.right.max(), apart.apart.free.max() // 3)) + 1), -1)
+    place[apart.apart.free] = np.arange(len(apart.apart.free))
+    moved = apart.T @ (stay + phase * turn)
+    sides = []
+    for nodes in (cut.left, cut.right):
+        at = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
+        there = sp.diags((at >= 0).astype(float))
+        sides.append(there @ moved[np.maximum(at, 0)])
+    wrong = abs(sides[1] - phase * sp.kron(sp.identity(len(cut.left)), cut.rotation).tocsr() @ sides[0]).tocoo()
+    if bad := len(np.unique(wrong.row[wrong.data > 1e-9] // 3)):
+        raise UserError(
+            f"cyclic: {bad} nodes of the cut faces follow others by the ties of the mesh file, and not alike on both "
+            "faces; tie them alike, leave them out of these ties, or make the cut elsewhere"
+        )
+
+
+def _free_pairs(apart: FreeUpper | Tied, cut: CutFaces) -> tuple[Array, Array]:
     """(l, 3) which directions are free on the left and on the right node of each pair."""
-    left, right = (np.isin(3 * nodes[:, None] + np.arange(3), apart.free) for nodes in (cut.left, cut.right))
+    left, right = (np.isin(3 * nodes[:, None] + np.arange(3), apart.own) for nodes in (cut.left, cut.right))
     R = np.abs(cut.rotation) > 1e-12
     mixed = (R[None] & (right[:, :, None] != left[:, None, :])).any(axis=(1, 2))
     if mixed.any():
@@ -222,9 +251,9 @@ class CyclicUpper:
     collect: sp.csr_matrix
 
     @property
-    def free(self) -> Indices:
-        """Free degrees of freedom of the sector with its cut faces apart."""
-        return self.unknowns.apart.free
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.indptr) - 1
 
     def matrix(self, values: Array) -> sp.csr_matrix:
         """CSR upper triangle of an operator (p, 3, 3)."""
@@ -233,15 +262,15 @@ class CyclicUpper:
 
     def restrict(self, forces: Array) -> Array:
         """(m,) or (m, r) forces on the unknowns, from forces (3n,) or (3n, r) on all degrees of freedom."""
-        return self.transformation.T @ forces[self.free]
+        return self.transformation.T @ self.unknowns.apart.restrict(forces)
 
     def unknowns_of(self, displacements: Array) -> Array:
         """(m, r) unknowns of displacements (3n, r) that move all sectors alike: `expand` turned round."""
-        return self.unknowns.stay.T @ displacements[self.free]
+        return self.unknowns.stay.T @ self.unknowns.apart.unknowns_of(displacements)
 
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
-        return B[:, self.free] @ self.transformation
+        return self.unknowns.apart.rows(B) @ self.transformation
 
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n,) or (3n, r) displacements of n points from the unknowns (m,) or (m, r)."""
@@ -251,29 +280,4 @@ class CyclicUpper:
 def cyclic_upper(unknowns: SectorUnknowns, size: int) -> CyclicUpper:
     """The symmetric static problem of a sector; size: pairs of points in the pattern."""
     T = unknowns.transformation(0)
-    upper = unknowns.apart
-    i = np.repeat(np.arange(len(upper.indptr) - 1), np.diff(upper.indptr))
-    j = upper.indices.astype(np.int64)
-    a, b, c, entry = _products(T, i, j)
-    m = T.shape[1]
-    key, where = np.unique(np.minimum(a, b) * m + np.maximum(a, b), return_inverse=True)
-    row, column = np.divmod(key, m)
-    collect = sp.csr_matrix((c, (where, upper.gather[entry])), shape=(len(key), 9 * size))
-    indptr = np.searchsorted(row, np.arange(m + 1)).astype(np.int32)
-    return CyclicUpper(unknowns, T, indptr, column.astype(np.int32), collect)
-
-
-def _products(T: sp.csr_matrix, i: Array, j: Array) -> tuple[Array, Array, Array, Array]:
-    """Where entry (i, j) of a symmetric matrix goes in T^T K T: unknowns a, b, factor c, and the entry's number."""
-    count = np.diff(T.indptr)
-    times = count[i] * count[j]
-    entry = np.repeat(np.arange(len(i)), times)
-    within = np.arange(len(entry)) - np.repeat(np.cumsum(times) - times, times)
-    first, second = np.divmod(within, count[j[entry]])
-    at_a, at_b = T.indptr[i[entry]] + first, T.indptr[j[entry]] + second
-    a, b = T.indices[at_a].astype(np.int64), T.indices[at_b].astype(np.int64)
-    c = T.data[at_a] * T.data[at_b]
-    diagonal = i[entry] == j[entry]
-    c = np.where(~diagonal & (a == b), 2 * c, c)  # (i, j) and (j, i) both land on the diagonal
-    keep = ~diagonal | (a <= b)
-    return a[keep], b[keep], c[keep], entry[keep]
+    return CyclicUpper(unknowns, T, *congruence(unknowns.apart, T, size))

@@ -157,6 +157,20 @@ class FreeUpper:
     indices: Indices
     gather: Indices
 
+    @property
+    def own(self) -> Indices:
+        """(m,) the degree of freedom that each unknown is."""
+        return self.free
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.free)
+
+    def congruent(self, A: sp.csr_matrix) -> sp.csr_matrix:
+        """(m, m) matrix on the unknowns, from (3n, 3n)."""
+        return A[self.free][:, self.free]
+
     def matrix(self, values: Array) -> sp.csr_matrix:
         """CSR upper triangle of an operator (p, 3, 3)."""
         n = len(self.free)

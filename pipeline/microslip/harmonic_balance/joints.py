@@ -99,9 +99,7 @@ class Joints:
         """(W, c) dv of (W, c) A dv + D E^T S E dv = R; None where it is not found this way."""
         if self.alone is None:
             return None
-        free = np.empty_like(R)
-        for (inverse, _), s in zip(self.alone, self.slices, strict=True):
-            free[:, s] = _once(inverse, R[:, s])
+        free = self._of_parts(0, R)
         force = self._across(self._relative.solve(_flat(self._felt(free))))
         dv = free - self._answered(force)
         again = self._across(_flat(self._felt(dv)))
@@ -120,43 +118,69 @@ class Joints:
             out[one.contact] += one.sign * v[:, self.slices[one.part]][:, one.at][:, self._active[one.contact]]
         return out
 
+    @cached_property
+    def _felt_slopes(self) -> list[Array]:
+        """Of each contact (W k, W a) S, both ordered by harmonics."""
+        W = self.coefficients
+        return [
+            S[:, :, a].transpose(1, 0, 3, 2).reshape(W * len(S), W * len(a))
+            for S, a in zip(self.slopes, self._active, strict=True)
+        ]
+
     def _across(self, d: Array) -> list[Array]:
         """Of each contact (W, k) forces S d."""
-        out, begin, W = [], 0, self.coefficients
-        for S, a in zip(self.slopes, self._active, strict=True):
-            own = d[begin : begin + W * len(a)].reshape(W, -1)
-            out.append(np.tensordot(S[:, :, a], own, axes=((2, 3), (1, 0))).T)
-            begin += own.size
-        return out
+        ends = np.cumsum([S.shape[1] for S in self._felt_slopes])[:-1]
+        pairs = zip(self._felt_slopes, np.split(d, ends), strict=True)
+        return [(S @ own).reshape(self.coefficients, -1) for S, own in pairs]
 
     def _answered(self, force: list[Array]) -> Array:
         """(W, c) A^-1 D E^T of forces."""
         out = np.zeros((self.coefficients, self.slices[-1].stop))
         for one in self.sides:
             out[:, self.slices[one.part]][:, one.at] += one.sign * force[one.contact]
-        for (_, loose), s in zip(self.alone or [], self.slices, strict=True):
-            out[:, s] = _once(loose, out[:, s])
+        return self._of_parts(1, out)
+
+    @cached_property
+    def _alike(self) -> list[tuple[list[int], list[list[Side]]]]:
+        """Parts whose sides stand and feel alike, and of each its sides."""
+        by_part: dict[int, list[Side]] = {i: [] for i in range(len(self.slices))}
+        for one in self.sides:
+            by_part[one.part].append(one)
+        found: dict[tuple[object, ...], list[int]] = {}
+        for i, own in by_part.items():
+            stands = ((x.at.start, x.at.stop, self._active[x.contact].tobytes()) for x in own)
+            found.setdefault((self.slices[i].stop - self.slices[i].start, *stands), []).append(i)
+        return [(parts, [by_part[i] for i in parts]) for parts in found.values()]
+
+    def _of_parts(self, which: int, v: Array) -> Array:
+        """(W, c) what every part makes of its own, by one of the matrices in `alone`."""
+        out = np.empty_like(v)
+        for parts, _ in self._alike:
+            D = np.array([(self.alone or [])[i][which] for i in parts])
+            own = np.array([v[:, self.slices[i]] for i in parts])
+            for i, one in zip(parts, applied(D, own[..., None])[..., 0], strict=True):
+                out[:, self.slices[i]] = one
         return out
 
     @cached_property
     def _relative(self) -> Matrix:
         """1 + E A^-1 D E^T S, contact by contact."""
         pieces: dict[tuple[int, int], Array] = {}
-        by_part: dict[int, list[Side]] = {}
-        for one in self.sides:
-            by_part.setdefault(one.part, []).append(one)
-        W, alone = self.coefficients, self.alone or []
-        for i, own in by_part.items():
-            rows = [to.at.start + self._active[to.contact] for to in own]
-            loose, ends = alone[i][1][:, np.concatenate(rows)], np.cumsum([len(r) for r in rows])
-            for by in own:
-                S, a = self.slopes[by.contact], self._active[by.contact]
-                felt = np.ascontiguousarray(S[:, :, a].transpose(1, 0, 3, 2)).reshape(W, S.shape[0], -1)
-                moved = np.split(applied(loose[..., by.at], felt), ends[:-1], axis=1)
-                for to, block in zip(own, moved, strict=True):
-                    block = (to.sign * by.sign) * block.reshape(W * len(self._active[to.contact]), W * len(a))
-                    key = to.contact, by.contact
-                    pieces[key] = pieces[key] + block if key in pieces else block
+        W = self.coefficients
+        for parts, sides in self._alike:
+            feel = [self._active[one.contact] for one in sides[0]]
+            rows = np.concatenate([one.at.start + a for one, a in zip(sides[0], feel, strict=True)] or [[]]).astype(int)
+            loose = np.array([(self.alone or [])[i][1][:, rows] for i in parts])
+            ends = np.cumsum([len(a) for a in feel])[:-1]
+            for n, by in enumerate(sides[0]):
+                S = np.array([self._felt_slopes[own[n].contact] for own in sides])
+                moved = applied(loose[..., by.at], S.reshape(len(parts), W, -1, S.shape[2]))
+                for m, block in enumerate(np.split(moved, ends, axis=2)):
+                    block = block.reshape(len(parts), -1, S.shape[2])
+                    for own, one in zip(sides, block, strict=True):
+                        key = own[m].contact, own[n].contact
+                        one = one if own[m].sign == own[n].sign else -one
+                        pieces[key] = pieces[key] + one if key in pieces else one
         return one_plus(pieces, [len(a) for a in self._active], W, by_parts=True)
 
 
@@ -165,14 +189,9 @@ def _flat(values: list[Array]) -> Array:
 
 
 def applied(D: ComplexArray, V: Array) -> Array:
-    """(..., W, c, m) matrices (..., H + 1, c, k) of the harmonics applied to (W, k, m)."""
-    out = np.empty((*D.shape[:-3], len(V), D.shape[-2], V.shape[-1]))
-    out[..., 0, :, :] = D[..., 0, :, :].real @ V[0]
-    amplitude = D[..., 1:, :, :] @ (V[1::2] - 1j * V[2::2])
+    """(..., W, c, m) matrices (..., H + 1, c, k) of the harmonics applied to (..., W, k, m)."""
+    out = np.empty((*D.shape[:-3], V.shape[-3], D.shape[-2], V.shape[-1]))
+    out[..., 0, :, :] = D[..., 0, :, :].real @ V[..., 0, :, :]
+    amplitude = D[..., 1:, :, :] @ (V[..., 1::2, :, :] - 1j * V[..., 2::2, :, :])
     out[..., 1::2, :, :], out[..., 2::2, :, :] = amplitude.real, -amplitude.imag
     return out
-
-
-def _once(D: ComplexArray, v: Array) -> Array:
-    """(W, c) of (W, k)."""
-    return applied(D, v[..., None])[..., 0]

@@ -434,12 +434,22 @@ class AtFrequency:
 
     def _applied(self, force: Array, which: slice, driven: float = 1.0) -> Array:
         """(n, W, c) D, its derivative or both, applied to (W, c), less the reference times a factor."""
-        p, out = self.problem, np.empty((which.stop, *force.shape))
-        for view, s in zip(self.views, p.slices, strict=True):
-            both = np.zeros((len(force), 1 + s.stop - s.start, 1))
-            both[0, 0], both[1::2, 0], both[:, 1:, 0] = -driven, -driven * p.share, force[:, s]
-            out[:, :, s] = applied(view.both[which], both)[..., 0]
+        out = np.empty((which.stop, *force.shape))
+        for at, both in self._views:
+            V = np.zeros((len(at), 1, len(force), 1 + at.shape[1], 1))
+            V[:, 0, 0, 0], V[:, 0, 1::2, 0] = -driven, -driven * self.problem.share
+            V[:, 0, :, 1:, 0] = force[:, at].transpose(1, 0, 2)
+            out[:, :, at] = applied(both[:, which], V)[..., 0].transpose(1, 2, 0, 3)
         return out
+
+    @cached_property
+    def _views(self) -> list[tuple[Indices, ComplexArray]]:
+        """Of parts with as many coordinates (n, c) these, and (n, 2, H + 1, c, 1 + c) their `View.both`."""
+        found: dict[int, list[int]] = {}
+        for i, s in enumerate(self.problem.slices):
+            found.setdefault(s.stop - s.start, []).append(i)
+        begins, both = np.array(self.problem.begins), [view.both for view in self.views]
+        return [(begins[parts, None] + np.arange(c), np.array([both[i] for i in parts])) for c, parts in found.items()]
 
     def _scaled(self, block: Array, rows: slice, columns: slice) -> Array:
         """A block (W, a, W, b) as a matrix, in units of x."""

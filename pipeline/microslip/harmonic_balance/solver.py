@@ -176,11 +176,21 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
-    rises = RISES if len(problem.slices) == 1 else 0  # of many bodies some contact always leads the wrong way
-    yield from (partial(newton, at, x, slope=slope, rises=rises) for x in starts)
+    rises = _rises(problem)
+    most = 60 if rises else AMONG
+    yield from (partial(newton, at, x, most=most, slope=slope, rises=rises) for x in starts)
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
     yield partial(_raised, problem, at.Omega)
+
+
+AMONG = 20
+"""Steps of Newton's method at most among many bodies: what arrives takes some five."""
+
+
+def _rises(problem: Problem) -> int:
+    """How often |R| may rise: of many bodies some contact always leads the wrong way."""
+    return RISES if len(problem.slices) == 1 else 0
 
 
 def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
@@ -195,7 +205,7 @@ def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
     q, point = pseudo_transient.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
     for count in range(most):
         step = pseudo_transient.slowly(at, rate, q)
-        trial = newton(step, point.x, TOLERANCE, most=20, slope=point.slope)
+        trial = newton(step, point.x, TOLERANCE, most=20, slope=point.slope, rises=_rises(problem))
         spent += trial.iterations
         if not trial.converged:
             rate, point = 4 * rate, replace(point, slope=None)
@@ -223,7 +233,8 @@ TOLERANCE = 1e-9
 
 def _ended(at: AtFrequency, point: Point, q: pseudo_transient.Places) -> Point:
     """Newton's method where pseudo-time ends; where that fails, with the place of what nothing holds left as it is."""
-    found = newton(at, point.x, most=20, slope=point.slope)
+    rises = _rises(at.problem)
+    found = newton(at, point.x, most=20 if rises else 10, slope=point.slope, rises=rises)
     if found.converged or not pseudo_transient.unheld(at.problem):
         return found
     held = pseudo_transient.in_place(at, q)

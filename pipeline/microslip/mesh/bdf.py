@@ -1,7 +1,8 @@
 """Reader of Nastran bulk data: grid points, solid elements, materials, sets of points, shells as faces.
 
 Written against the Quick Reference Guide: GRID, CTETRA, CHEXA, CPENTA, CPYRAM, PSOLID, MAT1, PARAM WTMASS, SET1, SPC,
-SPC1, SPCADD and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or sixteen columns or between commas.
+SPC1, SPCADD, the constraints RBE2, RBE3, MPC, MPCADD and the shells CTRIA3, CTRIA6, CQUAD4, CQUAD8; fields of eight or
+sixteen columns or between commas.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Indices
+from ..data import AverageLink, Equation, Indices, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh
@@ -29,9 +30,36 @@ _SOLIDS: dict[str, dict[int, tuple[str, Sequence[int]]]] = {
 _SOLIDS["CPYRA"] = _SOLIDS["CPYRAM"]
 _SHELLS = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4}
 _MATERIALS = {"MAT2", "MAT3", "MAT8", "MAT9", "MAT10", "MAT11"}
-_READ = {"GRID", "PSOLID", "MAT1", "PARAM", "SET1", "SPC", "SPC1", "SPCADD", *_SOLIDS, *_SHELLS, *_MATERIALS}
+_READ = {
+    "GRID",
+    "PSOLID",
+    "MAT1",
+    "PARAM",
+    "SET1",
+    "SPC",
+    "SPC1",
+    "SPCADD",
+    "RBE2",
+    "RBE3",
+    "MPC",
+    "MPCADD",
+    *_SOLIDS,
+    *_SHELLS,
+    *_MATERIALS,
+}
 
-Cards = dict[str, list[list[str]]]
+
+class _Card(list[str]):
+    """Name and fields, and the line of the file that they begin in."""
+
+    line = 0
+
+    @property
+    def where(self) -> str:
+        return f"line {self.line}: {self[0]} {_at(self, 1)}"
+
+
+Cards = dict[str, list[_Card]]
 
 
 def read_bdf(path: Path) -> RawMesh:
@@ -55,7 +83,10 @@ def read_bdf(path: Path) -> RawMesh:
         for card in cards.get(name, []):
             members = np.array(_listed(card, first), dtype=np.int64)
             raw.add_points(f"{label} {card[1]}", numbering.positions(members, f"{name} {card[1]} names"))
-    add_supports(raw, _constraints(cards, text), numbering)
+    held = _constraints(cards, text)
+    raw.links = [*_rigid(cards, path.name, numbering), *_averages(cards, path.name, numbering)]
+    raw.links += _equations(cards, path.name, text, numbering, held)
+    add_supports(raw, held, numbering)
     if not re.search(r"^\s*ENDDATA\b", text, re.IGNORECASE | re.MULTILINE):
         raw.unended = "no ENDDATA"  # a warning: decks are also kept as parts that others include
     return raw
@@ -64,12 +95,12 @@ def read_bdf(path: Path) -> RawMesh:
 # cards ---------------------------------------------------------------------------------------------------------------
 
 
-def _cards(text: str) -> Iterator[list[str]]:
+def _cards(text: str) -> Iterator[_Card]:
     """Name and fields of every card that matters, its continuations joined."""
     lines = text.splitlines()
     begin = next((i for i, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.IGNORECASE)), -1)
-    card: list[str] = []
-    for line in lines[begin + 1 :]:
+    card = _Card()
+    for number, line in enumerate(lines[begin + 1 :], begin + 2):
         line = line.split("$")[0].expandtabs(8).rstrip()
         if not line:
             continue
@@ -84,7 +115,8 @@ def _cards(text: str) -> Iterator[list[str]]:
             continue
         if card and card[0] in _READ:
             yield card
-        card = [words[0].upper().rstrip("*").strip(), *words[1:]]
+        card = _Card([words[0].upper().rstrip("*").strip(), *words[1:]])
+        card.line = number
     if card and card[0] in _READ:
         yield card
 
@@ -231,23 +263,80 @@ def _constraints(cards: Cards, text: str) -> Constraints:
 
 
 def _directions(components: str) -> str:
-    return "".join(name for name, digit in zip("xyz", "123", strict=True) if digit in components)
+    return "".join(name for name, digit in zip("xyzabc", "123456", strict=True) if digit in components)
 
 
-def _chosen(cards: Cards, text: str, held: Constraints) -> set[int]:
+def _chosen(cards: Cards, text: str, held: Constraints, kind: str = "SPC") -> set[int]:
     """Numbers of the sets of constraints that hold, those that they are made of included."""
     control = re.split(r"^\s*BEGIN\s+BULK", text, maxsplit=1, flags=re.IGNORECASE | re.MULTILINE)
-    pattern = re.compile(r"^\s*SPC\s*=\s*(\d{1,9})\b", re.IGNORECASE | re.MULTILINE)
+    pattern = re.compile(rf"^\s*{kind}\s*=\s*(\d{{1,9}})\b", re.IGNORECASE | re.MULTILINE)
     named = pattern.findall(control[0]) if len(control) > 1 else []
-    every = {_whole(c, 1) for name in ("SPC", "SPC1") for c in cards.get(name, [])}
+    every = {_whole(c, 1) for name in (kind, f"{kind}1") for c in cards.get(name, [])}
     if not named and len(every) > 1:
-        held.left_out.append("several sets of SPC, of which the case control chooses none")
+        held.left_out.append(f"several sets of {kind}, of which the case control chooses none")
         return set()
     chosen = {int(n) for n in named} if named else every
-    for card in cards.get("SPCADD", []):
+    for card in cards.get(f"{kind}ADD", []):
         if _whole(card, 1) in chosen:
             chosen |= set(_listed(card, 2))
     return chosen
+
+
+def _rigid(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
+    """RBE2: points that follow one as a rigid body does, in some of its directions."""
+    for card in cards.get("RBE2", []):
+        where = f"{name}, {card.where}"
+        members = [int(word) for word in card[4:] if word.isdecimal()] if "THRU" not in card else _listed(card, 4)
+        if not members:
+            raise Damaged(f"{where} couples no nodes to its node {_at(card, 2)}; add them")
+        reference = numbering.positions(np.array([_whole(card, 2)]), f"{where} names")
+        moves = "".join(c for c in _directions(_at(card, 3)) if c in "xyz")
+        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
+        yield RigidLink(where, int(reference[0]), positions, moves)
+
+
+def _averages(cards: Cards, name: str, numbering: Numbering) -> Iterator[Link]:
+    """RBE3: a point that follows others in the mean."""
+    for card in cards.get("RBE3", []):
+        where = f"{name}, {card.where}"
+        if "UM" in card:
+            raise Damaged(f"{where} names its dependent displacements by UM, which is not read; leave it out")
+        members: list[int] = []
+        weights: list[float] = []
+        place, end = 5, card.index("ALPHA") if "ALPHA" in card else len(card)
+        while place < end:
+            if not _at(card, place):
+                place += 1
+                continue
+            weight = _real(card, place)
+            if not set("123") <= set(_at(card, place + 1)):
+                raise Damaged(f"{where} takes single directions of its points ({_at(card, place + 1)}); 123 is read")
+            place += 2
+            while place < end and (not card[place] or card[place].isdecimal()):
+                if card[place]:
+                    members.append(int(card[place]))
+                    weights.append(weight or 0.0)
+                place += 1
+        if not members:
+            raise Damaged(f"{where} follows no nodes; add them")
+        reference = numbering.positions(np.array([_whole(card, 3)]), f"{where} names")
+        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
+        yield AverageLink(where, int(reference[0]), positions, np.array(weights), _directions(_at(card, 4)))
+
+
+def _equations(cards: Cards, name: str, text: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:
+    """MPC of the sets that the case control chooses, or of the only one."""
+    chosen = _chosen(cards, text, held, "MPC")
+    for card in cards.get("MPC", []):
+        if _whole(card, 1) not in chosen:
+            continue
+        where = f"{name}, {card.where}"
+        places = [p + s for p in range(2, len(card), 8) for s in (0, 3) if _at(card, p + s)]
+        nodes = numbering.positions(np.array([_whole(card, p) for p in places], dtype=np.int64), f"{where} names")
+        ways = [_whole(card, p + 1, 0) - 1 for p in places]
+        if not all(0 <= way < 6 for way in ways):
+            raise Damaged(f"{where} names a component that no grid point has (1 to 6)")
+        yield Equation(where, nodes, np.array(ways), np.array([_real(card, p + 2) or 0.0 for p in places]))
 
 
 def _shells(cards: Cards, raw: RawMesh, numbering: Numbering) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Array
+from ..data import Array, Equation, Link, RigidLink
 from ..elasticity import turned_strain
 from .materials import isotropic_rows, orthotropic_row
 from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number
@@ -52,6 +52,9 @@ class _Archive:
     uniform: float | None = None
     nodal: dict[int, float] = field(default_factory=dict)
     held: Constraints = field(default_factory=Constraints)
+    equations: dict[str, list[tuple[int, str, float]]] = field(default_factory=dict)
+    rigid: list[tuple[int, str, str]] = field(default_factory=list)
+    open: str = ""
 
 
 def read_cdb(path: Path) -> RawMesh:
@@ -263,7 +266,7 @@ def _refuse_temperatures(archive: _Archive, words: list[str]) -> None:
 def _read_displacement(archive: _Archive, words: list[str]) -> None:
     """D, node or component, UX or UY or UZ or ALL, value."""
     where, label, value = [*words[1:4], "", "", ""][:3]
-    directions = {"UX": "x", "UY": "y", "UZ": "z", "ALL": "xyz"}.get(label.upper(), "")
+    directions = _LABELS.get(label.upper(), "") if label.upper() != "ALL" else "xyzabc"
     if not directions:
         return
     if value and _number(value, "D") != 0:
@@ -274,7 +277,42 @@ def _read_displacement(archive: _Archive, words: list[str]) -> None:
         archive.held.left_out.append(f"D,{where},{label} names no node by its number")
 
 
+_LABELS = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "a", "ROTY": "b", "ROTZ": "c"}
+
+
+def _read_equation(archive: _Archive, words: list[str]) -> None:
+    """CE, number, constant, then node, label, factor in threes; or CE,R5.0,DEFI, length, number, constant and rows
+    CE,R5.0,NODE of terms, as archives have it."""
+    if len(words) > 2 and words[1].upper().startswith("R5"):
+        if words[2].upper() == "DEFI":
+            archive.open = words[4]
+            number, constant, terms = words[4], (words[5:6] or [""])[0], []
+        else:
+            number, constant, terms = archive.open, "", words[3:]
+    else:
+        number, constant, terms = (words[1:2] or [""])[0], (words[2:3] or [""])[0], words[3:]
+    if constant and _number(constant, "CE") != 0:
+        raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
+    found = archive.equations.setdefault(number, [])
+    for place in range(0, len(terms) - 2, 3):
+        node, label, factor = terms[place : place + 3]
+        if node:
+            if label.upper() not in _LABELS:
+                raise Damaged(f"the constraint equation CE {number} takes in {label or 'nothing'} of node {node}")
+            found.append((_whole(node, "CE"), _LABELS[label.upper()], _number(factor, "CE")))
+
+
+def _read_rigid(archive: _Archive, words: list[str]) -> None:
+    """CERIG, master, slave node or component, directions."""
+    master, slave, label = [*words[1:4], "", "", ""][:3]
+    ways = {"": "xyz", "ALL": "xyz", "UXYZ": "xyz", "RXYZ": ""}.get(label.upper(), _LABELS.get(label.upper(), "?"))
+    if ways == "?" or slave.upper() in ("ALL", ""):
+        raise Damaged(f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX")
+    archive.rigid.append((_whole(master, "CERIG"), slave, ways))
+
+
 _COMMANDS = {
+    "CE": _read_equation, "CERIG": _read_rigid,
     "D": _read_displacement,
     "ET": _read_type, "MPTEMP": _read_temperatures, "MPDATA": _read_data, "MP": _read_constant, "TREF": _read_reference,
     "TUNIF": _read_uniform, "BFUNIF": _read_uniform, "BF": _read_body_force, "BFBLOCK": _refuse_temperatures,
@@ -302,10 +340,33 @@ def _assembled(archive: _Archive) -> RawMesh:
         if members:
             chosen = np.array(members, dtype=np.int64)
             raw.add_points(name, numbering.positions(chosen, f"the component '{name}' names"))
+    raw.links = _links(archive, numbering)
     add_supports(raw, archive.held, numbering)
     raw.materials = [_material(archive, *key) for key in regions]
     _assign_temperatures(archive, raw, numbering)
     return raw
+
+
+def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
+    """Constraint equations, and nodes that follow one rigidly."""
+    found: list[Link] = []
+    for number, terms in archive.equations.items():
+        where = f"CE {number}"
+        if not terms:
+            raise Damaged(f"the constraint equation {where} has no terms")
+        nodes = numbering.positions(np.array([t[0] for t in terms], dtype=np.int64), f"{where} names")
+        ways = np.array(["xyzabc".index(t[1]) for t in terms])
+        found.append(Equation(where, nodes, ways, np.array([t[2] for t in terms])))
+    for master, slave, moves in archive.rigid:
+        where, members = f"CERIG,{master},{slave}", archive.components.get(slave, [])
+        members = [int(slave)] if is_number(slave) else members
+        if not members:
+            raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
+        reference = numbering.positions(np.array([master]), f"{where} names")
+        positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
+        if moves:
+            found.append(RigidLink(where, int(reference[0]), positions, moves))
+    return found
 
 
 def _form(archive: _Archive, number: int, kind: int, nodes: list[int]) -> tuple[str, list[int]] | None:

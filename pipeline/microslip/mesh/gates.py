@@ -63,7 +63,8 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     ]
     size = np.ptp(mesh.points, axis=0).max()
     pairs = cKDTree(mesh.points).query_pairs(1e-9 * size, output_type="ndarray")
-    parts = part_numbers(mesh)
+    pairs = pairs[~np.isin(pairs, _hanging(mesh)).any(axis=1)]
+    parts = part_numbers(mesh, tied=True)
     if not errors and (overlapping := _overlapping(mesh)):
         errors.append(f"{overlapping} facets belong to more than two cells, so cells overlap; remesh")
     if len(pairs):
@@ -112,12 +113,29 @@ def corner_volumes(mesh: Mesh, cell_type: str) -> Array:
     return np.array([np.linalg.det(e) for e in edges]).min(axis=0)
 
 
-def part_numbers(mesh: Mesh) -> Indices:
-    """(n,) number of the connected part each point belongs to."""
+def part_numbers(mesh: Mesh, tied: bool = False) -> Indices:
+    """(n,) number of the connected part each point belongs to; tied: parts that ties join are one."""
     rows = np.concatenate([np.repeat(c[:, 0], c.shape[1] - 1) for c in mesh.cells.values()])
     cols = np.concatenate([c[:, 1:].ravel() for c in mesh.cells.values()])
-    graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(mesh.n_points, mesh.n_points))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    size = mesh.n_points
+    if tied and mesh.ties is not None:
+        link = mesh.ties.rows.tocoo()
+        dof, n = link.col.astype(np.int64), 3 * mesh.n_points
+        nodes = np.where(dof < n, dof // 3, mesh.n_points + (dof - n) // 6)
+        size += len(mesh.ties.references) + link.shape[0]  # each equation joins what stands in it
+        rows = np.concatenate([rows, size - link.shape[0] + link.row])
+        cols = np.concatenate([cols, nodes])
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(size, size))
+    numbers = connected_components(graph, directed=False)[1][: mesh.n_points]
+    return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
+
+
+def _hanging(mesh: Mesh) -> Indices:
+    """Points that ties move: they may lie on others."""
+    if mesh.ties is None:
+        return np.zeros(0, dtype=np.int64)
+    given = mesh.ties.dependent
+    return np.unique(given[(given >= 0) & (given < 3 * mesh.n_points)] // 3)
 
 
 def longest_over_shortest(mesh: Mesh) -> float:

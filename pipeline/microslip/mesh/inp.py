@@ -1,24 +1,30 @@
 """Reader of Abaqus and CalculiX input files: nodes, solid cells, facets, node sets and element-based surfaces.
 
 Written against the keyword descriptions in the two programs' manuals. It keeps node numbers and reads ``*SURFACE``,
-in which such programs name faces; a file whose meaning it cannot keep (instances that are moved, generated nodes,
-local systems) is refused.
+in which such programs name faces; parts are laid where their instances stand (`instances`). A file whose meaning it
+cannot keep (generated nodes) is refused.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
-from ..files.store import ordinary
+from .cards import Card, data_of, fields, read_cards
+from .deck import Cells, Deck, DeckConstants
+from .deck_joints import KEYWORDS as JOINTS
+from .deck_joints import joints_of, preloads_of, unused_loads
+from .deck_links import KEYWORDS as LINKS
+from .deck_links import links_of
+from .instances import local_system, numbered, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, is_number, joined, refuse_twice
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, refuse_twice
 from .supports import Constraints, add_supports
 
 _SOLIDS = {
@@ -34,64 +40,12 @@ _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 }
 _REFUSED = {
     "NGEN": "generates nodes by *NGEN", "NFILL": "generates nodes by *NFILL", "NCOPY": "copies nodes by *NCOPY",
-    "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY", "SYSTEM": "uses a local *SYSTEM",
+    "ELGEN": "generates cells by *ELGEN", "ELCOPY": "copies cells by *ELCOPY",
 }  # fmt: skip
-_KEYWORDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "INSTANCE", "ASSEMBLY", "END ASSEMBLY"} | set(_REFUSED)
-_KEYWORDS |= {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "SOLID SECTION", "ORIENTATION"}
-_KEYWORDS |= {"INITIAL CONDITIONS", "TEMPERATURE", "BOUNDARY", "STEP", "TRANSFORM"}
-_ANYWHERE = {"MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "INITIAL CONDITIONS", "TEMPERATURE"}
-_ANYWHERE |= {"BOUNDARY", "STEP", "TRANSFORM"}
 _HELD = {
-    "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
-    "ZASYMM": "xy",
+    "ENCASTRE": "xyzabc", "PINNED": "xyz", "XSYMM": "xbc", "YSYMM": "yac", "ZSYMM": "zab", "XASYMM": "yza",
+    "YASYMM": "xzb", "ZASYMM": "xyc",
 }  # fmt: skip
-
-
-@dataclass
-class _Cells:
-    """Solid cells of one type. `ids` (e,), `nodes` (e, k) node numbers."""
-
-    kind: str
-    ids: Indices
-    nodes: Indices
-
-
-@dataclass
-class _Deck:
-    """What the keywords have said so far. Names of sets are free of case: their keys are in capitals."""
-
-    node_id: list[Indices] = field(default_factory=list)
-    points: list[Array] = field(default_factory=list)
-    solids: list[_Cells] = field(default_factory=list)
-    facets: list[_Cells] = field(default_factory=list)
-    written: dict[str, str] = field(default_factory=dict)
-    node_sets: dict[str, list[Indices]] = field(default_factory=dict)
-    cell_sets: dict[str, list[Indices]] = field(default_factory=dict)
-    surfaces: list[tuple[str, str, list[list[str]]]] = field(default_factory=list)
-    instances: int = 0
-    materials: dict[str, _Material] = field(default_factory=dict)
-    current: str = ""
-    orientations: dict[str, Array | str] = field(default_factory=dict)
-    sections: list[tuple[str, str, str]] = field(default_factory=list)
-    temperatures: list[tuple[int, str, float]] = field(default_factory=list)
-    held: list[tuple[str, str]] = field(default_factory=list)
-    not_held: list[str] = field(default_factory=list)
-    step: int = 0
-    renewed: int = -1
-    turned: bool = False
-
-
-@dataclass
-class _Material:
-    """Constants as written: name; (t, 3) E, nu, T or 9 engineering constants, or text why they are not read."""
-
-    name: str
-    isotropic: Array | None = None
-    orthotropic: Array | None = None
-    stiffness: Array | None = None
-    refused: str = ""
-    density: float | None = None
-    expansion: Array = field(default_factory=lambda: np.zeros(3))
 
 
 def read_inp(path: Path) -> RawMesh:
@@ -100,86 +54,99 @@ def read_inp(path: Path) -> RawMesh:
     Raises:
         Damaged: content that is inconsistent, or whose meaning would be lost.
     """
-    deck = _Deck()
-    assembly = False
-    for keyword, parameters, lines in _blocks(_lines(path, 0)):
-        if keyword in _REFUSED:
-            raise Damaged(f"the file {_REFUSED[keyword]}; write out every node and cell")
-        if keyword in ("ASSEMBLY", "END ASSEMBLY"):
-            assembly = keyword == "ASSEMBLY"
-        elif keyword == "INSTANCE":
-            deck.instances += 1
-            if deck.instances > 1 or any(_fields(line) for line in lines):
-                raise Damaged("the file holds several or moved *INSTANCEs; write it without parts and assemblies")
-        elif keyword in _READERS and (
-            not assembly or "INSTANCE" in parameters or keyword == "SURFACE" or keyword in _ANYWHERE
-        ):
-            if "INPUT" in parameters:
-                lines = [*lines, *(line for line in _lines(path.parent / parameters["INPUT"], 1))]
-            _READERS[keyword](deck, parameters, lines)
-    raw = _assembled(deck)
+    found = outline(read_cards(path))
+    whole = Deck()
+    parts = [(card, _part(path, found.parts, card, own)) for card, own in found.instances]
+    spaces = places([(card.parameters["NAME"], part) for card, part in parts])
+    for (card, part), space in zip(parts, spaces, strict=False):
+        at = _told(card, lambda c: placement(_table(c.lines, "*INSTANCE")))
+        place(whole, part, card.parameters["NAME"], at, space)
+    whole.spaces[""] = spaces[-1]
+    _read(path, whole, found.rest)
+    raw = _assembled(whole)
+    raw.remarks = [*numbered([card.parameters["NAME"] for card, _ in parts], spaces), *_replaced(raw, whole)]
+    whole.ignored += unused_loads(whole)
+    if whole.ignored:
+        raw.remarks.append(f"read and not used: {', '.join('*' + word for word in dict.fromkeys(whole.ignored))}")
     if not path.read_bytes().endswith(b"\n"):
         raw.unended = "a last line without an end"
     return raw
 
 
-def _lines(path: Path, depth: int) -> Iterator[str]:
-    """Lines of a file and of those it includes, without comments and empty lines."""
-    if depth > 10:
-        raise Damaged(f"the file includes itself by way of {path.name}")
+_AS = {
+    "C3D8R": "reduced integration becomes full", "C3D8RH": "reduced integration becomes full",
+    "C3D8I": "incompatible modes are left out", "C3D8H": "the hybrid form becomes that of displacements",
+    "C3D20R": "reduced integration becomes full, a little stiffer on coarse meshes",
+    "C3D20RH": "reduced integration becomes full, a little stiffer on coarse meshes",
+    "C3D10M": "the modified form becomes the plain one", "C3D10I": "the improved stress is left out",
+    "C3D10HS": "the hybrid form becomes that of displacements",
+}  # fmt: skip
+"""Solids that are taken as their plain sisters, and what that changes."""
+
+
+def _replaced(raw: RawMesh, deck: Deck) -> list[str]:
+    """Which cells are taken as others, and how far first-order ones lock in bending."""
+    count: dict[str, int] = {}
+    for cells in deck.solids:
+        count[cells.written] = count.get(cells.written, 0) + len(cells.ids)
+    told = []
+    for written, number in count.items():
+        plain = re.match(r"C3D\d+", written)
+        if written in _AS and plain:
+            told.append(f"{number} cells {written} are taken as {plain[0]}: {_AS[written]}")
+    bricks = [nodes for kind, nodes in raw.blocks if kind == "hexahedron"]
+    if bricks:
+        told.append(
+            f"first-order bricks lock: where one layer of them bends, stiffness is {locking(raw, bricks):.2g} times "
+            "too large, with m layers the excess falls as 1/m2; export second-order cells (C3D20)"
+        )
+    return told
+
+
+def locking(raw: RawMesh, bricks: list[Indices]) -> float:
+    """How many times too stiff one layer of fully integrated bricks is in bending, of the median brick.
+
+    (1 / (1 - nu) + a^2 / 2) / (1 + nu), a the length over the height (R. D. Cook and others, Concepts and Applications
+    of Finite Element Analysis, parasitic shear), here with nu = 0 and its longest over its shortest side.
+    """
+    x = raw.points[np.concatenate(bricks)]
+    sides = np.stack([np.linalg.norm(x[:, j] - x[:, 0], axis=1) for j in (1, 3, 4)])
+    with np.errstate(all="ignore"):  # flat cells are told elsewhere
+        return float(1 + 0.5 * np.median(sides.max(axis=0) / sides.min(axis=0)) ** 2)
+
+
+def _part(path: Path, parts: dict[str, list[Card]], instance: Card, own: list[Card]) -> Deck:
+    """A part as an instance of it begins: with what the instance itself says besides."""
+    name = instance.parameters.get("PART", "")
+    if "LIBRARY" in instance.parameters or name.upper() not in {*parts, ""}:
+        raise Damaged(f"{instance.where}: *INSTANCE names the part '{name}', which the file does not define")
+    deck = Deck()
+    _read(path, deck, [*parts.get(name.upper(), ()), *own])
+    return deck
+
+
+def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
+    """Take in cards one after the other."""
+    for card in cards:
+        if card.keyword in _REFUSED:
+            raise Damaged(f"{card.where}: the file {_REFUSED[card.keyword]}; write out every node and cell")
+        if "INPUT" in card.parameters and card.keyword in (*LINKS, *JOINTS, *_READERS):
+            card.lines = [*card.lines, *_told(card, lambda c: data_of(path, c.parameters.pop("INPUT")))]
+        if card.keyword in (*LINKS, *JOINTS):
+            deck.links.append((card, ""))
+        if card.keyword not in _READERS:
+            if card.keyword not in (*_SILENT, *LINKS, *JOINTS):
+                deck.ignored.append(card.keyword)
+            continue
+        _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
+
+
+def _told(card: Card, work: Callable[[Card], Any]) -> Any:
+    """What is made of a card; what is wrong with it is told with its place."""
     try:
-        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
-    for line in text.splitlines():
-        line = line.strip()
-        if re.match(r"\*INCLUDE\b", line, re.IGNORECASE):
-            target = _parameters(line).get("INPUT", "")
-            if not target:
-                raise Damaged("an *INCLUDE names no file")
-            yield from _lines(path.parent / target, depth + 1)
-        elif line and not line.startswith("**"):
-            yield line
-
-
-def files_of(path: Path, depth: int = 0) -> list[Path]:
-    """An input file and all that it reads from others, at any depth; what is missing is told where it is read."""
-    data = path.read_bytes() if path.is_file() and depth <= 10 else b""
-    found = [path]
-    for line in re.findall(r"^\s*\*[^*\n].*$", data.decode(errors="replace"), re.M) if b"INPUT" in data.upper() else ():
-        if name := _parameters(line).get("INPUT"):
-            found += files_of(path.parent / name, depth + 1)
-    return list(dict.fromkeys(found))
-
-
-def _blocks(lines: Iterator[str]) -> Iterator[tuple[str, dict[str, str], list[str]]]:
-    """(keyword, parameters, data lines) of each keyword that matters. A keyword line may go on after a comma."""
-    head = ""
-    data: list[str] = []
-    for line in lines:
-        if line.startswith("*"):
-            if _keyword(head) in _KEYWORDS:
-                yield _keyword(head), _parameters(head), data
-            head, data = line, []
-        elif head.endswith(",") and not data:
-            head += line
-        else:
-            data.append(line)
-    if _keyword(head) in _KEYWORDS:
-        yield _keyword(head), _parameters(head), data
-
-
-def _keyword(line: str) -> str:
-    return " ".join(line[1:].partition(",")[0].upper().split())
-
-
-def _parameters(line: str) -> dict[str, str]:
-    pairs = (word.partition("=") for word in line.split(",")[1:])
-    return {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs if key.strip()}
-
-
-def _fields(line: str) -> list[str]:
-    return [word.strip() for word in line.split(",") if word.strip()]
+        return work(card)
+    except Damaged as error:
+        raise Damaged(f"{card.where}: {error}") from None
 
 
 def _numbers(text: str, what: str) -> Indices:
@@ -193,21 +160,38 @@ def _numbers(text: str, what: str) -> Indices:
     return values
 
 
-def _read_nodes(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    if parameters.get("SYSTEM", "R").upper() not in ("R", ""):
-        raise Damaged("*NODE uses cylindrical or spherical coordinates; write Cartesian ones")
+def _read_nodes(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     rows = [line.split(",") for line in lines]
-    ids = _numbers(",".join(row[0] for row in rows), "*NODE")
+    ids = _numbers(",".join(row[0] for row in rows), "*NODE") + deck.spaces[""].nodes
     if len(ids) != len(rows):
         raise Damaged("*NODE holds a line without a number")
     values = _table([",".join(row[1:4]) for row in rows], "*NODE")
     deck.node_id.append(ids)
-    deck.points.append(np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3))
+    points = np.array([v + [0.0] * (3 - len(v)) for v in values]).reshape(-1, 3)
+    points = _cartesian(points, parameters.get("SYSTEM", "R").upper()[:1] or "R")
+    deck.points.append(points if deck.system is None else points @ deck.system[:3] + deck.system[3])
     if "NSET" in parameters:
-        _set(deck, deck.node_sets, parameters["NSET"]).append(ids)
+        deck.add(deck.node_sets, parameters["NSET"]).append(ids)
 
 
-def _read_elements(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _cartesian(points: Array, system: str) -> Array:
+    """Of rectangular (R), cylindrical (C: r, theta in degrees, z) or spherical coordinates (S: r, theta, phi)."""
+    if system == "R":
+        return points
+    if system not in "CS":
+        raise Damaged(f"*NODE, SYSTEM={system} is not read; use R, C or S")
+    r, theta, last = points[:, 0], np.radians(points[:, 1]), points[:, 2]
+    if system == "C":
+        return np.column_stack([r * np.cos(theta), r * np.sin(theta), last])
+    phi = np.radians(last)  # from the z axis, see the keyword's description
+    return np.column_stack([r * np.sin(phi) * np.cos(theta), r * np.sin(phi) * np.sin(theta), r * np.cos(phi)])
+
+
+def _read_system(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    deck.system = local_system(_table(lines, "*SYSTEM"))
+
+
+def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     kind = parameters.get("TYPE", "").upper()
     match = re.match(r"(D?C3D|AC3D|CPS|CPE|CAX|M3D|SFM3D|R3D|STRI|DS|S|DC2D)(\d+)", kind)
     if match is None:
@@ -222,46 +206,42 @@ def _read_elements(deck: _Deck, parameters: dict[str, str], lines: list[str]) ->
     table = _numbers(",".join(lines), f"*ELEMENT, TYPE={kind}")
     if len(table) % (count + 1):
         raise Damaged(f"*ELEMENT, TYPE={kind} holds another number of nodes than its cells need")
-    table = table.reshape(-1, count + 1)
-    nodes = table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]
-    cells = _Cells(_SOLIDS[count] if solid else "facet", table[:, 0], nodes)
+    table, own = table.reshape(-1, count + 1), deck.spaces[""]
+    nodes = (table[:, 1:] if not (solid and count == 27) else table[:, 1:][:, _BRICK27]) + own.nodes
+    cells = Cells(_SOLIDS[count] if solid else "facet", table[:, 0] + own.cells, nodes, kind)
     (deck.solids if solid else deck.facets).append(cells)
     if "ELSET" in parameters:
-        _set(deck, deck.cell_sets, parameters["ELSET"]).append(cells.ids)
+        deck.add(deck.cell_sets, parameters["ELSET"]).append(cells.ids)
 
 
-def _set(deck: _Deck, sets: dict[str, list[Indices]], name: str) -> list[Indices]:
-    deck.written.setdefault(name.upper(), name)
-    return sets.setdefault(name.upper(), [])
+def _read_node_set(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    _read_set(deck, deck.node_sets, parameters, "NSET", lines)
 
 
-def _read_node_set(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    _read_set(deck, deck.node_sets, parameters, "NSET", lines, joined(deck.node_id))
-
-
-def _read_cell_set(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
-    known = joined(cells.ids for cells in (*deck.solids, *deck.facets))
-    _read_set(deck, deck.cell_sets, parameters, "ELSET", lines, known)
+def _read_cell_set(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
+    _read_set(deck, deck.cell_sets, parameters, "ELSET", lines)
 
 
 def _read_set(
-    deck: _Deck, sets: dict[str, list[Indices]], parameters: dict[str, str], keyword: str, lines: list[str],
-    known: Indices,
-) -> None:  # fmt: skip
-    name = parameters.get(keyword, "")
+    deck: Deck, sets: dict[str, list[Indices]], parameters: dict[str, str], keyword: str, lines: list[str]
+) -> None:
+    name, space = parameters.get(keyword, ""), parameters.get("INSTANCE", "")
     if not name:
         raise Damaged(f"a *{keyword} has no name")
-    members = _set(deck, sets, name)
+    members, of_cells = deck.add(sets, name), keyword == "ELSET"
+    at, what = deck.place("1", space)[0], f"*{keyword}, {keyword}={name}"
+    more = at.cells if of_cells else at.nodes
     for line in lines:
-        words = _fields(line)
+        words = fields(line)
         if "GENERATE" in parameters:
-            members.append(_generated(words, known, f"*{keyword}, {keyword}={name}"))
+            known = joined(c.ids for c in (*deck.solids, *deck.facets)) if of_cells else joined(deck.node_id)
+            members.append(_generated(words, known - more, what) + more)
             continue
-        numbers = [word.rpartition(".")[2] for word in words if word.rpartition(".")[2].isdecimal()]
-        members.append(_numbers(",".join(numbers), f"*{keyword}, {keyword}={name}"))
+        members.append(_numbers(",".join(word for word in words if word.isdecimal()), what) + more)
         for word in words:
-            if not word.rpartition(".")[2].isdecimal():
-                members += sets.get(word.strip('"').upper(), [])
+            if not word.isdecimal():
+                found = deck.cells(word, space) if of_cells else deck.nodes(word, space)
+                members += [] if found is None else [found]
 
 
 def _generated(words: list[str], known: Indices, what: str) -> Indices:
@@ -273,10 +253,13 @@ def _generated(words: list[str], known: Indices, what: str) -> Indices:
     return known[(known >= first) & (known <= last) & ((known - first) % step == 0)]
 
 
-def _read_surface(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_surface(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     name, kind = parameters.get("NAME", ""), parameters.get("TYPE", "ELEMENT").upper()
-    if name and "COMBINE" not in parameters:
-        deck.surfaces.append((name, kind, [words for line in lines if (words := _fields(line))]))
+    if name:
+        kind = parameters.get("COMBINE", kind).upper()
+        rows = [words for line in lines if (words := [w.strip() for w in line.split(",")]) and any(words)]
+        deck.surfaces.append((name, kind, rows, ""))
+        deck.written.setdefault(name.upper(), name)
 
 
 def _table(lines: list[str], what: str) -> list[list[float]]:
@@ -288,21 +271,21 @@ def _table(lines: list[str], what: str) -> list[list[float]]:
         raise Damaged(f"{what} holds something that is no number ({str(error)[-60:]})") from None
 
 
-def _read_material(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_material(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     name = parameters.get("NAME", "")
     if not name:
         raise Damaged("a *MATERIAL has no name")
     deck.current = name.upper()
-    deck.materials[deck.current] = _Material(name)
+    deck.materials[deck.current] = DeckConstants(name)
 
 
-def _of(deck: _Deck, keyword: str) -> _Material:
+def _of(deck: Deck, keyword: str) -> DeckConstants:
     if not deck.current:
         raise Damaged(f"*{keyword} stands before any *MATERIAL")
     return deck.materials[deck.current]
 
 
-def _read_elastic(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_elastic(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     material, kind = _of(deck, "ELASTIC"), " ".join(parameters.get("TYPE", "ISO").upper().split())
     rows, what = _table(lines, f"*ELASTIC of {material.name}"), f"*ELASTIC, TYPE={kind} of the material {material.name}"
     if kind.startswith("ISO"):
@@ -321,7 +304,7 @@ def _read_elastic(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
         material.stiffness = values[:9]
 
 
-def _read_density(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_density(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     material = _of(deck, "DENSITY")
     rows = _table(lines, f"*DENSITY of {material.name}")
     if not rows or not rows[0]:
@@ -331,7 +314,7 @@ def _read_density(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> 
     material.density = rows[0][0]
 
 
-def _read_expansion(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     material, kind = _of(deck, "EXPANSION"), parameters.get("TYPE", "ISO").upper()
     rows = _table(lines, f"*EXPANSION of {material.name}")
     count = 3 if kind.startswith("ORTHO") else 1
@@ -343,12 +326,13 @@ def _read_expansion(deck: _Deck, parameters: dict[str, str], lines: list[str]) -
     material.expansion = np.broadcast_to(values[0], 3).copy()
 
 
-def _read_section(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     keys = ("ELSET", "MATERIAL", "ORIENTATION")
-    deck.sections.append((parameters.get(keys[0], ""), parameters.get(keys[1], ""), parameters.get(keys[2], "")))
+    words = [parameters.get(key, "") for key in keys]
+    deck.sections.append((words[0], words[1], words[2], ""))
 
 
-def _read_orientation(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     name, system = parameters.get("NAME", ""), parameters.get("SYSTEM", "RECTANGULAR").upper()
     key = name.upper()
     if not system.startswith("R") or parameters.get("DEFINITION", "COORDINATES").upper() != "COORDINATES":
@@ -369,31 +353,31 @@ def _read_orientation(deck: _Deck, parameters: dict[str, str], lines: list[str])
     deck.orientations[key] = np.array([x, np.cross(z, x), z])
 
 
-def _read_temperature(deck: _Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
+def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
     if "FILE" in parameters or "BSTEP" in parameters:
         raise Damaged("*TEMPERATURE reads from a results file; write the temperatures out")
     for line in lines:
-        words = _fields(line)
+        words = fields(line)
         try:
             deck.temperatures.append((column, words[0], float(words[1])))
         except (IndexError, ValueError):
             raise Damaged(f"*TEMPERATURE holds the line '{line[:60]}', no node (or set) and temperature") from None
 
 
-def _read_initial(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_initial(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     if parameters.get("TYPE", "").upper() == "TEMPERATURE":
         _read_temperature(deck, parameters, lines, column=0)
 
 
-def _read_step(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_step(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     deck.step += 1
 
 
-def _read_transform(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_transform(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     deck.turned = True
 
 
-def _read_boundary(deck: _Deck, parameters: dict[str, str], lines: list[str]) -> None:
+def _read_boundary(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     """Displacements that are zero. OP=NEW takes the place of all there was before the step."""
     if parameters.get("OP", "").upper() == "NEW" and deck.renewed != deck.step:
         deck.held, deck.not_held, deck.renewed = [], [], deck.step
@@ -420,10 +404,18 @@ def _zeros(words: list[str]) -> str:
     last = int(words[2]) if words[2] else first
     if first < 1 or (first <= 3 and words[3] and float(words[3]) != 0):
         raise ValueError
-    return "xyz"[first - 1 : last]
+    return "xyzabc"[first - 1 : last]
 
 
-_READERS = {
+_SILENT = {
+    "HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "NODE FILE",
+    "EL FILE", "NODE PRINT", "EL PRINT", "CONTACT PRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY", "END STEP",
+    "INSTANCE", "END INSTANCE", "STATIC", "FREQUENCY", "INCLUDE", "MONITOR", "SECTION PRINT", "CONTACT FILE",
+}  # fmt: skip
+"""Keywords that say nothing of the body."""
+
+_READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
+    "SYSTEM": _read_system,
     "BOUNDARY": _read_boundary,
     "STEP": _read_step,
     "TRANSFORM": _read_transform,
@@ -446,7 +438,7 @@ _READERS = {
 # from numbers to positions ---------------------------------------------------------------------------------------
 
 
-def _assembled(deck: _Deck) -> RawMesh:
+def _assembled(deck: Deck) -> RawMesh:
     if not deck.node_id:
         raise Damaged("there is no *NODE")
     node_id, points = _unique_nodes(np.concatenate(deck.node_id), np.concatenate(deck.points))
@@ -464,19 +456,25 @@ def _assembled(deck: _Deck) -> RawMesh:
         if len(members):
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
+    raw.links, left_out = links_of(deck, numbering, points)
+    raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
+    raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
+    deck.not_held += left_out
     add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : _CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")
     for key in deck.cell_sets:
-        chosen = _members(deck, key)
+        chosen = joined(deck.cell_sets[key])
         for cells in deck.facets:
             if (inside := np.isin(cells.ids, chosen)).any():
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
-    for name, kind, rows in deck.surfaces:
+    for name, kind, rows, space in deck.surfaces:
         if kind == "NODE":
-            _node_surface(deck, raw, numbering, name, rows)
+            _node_surface(deck, raw, numbering, name, rows, space)
         elif kind == "ELEMENT":
-            _element_surface(deck, raw, name, rows)
+            _element_surface(deck, raw, name, rows, space)
+        elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
+            _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
     return raw
 
 
@@ -490,22 +488,27 @@ def _unique_nodes(node_id: Indices, points: Array) -> tuple[Indices, Array]:
     return node_id[keep], points[keep]
 
 
-def _assign_materials(deck: _Deck, raw: RawMesh) -> None:
+def _assign_materials(deck: Deck, raw: RawMesh) -> None:
     """A region for every pair of material and orientation that sections give to cells."""
     if not deck.materials:
         return
     raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
     known: dict[tuple[str, str], int] = {}
-    for name_of_set, material, orientation in deck.sections:
+    for name_of_set, material, orientation, space in deck.sections:
         if material.upper() not in deck.materials:
             raise Damaged(f"*SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined")
-        key = (material.upper(), orientation.upper())
+        axes = deck.key(deck.orientations, orientation, space) if orientation else ""
+        if axes is None:
+            raise Damaged(
+                f"*SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not defined"
+            )
+        key = (material.upper(), axes)
         if key not in known:
             known[key] = len(raw.materials)
             raw.materials.append(_deck_material(deck, key, name_of_set))
-        if name_of_set.upper() not in deck.cell_sets:
+        chosen = deck.cells(name_of_set, space)
+        if chosen is None:
             raise Damaged(f"*SOLID SECTION names the element set '{name_of_set}', which is not defined")
-        chosen = _members(deck, name_of_set.upper())
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]
     bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]
@@ -516,10 +519,8 @@ def _assign_materials(deck: _Deck, raw: RawMesh) -> None:
             region[region < 0] = len(raw.materials) - 1
 
 
-def _deck_material(deck: _Deck, key: tuple[str, str], where: str) -> DeckMaterial:
+def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial:
     found = deck.materials[key[0]]
-    if key[1] and key[1] not in deck.orientations:
-        raise Damaged(f"*SOLID SECTION, ELSET={where} names the orientation '{key[1]}', which is not defined")
     turn = deck.orientations[key[1]] if key[1] else None
     axes = None if isinstance(turn, str) else turn
     if refused := found.refused or (turn if isinstance(turn, str) else ""):
@@ -548,56 +549,60 @@ def _orthotropic_stiffness(name: str, d: Array) -> Array:
     return C
 
 
-def _assign_temperatures(deck: _Deck, raw: RawMesh, numbering: Numbering) -> None:
+def _assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None:
     if not deck.temperatures:
         return
     raw.temperature = np.full((len(raw.points), 2), np.nan)
     for column, word, value in deck.temperatures:
-        if is_number(word):
-            members = np.array([int(word)])
-        elif word.strip('"').upper() in deck.node_sets:
-            members = joined(deck.node_sets[word.strip('"').upper()])
-        else:
+        members = deck.nodes(word)
+        if members is None:
             raise Damaged(f"*TEMPERATURE names the node set '{word}', which is not defined")
         raw.temperature[numbering.positions(members, "*TEMPERATURE names"), column] = value
 
 
-def _constraints(deck: _Deck) -> Constraints:
+def _constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
     for word, directions in deck.held:
-        tail = word.rpartition(".")[2]
-        key = next((k for k in (word.upper(), tail.upper()) if k in deck.node_sets), None)
-        if key is not None:
-            held.hold(deck.written[key], directions)
-        elif is_number(tail):
-            held.hold(int(tail), directions)
-        else:
+        key, found = deck.key(deck.node_sets, word), deck.nodes(word)
+        if found is None:
             held.left_out.append(f"*BOUNDARY names the node set '{word}', which is not defined")
+        elif key is not None:
+            held.hold(deck.written[key], directions)
+        else:
+            held.hold(int(found[0]), directions)
     return held
 
 
-def _members(deck: _Deck, key: str) -> Indices:
-    return joined(deck.cell_sets.get(key, []))
-
-
-def _named(word: str, sets: dict[str, list[Indices]]) -> list[Indices]:
-    """The node or cell of that number, or the parts of the set of that name, if there is one."""
-    number = word.rpartition(".")[2]
-    return [np.array([int(number)])] if is_number(number) else sets.get(word.strip('"').upper(), [])
-
-
-def _node_surface(deck: _Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]]) -> None:
+def _node_surface(deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str) -> None:
     for row in rows:
-        for part in _named(row[0], deck.node_sets):
-            raw.add_points(name, numbering.positions(part, f"the surface '{name}' names"))
+        if (found := deck.nodes(row[0], space)) is not None:
+            raw.add_points(name, numbering.positions(found, f"the surface '{name}' names"))
 
 
-def _element_surface(deck: _Deck, raw: RawMesh, name: str, rows: list[list[str]]) -> None:
+def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -> None:
+    """A surface of others: all of their facets, those that they have in common, or those of the first alone."""
+    parts = []
+    for word in words:
+        at, tail = deck.place(word)
+        parts.append(raw.facets.get(at.prefix + tail) or raw.facets.get(tail) or [])
+    if way == "UNION":
+        raw.facets[name] = [block for part in parts for block in part]
+        return
+    others = {tuple(row) for part in parts[1:] for block in part for row in np.sort(block, axis=1).tolist()}
+    for block in parts[0] if parts else ():
+        inside = np.array([tuple(row) in others for row in np.sort(block, axis=1).tolist()], dtype=bool)
+        raw.facets.setdefault(name, []).append(block[inside if way == "INTERSECTION" else ~inside])
+
+
+def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
-        chosen = joined(_named(row[0], deck.cell_sets))
+        everything = joined(c.ids for c in (*deck.solids, *deck.facets))
+        chosen = deck.cells(row[0], space) if row[0] else everything
         face = row[1].upper() if len(row) > 1 else ""
+        if chosen is None:
+            continue
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = _sides(cells.kind)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..data import Array, Indices
+from ..data import Array, Indices, Joint, Link
 
 NODES = {
     "vertex": 1, "line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "tetra": 4,
@@ -53,7 +53,10 @@ class RawMesh:
             unit, NaN where none is given, or None.
         cell_id: of each block, (e,) the file's own numbers of the cells, or nothing.
         supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
+        links: constraints between nodes, by positions in `points`, tolerances in the file's unit.
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
+        remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
+            faces in contact. preloads: of bolts: where it stands, force in the file's unit.
     """
 
     points: Array
@@ -67,7 +70,12 @@ class RawMesh:
     cell_id: list[Indices] = field(default_factory=list)
     supports: dict[str, str] = field(default_factory=dict)
     not_held: list[str] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
     unended: str = ""
+    remarks: list[str] = field(default_factory=list)
+    instances: dict[str, Indices] = field(default_factory=dict)
+    joints: list[Joint] = field(default_factory=list)
+    preloads: list[tuple[str, float]] = field(default_factory=list)
 
     def add_points(self, name: str, positions: Indices) -> None:
         """Add to a point set."""

@@ -24,6 +24,7 @@ from ..topology import CELL_TYPES, FACET_CORNERS
 from .bdf import read_bdf
 from .cdb import read_cdb
 from .inp import read_inp
+from .linking import renumbered
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
@@ -109,7 +110,7 @@ def _mesh_of(raw: RawMesh, metres: float, path: Path) -> Mesh:
         raise UserError(f"{path}: coordinates must be three finite numbers a point; the file is damaged or not 3-D")
     if np.abs(points).max() > _FARTHEST:
         raise UserError(f"{path}: a point lies {np.abs(points).max():.3g} m from the origin; the file is damaged")
-    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()})
+    return _assemble_mesh(raw, points, {t: np.concatenate(c) for t, c in cells.items()}, metres)
 
 
 # other formats, by meshio ----------------------------------------------------------------------------------------
@@ -224,7 +225,7 @@ def _cell_sets(raw: Any) -> dict[str, list]:
 # surface and faces ------------------------------------------------------------------------------------------------
 
 
-def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices]) -> Mesh:
+def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metres: float) -> Mesh:
     used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
     renumber = np.full(len(points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
@@ -253,8 +254,14 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices]) -> Me
             continue
         if face := faces_from_points(boundary, chosen, len(mesh.points)):
             faces[name] = face
-    supports = {n: directions for n, directions in raw.supports.items() if n in mesh.point_sets}
-    return replace(mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended)
+    links = renumbered(raw, points, renumber, metres)
+    known = {*mesh.point_sets, *(links.sets if links else ())}
+    supports = {n: directions for n, directions in raw.supports.items() if n in known}
+    return replace(
+        mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
+        links=links, remarks=tuple(raw.remarks), joints=tuple(raw.joints), preloads=tuple(raw.preloads),
+        instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
+    )  # fmt: skip
 
 
 def _cell_numbers(raw: RawMesh) -> dict[str, Indices]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..data import Equation, FaceTie, Indices
 from .raw import Numbering, RawMesh
 
 
@@ -38,22 +39,37 @@ class Constraints:
 
 
 def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
-    """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one."""
+    """Give `raw` the supports: named sets as they are; nodes held alike as the set that has just them, or a new one.
+
+    Rotations (a, b, c) are those of reference nodes; others have none.
+    """
+    turning = _turning(raw)
+    held = replace(held, sets=dict(held.sets), nodes=dict(held.nodes))
+    for name, found in held.sets.items():
+        if not np.isin(raw.point_sets.get(name, ()), turning).any():
+            held.sets[name] = found - set("abc")
+    for node, found in held.nodes.items():
+        at = raw.node_id[turning] == node
+        held.nodes[node] = found if at.any() else found - set("abc")
     left_out = dict.fromkeys(held.left_out)
     for name, found in held.sets.items():
-        directions = "".join(sorted(found))
-        if held.all_turned and directions != "xyz":
+        directions = _in_order(found)
+        if not directions:
+            continue
+        if held.all_turned and directions[:3] != "xyz":
             left_out[f"'{name}' is held in {directions} of what may be a local system"] = None
         elif name in raw.point_sets:
             raw.supports[name] = directions
     alike: dict[str, list[int]] = {}
     for node, found in held.nodes.items():
+        if not found:
+            continue
         if (held.all_turned or node in held.turned) and len(found) < 3:
-            left_out[f"node {node} is held in {''.join(sorted(found))} of a local system"] = None
+            left_out[f"node {node} is held in {_in_order(found)} of a local system"] = None
         elif not np.isin(node, numbering.sorted):
             left_out[f"node {node}, which the file does not define"] = None
         else:
-            alike.setdefault("".join(sorted(found)), []).append(node)
+            alike.setdefault(_in_order(found), []).append(node)
     for directions, nodes in alike.items():
         members = np.unique(numbering.positions(np.array(nodes, dtype=np.int64), "a constraint names"))
         same = (n for n, s in raw.point_sets.items() if n not in raw.supports and np.array_equal(s, members))
@@ -62,3 +78,19 @@ def add_supports(raw: RawMesh, held: Constraints, numbering: Numbering) -> None:
         raw.supports[name] = directions
     told = list(left_out)
     raw.not_held = told if len(told) <= 5 else [*told[:4], f"and {len(told) - 4} more like these"]
+
+
+def _in_order(directions: Iterable[str]) -> str:
+    """Displacements x, y, z, then rotations a, b, c."""
+    return "".join(sorted(directions, key="xyzabc".index))
+
+
+def _turning(raw: RawMesh) -> Indices:
+    """Positions of nodes without cells that constraints refer to: they have rotations."""
+    named = [
+        link.nodes if isinstance(link, Equation) else [link.reference]
+        for link in raw.links
+        if not isinstance(link, FaceTie)
+    ]
+    used = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(nodes.ravel() for _, nodes in raw.blocks)]))
+    return np.setdiff1d(np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, named)]), used)

@@ -16,6 +16,7 @@ import numpy as np
 from ..data import Array, UserError
 from ..files import store
 from ..settings.mistakes import whole
+from ..units import counted, percent
 from . import rare
 from .linear import beside, known_of
 from .ring import positive
@@ -38,6 +39,9 @@ FIRST = 1_000_000_000
 
 BEFORE = 20
 """Plain samples, at least, that tell the correlation before others are chosen."""
+
+UNSURE = 0.01
+"""Share by which a peak may be higher yet from which on that is said."""
 
 WATCHED = 0.95
 """Share of the samples below the quantile that progress shows, and that ends a run."""
@@ -71,6 +75,31 @@ class Ensemble:
         return np.isfinite(self.column("amplitude"))
 
     @property
+    def unsure(self) -> list[str]:
+        """Warnings, in sentences: of the tuned ring's peak, by which amplifications are divided, and of samples."""
+        told, top = [], self.tuned.top
+        if top.at_end:
+            told.append(
+                "the tuned ring is highest at an end of the band, so amplifications are over no peak of it; widen the "
+                "sweep."
+            )
+        elif top.missed > UNSURE:
+            told.append(f"the tuned ring may be {_missed(top.missed)}")
+        ends, off = int(np.nansum(self.column("at_end"))), self.column("missed") > UNSURE
+        if ends:
+            told.append(
+                f"in {counted(ends, 'sample')} the highest is at an end of the band; widen the sweep."
+            )
+        if off.any():
+            most = float(self.column("missed")[off].max())
+            told.append(f"{counted(int(off.sum()), 'sample')} may be {_missed(most)}")
+        if unsolved := int((self.column("unsolved") > 0).sum()):
+            told.append(
+                f"{counted(unsolved, 'sample')} lack solutions at some frequencies, counted in the column unsolved."
+            )
+        return told
+
+    @property
     def amplification(self) -> Array:
         """(n,) highest amplitude of any blade over that of the tuned ring; NaN where it is not known."""
         return self.column("amplitude") / self.tuned.top.amplitude
@@ -87,12 +116,13 @@ def run(
     """Samples until there are so many, or the interval of the 95 % quantile is narrow enough.
 
     Args:
-        until: half of that interval over the quantile. workers: processes; as many as there are cores, and one for a
-            few samples, if None. file: where the run is kept (.npz); with the same inputs it goes on. executor: in the
-            place of own processes, such as that of a cluster.
+        samples: one, where nothing is drawn. until: half of that interval over the quantile. workers: processes; as
+            many as there are cores, and one for a few samples, if None. file: where the run is kept (.npz); with the
+            same inputs it goes on. executor: in the place of own processes, such as that of a cluster.
     """
     for name, value in (("samples", samples), ("workers", 1 if workers is None else workers)):
         whole(name, value, ge=1)
+    samples = samples if any(s.random for s in asked.scatter) else 1
     report("the tuned ring")
     tuned = of_ring(asked, asked.tuned.whole, -1)
     if not np.isfinite(tuned.top.amplitude):
@@ -100,8 +130,8 @@ def run(
     found = Ensemble(
         asked, tuned, np.zeros((0, len(COLUMNS))), Envelope.empty(len(asked.frequency), tuned.top.amplitude)
     )
-    known = _kept(file, inputs, found) if file is not None else found
-    found = known if len(known) <= samples else found
+    found = _kept(file, inputs, found) if file is not None else found
+    found.rows = found.rows[:samples]
     workers = workers or min(_cores(), -(-samples // EACH))
     with _computed(asked, workers, executor) as of:
         while len(found) < samples and not _narrow(found, until):
@@ -130,6 +160,8 @@ def ready(asked: Asked, samples: int, chosen: int) -> None:
             positive(s, values)
     whole("rare", chosen)
     if chosen:
+        if not any(s.random for s in asked.scatter):
+            raise UserError("rare: nothing is drawn, so all samples are one ring; leave it out")
         known_of(asked)
         if samples < BEFORE:
             raise UserError(f"rare: {samples} plain samples tell too little of the linear ring; ask for {BEFORE}")
@@ -178,6 +210,11 @@ def _read(file: Path | None, inputs: str) -> Array:
     except (OSError, ValueError, KeyError):
         pass
     return np.zeros(0)
+
+
+def _missed(share: float) -> str:
+    why = "it jumps or bends there, or the sweep is coarse; give the sweep more points"
+    return f"{percent(share)} higher between two points: {why}."
 
 
 def _row(one: Sample) -> list[float]:

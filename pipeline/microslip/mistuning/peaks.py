@@ -1,8 +1,11 @@
-"""The highest of many read-outs over frequency: a sweep, then points where parabolas through it say that peaks are.
+"""The highest of many read-outs over frequency: a sweep, then points where its curves may be higher yet.
 
-Near a resonance 1/|y|^2 is a parabola over the frequency, exactly so for one mode, so one through the three highest
+Near a resonance g = 1/|y|^2 is a parabola over the frequency, exactly so for one mode, so one through the three highest
 points of a read-out says where its peak is and how high. A point is added where the highest is said to be, as long as
-that is higher than what is known, or was told wrongly.
+that is higher than what is known. Where contacts open or begin to slide, amplitudes jump and bend, which no parabola
+tells. So every interval between points says how high the curves may be in it (`may_be`), and the highest of them is
+halved as long as that is more than is known. Where there are two solutions, as beside a jump, the higher one is
+followed to where it ends.
 """
 
 from __future__ import annotations
@@ -17,19 +20,28 @@ from ..data import Array
 Respond = Callable[[float], Array | None]
 """(w,) amplitudes of the read-outs at a frequency (Hz); None where there is no solution."""
 
+Follow = Callable[[float, float], Array | None]
+"""The same, of the solution that goes on from the one at another frequency (Hz), the second; None where none does."""
+
 TOLERANCE = 1e-4
 """Share of the highest amplitude by which it may be missed."""
 
+LEFT = 1e-3
+"""Share of the highest amplitude by which intervals may tell more, where no parabola does."""
+
 MOST = 15
 """Points added at most."""
+
+STEADY = 0.9
+"""Amplitude over that of the neighbouring point above which no other solution is looked for between them."""
 
 
 @dataclass(frozen=True)
 class Highest:
     """Attributes:
-    output: number of the read-out. frequency: Hz. amplitude. missed: share of it by which a parabola says that it may
-        be higher yet. frequencies: (f,) Hz of all points with a solution, rising, amplitudes: (f, w). failed: Hz of
-        those without. at_end: whether it is at an end of the band.
+    output: number of the read-out. frequency: Hz. amplitude. missed: share of it by which it may be higher between the
+        points, see `may_be`. frequencies: (f,) Hz of all points with a solution, rising, amplitudes: (f, w). failed: Hz
+        of those without. at_end: whether it is at an end of the band.
     """
 
     output: int
@@ -42,14 +54,18 @@ class Highest:
     at_end: bool
 
 
-def highest(respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST) -> Highest:
+def highest(
+    respond: Respond, frequency: Array, tolerance: float = TOLERANCE, most: int = MOST, follow: Follow | None = None
+) -> Highest:
     """The highest amplitude of all read-outs in a band.
 
     Args:
-        frequency: (f,) Hz, rising, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`, `MOST`.
+        frequency: (f,) Hz, rising, a sweep that sees every resonance. tolerance, most: see `TOLERANCE`, `MOST`. follow:
+            where it is given, a sweep that jumps goes back on the higher side.
     """
     known: dict[float, Array] = {}
     failed: list[float] = []
+    tried: set[tuple[float, float, float]] = set()
 
     def look(f: float) -> bool:
         y = respond(f)
@@ -59,23 +75,114 @@ def highest(respond: Respond, frequency: Array, tolerance: float = TOLERANCE, mo
         known[f] = y
         return True
 
+    def goes_on(low: float, high: float) -> bool:
+        """Whether the higher of two points leads to more at the other one than is known there."""
+        far, near = sorted((low, high), key=lambda f: known[f].max())
+        told = known[near].max()
+        if follow is None or known[far].max() > STEADY * told or (far, near, told) in tried:
+            return False
+        tried.add((far, near, told))
+        y = follow(far, near)
+        if y is None or y.max() <= known[far].max() * (1 + tolerance):
+            return False
+        known[far] = y
+        return True
+
     for f in frequency:
         look(float(f))
-    for _ in range(most):
-        told = told_by(known)
-        if told is None or told[0] <= max(y.max() for y in known.values()) * (1 + tolerance):
+    before = np.inf  # what was left where a parabola placed the last point
+    count = 0 if known else most
+    while count < most:
+        top = max(float(y.max()) for y in known.values())
+        told, (more, low, high) = told_by(known) or (0.0, 0.0), may_be(known)
+        promised = told[0] > top * (1 + tolerance) and more - top <= 0.5 * before
+        if more <= top * (1 + (tolerance if promised else LEFT)):
             break
-        if not look(told[1]):
+        if goes_on(low, high):
+            continue
+        if not look(told[1] if promised else 0.5 * (low + high)):
             break
+        count, before = count + 1, more - top if promised else np.inf
     if not known:
         return Highest(-1, np.nan, np.nan, np.nan, np.zeros(0), np.zeros((0, 0)), tuple(failed), False)
-    at = np.array(sorted(known))
-    y = np.array([known[f] for f in at])
+    x, y = _table(known)
     i, output = np.unravel_index(int(y.argmax()), y.shape)
-    told = told_by(known)
-    missed = 0.0 if told is None else max(told[0] / y.max() - 1, 0.0)
-    ends = at[i] in (min(frequency), max(frequency))
-    return Highest(int(output), float(at[i]), float(y.max()), missed, at, y, tuple(failed), bool(ends))
+    missed = max(may_be(known)[0] / y.max() - 1, 0.0)
+    ends = x[i] in (min(frequency), max(frequency))
+    return Highest(int(output), float(x[i]), float(y.max()), missed, x, y, tuple(failed), bool(ends))
+
+
+def _table(known: dict[float, Array]) -> tuple[Array, Array]:
+    """(f,) frequencies, rising, and (f, w) amplitudes."""
+    x = np.array(sorted(known))
+    return x, np.array([known[f] for f in x])
+
+
+def may_be(known: dict[float, Array]) -> tuple[float, float, float]:
+    """The highest that an amplitude may be between points, and the ends of that interval (Hz).
+
+    In an interval a curve is smooth as points of one side and the interval's other end tell, or it is smooth from both
+    sides up to a jump or a kink. What tells less is believed, and that an interval is no wider than a resonance between
+    its half-power points: so its ends are no less than 1/sqrt(2) of what is in it.
+    """
+    x, y = _table(known)
+    if len(x) < 2 or not y.max():
+        return float(y.max()), float(x[0]), float(x[0])
+    y = np.maximum(y, 1e-9 * y.max())
+    (smooth, up_to), (smooth_back, from_) = _ahead(x, y), _ahead(-x[::-1], y[::-1])
+    told = np.minimum(np.minimum(smooth, smooth_back[::-1]), np.maximum(up_to, from_[::-1]))
+    told = np.minimum(told, np.sqrt(2) * np.maximum(y[1:], y[:-1])).max(axis=1)
+    i = int(told.argmax())
+    return float(told[i]), float(x[i]), float(x[i + 1])
+
+
+def _ahead(x: Array, y: Array) -> tuple[Array, Array]:
+    """(f - 1, w) highest of every interval: of a smooth curve, and of one that goes on from the left up to a jump."""
+    smooth, up_to = np.full((2, len(x) - 1, y.shape[1]), np.inf)
+    up_to[0] = y[0]
+    g, h = y**-2.0, np.diff(x)[:, None]
+    up_to[1:] = _height(g[1:-1] + np.diff(g, axis=0)[:-1] / h[:-1] * h[1:])  # g of a resonance bends away from a line
+    up_to = np.maximum(up_to, y[:-1])
+    if len(x) > 3:
+        smooth[2:] = _smooth(x, g, h)
+        up_to[2:] = np.maximum(up_to[2:], _folded(y, h))
+    return smooth, up_to
+
+
+def _smooth(x: Array, g: Array, h: Array) -> Array:
+    """(f - 3, w) by the parabola through the interval's left end and two points before, and twice what it misses the
+    right end by, either way, as it grows towards it."""
+    a, b, end = (x[:-3] - x[2:-1])[:, None], (x[1:-2] - x[2:-1])[:, None], h[2:]
+    to_a, to_b, to_end = (g[:-3] - g[2:-1]) / a, (g[1:-2] - g[2:-1]) / b, (g[3:] - g[2:-1]) / end
+    bend = (to_b - to_a) / (b - a)
+    off = ((to_end - to_a) / (end - a) - bend) / (end - b)
+    least = [_least(g[2:-1], to_a - bend * a + c * a * b, bend - c * (a + b), c, end) for c in (2 * off, -2 * off)]
+    return _height(np.minimum(*least))
+
+
+def _least(c0: Array, c1: Array, c2: Array, c3: Array, end: Array) -> Array:
+    """Least values of c0 + c1 t + c2 t^2 + c3 t^3 in 0 <= t <= end."""
+    with np.errstate(all="ignore"):
+        q = -(c2 + np.copysign(np.sqrt(np.maximum(c2**2 - 3 * c1 * c3, 0.0)), c2))
+        turns = np.nan_to_num(np.array([q / (3 * c3), c1 / q]), posinf=0.0, neginf=0.0)
+    t = np.clip(np.stack([*turns, 0 * c0, end + 0 * c0]), 0.0, end)
+    return np.asarray((c0 + t * (c1 + t * (c2 + t * c3))).min(axis=0))
+
+
+def _folded(y: Array, h: Array) -> Array:
+    """(f - 3, w) what a curve that rises ever faster to an interval's left end comes to in it, the frequency taken as a
+    parabola over the amplitude, which may turn back; 0 of other curves."""
+    a, b = y[1:-2] - y[:-3], y[2:-1] - y[1:-2]
+    with np.errstate(all="ignore"):
+        bend = (h[1:-1] / b - h[:-2] / a) / (a + b)
+        rate = h[1:-1] / b + bend * b
+        rise = (np.sqrt(np.maximum(rate**2 + 4 * bend * h[2:], 0.0)) - rate) / (2 * bend)
+    return np.where((a > 0) & (b > 0) & (bend < 0) & (rate > 0), y[2:-1] + rise, 0.0)
+
+
+def _height(g: Array) -> Array:
+    """1/sqrt(g), and no bound where g is not positive."""
+    return np.where(g > 0, np.maximum(g, 1e-300) ** -0.5, np.inf)
 
 
 def told_by(known: dict[float, Array]) -> tuple[float, float] | None:

@@ -219,9 +219,7 @@ def _heavier(group: ModalGroup, s: Scatter, mass: float) -> ModalGroup:
     rows = group.monitors.get(s.at or "")
     if rows is None or rows.unit != "m":
         known = dict.fromkeys(name.partition("@")[0] for name in group.monitors)
-        raise UserError(
-            f"added_mass: at: give a monitor of displacements, one of {', '.join(known) or 'none'}"
-        )
+        raise UserError(f"added_mass: at: give a monitor of displacements, one of {', '.join(known) or 'none'}")
     return replace(group, M_r=group.M_r + mass * rows.rows.conj().T @ rows.rows)
 
 

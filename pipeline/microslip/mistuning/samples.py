@@ -15,7 +15,7 @@ from ..harmonic_balance import reduced
 from ..harmonic_balance.forces import Forces
 from ..harmonic_balance.problem import AtFrequency, Problem
 from ..harmonic_balance.reduced import Seen
-from ..harmonic_balance.solver import Point, carried, solve, sweep
+from ..harmonic_balance.solver import Point, carried, newton, solve, sweep
 from ..system.assembly import Assembly
 from .peaks import Highest, highest
 from .ring import Deviations, Tuned
@@ -86,7 +86,7 @@ def sample(asked: Asked, number: int) -> Sample:
 def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
     """A whole ring: its highest blade over the frequency."""
     respond = Sticking(ring) if asked.stuck else Sliding(asked.problem(ring), asked.tuned_points)
-    top = highest(respond, asked.frequency)
+    top = highest(respond, asked.frequency, follow=respond.follow)
     grid = np.full((len(asked.frequency), asked.tuned.sectors), np.nan)
     places = {f: i for i, f in enumerate(top.frequencies)}
     for row, f in enumerate(asked.frequency):
@@ -99,27 +99,44 @@ def of_ring(asked: Asked, ring: Assembly, number: int = 0) -> Sample:
 class Sliding:
     """Amplitudes of a ring with friction at any frequency, each started from what is known nearby.
 
-    Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units. known: of this one.
+    Attributes: problem. tuned: solutions of the ring of equal sectors, in the same units. known: Hz -> of this one.
     """
 
     def __init__(self, problem: Problem, tuned: Sequence[Point] = ()) -> None:
         self.problem, self.tuned = problem, tuned
-        self.known: list[Point] = []
+        self.known: dict[float, Point] = {}
         self.slope: Any = None
 
     def __call__(self, frequency: float) -> Array | None:
         """(w,) m."""
         Omega = 2 * np.pi * frequency
-        point = solve(self.problem, Omega, self._starts(Omega), self.slope)
+        return self._kept(frequency, solve(self.problem, Omega, self._starts(Omega), self.slope))
+
+    def follow(self, frequency: float, behind: float) -> Array | None:
+        """(w,) m of the solution that Newton's method finds from the one at another frequency; the known one stays
+        where that is higher."""
+        Omega, before = 2 * np.pi * frequency, self.known.get(frequency)
+        beyond = [self.known[f] for f in self.known if (f - behind) * (frequency - behind) <= 0]
+        side = sorted(beyond, key=lambda p: abs(p.Omega - Omega))
+        for count in (2, 1):
+            point = newton(self.problem.at(Omega), carried(side[:count], Omega), most=20, rises=0)
+            y = self._kept(frequency, point)
+            if y is not None and (before is None or y.max() > np.abs(amplitudes(self.problem, before)).max()):
+                return y
+        if before is not None:
+            self.known[frequency] = before
+        return None
+
+    def _kept(self, frequency: float, point: Point) -> Array | None:
         self.slope = point.slope
         if not point.converged:
             return None
-        self.known.append(replace(point, slope=None))
+        self.known[frequency] = replace(point, slope=None)
         return np.abs(amplitudes(self.problem, point))
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """(m,) first harmonics of the coordinates, part by part, at a frequency that was solved for."""
-        (point,) = self._near(2 * np.pi * frequency, 1)
+        point = self.known[frequency]
         at = self.problem.at(point.Omega)
         return at.modal(point.x, at.force(point.x))[1]
 
@@ -131,7 +148,7 @@ class Sliding:
         return sorted(starts, key=lambda x: float(np.linalg.norm(at.residual(x))))[:2]
 
     def _near(self, Omega: float, most: int) -> list[Point]:
-        return sorted(self.known, key=lambda p: abs(p.Omega - Omega))[:most]
+        return sorted(self.known.values(), key=lambda p: abs(p.Omega - Omega))[:most]
 
 
 def amplitudes(problem: Problem, point: Point, harmonic: int = 1) -> Array:
@@ -159,6 +176,8 @@ class Sticking:
         found = self._at(frequency)
         force = self.k @ found.reference
         return np.abs(reduced.monitored(self.part, found.modal, force))
+
+    follow = None  # of linear equations there is one solution
 
     def coordinates(self, frequency: float) -> list[ComplexArray]:
         """See `Sliding`."""

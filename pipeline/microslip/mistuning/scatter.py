@@ -76,7 +76,10 @@ class Scatter:
             raise UserError(f"deviation of {self.of}: must be a number that is not negative")
         if (self.of == "modal_file") != bool(self.others):
             raise UserError(f"{self.of}: others belong to modal_file, which needs them")
-        if (self.deviation > 0) + bool(self.values) + bool(self.others) != 1:
+        given = (self.deviation > 0) + bool(self.values) + bool(self.others)
+        if not given:
+            raise UserError(f"{self.of}: nothing scatters; give a deviation above zero, or values that are known")
+        if given > 1:
             raise UserError(f"{self.of}: give one of deviation, values that are known, and others")
         for key, choices in (("distribution", DISTRIBUTIONS), ("arrangement", ARRANGEMENTS)):
             if getattr(self, key) not in choices:
@@ -84,6 +87,11 @@ class Scatter:
         for key, least in (("together", 0.0), ("neighbours", -1.0)):
             if not least <= getattr(self, key) <= 1.0:
                 raise UserError(f"{key}: {getattr(self, key):g} is no correlation between {least:g} and 1")
+
+    @property
+    def random(self) -> bool:
+        """Whether samples differ."""
+        return self.deviation > 0 or self.arrangement != "given"
 
     def drawn(self, sectors: int, modes: int, number: int, seed: int, sample: int) -> Array:
         """(sectors, modes) deviations of one sample.

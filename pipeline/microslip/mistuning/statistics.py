@@ -85,6 +85,10 @@ class Envelope:
         rows = np.broadcast_to(np.arange(len(y))[:, None], y.shape)
         np.add.at(self.bins, (rows[known], place[known]), 1)
 
+    def samples(self, sectors: int) -> int:
+        """How many were taken in with a solution somewhere."""
+        return round(float(self.sums[0].max(initial=0.0)) / sectors)
+
     @property
     def mean(self) -> Array:
         """(f,) of all blades and samples."""

@@ -12,7 +12,7 @@ from ..system.assembly import Assembly
 
 def worst(ring: Assembly, q: Sequence[ComplexArray]) -> tuple[float, float]:
     """Stress amplitude (von Mises, Pa) at the worst node and strain amplitude at the worst gauge of the bodies that are
-    read, 0-peak; NaN of what their modal files do not have.
+    read, 0-peak; NaN of what their modal files do not have, or do not feel.
 
     Args:
         q: amplitudes of the coordinates, component by component, in pieces of any length.
@@ -31,7 +31,13 @@ def _largest(values: Array) -> float:
 
 
 def _strain(group: ModalGroup, q: ComplexArray) -> float:
-    return max((float(np.abs(rows.rows @ q).max()) for rows in group.gauges.values()), default=np.nan)
+    read = [np.abs(row @ q) for gauge in group.gauges.values() for row in gauge.rows
+            if np.abs(row @ q) > READS * np.linalg.norm(row) * np.linalg.norm(q)]  # fmt: skip
+    return float(max(read, default=np.nan))
+
+
+READS = 1e-9
+"""Share of what a motion as large could make a gauge read, below which it reads rounding: by symmetry, say."""
 
 
 def _stress(group: ModalGroup, q: ComplexArray) -> float:

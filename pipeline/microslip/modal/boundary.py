@@ -31,11 +31,17 @@ def require_face(mesh: Mesh, face: str, key: str, points_suffice: bool = False) 
 
 
 def fixed_dofs(mesh: Mesh, settings: BodySettings) -> Indices:
+    """Held degrees of freedom: 3 * point + component, and behind those of the points six of each reference node."""
     fixed = [np.zeros(0, dtype=np.int64)]
     for support in settings.supports:
-        require_face(mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
-        nodes = mesh.face_points(support.face)
+        nodes = np.zeros(0, dtype=np.int64)
+        moves = mesh.ties.sets.get(support.face, nodes) if mesh.ties is not None else nodes
+        if not len(moves) or support.face in {*mesh.faces, *mesh.point_sets}:
+            require_face(mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
+            nodes = mesh.set_points(support.face)
         fixed += [3 * nodes + AXES[c] for c in support.directions]
+        ways = [AXES[c] for c in support.directions] + support.turns
+        fixed += [3 * mesh.n_points + 6 * moves + way for way in ways]
     return np.unique(np.concatenate(fixed))
 
 

@@ -15,9 +15,12 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from ..data import Array, Indices, Mesh, UserError
+from ..fem.cyclic import CyclicUpper
+from ..fem.discretise import FreeUpper
+from ..fem.tied import Tied
 from ..linalg import canonical, eigen
 from ..reduction.craig_bampton import static_shapes
-from ..settings.body import BodySettings
+from ..settings.body import BodySettings, InterfaceSettings
 from . import rigid
 from .body_rows import BodyRows
 from .equilibrium import BodyModel
@@ -38,15 +41,16 @@ def with_characteristic(
     chosen = [i for i in settings.interfaces if i.coordinates == "characteristic"]
     if not chosen:
         return rows
+    assert not isinstance(model.free, CyclicUpper)
     pencil = make_pencil(model, model.K0, solver)
-    R = motions[model.free.free]
+    R = model.free.unknowns_of(motions)
     R = rigid.mass_orthonormal(R, pencil.M) if R.shape[1] else R
     shift = rigid_shift(model) if R.shape[1] else 0.0
     few = eigen.search(pencil, R.shape[1] + 4, shift, rigid=R if R.shape[1] else None)  # factorises; a gap above R
     patches = dict(rows.patches)
     for item in chosen:
         mesh, p = model.d.mesh, rows.patches[item.name]
-        dofs = _patch_dofs(mesh, item.face, model.free.free)
+        dofs = _patch_dofs(mesh, item, model.free)
         if item.count > len(dofs) - 6:
             raise UserError(
                 f"interfaces.{item.name}.count: the patch has {len(dofs)} free displacements, six of which are its "
@@ -57,21 +61,31 @@ def with_characteristic(
                 f"interfaces.{item.name}.coordinates: the patch has {len(dofs)} displacements, too many to condense "
                 '(2 GB of static answers); mesh the patch coarser or keep coordinates = "rigid"'
             )
-        select = _selection(dofs, model.free.free)
+        select = _selection(dofs, model.free.own)
         answers = static_answers(pencil, few, select, R, shift)
         shapes = _shapes(pencil, select, answers, R, p.B[:, dofs], item.count)
         patches[item.name] = _with_shapes(p, mesh, dofs, shapes)
     return replace(rows, patches=patches)
 
 
-def _patch_dofs(mesh: Mesh, face: str, free: Indices) -> Indices:
-    nodes = mesh.face_points(face)
-    return np.intersect1d((3 * nodes[:, None] + np.arange(3)).ravel(), free)
+def _patch_dofs(mesh: Mesh, item: InterfaceSettings, free: FreeUpper | Tied) -> Indices:
+    """Displacements of the patch that are unknowns.
+
+    Raises:
+        UserError: some follow others.
+    """
+    every = (3 * mesh.face_points(item.face)[:, None] + np.arange(3)).ravel()
+    if isinstance(free, Tied) and len(np.setdiff1d(np.intersect1d(every, free.apart.free), free.own)):
+        raise UserError(
+            f"interfaces.{item.name}.coordinates: nodes of '{item.face}' follow others by ties of the mesh file, so "
+            'the patch has no shapes of its own; use "rigid"'
+        )
+    return np.intersect1d(every, free.own)
 
 
-def _selection(dofs: Indices, free: Indices) -> sp.csr_matrix:
-    at = np.searchsorted(free, dofs)
-    return sp.csr_matrix((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), len(free)))
+def _selection(dofs: Indices, own: Indices) -> sp.csr_matrix:
+    at = np.argsort(own, kind="stable")[np.searchsorted(np.sort(own), dofs)]
+    return sp.csr_matrix((np.ones(len(at)), (np.arange(len(at)), at)), shape=(len(at), len(own)))
 
 
 def _shapes(

@@ -16,8 +16,10 @@ from ..data import (
     UserError,
 )
 from ..fem.contact import coupled_points
-from ..fem.discretise import REDUCED, discretise, free_upper, whole
+from ..fem.cyclic import CyclicUpper
+from ..fem.discretise import REDUCED, discretise, whole
 from ..fem.operators import spin_projector
+from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
 from ..settings.body import BodySettings
 from ..units import from_rpm
@@ -111,9 +113,10 @@ def prepared(mesh: Mesh, settings: BodySettings, temperature: Array | None) -> P
     if degree and not set(mesh.cells) <= set(REDUCED):
         raise UserError('mesh.integration: "reduced" is of bricks of 20 nodes alone; write "full" or mesh with bricks')
     d = discretise(mesh, degree, coupled=[coupled_points(p) for p in pairs])
-    fixed = fixed_dofs(mesh, settings)
-    sector = make_sector(d, settings, fixed, axis, point) if settings.cyclic else None
-    free = free_upper(d.pattern, fixed) if sector is None else sector.static
+    held = fixed_dofs(mesh, settings)
+    fixed = held[held < 3 * mesh.n_points]
+    sector = make_sector(d, settings, held, axis, point) if settings.cyclic else None
+    free = tied_upper(d.pattern, held, mesh.ties) if sector is None else sector.static
     rows = body_rows(mesh, settings)
     materials = materials_of(d, settings)
     mass, centre, inertia = inertia_of(whole(d), [m.density for m in materials])
@@ -143,9 +146,15 @@ def _floating(model: BodyModel, sector: Sector | None, centre: Array) -> Array:
     """(3n, r) rigid motions that the supports leave; six supports may hold a ring though each lets its sector turn."""
     points = model.d.mesh.points
     if sector is None:
-        return rigid.free_motions(points, centre, model.fixed)
-    cut = sector.unknowns.cut
-    return rigid.free_motions_of_ring(points, model.point, model.fixed, cut.rotation, cut.sectors)
+        assert not isinstance(model.free, CyclicUpper)
+        return rigid.left_by(model.free, points, centre, model.fixed)
+    cut, apart = sector.unknowns.cut, sector.unknowns.apart
+    motions = rigid.free_motions_of_ring(points, model.point, model.fixed, cut.rotation, cut.sectors)
+    if not isinstance(apart, Tied) or (left := rigid.allowed(apart, motions)).shape[1] == motions.shape[1]:
+        return motions
+    if left.shape[1]:
+        raise UserError("supports: a reference node of a cyclic sector can be held wholly or not at all; hold a face")
+    return left
 
 
 def _at_speeds(

@@ -31,6 +31,7 @@ from ..fem.operators import (
     tangent_tensor,
     tangent_tensor_slope,
 )
+from ..fem.tied import Tied
 from ..linalg.eigen import DirectSolver, Unstable, symmetric_product
 from ..units import rpm_text
 from .closing import Closing
@@ -58,7 +59,7 @@ class BodyModel:
     M: Array
     M_full: sp.csr_matrix
     K0: Array
-    free: FreeUpper | CyclicUpper
+    free: FreeUpper | Tied | CyclicUpper
     fixed: Indices
     dead_load: Array
     axis: Array
@@ -100,7 +101,7 @@ class StaticState:
 
 
 def make_model(
-    d: Discretisation, material: Material | Sequence[Material], free: FreeUpper | CyclicUpper, fixed: Indices,
+    d: Discretisation, material: Material | Sequence[Material], free: FreeUpper | Tied | CyclicUpper, fixed: Indices,
     axis: Array, point: Array, temperature: Array | None, reference: float, dead_load: Array, spin_softening: bool,
 ) -> BodyModel:  # fmt: skip
     """Assemble what does not depend on speed.
@@ -325,7 +326,7 @@ def _newton_at(
         if _stands(steps) and closing.settled:
             if any((np.linalg.det(np.eye(3) + h) <= 0).any() for h in H):
                 break  # in balance, but turned inside out
-            whole = isinstance(free, FreeUpper)  # else a sector, whose neighbours count by nodal diameter (`sector`)
+            whole = not isinstance(free, CyclicUpper)  # of a sector neighbours count by nodal diameter (`sector`)
             K = _tangent(model, H, stress)
             K = closing.stiffened(K + soft if model.spin_softening else K, model.d.pattern, True, whole)
             return StaticState(u, H, stress, K, "nonlinear", len(steps), closing.grips)

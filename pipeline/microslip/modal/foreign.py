@@ -276,7 +276,7 @@ def _free(body: Matrices, settings: BodySettings) -> Indices:
     for support in settings.supports:
         require_face(body.mesh, support.face, f"supports.{support.face}.face", points_suffice=True)
         on = np.isin(body.node, body.mesh.face_points(support.face)) & (body.node >= 0)
-        ways = [AXES[c] for c in support.directions] + ([3, 4, 5] if support.rotations else [])
+        ways = [AXES[c] for c in support.directions] + support.turns
         chosen = on & np.isin(body.component, ways)
         if not chosen.any():
             raise UserError(

@@ -16,7 +16,8 @@ from ..data import (
     RunUp,
     StressSet,
 )
-from ..fem.discretise import Discretisation, FreeUpper
+from ..fem.cyclic import CyclicUpper
+from ..fem.discretise import Discretisation
 from ..fem.operators import per_block
 from ..linalg import eigen
 from ..linalg.gyroscopic import Certified, gyroscopic_modes
@@ -69,7 +70,7 @@ def searched_state(
     if pressed is not None:
         pencil, R = pressed_modes(model, state, pencil, pressed)
     else:
-        assert isinstance(model.free, FreeUpper)
+        assert not isinstance(model.free, CyclicUpper)
         pencil, R, floating = floated(model, state, speed, pencil, model.free, motions)
     return {0: searched(model, settings, pencil, speed, R, rows, report, floating)}
 

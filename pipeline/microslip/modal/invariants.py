@@ -87,7 +87,7 @@ def _answers(model: BodyModel, solver: DirectSolver, motions: Array, forces: Arr
     if not motions.shape[1]:
         solver.factorise(pencil.shifted(0.0))
         return model.free.expand(solver.solve(rest), n)
-    R = rigid.mass_orthonormal(model.free.restrict(motions), pencil.M)
+    R = rigid.mass_orthonormal(model.free.unknowns_of(motions), pencil.M)
     MR, shift = pencil.M(R), rigid_shift(model)
     solver.factorise(pencil.shifted(shift))
     rest = rest - MR @ (R.T @ rest)

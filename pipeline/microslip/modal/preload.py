@@ -19,7 +19,8 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices, UserError
 from ..fem.contact import Grip, cut_pair, grip
-from ..fem.discretise import FreeUpper, free_upper
+from ..fem.cyclic import CyclicUpper
+from ..fem.tied import Tied, tied_upper
 from ..linalg import eigen
 from . import rigid
 from .equilibrium import BodyModel, StaticState, equilibrium
@@ -41,7 +42,11 @@ def pressed_state(
     x = model.d.mesh.points
     left = not_resisted(motions, [touching_now(model, i, x) for i in range(len(model.contacts))], every=True)
     _refuse_drift(model, left, centre)
-    held = replace(model, free=free_upper(model.d.pattern, np.union1d(model.fixed, determinate(left))))
+    assert not isinstance(model.free, CyclicUpper)
+    plain = np.zeros((len(left), 1))
+    plain[model.free.own[model.free.own >= 0]] = 1.0
+    fixed = np.union1d(model.free.fixed if isinstance(model.free, Tied) else model.fixed, determinate(plain * left))
+    held = replace(model, free=tied_upper(model.d.pattern, fixed, model.d.mesh.ties))
     solver = eigen.new_solver(solver_name)
     try:
         return equilibrium(held, 0.0, prestress, solver, None, report)
@@ -96,8 +101,8 @@ def pressed_modes(
     orthonormal: the frame in which the body has no mean motion, Sextro 2.1). Its second derivative in equilibrium is
     P^T K P, and P^T K P R = 0 exactly. Motions that a contact kept closed resists are not rigid.
     """
-    assert isinstance(model.free, FreeUpper)
-    motions = rigid.free_motions(model.d.mesh.points + state.u, centre, model.fixed)
+    assert not isinstance(model.free, CyclicUpper)
+    motions = rigid.left_by(model.free, model.d.mesh.points + state.u, centre, model.fixed)
     kept = [g for g in state.contacts if g.pair.stays_closed]
     motions = not_resisted(motions, kept, every=False)
     R = model.free.unknowns_of(motions)

@@ -8,19 +8,11 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..data import Array, Indices
+from ..fem.discretise import FreeUpper
+from ..fem.tied import Tied
+from ..frames import rigid_fields as rigid_fields
 
 _NAMES = ("x", "y", "z")
-
-
-def rigid_fields(points: Array, centre: Array) -> Array:
-    """(n, 3, 6) translations along x, y, z and small rotations about axes through the centre."""
-    r = points - centre
-    fields = np.zeros((len(points), 3, 6))
-    for i in range(3):
-        fields[:, i, i] = 1.0
-        axis = np.eye(3)[i]
-        fields[:, :, 3 + i] = np.cross(axis, r)
-    return fields
 
 
 def free_motions(points: Array, centre: Array, fixed: Indices) -> Array:
@@ -29,6 +21,25 @@ def free_motions(points: Array, centre: Array, fixed: Indices) -> Array:
     size = max(float(np.ptp(points, axis=0).max()), 1e-30)
     scaled = fields / np.array([1, 1, 1, size, size, size])
     return scaled if not len(fixed) else scaled @ null_space(scaled[fixed])
+
+
+def left_by(free: FreeUpper | Tied, points: Array, centre: Array, fixed: Indices) -> Array:
+    """(3n, r) rigid motions that supports and ties leave, not normalised."""
+    if not isinstance(free, Tied):
+        return free_motions(points, centre, fixed)
+    return allowed(free, free_motions(points, centre, fixed[:0]))
+
+
+def allowed(free: Tied, motions: Array) -> Array:
+    """(3n, q) those motions out of (3n, r) that supports and ties let pass."""
+    moved = motions / np.maximum(np.abs(motions).max(axis=0), 1e-300)
+    barred = np.linalg.qr(moved - free.expand(free.unknowns_of(moved), len(moved) // 3), mode="r")
+    _, s, vt = np.linalg.svd(barred, full_matrices=True)
+    return moved @ vt[int((s > _BARRED * np.linalg.norm(moved)).sum()) :].T
+
+
+_BARRED = 1e-6
+"""Share of a motion beyond which ties resist it: positions in a file have some seven digits."""
 
 
 def null_space(rows: Array) -> Array:

@@ -47,15 +47,15 @@ class HarmonicUnknowns:
 
     def rows(self, B: sp.csr_matrix) -> sp.csr_matrix:
         """(r, m) rows on the unknowns, from rows (r, 3n) on all degrees of freedom."""
-        return (B[:, self.sector.apart.free] @ self.T).tocsr()
+        return (self.sector.apart.rows(B) @ self.T).tocsr()
 
     def restrict(self, forces: Array) -> Array:
         """(m, r) forces on the unknowns, from forces (3n, r) on all degrees of freedom."""
-        return self.T.conj().T @ forces[self.sector.apart.free]
+        return self.T.conj().T @ self.sector.apart.restrict(forces)
 
     def unknowns_of(self, displacements: Array) -> Array:
         """(m, r) unknowns of displacements (3n, r) of this nodal diameter: `expand` turned round."""
-        return self.sector.stay.T @ displacements[self.sector.apart.free]
+        return self.sector.stay.T @ self.sector.apart.unknowns_of(displacements)
 
     def expand(self, unknowns: Array, n: int) -> Array:
         """(3n, r) displacements of the sector's n points from the unknowns (m, r)."""
@@ -133,7 +133,7 @@ def make_sector(d: Discretisation, settings: BodySettings, fixed: Indices, axis:
     assert settings.cyclic is not None
     refuse_other_facets(d.mesh, settings.cyclic.left, settings.cyclic.right, cut)
     refuse_uncyclic(d.mesh, settings)
-    unknowns = sector_unknowns(d.pattern, fixed, cut)
+    unknowns = sector_unknowns(d.pattern, fixed, cut, d.mesh.ties)
     boundary = np.concatenate([unknowns.left, unknowns.right, _in_contact(d.mesh, settings, unknowns)])
     condensed = new_condensed(boundary, settings.modes.solver)
     return Sector(settings.cyclic.harmonics, unknowns, cyclic_upper(unknowns, d.pattern.size), condensed)
@@ -145,7 +145,9 @@ def _in_contact(mesh: Mesh, settings: BodySettings, unknowns: SectorUnknowns) ->
     if not kept:
         return np.zeros(0, dtype=np.int64)
     points = np.unique(np.concatenate([mesh.face_points(f) for c in kept for f in (c.face, c.against)]))
-    found = np.flatnonzero(np.isin(unknowns.apart.free // 3, points))
+    dofs = (3 * points[:, None] + np.arange(3)).ravel()
+    moves = sp.csr_matrix((np.ones(len(dofs)), (np.zeros(len(dofs), dtype=int), dofs)), shape=(1, 3 * mesh.n_points))
+    found = np.unique(unknowns.apart.rows(moves).indices)
     return np.setdiff1d(found, np.concatenate([unknowns.left, unknowns.right]))
 
 
@@ -158,9 +160,9 @@ def contact_between(grips: Sequence[Grip], unknowns: SectorUnknowns, harmonic: i
     kept = [g for g in grips if g.pair.stays_closed and g.pair.between_sectors]
     if not kept:
         return None
-    phase, free = unknowns.cut.phase(harmonic), unknowns.apart.free
+    phase, apart = unknowns.cut.phase(harmonic), unknowns.apart
     phases = [phase if np.allclose(g.pair.turn, unknowns.cut.rotation) else np.conj(phase) for g in kept]
-    first, *others = [contact_matrix(g, phase=p)[free][:, free] for g, p in zip(kept, phases, strict=True)]
+    first, *others = [apart.congruent(contact_matrix(g, phase=p)) for g, p in zip(kept, phases, strict=True)]
     return sum(others, start=first).tocsr()
 
 

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from ..data import Array, Indices, UserError
 from ..fem.discretise import FreeUpper
+from ..fem.tied import Tied
 from ..linalg import canonical, eigen
 from ..mesh import longest_over_shortest
 from ..reduced.coordinates import held
@@ -101,8 +102,8 @@ def search(
             f"modes.count: {wanted} modes asked for, but the body has only {pencil.n} degrees of freedom; "
             "ask for fewer or refine"
         )
-    if isinstance(unknowns, FreeUpper):
-        refuse_unconstrained_parts(model, pencil)
+    if isinstance(unknowns, FreeUpper | Tied):
+        refuse_unconstrained_parts(model, pencil, R.shape[1])
     try:
         found = eigen.search(pencil, wanted, shift, rigid=R if R.shape[1] else None)
     except eigen.Unstable as error:

@@ -9,7 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..data import Array, Indices
+from ..fem.cyclic import CyclicUpper
 from ..fem.discretise import FreeUpper
+from ..fem.tied import Tied
 from ..linalg import eigen
 from ..settings.body import BodySettings
 from .body_rows import BodyRows
@@ -18,11 +20,10 @@ from .equilibrium import BodyModel
 
 def make_pencil(model: BodyModel, K: Array, solver: eigen.DirectSolver) -> eigen.Pencil:
     """K x = lambda M x of a body on its free degrees of freedom; K: (p, 3, 3) over the pattern."""
-    assert isinstance(model.free, FreeUpper)
+    assert not isinstance(model.free, CyclicUpper)
     parts = pencil_parts(model.free, model.M, K)
-    return eigen.Pencil(
-        parts.shifted, parts.K, _mass_product(model), len(model.free.free), parts.k_norm, parts.m_norm, solver
-    )
+    M = _mass_product(model) if isinstance(model.free, FreeUpper) else parts.M
+    return eigen.Pencil(parts.shifted, parts.K, M, model.free.size, parts.k_norm, parts.m_norm, solver)
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class PencilParts:
     m_norm: float
 
 
-def pencil_parts(free: FreeUpper, M: Array, K: Array) -> PencilParts:
+def pencil_parts(free: FreeUpper | Tied, M: Array, K: Array) -> PencilParts:
     """Of the mass (p,) and the stiffness (p, 3, 3) over a pattern, on the free degrees of freedom."""
     K_upper, M_upper = free.matrix(K), free.matrix(M[:, None, None] * np.eye(3))
 
@@ -53,6 +54,7 @@ def pencil_parts(free: FreeUpper, M: Array, K: Array) -> PencilParts:
 
 def _mass_product(model: BodyModel) -> Callable[[Array], Array]:
     """Products of the mass matrix on the free degrees of freedom with (n_free,) or (n_free, r) arrays."""
+    assert isinstance(model.free, FreeUpper)
     free, n = model.free.free, model.d.mesh.n_points
     M: sp.csr_matrix = model.M_full
     nodes = np.unique(free // 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import Array, Indices, Mesh, UserError
+from ..fem.tied import Tied
 from ..linalg import eigen
 from ..mesh import part_numbers
 from ..settings.body import BodySettings
@@ -26,12 +27,15 @@ def refuse_unlinked_parts(model: BodyModel, settings: BodySettings) -> None:
     part = part_numbers(mesh)
     if not part.max(initial=0) or settings.cyclic:
         return
+    motions = _part_motions(model, part)
     if settings.free:
+        whole = _part_motions(model, np.zeros_like(part))
+        if motions.shape[1] == whole.shape[1]:
+            return
         raise UserError(
-            f"free: the mesh falls into {part.max() + 1} parts that share no points, so each floats by itself; join "
-            "them or give each a body of its own"
+            f"free: the mesh falls into {part.max() + 1} parts that share no points and are not tied wholly, so each "
+            "floats by itself; join them or give each a body of its own"
         )
-    motions = _part_motions(mesh.points, part, model.fixed)
     if motions.shape[1]:
         closed = [touching_now(model, i, mesh.points) for i in range(len(model.contacts))]
         motions = not_resisted(motions, closed, every=True)
@@ -42,8 +46,11 @@ def refuse_unlinked_parts(model: BodyModel, settings: BodySettings) -> None:
         )
 
 
-def refuse_unconstrained_parts(model: BodyModel, pencil: eigen.Pencil) -> None:
+def refuse_unconstrained_parts(model: BodyModel, pencil: eigen.Pencil, rigid_motions: int) -> None:
     """Refuse parts that the stiffness about the static state does not hold, since their contacts do not count in it.
+
+    Args:
+        rigid_motions: number of those that the whole body is free to make.
 
     Raises:
         UserError: with the part and a motion it is left.
@@ -52,10 +59,10 @@ def refuse_unconstrained_parts(model: BodyModel, pencil: eigen.Pencil) -> None:
     part = part_numbers(mesh)
     if not part.max(initial=0):
         return
-    motions = _part_motions(mesh.points, part, model.fixed)
-    if not motions.shape[1]:
+    motions = _part_motions(model, part)
+    if motions.shape[1] <= rigid_motions:
         return
-    X = motions[model.free.free]
+    X = model.free.unknowns_of(motions)
     energy, scale = X.T @ pencil.K(X), X.T @ (pencil.shifted(0.0).diagonal()[:, None] * X)
     root = np.linalg.inv(np.linalg.cholesky(scale))
     values, V = np.linalg.eigh(root @ (0.5 * (energy + energy.T)) @ root.T)
@@ -85,16 +92,17 @@ def refuse_unresolved(pencil: eigen.Pencil, found: eigen.Spectrum, rigid_motions
     )
 
 
-def _part_motions(points: Array, part: Indices, fixed: Indices) -> Array:
-    """(3n, r) motions of every part as a rigid one that its supports leave, one part after the other."""
-    columns = []
+def _part_motions(model: BodyModel, part: Indices) -> Array:
+    """(3n, r) motions of every part as a rigid one that supports and ties leave, one part after the other."""
+    columns, points, fixed = [], model.d.mesh.points, model.fixed
     for number in range(part.max() + 1):
         own = np.flatnonzero(part == number)
         left = rigid.free_motions(points[own], points[own].mean(axis=0), _renumbered(fixed, own))
         whole = np.zeros((len(points), 3, left.shape[1]))
         whole[own] = left.reshape(len(own), 3, -1)
         columns.append(whole.reshape(3 * len(points), -1))
-    return np.hstack(columns)
+    motions = np.hstack(columns)
+    return rigid.allowed(model.free, motions) if isinstance(model.free, Tied) else motions
 
 
 def _renumbered(fixed: Indices, own: Indices) -> Indices:

@@ -47,20 +47,20 @@ def map_picture(found: Map, full: Sequence[tuple[float, float, int]], path: Path
     return save_figure(figure, path)
 
 
-KINDS = {"supercritical": ("#0b4f9c", "-"), "subcritical": ("#c8382c", "--")}
+KINDS = {"supercritical": "#0b4f9c", "subcritical": "#c8382c"}
 IN_TIME = "#e8a013"
 TOLD_IN_TIME = "motions in time"
 
 
 def cycles_picture(found: Sequence[Cycles], title: str, path: Path) -> Path:
-    """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, dashed red from others;
+    """Amplitude of limit cycles over the parameter: in blue from supercritical Hopf points, in red from others;
     dots are motions in time."""
     figure, axes = single_panel(7.0, 4.4)
     name = found[0].system.named[0]
     for number, c in enumerate(found):
-        columns, (colour, line) = c.columns, KINDS[c.kind]
+        columns, colour = c.columns, KINDS[c.kind]
         label = f"{c.hopf.omega / (2 * np.pi):.5g} Hz, {c.kind}"
-        axes.plot(columns["parameter"], 1e6 * columns[f"amplitude {name}"], line, color=colour, marker=".", label=label)
+        axes.plot(columns["parameter"], 1e6 * columns[f"amplitude {name}"], color=colour, marker=".", label=label)
         axes.plot(c.hopf.p, 0.0, "o", color="white", markeredgecolor=colour, zorder=3)
         axes.plot(
             columns["parameter"], 1e6 * columns[f"in time {name}"], "o", color=IN_TIME, markeredgecolor="black",
@@ -89,19 +89,21 @@ def relief_picture(found: Sequence[tuple[float, Cycles]], titles: tuple[str, str
     axes.view_init(24, -62)
     axes.set_box_aspect((1.3, 1.3, 0.8), zoom=0.95)
     handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    names = sorted(handles, key=[*KINDS, "Hopf points", TOLD_IN_TIME].index)
+    lines = [handles[name] for name in names]
+    figure.legend(lines, names, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
     return save_figure(figure, path)
 
 
 def _wall(axes: Any, value: float, c: Cycles, order: int) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    columns, (colour, line), name = c.columns, KINDS[c.kind], c.system.named[0]
+    columns, colour, name = c.columns, KINDS[c.kind], c.system.named[0]
     x, z = np.append(c.hopf.p, columns["parameter"]), 1e6 * np.append(0.0, columns[f"amplitude {name}"])
     y, dots = np.full(len(x), value), 1e6 * columns[f"in time {name}"]
     wall = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, 0 * z])[::-1]])
     axes.add_collection3d(Poly3DCollection([wall], facecolor=colour, alpha=0.18, zorder=order))
-    axes.plot(x, y, z, line, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)
+    axes.plot(x, y, z, color=colour, linewidth=1.8, zorder=order + 1, label=c.kind)
     dot = {"ls": "", "marker": "o", "markeredgecolor": "black", "markersize": 6, "zorder": order + 2}
     axes.plot(x[:1], y[:1], z[:1], **dot, color="white", label="Hopf points")
     axes.plot(x[1:], y[1:], dots, **dot, color=IN_TIME, label=TOLD_IN_TIME)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,23 @@ def combined(first: Solid, second: Solid) -> Elastic:
     modulus = normal_modulus(first, second)
     G = 2 / (1 / first.shear + 1 / second.shear)
     return Elastic(modulus, G, 0.5 * G * (first.poisson / first.shear + second.poisson / second.shear))
+
+
+@cache
+def _widths() -> tuple[Array, Array, Array]:
+    """ln(low/high) of the half curvatures, and ln of (short axis)^2 and (long axis)^2 times low/approach."""
+    log_ratio = np.linspace(-18.0, 0.0, 4001)
+    g = axis_ratio(np.exp(log_ratio))
+    K, D, _ = ellipse_integrals(g)
+    return log_ratio, np.log(g**2 * D / K), np.log(D / K)
+
+
+def half_width(A: float, B: ArrayLike, approach: float) -> Array:
+    """b (m) of ellipses, to 1e-6 of it, a hundred times faster than `ellipses`; see there."""
+    log_ratio, short, long = _widths()
+    low, at = np.minimum(A, B), -np.abs(np.log(A / np.asarray(B)))
+    of = np.where(np.less_equal(A, B), np.interp(at, log_ratio, short), np.interp(at, log_ratio, long))
+    return np.sqrt(np.exp(of) * approach / low)
 
 
 class Ellipse(NamedTuple):

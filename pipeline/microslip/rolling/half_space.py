@@ -30,6 +30,8 @@ from .half_space_normal import normal_contact
 from .half_space_tangential import TOLERANCE, Shear, tractions
 
 ITERATIONS = 50
+FASTEST = 1e4
+"""Slip over the speed of rolling (of a shift m) up to which tractions are looked for."""
 Forces = tuple[float | None, float | None]
 
 
@@ -196,6 +198,11 @@ def _contact(
         raise UserError("friction: mu is negative or not a number somewhere; it must be 0 or more")
     if w.shape != (3,) or not np.isfinite(w).all():
         raise UserError(f"creepages: {w.tolist()}; give three numbers, along x, along y and the spin or turn")
+    if motion is not None and (fastest := np.abs(np.tensordot(w, motion.rigid, 1)).max()) > FASTEST:
+        raise UserError(
+            f"creepages: a slip of {fastest:.3g} times the speed is no rolling any more; creepages have no unit, the "
+            "spin is in 1/m"
+        )
     whole = influence(grid, pair)
     none = np.zeros((2, grid.nx, grid.ny))
     now = Contact(grid, pair, none[0], none, none, none[0], 0.0, w)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,8 @@ from ..files import store
 
 WIDTH = 0.07
 """m, of profiles that are given by a formula."""
+
+EVERYWHERE = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -72,24 +75,36 @@ def polynomial(coefficients: Sequence[float], width: float = WIDTH) -> Profile:
     return Profile(y, sum((c * y ** (k + 2) for k, c in enumerate(coefficients)), np.zeros_like(y)))
 
 
+def has_arc(radius: float, width: float) -> bool:
+    return 0 < width < 1.8 * abs(radius)
+
+
 def circle(radius: float, width: float = WIDTH) -> Profile:
     """An arc that falls to both sides of the origin, as a convex rail or a hollow wheel; a negative radius rises, m.
 
     Raises:
         UserError: an arc as wide as its circle.
     """
-    if not 0 < width < 1.8 * abs(radius):
+    if not has_arc(radius, width):
         raise UserError(f"profile: a radius of {radius:g} m has no arc {width:g} m wide; correct one of them")
     y = np.linspace(-0.5 * width, 0.5 * width, 401)
     return Profile(y, np.sign(radius) * (abs(radius) - np.sqrt(radius**2 - y**2)))
 
 
-def read_profile(path: Path | str, noise: float = 0.0, unit: float = 1e-3) -> Profile:
-    """A profile of a file: ``.prr`` and ``.prw`` (points between point.begin and point.end), or a table of y and z with
-    commas or blanks between.
+Mirror = Literal["", "y", "z", "yz"]
+MINIPROF = (".ban", ".whl")
+
+
+def read_profile(
+    path: Path | str, noise: float = 0.0, unit: float = 1e-3, mirror: Mirror = "",
+    between: tuple[float, float] = EVERYWHERE,
+) -> Profile:  # fmt: skip
+    """A profile of a file: ``.prr`` and ``.prw`` (points between point.begin and point.end), MiniProf's ``.ban`` and
+    ``.whl``, or a table of y and z with commas or blanks between.
 
     Args:
-        noise: see `Profile`. unit: of the numbers, m.
+        noise: see `Profile`. unit: of the numbers of a table, m. mirror: axes that run the other way in the file; those
+            of MiniProf do not tell. between: y that are kept, m, after that.
 
     Raises:
         UserError: no file, no numbers; points that turn back or of another unit.
@@ -101,6 +116,8 @@ def read_profile(path: Path | str, noise: float = 0.0, unit: float = 1e-3) -> Pr
         raise UserError(f"{path}: cannot be read as a profile ({error}); correct the path") from error
     lines = [line.split("!")[0].split("#")[0].strip() for line in lines]
     sign, shift = np.ones(2), np.zeros(2)
+    if path.suffix.lower() in MINIPROF:
+        unit, lines = 1e-3, _miniprof(lines, path)
     if "point.begin" in lines:
         begin, end = lines.index("point.begin"), lines.index("point.end") if "point.end" in lines else len(lines)
         unit, sign, shift = _header(lines[:begin], path)
@@ -114,7 +131,11 @@ def read_profile(path: Path | str, noise: float = 0.0, unit: float = 1e-3) -> Pr
         raise UserError(f"{path}: {error}; a profile is a table of y and z") from error
     if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 5 or not np.isfinite(points).all():
         raise UserError(f"{path}: has no five points of y and z; a profile is a table of both")
-    y, z = ((points + shift) * sign * unit).T
+    y, z = ((points + shift) * sign * unit * [1 - 2 * (axis in mirror) for axis in "yz"]).T
+    kept = (y >= between[0]) & (y <= between[1])
+    if kept.sum() < 5:
+        raise UserError(f"{path}: has no five points between {between[0]:g} and {between[1]:g} m; correct that")
+    y, z = y[kept], z[kept]
     return _checked(y, z, str(path), noise)
 
 
@@ -131,6 +152,21 @@ def _header(lines: list[str], path: Path) -> tuple[float, Array, Array]:
         raise UserError(f"{path}: units.len.f must be greater than 0; 1000 says that the points are in mm")
     sign = 1 - 2 * np.array([told["mirror.y"], told["mirror.z"]])
     return 1 / told["units.len.f"], sign, np.array([told["shift.y"], told["shift.z"]])
+
+
+def _miniprof(lines: list[str], path: Path) -> list[str]:
+    """Points as "y z" of a file of MiniProf: keys or free text before, what begins with a quotation mark left out."""
+    lines = [line for line in lines if not line.startswith('"')]
+    told = dict(line.split("=", 1) for line in lines if "=" in line)
+    for key in ("XOffset", "YOffset", "Tilt"):
+        if _is_number(told.get(key, "")) and float(told[key]):
+            raise UserError(f"{path}: {key} is not read; save the profile with {key} applied to its points")
+    names = [name.strip() for name in told.get("ColumnDef", "X,Y").split(",")]
+    if not {"X", "Y"} <= set(names):
+        raise UserError(f"{path}: ColumnDef names no X and Y; save the profile with both")
+    rows = [line.split() for line in lines]
+    rows = [row for row in rows if len(row) >= len(names) and all(map(_is_number, row))]
+    return [f"{row[names.index('X')]} {row[names.index('Y')]}" for row in rows]
 
 
 def _is_number(text: str) -> bool:

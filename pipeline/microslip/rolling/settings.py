@@ -29,36 +29,57 @@ from ..settings.body import (
 from ..settings.mistakes import validate
 from .ellipse import combined
 from .kalker import Coefficients
-from .profiles import WIDTH, Profile, circle, polynomial, read_profile
+from .profiles import EVERYWHERE, WIDTH, Mirror, Profile, circle, has_arc, polynomial, read_profile
 from .rolled import Heat
 from .strips import Distribution, Spin
-from .table import POINTS
+from .table import ELEMENTS, POINTS
 from .temperature import Conductor
 from .wheelset import Pose, Track
 
 Temperature = Annotated[Number, Field(gt=-273.15)]
 Count = Annotated[int, Field(ge=2, le=400)]
+Fineness = Annotated[int, Field(ge=4, le=100)]
+
+SUFFIXES = {"wheel": (".prw", ".whl"), "rail": (".prr", ".ban")}
+MIDDLES = {"wheel": "axle", "rail": "track"}
 
 BIGGEST = 5.0
 """m: a wheel's radius above this is given in another unit."""
 
 
 class Section(Model):
-    """A cross-section. Attributes: profile: radius of a circle, m (convex positive, hollow negative), coefficients of
-    y^2, y^3, ... (1/m, ...), or a file. width: of a circle or polynomial, m. noise: of a measured profile, m. at: of
-    the profile's origin from the middle of the track or axle, m."""
+    """A cross-section.
+
+    Attributes:
+        profile: radius of a circle, m (convex positive, hollow negative), coefficients of y^2, y^3, ... (1/m, ...), or
+            a file. width: of a circle or polynomial, m. noise: of a measured profile, m. mirror: axes that run the
+            other way in its file. between: y of it that are kept, m, after that. at: of the profile's origin from the
+            middle of the track or axle, m; there is no usual one where a profile is measured.
+    """
 
     profile: Number | Annotated[Numbers, Field(min_length=1)] | FileName
     width: Positive = WIDTH
     noise: Annotated[NotNegative, Field(le=1e-3)] = 0.0
+    mirror: Mirror = ""
+    between: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] | None = None
     at: Positive = 0.75
     young: Positive = 2.1e11
     poisson: Poisson = 0.28
 
+    @model_validator(mode="after")
+    def _is_an_arc(self) -> Section:
+        if isinstance(self.profile, float) and not has_arc(self.profile, self.width):
+            raise ValueError(
+                f"a profile of radius {self.profile:g} m has no arc {self.width:g} m wide; correct profile or width"
+            )
+        return self
+
     def made(self, folder: Path, outward: float) -> Profile:
         """outward: 1 if a convex profile falls to its sides (a rail), -1 if it rises (a wheel)."""
         if isinstance(self.profile, str):
-            return read_profile(folder / self.profile, self.noise)
+            return read_profile(
+                folder / self.profile, self.noise, mirror=self.mirror, between=self.between or EVERYWHERE
+            )
         if isinstance(self.profile, tuple):
             return polynomial(self.profile, self.width)
         return circle(outward * self.profile, self.width)
@@ -118,9 +139,11 @@ class ModelOfCase(Model):
 
 
 class TableOfCase(Model):
-    """points: of a table of creep forces on its axes, see `table.CreepTable`."""
+    """points: of a table of creep forces, of the size below and above saturation, azimuth, polar angle, a/b; see
+    `table.CreepTable`. elements: of the strips it is made with."""
 
-    points: Annotated[tuple[Count, Count, Count, Count], BeforeValidator(_tuple)] = POINTS
+    points: Annotated[tuple[Fineness, Fineness, Fineness, Fineness, Fineness], BeforeValidator(_tuple)] = POINTS
+    elements: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = ELEMENTS
 
 
 class HeatOfCase(Model):
@@ -167,6 +190,7 @@ class RollingCase(Model):
 
     @model_validator(mode="after")
     def _fits(self) -> RollingCase:
+        self._stands()
         if self.friction.heated:
             raise ValueError(
                 f'friction.kind: "{self.friction.kind}" belongs to contact files, whose [temperature] rolling has not; '
@@ -174,9 +198,26 @@ class RollingCase(Model):
             )
         if self.friction.deviation:
             raise ValueError("friction.deviation: rolling is steady, and friction random in time is not; remove it")
+        if self.table is not None and self.model.spin == "book":
+            raise ValueError('table: is made with model.spin = "kalker"; take that, or remove the table')
         if self.table is not None and not self.is_constant:
             raise ValueError("table: is of constant friction; give a number, without heat.limit, or remove the table")
         return self
+
+    def _stands(self) -> None:
+        """Files are of the body that names them, and where they stand is given: a few mm move the contact."""
+        bodies = {"wheel": self.wheel, "rail": self.rail}
+        for name, other in (("wheel", "rail"), ("rail", "wheel")):
+            file = bodies[name].profile
+            if isinstance(file, str) and Path(file).suffix.lower() in SUFFIXES[other]:
+                raise ValueError(f"{name}.profile: {file} is the profile of a {other}; exchange wheel and rail")
+        measured = [name for name, body in bodies.items() if isinstance(body.profile, str)]
+        for name, body in bodies.items():
+            if measured and "at" not in body.model_fields_set:
+                raise ValueError(
+                    f"{name}.at: is missing, and with the measured profile of the {measured[0]} there is no usual one; "
+                    f"give the distance of the {name}'s profile from the middle of the {MIDDLES[name]}, m"
+                )
 
     @property
     def is_constant(self) -> bool:

@@ -29,6 +29,14 @@ FAST = 5.0
 """V a/(2 kappa) from which on heat flows across the surface alone (Johnson, Contact Mechanics, 12.1)."""
 
 
+ROUNDING, SETTLED = 1e-10, 1e-6
+"""Of mu F_N: less is no force, of the strips and of the half-spaces, whose tractions settle to 1e-7."""
+
+
+def without_rounding(values: Array, least: float) -> Array:
+    return np.where(np.abs(values) < least, 0.0, values)
+
+
 @dataclass(frozen=True)
 class Studied:
     """Attributes: patches: of the wheel, the most loaded first; none if it does not touch. creep: (3, n) xi, eta, phi
@@ -62,7 +70,8 @@ class Studied:
             side = 1.0 if self.case.pose.side == "right" else -1.0
             places = {"wheel": np.array([0.0, *p.axle]), "rail": np.array([0.0, side * self.track.rail_at, 0.0])}
             for sign, (body, about) in zip((1.0, -1.0), places.items(), strict=True):
-                rows.append([k + 1, body, *map(float, sign * p.felt(x, y, moment, about))])
+                felt = without_rounding(sign * p.felt(x, y, moment, about), ROUNDING * p.normal_force)
+                rows.append([k + 1, body, *map(float, felt)])
         return ["patch", "body", "F_x_N", "F_y_N", "F_z_N", "M_x_Nm", "M_y_Nm", "M_z_Nm"], rows
 
     @property
@@ -77,13 +86,15 @@ class Studied:
 
     def columns(self) -> dict[str, Array]:
         """Of the table of the curve."""
-        f, m, n = self.forces, self.held, self.creep.shape[1]
-        assert f is not None
+        m, n, p = self.held, self.creep.shape[1], self.patches[0]
+        assert self.forces is not None
+        x, y = (without_rounding(v, ROUNDING * m) for v in self.forces[:2])
+        turn = without_rounding(self.forces.moment, ROUNDING * m * np.sqrt(p.a * p.b))
         hot = {} if self.hottest is None else {"largest_temperature_C": self.hottest[:n]}
         return {
             "longitudinal_creepage": self.creep[0], "lateral_creepage": self.creep[1], "spin_1_per_m": self.creep[2],
-            "F_x_N": f.x, "F_y_N": f.y, "M_z_Nm": f.moment, "F_x_over_mu_F_N": f.x / m, "F_y_over_mu_F_N": f.y / m,
-            "friction_power_W": f.power * self.patches[0].speed, "share_sliding": f.sliding, **hot,
+            "F_x_N": x, "F_y_N": y, "M_z_Nm": turn, "F_x_over_mu_F_N": x / m, "F_y_over_mu_F_N": y / m,
+            "friction_power_W": self.forces.power * p.speed, "share_sliding": self.forces.sliding, **hot,
         }  # fmt: skip
 
     def sentences(self) -> list[str]:
@@ -167,8 +178,9 @@ class Studied:
         if e is None:
             return {}
         xi, eta, phi = self.creep[:, e.at]
-        return {"longitudinal_creepage": xi, "lateral_creepage": eta, "spin_1_per_m": phi, "F_x_N": e.x, "F_y_N": e.y,
-                "M_z_Nm": e.moment, "F_x_over_mu_F_N": e.x / self.held, "F_y_over_mu_F_N": e.y / self.held}  # fmt: skip
+        x, y = (without_rounding(v, self.held * SETTLED) for v in (e.x, e.y))
+        return {"longitudinal_creepage": xi, "lateral_creepage": eta, "spin_1_per_m": phi, "F_x_N": x, "F_y_N": y,
+                "M_z_Nm": e.moment, "F_x_over_mu_F_N": x / self.held, "F_y_over_mu_F_N": y / self.held}  # fmt: skip
 
     def warnings(self) -> list[str]:
         """What a person should doubt."""

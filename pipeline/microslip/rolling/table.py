@@ -1,132 +1,252 @@
 """Tables of creep forces for vehicle programs, over creepages, spin and a/b, with the error of reading between points.
 
-Forces over mu F_N of one Poisson's ratio depend on four numbers: how large the slip is, where its pole lies, and a/b.
-With xi the sign of F_x turns, with eta and phi together those of F_y and M_z, so half of the directions is enough.
+What moves the springs of the strips, three numbers over mu F_N, makes the forces, with a/b and the ratio of the springs
+across and along; Kalker's coefficients and his blending (`strips.poses`) are left to the reader, and their kinks with
+them. With xi the sign of F_x turns, with eta and phi together those of F_y and M_z: half of the directions is enough.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import RegularGridInterpolator
 
+from ..contact.law import program
 from ..data import Array, UserError
 from ..files import hdf5, store
-from .kalker import creep_coefficients
-from .strips import creep_forces
+from .kalker import Coefficients, creep_coefficients
+from .strips import BLOCK, Distribution, Forces, Poses, creep_forces, forces, grid, poses
 
-POINTS = (65, 65, 49, 21)
-"""Of the size of the slip, its azimuth, its polar angle, a/b."""
+POINTS = (19, 36, 33, 39, 13)
+"""Of the size of the pull below and above 1/2, its azimuth, its polar angle, a/b."""
+
+ELEMENTS = (40, 120)
+"""Of the strips: with 20 of them narrow patches feel it when the pole of the slip goes from one strip to the next."""
 
 WIDEST = 5.0
 """a/b and b/a of the table's ends."""
 
+SATURATED = 32 / (3 * np.pi)
+"""C G a b s/(mu F_N) from which all slides in pure creepage; C23 G a^2 b phi/(mu F_N) where pure spin lets all slide at
+once: springs and bound are both a parabola then, and the forces have a ridge."""
+
 VALUES = ("F_x/(mu F_N)", "F_y/(mu F_N)", "M_z/(mu F_N sqrt(a b))")
+FINEST = 2**15 - 1
+"""Steps of `values` from 0 to its largest."""
 
 
 @dataclass(frozen=True)
 class CreepTable:
-    """Forces over the direction and the size of the slip, read straight between points.
+    """Forces over size and direction of the pull, a/b and the springs, read by cubics through four points.
 
-    Polar is the angle of (xi/b, eta/a, phi) from phi: up to 45 degrees the pole of the slip lies in the patch. Azimuth
-    is that of (xi sqrt(a), eta sqrt(b)). Size is r/(1 + r), r the length of G/(mu F_N) (C11 a b xi, C22 a b eta,
-    C23 (a b)^1.5 phi) with the coefficients of the table, straight over ln(a/b).
+    The pull is (u, v, w) = G a b/(mu F_N) (C_x xi, C_y eta, C_t sqrt(a b) phi) with blended coefficients: with
+    f = (1/C11, 1/C22, sqrt(a/b)/(spin_factor C23)), blend = min(1, |(xi, eta)| G a b/(3 mu F_N hypot(f0, f1))) and
+    e = (xi, eta, 3 pi a phi/32), each f becomes (1 - blend) f + blend |e|^2/sum(e^2/f); C_x = 1/f0, C_y = 1/f1,
+    C_t = 1/f2.
+    Size is r/(1 + r), r = 3 pi/32 |(u, v, sqrt(a/b) w)|, 1 where all slides. Azimuth is the angle of (|u| sqrt(a),
+    v sqrt(b)), v with the sign of w. Polar is that of (u/b, v/a, w) from w: up to 45 degrees the pole of the slip lies
+    in the patch. F_x has the opposite sign of u, F_y and M_z turn with that of w. The four points of a cubic lie on one
+    side of size 1/2, where the forces have a ridge; over the last axis a parabola goes through its three points.
 
     Attributes:
-        size: (n,) 0 to 1, where all slides. azimuth: (m,) -pi/2 to pi/2. polar: (k,) 0 to pi/2. ratio: (l,) a/b.
-        coefficients: (3, l) C11, C22, C23. values: (3, n, m, k, l), `VALUES`. poisson: nu of both bodies combined.
-        error: (3, 3) found between points, over mu F_N likewise: of each value the mean, what 95 % are below, and the
-            largest. checked: at so many.
+        size: (n,) 0 to 1. azimuth: (m,) -pi/2 to pi/2. polar: (k,) 0 to pi/2. ratio: (l,) a/b, read over its logarithm.
+        springs: (3,) ln(C_y/C_x). kalker: (4, i) a/b, C11, C22, C23, closely. values: (3, n, m, k, l, 3), `VALUES`.
+        poisson: nu of both bodies combined. how: elements, distribution, coefficients of the strips. error: (3, 3)
+            found between points, over mu F_N likewise: of each value the mean, what 95 % are below, and the largest.
+        checked: at so many.
     """
 
     size: Array
     azimuth: Array
     polar: Array
     ratio: Array
-    coefficients: Array
+    springs: Array
+    kalker: Array
     values: Array
     poisson: float
+    how: dict[str, Any]
     error: Array
     checked: int
 
-    @cached_property
-    def _between(self) -> RegularGridInterpolator:
-        axes = self.size, self.azimuth, self.polar, np.log(self.ratio)
-        return RegularGridInterpolator(axes, np.moveaxis(self.values.astype(float), 0, -1))
-
-    def scale(self, ratio: Array) -> Array:
-        """(3, ...) C11, C22, C23 by which the size of a slip is measured."""
-        return np.stack([np.interp(np.log(ratio), np.log(self.ratio), c) for c in self.coefficients])
+    @property
+    def axes(self) -> tuple[Array, ...]:
+        return self.size, self.azimuth, self.polar, np.log(self.ratio), self.springs
 
     def forces(
         self, xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, a: ArrayLike, b: ArrayLike, normal_force: ArrayLike,
         friction: ArrayLike, shear: float,
     ) -> Array:  # fmt: skip
-        """(3, ...) F_x, F_y in N, M_z in N m, of what `strips.creep_forces` takes; a/b beyond the table is its end."""
+        """(3, ...) F_x, F_y in N, M_z in N m, of what `strips.creep_forces` takes.
+
+        Raises:
+            UserError: a/b beyond the table.
+        """
         given = (np.asarray(v, dtype=float) for v in (xi, eta, phi, a, b, np.multiply(friction, normal_force)))
         x, y, turn, a, b, held = np.broadcast_arrays(*given)
-        ratio, area = np.clip(a / b, self.ratio[0], self.ratio[-1]), a * b
-        r = shear * area / held * self.scale(ratio) * np.stack([x, y, np.sqrt(area) * turn])
-        r = np.sqrt((r**2).sum(axis=0))
-        forward, turned = np.where(x < 0, -1.0, 1.0), np.where(turn < 0, -1.0, 1.0)
-        flat = np.hypot(x / b, y / a)
-        polar = np.arctan2(flat, np.abs(turn))
-        at = [r / (1 + r), np.arctan2(turned * y * np.sqrt(b), np.abs(x) * np.sqrt(a)), polar, np.log(ratio)]
-        found = np.moveaxis(self._between(np.stack(at, axis=-1)), -1, 0).reshape(3, *x.shape)
-        found = found * np.stack([forward, turned, turned])
-        return found * held * np.stack([np.ones_like(area), np.ones_like(area), np.sqrt(area)])
+        ratio, c = a / b, np.sqrt(a * b)
+        least, most = self.ratio[0] * (1 - 1e-9), self.ratio[-1] * (1 + 1e-9)
+        if not ((ratio >= least) & (ratio <= most)).all():
+            worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
+            raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
+        p = Poses(*map(np.asarray, poses(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
+        stiff = p.stiffness_x * c**2 / held
+        at, signs = _place(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
+        at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
+        found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
+        return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
+
+    def _between(self, at: Array) -> Array:
+        """(3, n) values at (5, n) coordinates."""
+        ridge = int(np.searchsorted(self.size, 0.5))
+        parts = [_weights(self.axes[0], at[0], ridge)]
+        parts += [_weights(axis, v) for axis, v in zip(self.axes[1:], at[1:], strict=True)]
+        shape = self.values.shape[1:]
+        index = np.zeros((at.shape[1], 1), int)
+        for (first, weight), many in zip(parts, shape, strict=True):
+            index = (index * many)[:, :, None] + (first[:, None] + np.arange(weight.shape[1]))[:, None, :]
+            index = index.reshape(at.shape[1], -1)
+        found = self.values.reshape(3, -1)[:, index]
+        for _, weight in parts[::-1]:
+            found = np.einsum("knip,np->kni", found.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
+        return found[..., 0]
+
+
+def _weights(axis: Array, v: Array, ridge: int = 0) -> tuple[Array, Array]:
+    """Index of the first of the points about each place, on one side of a ridge, and what each of them counts (n, 4):
+    Lagrange's polynomials."""
+    many = min(4, len(axis))
+    i = np.clip(np.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
+    right = i >= ridge
+    low, high = np.where(right, ridge, 0), np.where(right, len(axis) - 1, ridge)
+    first = np.clip(i - (many - 1) // 2, low, np.maximum(high - many + 1, low))
+    x = axis[first[:, None] + np.arange(many)]
+    weight = np.ones_like(x)
+    for j in range(many):
+        for k in range(many):
+            if j != k:
+                weight[:, j] *= (v - x[:, k]) / (x[:, j] - x[:, k])
+    return first, weight
+
+
+def _place(pull: Array, ratio: Array) -> tuple[Array, Array]:
+    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it."""
+    u, v, w = pull
+    r = np.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
+    forward, turned = np.where(u < 0, -1.0, 1.0), np.where(w < 0, -1.0, 1.0)
+    root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)
+    polar = np.arctan2(np.hypot(u * root**2, v / root**2), np.abs(w))
+    azimuth = np.arctan2(turned * v / root, np.abs(u) * root)
+    return np.stack([r / (1 + r), azimuth, polar]), np.stack([forward, turned, turned])
+
+
+FAR = 1e4
+"""r that stands for the size 1."""
+
+
+def _pull(at: Array) -> Array:
+    """(3, n) pull of (4, n) size, azimuth, polar angle and ln(a/b)."""
+    size, azimuth, polar, ratio = at[0], at[1], at[2], np.exp(at[3])
+    root = ratio**0.25
+    u, v = np.cos(azimuth) / root, np.sin(azimuth) * root
+    flat = np.sin(polar) / np.hypot(u * root**2, v / root**2)
+    pull = np.stack([flat * u, flat * v, np.cos(polar)])
+    r = np.minimum(size / np.maximum(1 - size, 1e-300), FAR) * SATURATED
+    return pull * r / np.sqrt(pull[0] ** 2 + pull[1] ** 2 + ratio * pull[2] ** 2)
+
+
+@partial(program, static_argnames=("elements", "distribution"))
+def _marched(
+    pull: Array, ratio: Array, springs: Array, elements: tuple[int, int], distribution: Distribution
+) -> Forces:
+    """Forces over mu F_N of springs that are pulled, with a b and mu F_N of one."""
+    a, one = ratio**0.5, ratio**0.0
+    x, y = springs**-0.5, springs**0.5
+    pose = Poses(pull[0] / x, pull[1] / y, pull[2] / x, pull[2] / y, a, 1 / a, one, one, x, y)
+    return forces(pose, elements, distribution)
+
+
+def _tabulated(axes: tuple[Array, ...], **how: Any) -> Array:
+    """(3, ...) values over the axes, in `FINEST` steps."""
+    shape = [len(axis) for axis in axes]
+    n = int(np.prod(shape))
+    parts = []
+    for i in range(0, n, BLOCK):
+        which = np.unravel_index(np.minimum(np.arange(i, i + BLOCK), n - 1), shape)
+        at = np.stack([axis[k] for axis, k in zip(axes, which, strict=True)])
+        f = _marched(_pull(at), np.exp(at[3]), np.exp(at[4]), **how)
+        parts.append(np.stack([f.x, f.y, f.moment]))
+    values = np.concatenate(parts, axis=1)[:, :n].reshape(3, *shape)
+    step = np.abs(values).max() / FINEST
+    return np.rint(values / step) * step
 
 
 def creep_table(
-    poisson: float, *, points: tuple[int, int, int, int] = POINTS, checked: int = 20_000, seed: int = 0, **how: Any
-) -> CreepTable:
-    """A table, and its error at random places between its points.
+    poisson: float, *, points: tuple[int, int, int, int, int] = POINTS, elements: tuple[int, int] = ELEMENTS,
+    distribution: Distribution = "constant", coefficients: Coefficients = "table", checked: int = 20_000, seed: int = 0,
+) -> CreepTable:  # fmt: skip
+    """A table, and its error at random places between its points, of the strips with `spin` "kalker".
 
     Args:
-        poisson: of both bodies combined. points: of size, azimuth, polar angle and a/b. how: as `strips.creep_forces`
-            (elements, distribution, coefficients, spin).
+        poisson: of both bodies combined. points: of the size below and above 1/2, of azimuth, polar angle and a/b. The
+            rest as `strips.creep_forces`.
 
     Raises:
-        UserError: fewer than two points on an axis.
+        UserError: fewer than four points on an axis.
     """
-    if min(points) < 2:
-        raise UserError("points: an axis of a table needs two or more; give four numbers")
-    axes = (
-        np.linspace(0, 1, points[0]), np.linspace(-np.pi / 2, np.pi / 2, points[1]),
-        np.linspace(0, np.pi / 2, points[2]), np.geomspace(1 / WIDEST, WIDEST, points[3]),
+    if min(points) < 4:
+        raise UserError("points: cubics need four or more on each axis of a table; give five numbers")
+    closely = np.geomspace(1 / WIDEST, WIDEST, 801)
+    c = np.asarray(creep_coefficients(closely, poisson, coefficients))
+    springs = np.log(c[1] / c[0])  # of the blended ones as well, which are nearer to each other
+    below, above, around, polar, ratios = (np.linspace(0, 1, n) for n in points)
+    size = np.concatenate([0.5 * (1 - (1 - below) ** 2), 0.75 - 0.25 * np.cos(np.pi * above[1:])])
+    axes = (size, np.pi * (around - 0.5), np.pi / 2 * polar**1.5, np.log(WIDEST) * (2 * ratios - 1),
+            np.linspace(min(springs.min(), -NEAR), max(springs.max(), NEAR), 3))  # fmt: skip
+    how: dict[str, Any] = {"elements": elements, "distribution": distribution}
+    table = CreepTable(
+        *axes[:3], np.exp(axes[3]), axes[4], np.vstack([closely, c[:3]]), _tabulated(axes, **how), poisson,
+        how | {"coefficients": coefficients}, np.full((3, 3), np.nan), checked,
     )  # fmt: skip
-    scale = np.asarray(creep_coefficients(axes[3], poisson))[:3]
-    empty = CreepTable(*axes, scale, np.zeros((3, *points), np.float32), poisson, np.full((3, 3), np.nan), checked)
-    at = np.stack([v.ravel() for v in np.meshgrid(*axes, indexing="ij")])
-    values = _solved(empty, at, **how)[1].reshape(3, *points).astype(np.float32)
-    table = replace(empty, values=values)
-    low, high = (np.array([axis[i] for axis in axes])[:, None] for i in (0, -1))
-    low[3], high[3] = np.log(low[3]), np.log(high[3])
-    tried = low + (high - low) * np.random.default_rng(seed).uniform(size=(4, checked))
-    tried[3] = np.exp(tried[3])
-    (xi, eta, phi, a, b, load, mu), exact = _solved(table, tried, **how)
-    error = np.abs(table.forces(xi, eta, phi, a, b, load, mu, 1.0) - exact)
-    found = np.stack([error.mean(axis=1), np.quantile(error, 0.95, axis=1), error.max(axis=1)], axis=1)
-    return replace(table, error=found)
+    return replace(table, error=_missed(table, checked, seed))
 
 
-FORMAT = "microslip-creep-table"
+NEAR = 0.01
+"""Least range of the logarithm of the springs' ratio to both sides of 0, so that its three points are apart."""
+
+
+def _missed(table: CreepTable, checked: int, seed: int) -> Array:
+    """(3, 3) mean, 95 % quantile and largest error at random states, spread evenly over the axes."""
+    low, high = (np.array([axis[i] for axis in table.axes[:4]])[:, None] for i in (0, -1))
+    at = low + (high - low) * np.random.default_rng(seed).uniform(size=(4, checked))
+    a, one = np.exp(0.5 * at[3]), np.ones(checked)
+    c = np.asarray(creep_coefficients(a**2, table.poisson, table.how["coefficients"]))
+    xi, eta, phi = _pull(at) / c[:3]
+    f = creep_forces(xi, eta, phi, a, 1 / a, one, one, 1.0, table.poisson, **table.how)
+    error = np.abs(table.forces(xi, eta, phi, a, 1 / a, one, one, 1.0) - np.stack([f.x, f.y, f.moment]))
+    return np.stack([error.mean(axis=1), np.quantile(error, 0.95, axis=1), error.max(axis=1)], axis=1)
+
+
+FORMAT = "microslip-creep-table-2"
+AXES = ("size", "azimuth", "polar", "ratio", "springs")
 
 
 def write_creep_table(path: Path, table: CreepTable) -> Path:
-    """As HDF5: a dataset an axis, ``coefficients``, ``values`` and ``error``; complete or not at all."""
+    """As HDF5: a dataset an axis, ``kalker``, ``values`` in whole steps and ``error``; complete or not at all."""
+    step = np.abs(table.values).max() / FINEST
+    g = grid(tuple(table.how["elements"]), table.how["distribution"])
     with store.complete_or_absent(path) as temporary:
         with hdf5.create(temporary) as file:
             file.attrs.update(format=FORMAT, poisson=table.poisson, checked=table.checked, values=", ".join(VALUES),
-                              error="mean, 95 % quantile, largest", axes=str(CreepTable.__doc__))  # fmt: skip
-            for name in (*AXES, "coefficients", "values", "error"):
+                              step=step, spin_factor=2 * g.sprung / g.spun, error="mean, 95 % quantile, largest",
+                              meaning=str(CreepTable.__doc__), **table.how)  # fmt: skip
+            for name in (*AXES, "kalker", "error"):
                 hdf5.put(file, name, getattr(table, name))
+            hdf5.put(file, "values", np.rint(table.values / step).astype(np.int16))
         hdf5.seal(temporary)
     return path
 
@@ -139,28 +259,10 @@ def read_creep_table(path: Path | str) -> CreepTable:
     """
     try:
         with h5py.File(store.ordinary(Path(path)), "r") as file:
-            parts = {name: file[name][()] for name in (*AXES, "coefficients", "values", "error")}
-            return CreepTable(**parts, poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))
+            parts = {name: file[name][()] for name in (*AXES, "kalker", "error")}
+            nx, ny = map(int, file.attrs["elements"])
+            how = {"elements": (nx, ny)} | {k: str(file.attrs[k]) for k in ("distribution", "coefficients")}
+            return CreepTable(**parts, values=file["values"][()] * float(file.attrs["step"]), how=how,
+                              poisson=float(file.attrs["poisson"]), checked=int(file.attrs["checked"]))  # fmt: skip
     except (OSError, KeyError) as error:
         raise UserError(f"{path}: is no table of creep forces ({error}); write one with [table] in a case") from error
-
-
-AXES = ("size", "azimuth", "polar", "ratio")
-
-FAR = 1e4
-"""r that stands for the size 1."""
-
-
-def _solved(table: CreepTable, at: Array, **how: Any) -> tuple[list[Array], Array]:
-    """What `forces` takes at (4, n) coordinates, with a b, G and mu F_N of one, and (3, n) what the strips say."""
-    size, azimuth, polar, ratio = at
-    a, b = np.sqrt(ratio), 1 / np.sqrt(ratio)
-    x, y = np.cos(azimuth) * np.sqrt(b), np.sin(azimuth) * np.sqrt(a)
-    flat = np.sin(polar) / np.hypot(x / b, y / a)
-    creep = np.stack([flat * x, flat * y, np.cos(polar)])
-    r = np.minimum(size / np.maximum(1 - size, 1e-300), FAR)
-    creep = creep * r / np.sqrt(((table.scale(ratio) * creep) ** 2).sum(axis=0))
-    one = np.ones_like(ratio)
-    xi, eta, phi = creep
-    f = creep_forces(xi, eta, phi, a, b, one, one, 1.0, table.poisson, **how)
-    return [xi, eta, phi, a, b, one, one], np.stack([f.x, f.y, f.moment])

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from ..data import Array, UserError
-from .ellipse import Elastic, ellipses
+from .ellipse import Elastic, ellipses, half_width
 from .profiles import Profile
 
 
@@ -109,6 +110,7 @@ def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]
     gap = _gap(track, seen)
     if not vertical > 0:
         return []
+
     def missing(down: float) -> float:
         return float(vertical ** (2 / 3) - sum(_lifted(p) for p in _pressed(track, gap, down)) ** (2 / 3))
 
@@ -137,7 +139,7 @@ def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Ar
 class Gap(NamedTuple):
     """Above the rail, over the wheel's profile, (k,). Attributes: on_wheel: y of the profile; x, y, z: of the point of
     its circle that comes nearest to the rail, m, the axle's middle as high as the nominal radius; gap: vertical, m;
-    radius: m; slope: of the gap along the surface; arc: from point to point, m."""
+    radius: m; slope: of the gap along the surface, beyond the rail that at its end; arc: from point to point, m."""
 
     on_wheel: Array
     x: Array
@@ -156,7 +158,9 @@ def _gap(track: Track, pose: Pose) -> Gap:
     c, s, t = np.cos(pose.roll), np.sin(pose.roll), np.tan(pose.yaw)
     turn = np.zeros_like(r)
     for _ in range(20):  # of 0.1 rad at the most each
-        turn = np.arcsin(np.clip(-t * (slope * c + np.cos(turn) * s), -1, 1))
+        before, turn = turn, np.arcsin(np.clip(-t * (slope * c + np.cos(turn) * s), -1, 1))
+        if np.nanmax(np.abs(turn - before)) < 1e-12:
+            break
     along, across, down = r * np.sin(turn), track.wheel_at + y_w, r * np.cos(turn)
     across, down = across * c - down * s, across * s + down * c
     x = along * np.cos(pose.yaw) - across * np.sin(pose.yaw)
@@ -171,7 +175,9 @@ def _gap(track: Track, pose: Pose) -> Gap:
         )
     incline = np.arctan(np.gradient(z, y))
     arc = np.gradient(y) / np.cos(incline)
-    return Gap(y_w, x, y, z, gap, r, np.gradient(gap) * np.cos(incline) / arc, arc)
+    slope = np.gradient(gap) * np.cos(incline) / arc
+    known = np.flatnonzero(np.isfinite(slope))
+    return Gap(y_w, x, y, z, gap, r, np.interp(np.arange(len(slope)), known, slope[known]), arc)
 
 
 class Pressed(NamedTuple):
@@ -209,14 +215,23 @@ def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:
     cosine = np.cos(angle)
     approach = (level - least) * cosine
     A = cosine / (2 * float(np.interp(at, np.arange(len(gap.y)), gap.radius)))
-    B, b = 0.0, 1e-3
-    for _ in range(12):
-        B = _curvature(gap, at, b)
-        one = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
-        grown = float(approach / one.approach)
-        b = 0.5 * (b + float(one.b) * grown**0.5)
+
+    B = float(_curvature(gap, at, _half_width(gap, at, A, approach)))
+    one = ellipses(A, max(B, CONFORMAL * A), 1.0, track.elastic.modulus)
+    grown = float(approach / one.approach)
     axes = float(one.a) * grown**0.5, float(one.b) * grown**0.5
     return Pressed(at, angle, A, B, grown**1.5, *axes, approach, float(one.pressure) * grown**0.5)
+
+
+def _half_width(gap: Gap, at: float, A: float, approach: float) -> float:
+    """b that the mean curvature over +-b makes, m: the smallest one, which grows from 0 without jumps."""
+
+    def wider(b: ArrayLike) -> Array:
+        return half_width(A, np.maximum(_curvature(gap, at, b), CONFORMAL * A), approach) - b
+
+    tried = np.append(0.0, np.geomspace(0.005, 1.01, 30)) * float(half_width(A, np.array(CONFORMAL * A), approach))
+    first = 2 + int(np.argmax(wider(tried[2:]) <= 0))
+    return brentq(wider, tried[first - 1], tried[first], xtol=1e-9) if wider(tried[first - 1]) > 0 else tried[first - 1]
 
 
 def _summit(gap: Array, i: int) -> tuple[float, float]:
@@ -232,12 +247,12 @@ def _summit(gap: Array, i: int) -> tuple[float, float]:
     return i + float(shift), float(middle + 0.5 * lean * shift)
 
 
-def _curvature(gap: Gap, at: float, half: float) -> float:
+def _curvature(gap: Gap, at: float, half: ArrayLike) -> Array:
     """Half the mean second derivative of the gap over +-half (m) about an index."""
-    steps = half / gap.arc[round(at)]
-    known = np.flatnonzero(np.isfinite(gap.slope))
-    ends = np.interp([at - steps, at + steps], known, gap.slope[known])
-    return float(ends[1] - ends[0]) / (4 * half)
+    place = np.clip(at + np.multiply.outer([-1, 1], half) / gap.arc[round(at)], 0, len(gap.slope) - 1.001)
+    i = place.astype(int)
+    ends = gap.slope[i] + (place - i) * (gap.slope[i + 1] - gap.slope[i])
+    return (ends[1] - ends[0]) / (4 * np.asarray(half))
 
 
 def _lifted(p: Pressed) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +14,7 @@ from ..linalg.quadratic import Quadratic, Window
 from ..modal.unreduced import Unreduced
 from ..sliding import Tangent
 from ..system.assembly import Assembly
+from ..system.spin import Spin
 from .spectrum import Spectrum
 
 Report = Callable[[str], None]
@@ -23,12 +24,13 @@ def full_matrices(bodies: Mapping[str, Unreduced], assembly: Assembly, contacts:
     """M, C and K of all bodies with the tangents of their contacts, sparse.
 
     Args:
-        bodies: by the names of the assembly's components. contacts: in the order of the assembly.
+        bodies: by the names of the assembly's components, whose spins they take. contacts: in the assembly's order.
 
     Raises:
         UserError: patches that deform, whose coordinates are those of the reduced bodies.
     """
     names = [m.name for m in assembly.components]
+    bodies = {m.name: _turned(bodies[m.name], m.spin) for m in assembly.components}
     sizes = [bodies[name].M.shape[0] for name in names]
     M, C, K = (sp.block_diag([getattr(bodies[name], key) for name in names], format="csr") for key in "MCK")
     for c, at in zip(assembly.contacts, contacts, strict=True):
@@ -42,6 +44,14 @@ def full_matrices(bodies: Mapping[str, Unreduced], assembly: Assembly, contacts:
         T = sp.hstack(parts).tocsr()
         C, K = C + T.T @ sp.csr_matrix(at.C) @ T, K + T.T @ sp.csr_matrix(at.K) @ T
     return Quadratic(M, C.tocsr(), K.tocsr())
+
+
+def _turned(body: Unreduced, spin: Spin | None) -> Unreduced:
+    """The body with its material running through its standing shape; itself without a spin."""
+    if spin is None:
+        return body
+    D, B = (body.congruent(sp.kron(A, sp.eye(3)).tocsr()) for A in spin.matrices(body.mesh, body.mass))
+    return replace(body, C=body.C + spin.rate * (D - D.T), K=body.K - spin.rate**2 * B)
 
 
 def growing(Q: Quadratic, window: Window, near: ComplexArray, report: Report = lambda _: None) -> Spectrum:

@@ -295,6 +295,7 @@ class Geometry(Model):
     build: str | None = None
     cad: str | None = None
     mesh: str | None = None
+    instances: Annotated[tuple[str, ...], BeforeValidator(_tuple)] = ()
     matrices: MatrixFiles | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     faces: Annotated[tuple[FaceRule, ...], BeforeValidator(_tuple)] = ()
@@ -302,6 +303,8 @@ class Geometry(Model):
     @model_validator(mode="after")
     def _one_source(self) -> Geometry:
         only_one(self, "build", "cad", "mesh", "matrices")
+        if self.instances and self.mesh is None:
+            raise ValueError("instances: are those of a deck; give it as mesh")
         return self
 
 
@@ -435,7 +438,13 @@ class Support(Model):
 
     face: FaceName
     directions: Directions = "xyz"
-    rotations: bool = False
+    rotations: bool | Directions = False
+
+    @property
+    def turns(self) -> list[int]:
+        """Rotations about x, y, z that are held too, as 3, 4, 5: of reference nodes and of nodes of matrices."""
+        axes = self.rotations if isinstance(self.rotations, str) else "xyz" * self.rotations
+        return [3 + "xyz".index(c) for c in axes]
 
 
 class Cyclic(Model):

@@ -7,7 +7,9 @@ import os
 import re
 import shlex
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from ..data import Mesh, UserError
 from ..exchange.measured import holds_modes, read_measured
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
+from ..mesh.chosen import of_instances
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -40,12 +43,13 @@ class Imported:
     told: tuple[str, ...]
 
 
-def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
+def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[str] = ()) -> Imported:
     """Write a body.toml around a CAD file, a mesh or matrices; nothing is copied, the file is named where it lies.
 
     Args:
         file: a CAD file, a mesh with or without materials, or the stiffness matrix of a pair. folder: of the new
             body.toml, and the body's name; by default one of the file's name here. unit: of its lengths.
+        instances: those of a deck that are the body, all if none.
 
     Raises:
         UserError: unreadable, or there is a body.toml already.
@@ -61,7 +65,7 @@ def import_file(file: Path, folder: Path | None, unit: str) -> Imported:
     if target.exists():
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
     kind = file.suffix.lower()
-    made = _matrices if kind in MATRICES else _cad if kind in CAD else _mesh
+    made = _matrices if kind in MATRICES else _cad if kind in CAD else partial(_mesh, instances=instances)
     lines, told = made(file, target.parent, unit)
     head = [f'name = "{name}"', f'length_unit = "{unit}"']
     write_text(target, "\n".join([*head, *lines]) + "\n")
@@ -117,7 +121,10 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
     lines, mark = ["", "# Held by the file itself:"], "" if _hold(mesh) else "#"
     for name, directions in mesh.supports.items():
         lines += [f"{mark}[[supports]]", f"{mark}face = {json.dumps(name)}"]
-        lines += [f'{mark}directions = "{directions}"'] if directions != "xyz" else []
+        moves = "".join(c for c in directions if c in "xyz")
+        turns = "".join("xyz"["abc".index(c)] for c in directions if c in "abc")
+        lines += [f'{mark}directions = "{moves}"'] if moves != "xyz" else []
+        lines += [f"{mark}rotations = {'true' if turns == 'xyz' else json.dumps(turns)}"] if turns else []
     named = ", ".join(f"{name} in {directions}" for name, directions in mesh.supports.items())
     if mark:
         lines[1] = "# Held by the file itself, but not against every rigid motion (then remove free = true at the top):"
@@ -127,10 +134,39 @@ def _supports(mesh: Mesh) -> tuple[list[str], list[str]]:
 
 def _hold(mesh: Mesh) -> bool:
     """Whether the file's supports leave no rigid motion."""
-    from ..modal.rigid import free_motions
+    from ..fem.discretise import discretise
+    from ..fem.tied import tied_upper
+    from ..modal.rigid import free_motions, left_by
 
-    fixed = [3 * mesh.point_sets[n] + "xyz".index(c) for n, directions in mesh.supports.items() for c in directions]
-    return free_motions(mesh.points, mesh.points.mean(axis=0), np.concatenate(fixed)).shape[1] == 0
+    none = np.zeros(0, dtype=np.int64)
+    held = [(mesh.point_sets.get(n, none), ways) for n, ways in mesh.supports.items()]
+    fixed = np.concatenate([3 * s + "xyz".index(c) for s, ways in held for c in ways if c in "xyz"])
+    if mesh.ties is None:
+        return free_motions(mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+    first, sets = 3 * mesh.n_points, mesh.ties.sets
+    moves = [first + 6 * sets.get(n, none) + "xyzabc".index(c) for n, ways in mesh.supports.items() for c in ways]
+    free = tied_upper(discretise(mesh).pattern, np.concatenate([fixed, *moves]), mesh.ties)
+    return left_by(free, mesh.points, mesh.points.mean(axis=0), fixed).shape[1] == 0
+
+
+def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
+    """The mesh with the equations of its constraints, and these in words.
+
+    Raises:
+        UserError: with file and line, what is wrong with one.
+    """
+    if mesh.links is None:
+        return mesh, []
+    from ..fem.discretise import discretise
+    from ..fem.links import linked
+    from ..fem.tied import tied_upper
+
+    try:
+        mesh, told = linked(mesh)
+        tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
+    except UserError as error:
+        raise UserError(f"{file}: {error}") from None
+    return mesh, told if len(told) <= 12 else [*told[:10], f"and {len(told) - 10} constraints more"]
 
 
 def cad_table(file: Path, unit: str, picture: Path | None = None) -> tuple[str, str]:
@@ -205,7 +241,7 @@ def _cad(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
 _END = ["", "[modes]", "count = 20", "", "[damping]", "ratio = 0.001"]
 
 
-def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
+def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) -> tuple[list[str], list[str]]:
     system = usual_system(unit)
     told = []
     try:
@@ -213,13 +249,20 @@ def _mesh(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:
     except UserError as error:
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
         told.append(f"warning: {error}")
+    joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
+    mesh = of_instances(mesh, instances) if instances else mesh
+    mesh, ties = _tied(file, mesh)
     kinds = ", ".join(f"{len(c)} {t}" for t, c in mesh.cells.items())
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
+    told += [f"note: {text}" for text in mesh.remarks]
+    told += [*ties, *(joints if not instances else ())]
     held, said = _supports(mesh)
     told += said
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
-    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}", "", "[material]"]
+    lines += ["", "[geometry]", f"mesh = {_beside(file, folder)}"]
+    lines += [f"instances = {json.dumps(list(instances))}"] if instances else []
+    lines += ["", "[material]"]
     if mesh.materials:
         lines.append('from = "mesh"')
         lines += [f"# {m.name}: {m.density:.6g} kg/m3, C_xxxx {m.elasticity[0, 0]:.6g} Pa" for m in mesh.materials]

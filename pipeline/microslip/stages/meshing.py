@@ -15,6 +15,7 @@ import numpy as np
 from ..data import Indices, Material, Mesh, UserError
 from ..files import store
 from ..mesh import mesh_problems, part_numbers, read_mesh
+from ..mesh.chosen import of_instances
 from ..settings.body import FaceRule, MaterialSettings, implausible
 from ..units import SYSTEMS, usual_system
 from .job import Job
@@ -179,10 +180,16 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     """
     path = path or job.mesh_file
     mesh, told = _read_with_materials(job, path)
+    if names := job.settings.geometry.instances:
+        try:
+            mesh = of_instances(mesh, names)
+        except UserError as error:
+            raise UserError(f"{job.path}: geometry.instances: {path} {error}") from None
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
+    mesh = _linked(path, mesh)
     errors, warnings = mesh_problems(mesh)
-    if job.settings.cyclic is not None and part_numbers(mesh).max() > 0:
+    if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
     if errors:
         raise UserError("\n".join(f"{path}: {e}" for e in errors))
@@ -190,6 +197,22 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     warnings = [f"{path}: {w}" for w in (*warnings, *told)]
     warnings += [f"{job.path}: {w}" for w in implausible(job.settings, size)]
     return mesh, warnings
+
+
+def _linked(path: Path, mesh: Mesh) -> Mesh:
+    """The mesh with the equations that its file ties it by.
+
+    Raises:
+        UserError: with the file, what is wrong with one.
+    """
+    if mesh.links is None:
+        return mesh
+    from ..fem.links import linked
+
+    try:
+        return linked(mesh)[0]
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
 
 
 def _read_with_materials(job: Job, path: Path) -> tuple[Mesh, list[str]]:

@@ -23,12 +23,13 @@ from ..files.tables import columns_csv, rows_csv
 from ..harmonic_balance.readout import measured
 from ..mistuning.ensemble import COLUMNS, RARE, Ensemble, choose, ready, run
 from ..mistuning.ring import Tuned
-from ..mistuning.samples import Asked, Sample
+from ..mistuning.samples import Asked
 from ..mistuning.scatter import OF_CONTACTS, Scatter, check
 from ..mistuning.sensitivity import Approximation, approximation
 from ..mistuning.statistics import SHARES, fits
 from ..report.mistuning import mistuning_html
 from ..system.assembly import Assembly, Contact
+from ..units import counted
 from .checkpoint import inputs_of
 from .stage import Made, Report, Stage, hash_of_code
 
@@ -199,16 +200,15 @@ def said(found: Ensemble) -> list[str]:
     """What a reader came for, in sentences."""
     top, assembly = found.tuned.top, found.asked.tuned.whole
     sized, N = measured(assembly).sized, found.asked.tuned.sectors
-    count = int(found.solved.sum())
+    count, warned = int(found.solved.sum()), [f"warning: {one}" for one in found.unsure]
     told = [
         f"The tuned ring of {N} sectors reaches {sized(top.amplitude)} at {top.frequency:.6g} Hz.",
-        *unsure(found.tuned),
     ]
     if not count:
-        return [*told, "No sample has a solution."]
+        return [*told, *warned, "No sample has a solution."]
     a, at = found.amplification, int(np.nanargmax(found.amplification))
     told.append(
-        f"Amplification of the highest blade in {count} samples: mean {np.nanmean(a):.4g}, 95 % quantile "
+        f"Amplification of the highest blade in {counted(count, 'sample')}: mean {np.nanmean(a):.4g}, 95 % quantile "
         f"{found.quantile(0.95)}, 99 % quantile {found.quantile(0.99)}; the intervals hold with 95 %."
     )
     if (rare := found.rare) is not None:
@@ -226,36 +226,13 @@ def said(found: Ensemble) -> list[str]:
     if found.asked.stuck:
         whitehead = 0.5 * (1 + np.sqrt(N))
         told.append(f"Contacts stick. Whitehead's bound for one family of modes and equal damping is {whitehead:.4g}.")
-    ends, unsolved = int(np.nansum(found.column("at_end"))), int((found.column("unsolved") > 0).sum())
-    if ends:
-        told.append(f"warning: in {ends} samples the highest amplitude is at an end of the band; widen the sweep.")
-    if unsolved:
-        told.append(
-            f"warning: {unsolved} samples have frequencies without a solution; they are counted in samples.csv."
-        )
-    return told
-
-
-def unsure(tuned: Sample) -> list[str]:
-    """Warnings, where the tuned ring's peak, by which all amplifications are divided, is none or lies beside a jump."""
-    top = tuned.top
-    if top.at_end:
-        return [
-            "warning: the tuned ring is highest at an end of the band, so amplifications are over no peak of it; widen "
-            "the sweep."
-        ]
-    at = int(np.abs(top.frequencies - top.frequency).argmin())
-    lower = top.amplitudes[[at - 1, at + 1], top.output].min() / top.amplitude
-    if lower >= JUMP:
-        return []
-    return [
-        f"warning: beside its peak the tuned ring falls to {100 * lower:.0f} % from one point to the next: it jumps, "
-        "or the sweep is coarse, and the peak may be higher yet; give the sweep more points."
-    ]
-
-
-JUMP = 0.6
-"""Amplitude beside a peak over the peak's below which the two are no resonance seen by some points."""
+    if not any(s.random for s in found.asked.scatter):
+        told.append("Nothing is drawn, so there is one sample.")
+    if found.envelope.samples(N) > len(found):
+        told.append(f"The envelope is that of all {found.envelope.samples(N)} samples that were kept.")
+    if np.isnan(found.column("strain")).all() and any(m.groups[0].gauges for m in assembly.components):
+        told.append("The gauges read nothing but rounding of this motion, so samples.csv has no strain.")
+    return [*told, *warned]
 
 
 def _written(found: Ensemble, near: Approximation | None, folder: Path) -> list[Path]:

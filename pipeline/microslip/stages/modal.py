@@ -15,7 +15,7 @@ from ..basis import write_basis
 from ..data import Array, Mesh, ModalBasis, UserError
 from ..files import store
 from ..mesh import UNITS
-from ..mesh.inp import files_of
+from ..mesh.cards import files_of
 from ..settings.body import BodySettings, MatrixFiles
 from .job import Job
 from .meshing import load_mesh, mesh_stage, touched_files
@@ -106,6 +106,8 @@ def modes_inputs(job: Job, mesh_file: Path) -> dict[str, Any]:
         inputs["included"] = [store.hash_file(f) for f in read if f.is_file()]
     if job.settings.geometry.mesh is not None:
         inputs["faces"] = job.raw["geometry"].get("faces", [])
+        if names := job.raw["geometry"].get("instances"):
+            inputs["instances"] = names
         if touched := touched_files(job):
             inputs["touched"] = [store.hash_file(f) for f in touched]
     if job.settings.temperature.file:

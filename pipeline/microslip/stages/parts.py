@@ -57,7 +57,8 @@ class Patch:
 
     Attributes:
         parts: their numbers. area, normal: (3,) None where it is curved. boxes: (2, 6) low and high corner in either
-            part. faces: its name in either part. alone: whether these two parts touch nowhere else.
+            part. faces: its name in either part. alone: whether these two parts touch nowhere else. friction: its
+            coefficient.
     """
 
     parts: tuple[int, int]
@@ -66,6 +67,7 @@ class Patch:
     boxes: Array
     faces: tuple[str, str] = ("", "")
     alone: bool = True
+    friction: float = 0.2
 
 
 def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Imported:
@@ -93,14 +95,14 @@ def import_parts(files: Sequence[Path], folder: Path | None, unit: str) -> Impor
         if not part.there:
             written = import_file(part.file, part.body.parent, unit).told[:-1]
             told += [text.splitlines()[0] for text in written]  # a table of surfaces stands in the body.toml as well
-        _add(part, _joints(parts, number, patches, unit))
+        add_lines(part, _joints(parts, number, patches, unit))
     told += [_sentence(parts, patch, unit) for patch in patches]
     flat = [patch for patch in patches if patch.normal is not None]
     if not flat:
         return Imported(home, (*told, "warning: none of the patches is flat, so no case is written"))
     driven = flat[0].parts[0]
-    rows = _drive(parts[driven], shapes[driven].points, flat[0])
-    write_text(home / "case.toml", "\n".join(_case(home, parts, flat, shapes, unit, rows)) + "\n")
+    rows = drive(parts[driven], shapes[driven].points, flat[0])
+    write_text(home / "case.toml", "\n".join(case_lines(home, parts, flat, shapes, unit, rows)) + "\n")
     told.append(f"{home / 'case.toml'}: ready. Correct its numbers, then: microslip run {shlex.quote(str(home))}")
     return Imported(home / "case.toml", tuple(told))
 
@@ -246,7 +248,7 @@ def _widened(box: Array) -> Array:
     return np.concatenate([box[:3] - more, box[3:] + more])
 
 
-def _add(part: Part, lines: Sequence[str]) -> None:
+def add_lines(part: Part, lines: Sequence[str]) -> None:
     """Write lines at the end of a body.toml."""
     if lines:
         write_text(part.body, part.body.read_text(encoding="utf-8").rstrip("\n") + "\n" + "\n".join(lines) + "\n")
@@ -262,7 +264,7 @@ def _sentence(parts: Sequence[Part], patch: Patch, unit: str) -> str:
     )
 
 
-def _drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
+def drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
     """Excitation and monitor of a part: its own first ones, or new ones at the point farthest from a patch."""
     names = [next((row["name"] for row in part.keys.get(key, ())), "") for key in ("excitations", "monitors")]
     middle = (patch.boxes[0, :3] + patch.boxes[0, 3:]) / 2
@@ -272,18 +274,19 @@ def _drive(part: Part, corners: Array, patch: Patch) -> tuple[str, str]:
     if not names[0]:
         lines += ["", "[[excitations]]           # a force of 1 N, as far from the contact as can be:"]
         lines += ["                          # move it, and the probe, when you clamp the body there"]
-        lines += ['name = "shaker"', f"point = [{at}]", f"direction = [{', '.join(f'{v:.6g}' for v in n + 0.0)}]"]
+        along = ", ".join(f"{v:.6g}" for v in np.round(n, 9) + 0.0)
+        lines += ['name = "shaker"', f"point = [{at}]", f"direction = [{along}]"]
     if not names[1]:
         lines += ["", "[[monitors]]", 'name = "probe"', f"point = [{at}]"]
-    _add(part, lines)
+    add_lines(part, lines)
     return names[0] or "shaker", names[1] or "probe"
 
 
-def _case(
+def case_lines(
     home: Path, parts: Sequence[Part], patches: Sequence[Patch], shapes: Sequence[Shape], unit: str,
-    rows: tuple[str, str],
+    rows: tuple[str, str], pressed: str = "1000.0]       # N",
 ) -> list[str]:  # fmt: skip
-    """Lines of a case.toml of the parts and their flat contacts."""
+    """Lines of a case.toml of the parts and their flat contacts. pressed: end of the line of its normal forces."""
     driven, n = parts[patches[0].parts[0]].name, patches[0].normal
     axis = "xyz"[int(np.abs(n).argmax())] if n is not None else "x"
     low, high = _band(shapes, UNITS[unit])
@@ -304,7 +307,8 @@ def _case(
         area = patch.area * UNITS[unit] ** 2
         lines += ["", "[[contacts]]", f'interface = "{one}"', f'against = "{other}"']
         lines += [f"normal_stiffness = {NORMAL_STIFFNESS * area:.2g}   # N/m of the whole patch: a guess by its area"]
-        lines += [f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", "friction = 0.2", "points = [3, 3]"]
+        lines += [f"tangential_stiffness = {TANGENTIAL_STIFFNESS * area:.2g}", f"friction = {patch.friction:g}"]
+        lines += ["points = [3, 3]"]
     lines += ["", "# A guess for free parts, about the first bending of a beam as long as all of them:"]
     lines += ["# when you clamp one, set the band anew; microslip modes tells the frequencies.", "[sweep]"]
     return [
@@ -312,7 +316,7 @@ def _case(
         f"start = {float(f'{low:.2g}'):g}",
         f"stop = {float(f'{high:.2g}'):g}",
         "points = 100",
-        "normal_forces = [1000.0]       # N",
+        f"normal_forces = [{pressed}",
     ]
 
 

@@ -55,7 +55,8 @@ def _work(stage: Stage, case: RollingCase, case_path: Path, pictures: bool) -> M
     made = _tables(found, folder)
     if case.table is not None:
         stage.report("table of creep forces")
-        table = creep_table(found.track.elastic.poisson, points=case.table.points, **case.model.model_dump())
+        how = case.model.model_dump(include={"distribution", "coefficients"})
+        table = creep_table(found.track.elastic.poisson, **case.table.model_dump(), **how)
         made.append(write_creep_table(folder / "creep_table.h5", table))
         sentences.append(
             f"Between the points of the table forces are off by {100 * table.error[:, 0].max():.2g} % of mu F_N in the "

@@ -12,7 +12,7 @@ import numpy as np
 from ..data import Array, ModalGroup, UserError
 
 if TYPE_CHECKING:
-    pass
+    from .spin import Spin
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class Component:
             mode, in the travelling wave of that index.
         loss: index of a ring -> (m, m) H of a body with a loss factor, whose stiffness is K + i H in every harmonic but
             the mean (see `damping.as_loss`). residual_loss: loss factor of the compliance that `residual_share` adds.
+        spin: how its material runs through its standing shape, which the groups hold already (see `spin.turned`).
     """
 
     name: str
@@ -53,6 +54,7 @@ class Component:
     aerodynamic: Mapping[int, complex] = field(default_factory=dict)
     loss: Mapping[int, Array] = field(default_factory=dict)
     residual_loss: float = 0.0
+    spin: Spin | None = None
 
     def at(self, index: int) -> InWave:
         """Matrices and rows in the wave of a ring's index.

@@ -1,0 +1,123 @@
+"""Keyword lines of Abaqus and CalculiX input files, with their parameters, data and place, through all includes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..files.store import ordinary
+from .raw import Damaged
+
+
+@dataclass
+class Card:
+    """A keyword line and its data.
+
+    Attributes:
+        keyword: in capitals, without the star. parameters: in capitals -> as written. lines: of data, without
+            comments. where: ``part.inp, line 12``.
+    """
+
+    keyword: str
+    parameters: dict[str, str] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+    where: str = ""
+
+
+def read_cards(path: Path) -> list[Card]:
+    """All cards of a file and of those that it includes, in their order.
+
+    Raises:
+        Damaged: an included file that cannot be read or includes itself.
+    """
+    found: list[Card] = []
+    for where, line in _lines(path, (), path.parent):
+        if line.startswith("*"):
+            if found:
+                _end(found[-1])
+            found.append(Card(line, where=where))
+        elif found and not found[-1].lines and found[-1].keyword.endswith(","):
+            found[-1].keyword += line
+        elif found:
+            found[-1].lines.append(line)
+    if found:
+        _end(found[-1])
+    return found
+
+
+def _end(card: Card) -> None:
+    """A keyword line is whole: take it apart."""
+    head = card.keyword
+    card.keyword, card.parameters = keyword(head), parameters(head)
+
+
+def _lines(path: Path, within: tuple[Path, ...], home: Path) -> Iterator[tuple[str, str]]:
+    """Place and text of every line but comments and empty ones; data lines have no place."""
+    if path.resolve() in within:
+        raise Damaged(f"the file includes itself by way of {path.name}")
+    try:
+        text = ordinary(path).read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise Damaged(f"the included file {path} cannot be read ({error.strerror})") from None
+    name = f"{path.name}, "
+    for number, line in enumerate(text.splitlines(), 1):
+        line = line.strip()
+        if not line.startswith("*"):
+            if line:
+                yield "", line
+        elif line.startswith("**"):
+            continue
+        elif re.match(r"\*INCLUDE\b", line, re.IGNORECASE):
+            yield from _included(path, line, f"{name}line {number}", within, home)
+        else:
+            yield f"{name}line {number}", line
+
+
+def _included(path: Path, line: str, where: str, within: tuple[Path, ...], home: Path) -> Iterator[tuple[str, str]]:
+    target = parameters(line).get("INPUT", "")
+    if not target:
+        raise Damaged(f"{where}: an *INCLUDE names no file")
+    try:
+        yield from _lines(beside(path, target, home), (*within, path.resolve()), home)
+    except Damaged as error:
+        raise Damaged(str(error) if re.match(r"[^,]+, line \d", str(error)) else f"{where}: {error}") from None
+
+
+def beside(path: Path, target: str, home: Path) -> Path:
+    """A file named in another one: from its folder, else from that of the whole deck."""
+    near = path.parent / target
+    return near if near.is_file() or not (home / target).is_file() else home / target
+
+
+def data_of(path: Path, target: str) -> list[str]:
+    """Data lines of a file that a keyword's INPUT names."""
+    return [line for _, line in _lines(beside(path, target, path.parent), (path.resolve(),), path.parent)]
+
+
+def files_of(path: Path, within: tuple[Path, ...] = (), home: Path | None = None) -> list[Path]:
+    """An input file and all that it reads from others, at any depth; what is missing is told where it is read."""
+    home, path_itself = home or path.parent, path.resolve()
+    data = path.read_bytes() if path.is_file() and path_itself not in within else b""
+    found = [path]
+    for line in re.findall(r"^\s*\*[^*\n].*$", data.decode(errors="replace"), re.M) if b"INPUT" in data.upper() else ():
+        if name := parameters(line).get("INPUT"):
+            found += files_of(beside(path, name, home), (*within, path_itself), home)
+    return list(dict.fromkeys(found))
+
+
+def keyword(line: str) -> str:
+    """The keyword of a line, in capitals."""
+    return " ".join(line[1:].partition(",")[0].upper().split())
+
+
+def parameters(line: str) -> dict[str, str]:
+    """Its parameters: in capitals -> as written, without quotes."""
+    pairs = (word.partition("=") for word in line.split(",")[1:])
+    return {" ".join(key.upper().split()): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+
+
+def fields(line: str) -> list[str]:
+    """The words of a data line."""
+    return [word.strip() for word in line.split(",") if word.strip()]

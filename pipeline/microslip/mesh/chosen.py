@@ -1,0 +1,125 @@
+"""Some instances of a deck as a mesh of their own, and which instances hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..data import Equation, FaceTie, Indices, Link, Mesh, UserError
+
+
+def of_instances(mesh: Mesh, names: Sequence[str]) -> Mesh:
+    """The mesh of these instances alone, with their sets, constraints and contacts.
+
+    Raises:
+        UserError: an instance that the file does not have, a constraint that ties them to others.
+    """
+    unknown = [name for name in names if name not in mesh.instances]
+    if unknown:
+        raise UserError(f"has no instance '{unknown[0]}'; its instances are {', '.join(mesh.instances) or 'none'}")
+    inside = np.zeros(mesh.n_points, dtype=bool)
+    inside[np.concatenate([mesh.instances[name] for name in names])] = True
+    kept = {kind: inside[cells].all(axis=1) for kind, cells in mesh.cells.items()}
+    cells = {kind: cells[kept[kind]] for kind, cells in mesh.cells.items() if kept[kind].any()}
+    number = np.cumsum(inside) - 1
+    faces: dict[str, dict[str, Indices]] = {}
+    for name, blocks in mesh.faces.items():
+        if face := {t: number[f[own]] for t, f in blocks.items() if (own := inside[f].all(axis=1)).any()}:
+            faces[name] = face
+    sets = {name: number[s[inside[s]]] for name, s in mesh.point_sets.items()}
+    sets = {name: s for name, s in sets.items() if len(s)}
+    part = replace(
+        mesh, points=mesh.points[inside], cells={t: number[c] for t, c in cells.items()}, faces=faces,
+        point_sets=sets, node_id=mesh.node_id[inside],
+        regions={t: r[kept[t]] for t, r in mesh.regions.items() if kept[t].any()},
+        cell_id={t: r[kept[t]] for t, r in mesh.cell_id.items() if kept[t].any()},
+        temperature=None if mesh.temperature is None else mesh.temperature[inside],
+        instances={name: number[mesh.instances[name]] for name in names},
+    )  # fmt: skip
+    return _with_links(mesh, part, inside, number)
+
+
+def _with_links(mesh: Mesh, part: Mesh, inside: Indices, number: Indices) -> Mesh:
+    """The part with the constraints that are its own."""
+    if mesh.links is None:
+        return replace(part, supports={n: d for n, d in mesh.supports.items() if n in part.point_sets})
+    own = []
+    for link, nodes in zip(mesh.links.items, nodes_of(mesh), strict=True):
+        there = inside[nodes]
+        if there.any() and not there.all():
+            raise UserError(f"{link.where} ties these instances to others; take those in too")
+        if there.any():
+            own.append(_moved(link, mesh.n_points, part.n_points, number))
+    used = {n - part.n_points for link in own for n in _references(link) if n >= part.n_points}
+    sets = {name: s for name, s in mesh.links.sets.items() if np.isin(s, list(used)).all()}
+    links = replace(mesh.links, items=tuple(own), sets=sets) if own else None
+    known = {*part.point_sets, *(links.sets if links else ())}
+    return replace(part, links=links, supports={n: d for n, d in mesh.supports.items() if n in known})
+
+
+def _references(link: Link) -> list[int]:
+    """Nodes of a link that may be reference nodes."""
+    if isinstance(link, FaceTie):
+        return []
+    return link.nodes.tolist() if isinstance(link, Equation) else [link.reference]
+
+
+def _moved(link: Link, before: int, after: int, number: Indices) -> Link:
+    """A link with its points and reference nodes counted anew."""
+
+    def new(nodes: Indices) -> Indices:
+        nodes = np.asarray(nodes)
+        return np.where(nodes < before, number[np.minimum(nodes, before - 1)], nodes - before + after)
+
+    if isinstance(link, FaceTie):
+        return link
+    if isinstance(link, Equation):
+        return replace(link, nodes=new(link.nodes))
+    members = link.members if isinstance(link.members, str) else new(link.members)
+    return replace(link, reference=int(new(np.array(link.reference))), members=members)
+
+
+def nodes_of(mesh: Mesh) -> list[Indices]:
+    """Points that each link takes in, those behind its reference nodes too."""
+    assert mesh.links is not None
+    found = []
+    for link in mesh.links.items:
+        if isinstance(link, FaceTie):
+            named = [mesh.set_points(n) for n in (link.slave, link.master) if n in {*mesh.faces, *mesh.point_sets}]
+        elif isinstance(link, Equation):
+            named = [link.nodes]
+        else:
+            members = link.members
+            if isinstance(members, str):
+                members = mesh.set_points(members) if members in {*mesh.faces, *mesh.point_sets} else np.zeros(0, int)
+            named = [members, np.array([link.reference])]
+        found.append(np.concatenate([np.zeros(0, dtype=np.int64), *named]))
+    behind = {int(n): np.zeros(0, dtype=np.int64) for nodes in found for n in nodes[nodes >= mesh.n_points]}
+    for _ in range(2):  # what a reference node moves, and what moves with that
+        for nodes in found:
+            points = np.unique(
+                np.concatenate([nodes[nodes < mesh.n_points], *(behind[int(n)] for n in nodes if n in behind)])
+            )
+            behind.update({int(n): np.union1d(behind[int(n)], points) for n in nodes if n in behind})
+    return [
+        np.unique(np.concatenate([nodes[nodes < mesh.n_points], *(behind[int(n)] for n in nodes if n in behind)]))
+        for nodes in found
+    ]
+
+
+def bodies(mesh: Mesh) -> list[list[str]]:
+    """Instances that constraints or common points hold together, in the order of the file."""
+    names = list(mesh.instances)
+    of = np.full(mesh.n_points, -1)
+    for number, name in enumerate(names):
+        of[mesh.instances[name]] = number
+    pairs = [np.unique(of[nodes]) for nodes in (nodes_of(mesh) if mesh.links is not None else ())]
+    edges = [(p[0], q) for p in pairs if len(p) for q in p]
+    rows, columns = np.array(edges, dtype=int).reshape(-1, 2).T
+    graph = sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
+    group = connected_components(graph, directed=False)[1]
+    return [[n for n, g in zip(names, group, strict=True) if g == number] for number in dict.fromkeys(group.tolist())]

@@ -1,0 +1,117 @@
+"""What an Abaqus or CalculiX input file has said so far, and what its words name: numbers and sets of instances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data import Array, Indices
+from .cards import Card
+from .raw import Damaged, is_number, joined
+
+
+@dataclass
+class Cells:
+    """Cells of one type. `ids` (e,), `nodes` (e, k) node numbers. `written`: the type in the file."""
+
+    kind: str
+    ids: Indices
+    nodes: Indices
+    written: str = ""
+
+
+@dataclass
+class DeckConstants:
+    """Constants as written: name; (t, 3) E, nu, T or 9 engineering constants, or text why they are not read."""
+
+    name: str
+    isotropic: Array | None = None
+    orthotropic: Array | None = None
+    stiffness: Array | None = None
+    refused: str = ""
+    density: float | None = None
+    expansion: Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Space:
+    """Where the numbers and names of an instance stand in the whole: added to numbers, put before names."""
+
+    nodes: int = 0
+    cells: int = 0
+    prefix: str = ""
+
+
+@dataclass
+class Deck:
+    """What the keywords have said so far. Names of sets are free of case: their keys are in capitals.
+
+    Attributes:
+        spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
+        links: constraints, contacts and loads, each with the instance it stands in, resolved at the end.
+        system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
+    """
+
+    node_id: list[Indices] = field(default_factory=list)
+    points: list[Array] = field(default_factory=list)
+    solids: list[Cells] = field(default_factory=list)
+    facets: list[Cells] = field(default_factory=list)
+    written: dict[str, str] = field(default_factory=dict)
+    node_sets: dict[str, list[Indices]] = field(default_factory=dict)
+    cell_sets: dict[str, list[Indices]] = field(default_factory=dict)
+    surfaces: list[tuple[str, str, list[list[str]], str]] = field(default_factory=list)
+    materials: dict[str, DeckConstants] = field(default_factory=dict)
+    current: str = ""
+    orientations: dict[str, Array | str] = field(default_factory=dict)
+    sections: list[tuple[str, str, str, str]] = field(default_factory=list)
+    temperatures: list[tuple[int, str, float]] = field(default_factory=list)
+    held: list[tuple[str, str]] = field(default_factory=list)
+    not_held: list[str] = field(default_factory=list)
+    step: int = 0
+    renewed: int = -1
+    turned: bool = False
+    spaces: dict[str, Space] = field(default_factory=lambda: {"": Space()})
+    links: list[tuple[Card, str]] = field(default_factory=list)
+    system: Array | None = None
+    ignored: list[str] = field(default_factory=list)
+    instances: dict[str, Indices] = field(default_factory=dict)
+
+    def place(self, word: str, space: str = "") -> tuple[Space, str]:
+        """The instance that a word is in, and the word without it: ``Blade-1.Tip``, ``17``, ``Tip``."""
+        word = word.strip().strip('"')
+        head, dot, tail = word.partition(".")
+        if dot and head.upper() in self.spaces:
+            return self.spaces[head.upper()], tail
+        if space.upper() not in self.spaces:
+            raise Damaged(f"names the instance '{space}', which is not defined")
+        return self.spaces[space.upper()], word
+
+    def key(self, known: dict, word: str, space: str = "") -> str | None:
+        """The key of a named set, surface or orientation, or None where there is none."""
+        at, tail = self.place(word, space)
+        tries = [at.prefix.upper() + tail.upper(), tail.upper(), word.strip('"').upper()]
+        if len(self.spaces) <= 2:  # nothing else can be meant
+            tries.append(tail.rpartition(".")[2].upper())
+        return next((name for name in tries if name in known), None)
+
+    def nodes(self, word: str, space: str = "") -> Indices | None:
+        """Node numbers of the whole that a word names: a number or a set; None where there is no such set."""
+        return self._members(self.node_sets, word, space, cells=False)
+
+    def cells(self, word: str, space: str = "") -> Indices | None:
+        """Cell numbers of the whole that a word names."""
+        return self._members(self.cell_sets, word, space, cells=True)
+
+    def _members(self, sets: dict[str, list[Indices]], word: str, space: str, cells: bool) -> Indices | None:
+        at, tail = self.place(word, space)
+        number = tail if is_number(tail) or len(self.spaces) > 2 else tail.rpartition(".")[2]
+        if is_number(number):
+            return np.array([int(number) + (at.cells if cells else at.nodes)], dtype=np.int64)
+        name = self.key(sets, word, space)
+        return None if name is None else joined(sets[name])
+
+    def add(self, sets: dict[str, list[Indices]], name: str) -> list[Indices]:
+        """The parts of a set, to add to."""
+        self.written.setdefault(name.upper(), name)
+        return sets.setdefault(name.upper(), [])

@@ -1,0 +1,82 @@
+"""Contact pairs, their friction and the preload of bolts in an Abaqus or CalculiX deck."""
+
+from __future__ import annotations
+
+from ..data import Joint
+from .cards import Card, fields
+from .deck import Deck
+from .raw import Damaged
+
+KEYWORDS = ("CONTACT PAIR", "SURFACE INTERACTION", "FRICTION", "SURFACE BEHAVIOR", "PRE-TENSION SECTION", "CLOAD")
+
+
+def joints_of(deck: Deck) -> list[Joint]:
+    """The contact pairs: names of slave and master surface in the whole, and their coefficient of friction.
+
+    Raises:
+        Damaged: with the line, a surface that is not defined.
+    """
+    friction, current = dict[str, float](), ""
+    for card, _ in deck.links:
+        if card.keyword == "SURFACE INTERACTION":
+            current = card.parameters.get("NAME", "").upper()
+        elif card.keyword == "FRICTION" and card.lines:
+            friction[current] = _number(card, card.lines[0])
+    known = {name.upper(): name for name, *_ in deck.surfaces}
+    found = []
+    for card, space in deck.links:
+        for line in card.lines if card.keyword == "CONTACT PAIR" else ():
+            words = fields(line)[:2]
+            keys = [deck.key(known, word, space) for word in words]
+            if len(words) < 2 or None in keys:
+                raise Damaged(
+                    f"{card.where}: *CONTACT PAIR names '{line[:60]}', which are not two surfaces of the file"
+                )
+            mu = friction.get(card.parameters.get("INTERACTION", "").upper())
+            found.append(Joint(f"{card.where}: *CONTACT PAIR", known[str(keys[0])], known[str(keys[1])], mu))
+    return found
+
+
+def preloads_of(deck: Deck) -> list[tuple[str, float]]:
+    """Of every *PRE-TENSION SECTION the force of *CLOAD on its node, along its first direction.
+
+    Raises:
+        Damaged: with the line, a section without a node.
+    """
+    found = []
+    for card, space in deck.links:
+        if card.keyword != "PRE-TENSION SECTION":
+            continue
+        nodes = deck.nodes(card.parameters.get("NODE", "-"), space)
+        if nodes is None or len(nodes) != 1:
+            raise Damaged(f"{card.where}: *PRE-TENSION SECTION names no single NODE of the file")
+        forces = [force for node, force in _loads(deck) if node == nodes[0]]
+        if forces:
+            found.append((f"{card.where}: *PRE-TENSION SECTION", forces[-1]))
+    return found
+
+
+def unused_loads(deck: Deck) -> list[str]:
+    """Keywords of loads that are no preloads of bolts."""
+    sections = [card.parameters.get("NODE", "-") for card, _ in deck.links if card.keyword == "PRE-TENSION SECTION"]
+    bolts = {int(n) for word in sections if (found := deck.nodes(word)) is not None for n in found}
+    return ["CLOAD"] if any(node not in bolts for node, _ in _loads(deck)) else []
+
+
+def _loads(deck: Deck) -> list[tuple[int, float]]:
+    """Node and force of every concentrated load along the first direction."""
+    found = []
+    for card, space in deck.links:
+        for line in card.lines if card.keyword == "CLOAD" else ():
+            words = [word.strip() for word in line.split(",")]
+            nodes = deck.nodes(words[0], space)
+            if nodes is not None and len(words) > 2:
+                found += [(int(node), _number(card, words[2]) if words[1] == "1" else 0.0) for node in nodes]
+    return found
+
+
+def _number(card: Card, line: str) -> float:
+    try:
+        return float(line.split(",")[0].replace("D", "e").replace("d", "e"))
+    except ValueError:
+        raise Damaged(f"{card.where}: *{card.keyword} holds '{line[:40]}', no number") from None

@@ -1,0 +1,236 @@
+"""Constraints of an Abaqus or CalculiX deck: ties, equations, multi-point constraints, couplings, rigid bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLink
+from .cards import Card, fields
+from .deck import Deck
+from .raw import Damaged, Numbering, is_number
+
+KEYWORDS = (
+    "TIE", "EQUATION", "MPC", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "COUPLING", "KINEMATIC", "DISTRIBUTING",
+    "RIGID BODY",
+)  # fmt: skip
+_WAYS = "xyzabc"
+
+
+@dataclass
+class _Reading:
+    """A deck whose nodes are known. left_out: what is not read, in words. points: of all nodes."""
+
+    deck: Deck
+    numbering: Numbering
+    points: Array
+    left_out: list[str] = field(default_factory=list)
+
+    def nodes(self, word: str, card: Card, space: str) -> Indices:
+        """Positions of the nodes that a word names.
+
+        Raises:
+            Damaged: there is no such set.
+        """
+        found = self.deck.nodes(word, space)
+        if found is None:
+            raise Damaged(f"*{card.keyword} names the node set '{word}', which is not defined")
+        return self.numbering.positions(np.unique(found), f"*{card.keyword} names")
+
+    def node(self, word: str, card: Card, space: str) -> int:
+        """The position of a single node.
+
+        Raises:
+            Damaged: none or several.
+        """
+        if not word:
+            raise Damaged(f"*{card.keyword} names no reference node; give REF NODE")
+        found = self.nodes(word, card, space)
+        if len(found) != 1:
+            raise Damaged(f"*{card.keyword} names '{word}' as one node, but it has {len(found)}")
+        return int(found[0])
+
+    def surface(self, word: str, card: Card, space: str) -> str:
+        """The name of a surface in the whole.
+
+        Raises:
+            Damaged: there is none.
+        """
+        known = {name.upper(): name for name, *_ in self.deck.surfaces}
+        key = self.deck.key(known, word, space)
+        if key is None:
+            raise Damaged(f"*{card.keyword} names the surface '{word}', which is not defined")
+        return known[key]
+
+
+def links_of(deck: Deck, numbering: Numbering, points: Array) -> tuple[list[Link], list[str]]:
+    """The constraints of a deck, nodes by their positions in the file, and what is not read, in words.
+
+    Raises:
+        Damaged: with the line, what is wrong with one.
+    """
+    reading, found = _Reading(deck, numbering, points), list[Link]()
+    cards = [(card, space) for card, space in deck.links if card.keyword in KEYWORDS]
+    for number, (card, space) in enumerate(cards):
+        following = cards[number + 1][0] if number + 1 < len(cards) else None
+        try:
+            found += _MAKERS[card.keyword](reading, card, space, following)
+        except Damaged as error:
+            raise Damaged(f"{card.where}: {error}") from None
+    return found, reading.left_out
+
+
+def _where(card: Card) -> str:
+    name = card.parameters.get("NAME") or card.parameters.get("CONSTRAINT NAME")
+    return f"{card.where}: *{card.keyword}" + (f" '{name}'" if name else "")
+
+
+def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    if "CYCLIC SYMMETRY" in card.parameters:
+        reading.left_out.append(f"{_where(card)} of cyclic symmetry; write [cyclic] in body.toml")
+        return
+    text = card.parameters.get("POSITION TOLERANCE", "")
+    tolerance = _number(text, "POSITION TOLERANCE") if text else None
+    for line in card.lines:
+        words = [word.strip() for word in line.split(",")]
+        if len(words) < 2 or not words[1]:
+            raise Damaged(f"*TIE needs the slave and the master surface in a line, not '{line[:60]}'")
+        slave, master = (reading.surface(word, card, space) for word in words[:2])
+        yield FaceTie(_where(card), slave, master, tolerance)
+
+
+def _number(word: str, what: str) -> float:
+    try:
+        return float(word.replace("D", "e").replace("d", "e"))
+    except ValueError:
+        raise Damaged(f"{what} is '{word[:40]}', no number") from None
+
+
+def _equations(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    words = [word.strip() for line in card.lines for word in line.rstrip().rstrip(",").split(",")]
+    while words:
+        if not is_number(words[0]) or int(words[0]) < 1:
+            raise Damaged(f"*EQUATION begins with '{words[0][:40]}', which is no number of terms")
+        count = int(words[0])
+        terms, words = words[1 : 1 + 3 * count], words[1 + 3 * count :]
+        if len(terms) < 3 * count:
+            raise Damaged(f"*EQUATION announces {count} terms of three words and has {len(terms)} words")
+        ways = [_direction(word) for word in terms[1::3]]
+        factors = np.array([_number(word, "a factor of *EQUATION") for word in terms[2::3]])
+        members = [reading.nodes(word, card, space) for word in terms[::3]]
+        length = max(map(len, members))
+        if any(len(m) not in (1, length) for m in members):
+            raise Damaged(f"*EQUATION names sets of {', '.join(str(len(m)) for m in members)} nodes, not equally many")
+        for nodes in np.column_stack([np.broadcast_to(m, length) for m in members]):
+            yield Equation(_where(card), nodes, np.array(ways), factors)
+
+
+def _direction(word: str) -> int:
+    if word not in {"1", "2", "3", "4", "5", "6"}:
+        raise Damaged(f"'{word[:20]}' is no degree of freedom of a node (1 to 6)")
+    return int(word) - 1
+
+
+def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    for line in card.lines:
+        kind, *words = [*fields(line), ""]
+        words = [word for word in words if word]
+        if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK") or len(words) < 2:
+            reading.left_out.append(f"{card.where}: *MPC of the kind {kind}")
+            continue
+        members, other = reading.nodes(words[0], card, space), reading.nodes(words[1], card, space)
+        if len(other) not in (1, len(members)):
+            raise Damaged(f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all")
+        for a, b in zip(members, np.broadcast_to(other, len(members)), strict=True):
+            along = reading.points[a] - reading.points[b]
+            yield from _pair(kind.upper(), f"{card.where}: *MPC {kind.upper()}", int(a), int(b), along)
+
+
+def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]:
+    if kind == "BEAM":
+        yield RigidLink(where, b, np.array([a]))
+    elif kind == "LINK":
+        if not along.any():
+            raise Damaged("*MPC LINK between two nodes at one place has no direction; use PIN")
+        factors = np.concatenate([along, -along]) / np.linalg.norm(along)
+        yield Equation(where, np.repeat([a, b], 3), np.tile(np.arange(3), 2), factors, first=False)
+    else:
+        for way in range(3):
+            yield Equation(where, np.array([a, b]), np.array([way, way]), np.array([1.0, -1.0]))
+
+
+def _old_coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    """*KINEMATIC COUPLING: nodes, first and last direction a line."""
+    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
+    for line in card.lines:
+        words = [word.strip() for word in line.split(",")]
+        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), _ways([words[1:]])[0])
+    if not card.lines:
+        raise Damaged("*KINEMATIC COUPLING couples no nodes to its reference node; add them")
+
+
+def _not_read(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    reading.left_out.append(f"{_where(card)} of elements DCOUP3D; write *COUPLING with *DISTRIBUTING")
+    return iter(())
+
+
+def _ways(lines: list[list[str]]) -> tuple[str, str]:
+    """Directions x, y, z and rotations a, b, c of lines (first, last); all without any."""
+    found: set[str] = set()
+    for words in lines:
+        given = [word for word in words if word]
+        if given:
+            first = _direction(given[0])
+            found |= set(_WAYS[first : _direction(given[-1]) + 1])
+    every = "".join(w for w in _WAYS if w in found) or _WAYS
+    return "".join(w for w in every if w in "xyz"), every
+
+
+def _coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    if following is None or following.keyword not in ("KINEMATIC", "DISTRIBUTING"):
+        raise Damaged("*COUPLING is followed by neither *KINEMATIC nor *DISTRIBUTING; say which it is")
+    if "INFLUENCE RADIUS" in card.parameters:
+        raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
+    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
+    members = reading.surface(card.parameters.get("SURFACE", ""), card, space)
+    moves, every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
+    if "ORIENTATION" in card.parameters and (len(moves) < 3 or len(every) < 6):
+        raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
+    if following.keyword == "KINEMATIC":
+        yield RigidLink(_where(card), reference, members, moves)
+        return
+    if following.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
+        raise Damaged("*DISTRIBUTING is read with WEIGHTING METHOD=UNIFORM alone")
+    yield AverageLink(_where(card), reference, members, np.ones(1), every)
+
+
+def _nothing(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    return iter(())  # told with its *COUPLING
+
+
+def _rigid_body(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    sets = [card.parameters[k] for k in ("NSET", "PIN NSET", "TIE NSET") if k in card.parameters]
+    members = [reading.nodes(word, card, space) for word in sets]
+    if "ELSET" in card.parameters:
+        chosen = reading.deck.cells(card.parameters["ELSET"], space)
+        if chosen is None:
+            raise Damaged(f"*RIGID BODY names the element set '{card.parameters['ELSET']}', which is not defined")
+        for cells in (*reading.deck.solids, *reading.deck.facets):
+            members.append(np.unique(cells.nodes[np.isin(cells.ids, chosen)]))
+    every = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *members]))
+    reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
+    yield RigidLink(_where(card), reference, every[every != reference])
+    if "ROT NODE" in card.parameters:
+        turns = reading.node(card.parameters["ROT NODE"], card, space)
+        for way in range(3):
+            pair, ways = np.array([turns, reference]), np.array([way, 3 + way])
+            yield Equation(f"{_where(card)}, ROT NODE", pair, ways, np.array([1.0, -1.0]), first=False)
+
+
+_MAKERS: dict[str, Callable[[_Reading, Card, str, Card | None], Iterator[Link]]] = {
+    "TIE": _tie, "EQUATION": _equations, "MPC": _mpc, "KINEMATIC COUPLING": _old_coupling,
+    "DISTRIBUTING COUPLING": _not_read, "COUPLING": _coupling, "KINEMATIC": _nothing, "DISTRIBUTING": _nothing,
+    "RIGID BODY": _rigid_body,
+}  # fmt: skip

@@ -1,0 +1,148 @@
+"""Parts of a deck laid beside each other: instances moved and turned, with numbers and names of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data import Array, Indices
+from ..frames import rotation
+from .cards import Card
+from .deck import Cells, Deck, Space
+from .raw import Damaged, joined
+
+_MODEL = ("MATERIAL", "ELASTIC", "DENSITY", "EXPANSION")
+
+
+@dataclass
+class Outline:
+    """Cards of a deck by where they stand: parts by name in capitals, instances, and the rest in its order."""
+
+    parts: dict[str, list[Card]] = field(default_factory=dict)
+    instances: list[tuple[Card, list[Card]]] = field(default_factory=list)
+    rest: list[Card] = field(default_factory=list)
+
+
+def outline(cards: list[Card]) -> Outline:
+    """The cards of parts, of instances and of everything else; a deck without instances is all rest.
+
+    Raises:
+        Damaged: two parts or instances of one name, an end without a beginning.
+    """
+    if not any(card.keyword == "INSTANCE" for card in cards):
+        return Outline(rest=cards)
+    found, into = Outline(), None
+    names: set[str] = set()
+    for card in cards:
+        name = card.parameters.get("NAME", "").upper()
+        if card.keyword == "PART":
+            if name in found.parts:
+                raise Damaged(f"{card.where}: the *PART '{card.parameters['NAME']}' is there twice")
+            into = found.parts.setdefault(name, [])
+        elif card.keyword == "INSTANCE":
+            if not name:
+                raise Damaged(f"{card.where}: an *INSTANCE has no NAME")
+            if name in names:
+                raise Damaged(f"{card.where}: the *INSTANCE '{card.parameters['NAME']}' is there twice; rename one")
+            names.add(name)
+            into = []
+            found.instances.append((card, into))
+        elif card.keyword in ("END PART", "END INSTANCE"):
+            into = None
+        elif into is None or card.keyword in _MODEL:
+            found.rest.append(card)
+        else:
+            into.append(card)
+    return found
+
+
+@dataclass(frozen=True)
+class Placement:
+    """x -> turn @ x + shift; lengths in the file's unit."""
+
+    turn: Array
+    shift: Array
+
+
+def placement(lines: list[list[float]]) -> Placement:
+    """Of an instance by its data lines: a translation, then two points of an axis and an angle in degrees.
+
+    Raises:
+        Damaged: another number of values, an axis of no length.
+    """
+    if len(lines) > 2 or (lines and len(lines[0]) > 3) or (len(lines) == 2 and len(lines[1]) != 7):
+        raise Damaged("*INSTANCE needs a line of three numbers, then perhaps one of two points and an angle")
+    shift = np.array([*lines[0], 0.0, 0.0, 0.0][:3]) if lines else np.zeros(3)
+    if len(lines) < 2:
+        return Placement(np.eye(3), shift)
+    a, b, angle = np.array(lines[1][:3]), np.array(lines[1][3:6]), lines[1][6]
+    if not np.linalg.norm(b - a) > 0:
+        raise Damaged("the axis of an *INSTANCE has no length: its two points are the same")
+    turn = rotation(b - a, np.radians(angle))
+    return Placement(turn, turn @ (shift - a) + a)
+
+
+def local_system(rows: list[list[float]]) -> Array | None:
+    """(4, 3) axes x, y, z and origin of a *SYSTEM by its data lines; None: the global one again.
+
+    Raises:
+        Damaged: points on a line.
+    """
+    if not rows or not any(rows[0]):
+        return None
+    first = [*rows[0], *[0.0] * 6][:6]
+    origin, x = np.array(first[:3]), np.array(first[3:])
+    if len(rows[0]) <= 3:
+        return np.vstack([np.eye(3), origin])
+    x = x - origin
+    y = np.array([*rows[1], 0.0, 0.0, 0.0][:3]) - origin if len(rows) > 1 else np.cross([0.0, 0.0, 1.0], x)
+    z = np.cross(x, y)
+    if not np.linalg.norm(z) > 1e-9 * np.linalg.norm(x) * np.linalg.norm(y):
+        raise Damaged("the points of *SYSTEM lie on a line")
+    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    return np.vstack([x, np.cross(z, x), z, origin])
+
+
+def places(parts: list[tuple[str, Deck]]) -> list[Space]:
+    """Of every instance, and last of the assembly's own nodes; a single one keeps its numbers and names."""
+    nodes = _power(ids for _, part in parts for ids in part.node_id)
+    cells = _power(c.ids for _, part in parts for c in (*part.solids, *part.facets))
+    named = [f"{name}." if len(parts) > 1 else "" for name, _ in parts]
+    return [Space(k * nodes, k * cells, prefix) for k, prefix in enumerate([*named, ""])]
+
+
+def numbered(names: list[str], spaces: list[Space]) -> list[str]:
+    """Where the numbers of instances are, in words."""
+    moved = [f"{name} + {space.nodes}" for name, space in zip(names, spaces, strict=False) if space.nodes]
+    return [f"numbers of nodes: as in the part, those of {', '.join(moved)}"] if moved else []
+
+
+def _power(numbers: Iterable[Indices]) -> int:
+    """The power of ten above all numbers."""
+    return int(10 ** len(str(int(joined(numbers).max(initial=0)))))
+
+
+def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> None:
+    """Add a part to the whole as the instance `name`."""
+    key = name.upper()
+    whole.spaces[key] = space
+    whole.instances[name] = joined(part.node_id) + space.nodes
+    whole.node_id += [ids + space.nodes for ids in part.node_id]
+    whole.points += [points @ at.turn.T + at.shift for points in part.points]
+    for into, cells in ((whole.solids, part.solids), (whole.facets, part.facets)):
+        into += [Cells(c.kind, c.ids + space.cells, c.nodes + space.nodes, c.written) for c in cells]
+    for own, sets, more in (
+        (part.node_sets, whole.node_sets, space.nodes),
+        (part.cell_sets, whole.cell_sets, space.cells),
+    ):
+        for word, members in own.items():
+            whole.add(sets, space.prefix + part.written[word]).extend(ids + more for ids in members)
+    for word, axes in part.orientations.items():
+        turned = axes if isinstance(axes, str) else axes @ at.turn.T
+        whole.orientations[space.prefix.upper() + word] = turned
+    whole.sections += [(*section[:3], key) for section in part.sections]
+    whole.surfaces += [(space.prefix + surface[0], *surface[1:3], key) for surface in part.surfaces]
+    whole.links += [(card, key) for card, _ in part.links]
+    whole.ignored += part.ignored

@@ -1,0 +1,102 @@
+"""Decks of parts and instances: the same body as flattened by hand, and as CalculiX has it."""
+
+from __future__ import annotations
+
+import decks
+import instanced
+import meshes
+import numpy as np
+import pytest
+from instanced import Placed
+
+from microslip.basis import read_basis
+from microslip.cli import main
+from microslip.mesh import read_mesh
+
+PARTS = {
+    "Root": meshes.brick("hexahedron20", (2, 2, 3), (0.01, 0.012, 0.03), to=meshes.shaken(0.0002)),
+    "Vane": meshes.brick("wedge15", (1, 2, 3), (0.008, 0.015, 0.04)),
+}
+SETS = ("z0", "z1", "x1")
+PLACED = [
+    Placed("Root-1", "Root"),
+    Placed("Vane-1", "Vane", (40.0, 5.0, 1.0), (1.0, 2.0, 3.0), (2.0, 3.0, 5.0), 33.0),
+    Placed("Vane-2", "Vane", (-30.0, 0.0, 0.0)),
+]
+ENCASTRE = ["*BOUNDARY"] + [f"{p.name}.z0, ENCASTRE" for p in PLACED]
+
+
+def deck(placed=PLACED, inside=(), behind=ENCASTRE, tail=()):
+    parts = {name: instanced.part_lines(name, mesh, SETS) for name, mesh in PARTS.items()}
+    return instanced.instanced(parts, placed, list(inside), [*decks.MATERIAL, *behind, *tail])
+
+
+def modes(folder, name, monkeypatch, *more):
+    """Frequencies (Hz) of a deck, from import to the modal file."""
+    monkeypatch.chdir(folder)
+    assert main(["import", f"{name}.inp"]) == 0
+    assert main(["modes", name, "-q", "--set", "modes.count=8", *more]) == 0
+    return read_basis(folder / "build" / name / "basis.h5").groups[0, 0].omega / 2 / np.pi
+
+
+def write(folder, name, lines):
+    (folder / f"{name}.inp").write_text("\n".join(lines) + "\n")
+
+
+def test_instances_are_the_body_flattened_by_hand(tmp_path, monkeypatch, capsys):
+    write(tmp_path, "two", deck())
+    flat, _ = instanced.flattened(PARTS, PLACED, SETS)
+    held = ["*BOUNDARY"] + [f"{p.name}_z0, 1, 3" for p in PLACED]
+    sections = [decks.section(f"E_{p.name}") for p in PLACED]
+    write(tmp_path, "flat", [*flat, *decks.MATERIAL, *sections, *held])
+    ours = read_mesh(tmp_path / "two.inp", "mm")
+    np.testing.assert_allclose(ours.points, read_mesh(tmp_path / "flat.inp", "mm").points, rtol=0, atol=1e-16)
+    assert {"Root-1.z0", "Vane-2.z1", "Vane-2.S-x1"} <= set(ours.faces)
+    found = modes(tmp_path, "two", monkeypatch)
+    assert "supports of the file: Root-1.z0 in xyz, Vane-1.z0 in xyz, Vane-2.z0 in xyz" in capsys.readouterr().out
+    np.testing.assert_allclose(found, modes(tmp_path, "flat", monkeypatch), rtol=1e-10)
+    if decks.CCX is not None:
+        step = decks.frequency_step(8)
+        there = decks.run(tmp_path, "ccx", [*flat, *decks.MATERIAL, *sections, *held, *step])
+        np.testing.assert_allclose(found, there[:8], rtol=1e-6)
+
+
+def test_nodes_in_a_system_of_their_own_and_files_in_files(tmp_path):
+    """*SYSTEM moves what follows it, until the next; cylindrical coordinates; an include in an include."""
+    mesh = PARTS["Root"]
+    lines = decks.mesh_lines(mesh)
+    at = next(i for i, line in enumerate(lines) if line.startswith("*ELEMENT"))
+    one = Placed("", "", (7.0, -2.0, 4.0), (0, 0, 0), (0, 0, 1.0), 90.0)
+    axes = ["*SYSTEM", "7., -2., 4., 7., -1., 4.", "6., -2., 4.", *lines[:at], "*SYSTEM"]
+    (tmp_path / "deep").mkdir()
+    write(tmp_path / "deep", "nodes", axes[:9])
+    write(tmp_path / "deep", "more", axes[9:])
+    write(tmp_path / "deep", "first", ["*Include, input=nodes.inp", "*Include, input=more.inp"])
+    write(tmp_path, "system", ["*INCLUDE, INPUT=deep/first.inp", *lines[at:], "*NODE, SYSTEM=C", "9999, 3., 90., 2."])
+    found = read_mesh(tmp_path / "system.inp", "mm")
+    turned = Placed("", "", (0, 0, 0), angle=90.0).points(mesh.points) + np.array(one.shift) / 1e3
+    np.testing.assert_allclose(found.points, turned, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("name=Vane-2", "name=Vane-1", "the *INSTANCE 'Vane-1' is there twice"),
+        ("name=Root-1, part=Root", "name=Root-1, part=Rot", "names the part 'Rot', which the file does not define"),
+        ("name=Root-1,", "", "has no NAME"),
+        ("1.0, 2.0, 3.0, 2.0, 3.0, 5.0, 33.0", "1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 33.0", "has no length"),
+        ("*End Assembly", "*Nset, nset=A, instance=Nobody\n1,\n*End Assembly", "the instance 'Nobody'"),
+        ("*End Assembly", "*Include, input=two.inp\n*End Assembly", "includes itself by way of two.inp"),
+        ("*End Assembly", "*Include, input=none.inp\n*End Assembly", "none.inp cannot be read"),
+        ("*Part, name=Vane", "*Part, name=Root", "the *PART 'Root' is there twice"),
+    ],
+)
+def test_wrong_assemblies_are_told_with_file_and_line(tmp_path, monkeypatch, capsys, old, new, text):
+    lines = "\n".join(deck())
+    assert old in lines
+    write(tmp_path, "two", lines.replace(old, new, 1).splitlines())
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", "two.inp"]) == 2
+    said = capsys.readouterr().err
+    assert text in said and "two.inp" in said and "line " in said
+    assert not (tmp_path / "two").exists()

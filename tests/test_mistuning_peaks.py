@@ -1,0 +1,104 @@
+"""The search for the highest blade: what it says to have missed is more than what it misses, where truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import scipy.optimize
+from test_mistuning import FINE, sector
+
+from microslip.mistuning.peaks import highest
+from microslip.mistuning.ring import Tuned
+from microslip.mistuning.samples import Asked, Sliding
+
+LOW, HIGH = 94.0, 111.0
+Curve = Callable[[float], np.ndarray]
+
+
+def resonance(f: float, w: float, D: float) -> float:
+    return float(w**2 / abs(w**2 - f**2 + 2j * D * w * f))
+
+
+def one(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
+    """One mode: 1 / (2 D sqrt(1 - D^2)) high."""
+    return lambda f: np.array([resonance(f, w, D)]), 1 / (2 * D * np.sqrt(1 - D * D))
+
+
+def close(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
+    """Six blades in six modes that are close."""
+    ws, V = rng.normal(w, 1.0, 6), np.linalg.qr(rng.normal(size=(6, 6)))[0]
+
+    def curve(f: float) -> np.ndarray:
+        return np.abs(V @ (V.sum(axis=0) * w**2 / (ws**2 - f**2 + 2j * D * ws * f)))
+
+    return curve, max(float(curve(f).max()) for f in np.arange(w - 4, w + 4, 0.004))
+
+
+def jump(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
+    """It falls to a share beside its peak, as where contacts open."""
+    at, share = w * (1 + D * rng.uniform(-1.5, 1.5)), rng.uniform(0.3, 0.8)
+    after = one(w, D, rng)[1] if at < w else resonance(at, w, D)
+    before = resonance(at, w, D) if at < w else one(w, D, rng)[1]
+    return lambda f: np.array([resonance(f, w, D) * (1.0 if f < at else share)]), max(before, share * after)
+
+
+def kink(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
+    """The lower of two resonances, highest where they cross."""
+    other, share = w * (1 + D * rng.uniform(2, 3)), rng.uniform(0.9, 1.1)
+
+    def curve(f: float) -> np.ndarray:
+        return np.array([min(resonance(f, w, D), share * resonance(f, other, D))])
+
+    at = scipy.optimize.brentq(lambda f: resonance(f, w, D) - share * resonance(f, other, D), w, other)
+    return curve, float(curve(at)[0])
+
+
+def fold(w: float, D: float, rng: np.random.Generator) -> tuple[Curve, float]:
+    """A hardening spring, w^2 (1 + k y^2): the upper branch up to where it turns back."""
+    k = rng.uniform(4e-6, 8e-6)
+
+    def curve(f: float) -> np.ndarray:
+        terms = [(w * w * k) ** 2, 2 * w**2 * k * (w**2 - f**2), (w**2 - f**2) ** 2 + (2 * D * w * f) ** 2, -(w**4)]
+        s = np.roots(terms)
+        return np.sqrt([s[np.abs(s.imag) < 1e-9 * np.abs(s)].real.max()])
+
+    s = np.linspace(1.0, 1 / (2 * D) ** 2, 400_001)  # y^2, and from b^2 + (2 D w f)^2 = w^4/s, b = w^2 (1 + k s) - f^2:
+    b = w**2 * (1 + k * s) - 2 * (D * w) ** 2
+    return curve, float(np.sqrt(s[b**2 - (w**2 * (1 + k * s)) ** 2 + w**4 / s >= 0].max()))
+
+
+@pytest.mark.parametrize(("kind", "added"), [(one, 2), (close, 7), (jump, 11), (kink, 10), (fold, 8)])
+def test_what_is_missed_is_said(kind: Callable[..., tuple[Curve, float]], added: int) -> None:
+    """Sweeps with a point a half-power width or fewer: the error is within what is said, which is small; a smooth curve
+    takes one or two points more than its sweep."""
+    rng, points = np.random.default_rng(1), []
+    for i in range(8):
+        w, D = rng.uniform(100, 103), rng.uniform(0.004, 0.01)
+        curve, truth = kind(w, D, rng)
+        grid = np.arange(LOW + rng.uniform(0, 0.3), HIGH, (0.3, 0.7)[i % 2])
+        found = highest(curve, grid)
+        assert truth / found.amplitude - 1 <= 1.0001 * found.missed + 1e-5, (w, D)
+        assert found.missed < 5e-3
+        assert found.amplitude <= truth * (1 + 1e-5)
+        points.append(len(found.frequencies) - len(grid))
+    assert np.mean(points) <= added
+
+
+@pytest.mark.slow
+def test_a_contact_that_opens() -> None:
+    """Five vanes whose contacts open, so that there are two solutions beside the peak and sweeps jump: a coarse one
+    finds no less than fine ones that go up and down."""
+    tuned = Tuned(sector(5), {})
+    asked = Asked(tuned, (), np.zeros(0), balance=FINE)
+    fine, walks = np.arange(343.0, 357.0, 1.0), []
+    for grid in (fine, fine[::-1]):
+        walk = Sliding(asked.problem(tuned.whole))
+        walks.append(np.array([0.0 if (y := walk(f)) is None else y.max() for f in grid]))
+    top = max(walk.max() for walk in walks)
+    ring = Sliding(asked.problem(tuned.whole))
+    found = highest(ring, np.arange(342.0, 358.0, 5.0), follow=ring.follow)
+    assert found.missed < 0.1
+    assert top / found.amplitude - 1 <= found.missed
+    assert max(walks[0]) < 0.8 * top
