@@ -7,7 +7,6 @@ them. With xi the sign of F_x turns, with eta and phi together those of F_y and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -89,67 +88,62 @@ class CreepTable:
         """
         given = (np.asarray(v, dtype=float) for v in (xi, eta, phi, a, b, np.multiply(friction, normal_force)))
         x, y, turn, a, b, held = np.broadcast_arrays(*given)
-        ratio = a / b
+        ratio, c = a / b, np.sqrt(a * b)
         least, most = self.ratio[0] * (1 - 1e-9), self.ratio[-1] * (1 + 1e-9)
         if not ((ratio >= least) & (ratio <= most)).all():
             worst = float(ratio.ravel()[np.argmax(np.abs(np.log(ratio)))])
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
-        flat = np.stack([v.ravel() for v in (x, y, turn, a, b, held, np.broadcast_to(shear, x.shape))])
-        parts = [self.read(*flat[:, i : i + BLOCK]) for i in range(0, x.size, BLOCK)]
-        return np.concatenate([np.zeros((3, 0)), *parts], axis=1).reshape(3, *x.shape)
+        p = Poses(*map(np.asarray, poses(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
+        stiff = p.stiffness_x * c**2 / held
+        at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
+        at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
+        found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
+        return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
 
-    def read(
-        self, xi: Any, eta: Any, phi: Any, a: Any, b: Any, held: Any, shear: Any, xp: Any = np
-    ) -> Any:  # fmt: skip
-        """`forces` of arrays (n,), with mu F_N as `held` and a/b within the table; in jax with xp = jax.numpy."""
-        p = poses(xi, eta, phi, a, b, held, xp.ones_like(a), shear, self.poisson, **self.how)
-        ratio, c = a / b, xp.sqrt(a * b)
-        pull = xp.stack([xp.asarray(v) for v in (xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x)])
-        at, signs = _place(pull * xp.asarray(p.stiffness_x) * c**2 / held, ratio, xp)
-        place = [*at, xp.log(ratio), xp.log(xp.asarray(p.stiffness_y / p.stiffness_x))]
-        return self._between(place, xp) * signs * held * xp.stack([xp.ones_like(c), xp.ones_like(c), c])
-
-    def _between(self, at: Sequence[Any], xp: Any) -> Any:
-        """(3, n) values at five coordinates (n,)."""
-        ridge, n = int(np.searchsorted(self.size, 0.5)), len(at[0])
-        parts = [_weights(axis, v, ridge * (not k), xp) for k, (axis, v) in enumerate(zip(self.axes, at, strict=True))]
-        index = xp.zeros((n, 1), int)
-        for (first, weight), many in zip(parts, self.values.shape[1:], strict=True):
-            index = (index * many)[:, :, None] + (first[:, None] + xp.arange(weight.shape[1]))[:, None, :]
-            index = index.reshape(n, -1)
-        found = xp.asarray(self.values).reshape(3, -1)[:, index]
+    def _between(self, at: Array) -> Array:
+        """(3, n) values at (5, n) coordinates."""
+        ridge = int(np.searchsorted(self.size, 0.5))
+        parts = [_weights(self.axes[0], at[0], ridge)]
+        parts += [_weights(axis, v) for axis, v in zip(self.axes[1:], at[1:], strict=True)]
+        shape = self.values.shape[1:]
+        index = np.zeros((at.shape[1], 1), int)
+        for (first, weight), many in zip(parts, shape, strict=True):
+            index = (index * many)[:, :, None] + (first[:, None] + np.arange(weight.shape[1]))[:, None, :]
+            index = index.reshape(at.shape[1], -1)
+        found = self.values.reshape(3, -1)[:, index]
         for _, weight in parts[::-1]:
-            found = xp.einsum("knip,np->kni", found.reshape(3, n, -1, weight.shape[1]), weight)
+            found = np.einsum("knip,np->kni", found.reshape(3, at.shape[1], -1, weight.shape[1]), weight)
         return found[..., 0]
 
 
-def _weights(axis: Array, v: Any, ridge: int = 0, xp: Any = np) -> tuple[Any, Any]:
+def _weights(axis: Array, v: Array, ridge: int = 0) -> tuple[Array, Array]:
     """Index of the first of the points about each place, on one side of a ridge, and what each of them counts (n, 4):
     Lagrange's polynomials."""
-    many, points = min(4, len(axis)), xp.asarray(axis)
-    i = xp.clip(xp.searchsorted(points, v, side="right") - 1, 0, len(axis) - 2)
+    many = min(4, len(axis))
+    i = np.clip(np.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
     right = i >= ridge
-    low, high = xp.where(right, ridge, 0), xp.where(right, len(axis) - 1, ridge)
-    first = xp.clip(i - (many - 1) // 2, low, xp.maximum(high - many + 1, low))
-    x = points[first[:, None] + xp.arange(many)]
-    others = [np.delete(np.arange(many), j) for j in range(many)]
-    each = [(v[:, None] - x[:, k]) / (x[:, j : j + 1] - x[:, k]) for j, k in enumerate(others)]
-    return first, xp.stack([xp.prod(one, axis=1) for one in each], axis=1)
+    low, high = np.where(right, ridge, 0), np.where(right, len(axis) - 1, ridge)
+    first = np.clip(i - (many - 1) // 2, low, np.maximum(high - many + 1, low))
+    x = axis[first[:, None] + np.arange(many)]
+    weight = np.ones_like(x)
+    for j in range(many):
+        for k in range(many):
+            if j != k:
+                weight[:, j] *= (v - x[:, k]) / (x[:, j] - x[:, k])
+    return first, weight
 
 
-def _place(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
-    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it."""
+def placed(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
+    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it; xp: numpy,
+    or jax.numpy in what is traced."""
     u, v, w = pull
-    r = xp.sqrt(u**2 + v**2 + ratio * w**2 + TINY) / SATURATED
+    r = xp.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
     forward, turned = xp.where(u < 0, -1.0, 1.0), xp.where(w < 0, -1.0, 1.0)
     root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)
-    polar = xp.arctan2(xp.sqrt((u * root**2) ** 2 + (v / root**2) ** 2 + TINY), xp.abs(w))
+    polar = xp.arctan2(xp.hypot(u * root**2, v / root**2), xp.abs(w))
     azimuth = xp.arctan2(turned * v / root, xp.abs(u) * root)
     return xp.stack([r / (1 + r), azimuth, polar]), xp.stack([forward, turned, turned])
 
-
-TINY = 1e-40
-"""Beside squares, so that roots have a derivative at rest."""
 
 FAR = 1e4
 """r that stands for the size 1."""
