@@ -1094,7 +1094,7 @@ def own() -> None:
     with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes"))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
     upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
-    with_studio(upper, lambda s: save(mode_sheet(s, (6, 7), 0.35), "joint", smooth=True))
+    with_studio(upper, lambda s: save(mode_sheet(s, (5, 6), 0.35), "joint", smooth=True))
     save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
     mast = read_basis(folder / "build" / "mast" / "basis.h5")
     save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
