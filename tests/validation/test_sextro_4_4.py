@@ -7,6 +7,7 @@ over the velocity (docs/bifurcation.md). Nothing else is chosen.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import jax
@@ -18,6 +19,7 @@ from scipy.integrate import solve_ivp
 from microslip.bifurcation import balance, deflation, floquet
 from microslip.bifurcation.branches import SPECIAL, Branch
 from microslip.bifurcation.diagram import Asked, Diagram, diagram
+from microslip.bifurcation.dynamics import Dynamics
 
 pytestmark = pytest.mark.slow
 
@@ -106,10 +108,16 @@ def test_deflation_finds_the_orbits_of_the_window_without_any_motion() -> None:
     assert [period for period, _ in own] == pytest.approx([period for period, _ in sorted(crossed)], rel=1e-3)
 
 
+@cache
+def rate(system: Dynamics) -> Callable[..., jax.Array]:
+    """x' of x and p, compiled once for all branches."""
+    return jax.jit(lambda x, p: system.rate(x, p, 0.0))
+
+
 def in_time(found: Diagram, p: float, x: np.ndarray, time: float) -> np.ndarray:
     """Where a motion from x is after a time, by SciPy's LSODA."""
-    f = jax.jit(lambda x: found.system.rate(x, p, 0.0))
-    return solve_ivp(lambda _, x: np.asarray(f(x)), (0, time), x, method="LSODA", rtol=1e-9, atol=1e-11).y[:, -1]
+    f = rate(found.system)
+    return solve_ivp(lambda _, x: np.asarray(f(x, p)), (0, time), x, method="LSODA", rtol=1e-9, atol=1e-11).y[:, -1]
 
 
 def chosen(branch: Branch) -> list[int]:
