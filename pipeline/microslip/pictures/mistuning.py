@@ -32,7 +32,8 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
         x = np.linspace(edges[0], edges[-1], 300)
         y = scipy.stats.genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
         axes.plot(x, y, color=COLOURS[0], label=f"{fit.name}, misfit {fit.distance:.2g}")
-    axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title, ylim=(0, 1.3 * top))
+    axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title)
+    axes.set_ylim(0, 1.3 * top)
     axes.legend(fontsize=9, loc="upper center", ncols=2)  # above all that is drawn
     return save_figure(figure, path)
 
