@@ -1191,9 +1191,9 @@ def half_space() -> None:
     """Exact half-spaces that roll: convergence, Kalker's coefficients, wear, timings, one patch with its heat."""
     import half_space_study as study
 
-    fig = figure(4.6, 1.9)
+    fig = figure(8.0, 3.3)
     study.picture(*fig.subplots(1, 2, width_ratios=(1.5, 1)))
-    save(drawn(fig), "half_space", colours=4)
+    save(drawn(fig), "half_space", colours=8)
     for name in ("convergence", "coefficients", "worn_profiles", "timings"):
         fill("half_space.md", name, table(*getattr(study, name)()))
 
