@@ -55,7 +55,8 @@ def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: 
         np.testing.assert_allclose([found.a[k], found.b[k]], [p.a, p.b], rtol=2e-3)
         np.testing.assert_allclose(found.on_wheel[k], p.on_wheel, atol=2e-5)
         np.testing.assert_allclose([found.xi[k], found.eta[k]], [p.xi, p.eta], atol=1.2e-5)  # yaw^2/2 is 8e-6
-        assert float(found.phi[k]) == pytest.approx(p.phi, rel=1e-3)
+        # the place moves with the square of the yaw, by 15 um and 3e-5 rad here, which the motion leaves out
+        assert float(found.phi[k]) == pytest.approx(p.phi, abs=2 * x[3] ** 2 / 0.46)
 
 
 def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
