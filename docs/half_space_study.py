@@ -108,9 +108,9 @@ def picture(left: Any, right: Any) -> None:
     left.contourf(x, y, c.sticking.T, levels=(0.5, 1.5), colors="#7fb0e0")
     left.contour(x, y, c.touching.T, levels=(0.5,), colors="black", linewidths=1)
     few = np.zeros_like(c.touching)
-    few[3::5, 3::5] = True
+    few[1::3, 1::3] = True
     i, j = np.nonzero(few & c.touching)
-    left.quiver(x[i], y[j], *(c.traction[:, i, j] / c.bound.max()), color="black", scale=9, width=0.008)
+    left.quiver(x[i], y[j], *(c.traction[:, i, j] / c.bound.max()), color="black", scale=16, width=0.005)
     left.set_xlabel("x in mm, rolling to the right")
     left.set_ylabel("y in mm")
     steel = Conductor(50.0, 7850.0, 450.0)

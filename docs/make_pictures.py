@@ -127,7 +127,7 @@ def geometry() -> None:
     for body in ("blade", "shroud", "pendulum", "half-pipe"):
         still = AT_REST if body == "shroud" else ()
         basis = made(body, body, *LIGHT, *still)
-        with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body))
+        with_studio(basis, lambda s, body=body: save(views.mesh_picture(s), body, colours=2 * LINES))
         group = basis.groups[0, 0]
         lowest = group.frequency[group.kind.index("normal")]
         size = " x ".join(f"{v:.4g}" for v in np.ptp(basis.mesh.points, axis=0) * 1e3)
@@ -590,7 +590,7 @@ def contact() -> None:
     PICTURES.mkdir(exist_ok=True)
     response_picture(result, BUILD / "response.png")
     save(from_file(BUILD / "response.png"), "blade_response")
-    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes", smooth=True))
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 4, 6), 0.6), "blade_modes"))
 
 
 def mode_sheet(studio: views.Studio, chosen: Sequence[int], factor: float) -> Any:
@@ -880,7 +880,7 @@ def counted_once() -> None:
     shares_by_count()
     groups = {m: made(f"blade-{m}", "blade", *LIGHT, f'reduction="{m}"') for m in METHODS}
     law_by_method(groups)
-    save(drawn(counted_picture(found)), "counted_once", smooth=True)
+    save(drawn(counted_picture(found)), "counted_once", colours=LINES)
 
 
 def short(value: float) -> str:
@@ -1091,10 +1091,10 @@ def own() -> None:
     basis = read_basis(folder / "build" / "bracket" / "basis.h5")
     save(from_file(folder / "bracket" / "surfaces.png"), "bracket_surfaces")
     with_studio(basis, lambda s: save(views.mesh_picture(s), "bracket"))
-    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes", smooth=True))
+    with_studio(basis, lambda s: save(mode_sheet(s, (0, 1, 2, 3), 0.5), "bracket_modes"))
     save(from_file(folder / "build" / "bracket" / "pictures" / "response.png"), "bracket_response")
     upper = read_basis(folder / "build" / "Upper-Bolt" / "basis.h5")
-    with_studio(upper, lambda s: save(mode_sheet(s, (6, 7), 0.35), "joint", smooth=True))
+    with_studio(upper, lambda s: save(mode_sheet(s, (5, 6), 0.35), "joint", smooth=True))
     save(from_file(folder / "build" / "bolted" / "pictures" / "response.png"), "joint_response")
     mast = read_basis(folder / "build" / "mast" / "basis.h5")
     save(from_file(points_sheet(mast, mast.groups[0, 0], folder / "mast.png", 4)), "mast_modes")
@@ -1191,9 +1191,9 @@ def half_space() -> None:
     """Exact half-spaces that roll: convergence, Kalker's coefficients, wear, timings, one patch with its heat."""
     import half_space_study as study
 
-    fig = figure(4.6, 1.9)
+    fig = figure(8.0, 3.3)
     study.picture(*fig.subplots(1, 2, width_ratios=(1.5, 1)))
-    save(drawn(fig), "half_space", colours=4)
+    save(drawn(fig), "half_space", colours=8)
     for name in ("convergence", "coefficients", "worn_profiles", "timings"):
         fill("half_space.md", name, table(*getattr(study, name)()))
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-import sys
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+import microslip
+from microslip.case import load_case
+from microslip.contact.settings import load_contact
+from microslip.rolling.settings import load_rolling
+
 ROOT = Path(__file__).parents[1]
 PACKAGE, CASES, BODIES = ROOT / "pipeline" / "microslip", ROOT / "pipeline" / "cases", ROOT / "geometry"
-sys.path.insert(0, str(ROOT / "docs"))
-
-import microslip  # noqa: E402
 
 FIGURES = {
     "1.1": 7, "1.2": 8, "2.1": 1, "2.2": 1, "3.1": 1, "3.2": 1, "3.3": 9, "3.4": 2, "3.5": 3, "3.6": 5, "3.7": 7,
@@ -144,6 +145,15 @@ def exists(name: str) -> bool:
 def test_what_is_named_exists(column: int) -> None:
     missing = [(row[0], n) for row in rows() for n in re.findall(r"`([^`]+)`", row[column]) if not exists(n)]
     assert not missing
+
+
+def test_settings_of_commands_are_keys_of_their_files() -> None:
+    commands = [c for row in rows() for c in re.findall(r"`(microslip [^`]+ --set [^`]+)`", row[2])]
+    for _, verb, what, *rest in map(shlex.split, commands):
+        load = {"contact": load_contact, "roll": load_rolling}.get(verb, load_case)
+        file = CASES / f"contact/fig-{what}.toml" if verb == "contact" else CASES / f"{Path(what).stem}.toml"
+        load(file, [text for flag, text in pairwise(rest) if flag == "--set"])
+    assert len(commands) > 5
 
 
 def test_errata_name_code_that_exists() -> None:

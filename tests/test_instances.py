@@ -78,6 +78,24 @@ def test_nodes_in_a_system_of_their_own_and_files_in_files(tmp_path):
     np.testing.assert_allclose(found.points, turned, rtol=0, atol=1e-15)
 
 
+def test_first_order_bricks_lock_as_far_as_is_told(tmp_path, monkeypatch, capsys):
+    """One layer in bending against the same bricks of second order, without lateral contraction; unused keywords."""
+    lines = {"C3D8I": "hexahedron", "C3D20": "hexahedron20"}
+    found = []
+    for kind, cell in lines.items():
+        mesh = meshes.brick(cell, (40, 1, 1), (0.4, 0.005, 0.005))
+        own = [line.replace("TYPE=C3D8,", f"TYPE={kind},") for line in decks.mesh_lines(mesh, sets=("x0",))]
+        steel = [line.replace("0.3", "0.0") for line in decks.MATERIAL]
+        own += [*steel, decks.section(), "*BOUNDARY", "x0, 1, 3", "*DLOAD", "1, GRAV, 9.81, 0., 0., -1."]
+        write(tmp_path, kind, own)
+        found.append(modes(tmp_path, kind, monkeypatch)[0])
+    told = capsys.readouterr().out
+    assert "C3D8I are taken as C3D8: incompatible modes are left out" in told and "not used: *DLOAD" in told
+    factor = float(told.split("stiffness is ")[1].split(" times")[0])
+    assert factor == 3.0  # 1 + 2^2 / 2
+    assert (found[0] / found[1]) ** 2 == pytest.approx(factor, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [

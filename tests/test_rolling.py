@@ -283,6 +283,19 @@ def test_left_and_right_wheels_mirror() -> None:
     np.testing.assert_allclose([left.xi, left.eta, left.phi], [right.xi, -right.eta, -right.phi], rtol=1e-12)
 
 
+def test_an_axle_shares_its_load_by_its_roll() -> None:
+    """Level, both wheels carry half, as each alone would; turned by more than their approach, one carries all."""
+    left, right, _ = ms.axle(track(), ms.Pose(speed=20.0), 2e5)
+    (alone,) = ms.patches(track(), ms.Pose(speed=20.0), "right", 1e5)
+    np.testing.assert_allclose([right[0].normal_force, left[0].normal_force], alone.normal_force, rtol=1e-6)
+    left, right, _ = ms.axle(track(), ms.Pose(roll=2e-3), 1e5)
+    assert not left and right[0].normal_force * np.cos(right[0].angle) == pytest.approx(1e5, rel=1e-6)
+    left, right, pose = ms.axle(track(), ms.Pose(lateral=3e-3, roll=0.01), 2e5, even=True)
+    lifted = [p.normal_force * np.cos(p.angle) for p in (*left, *right)]
+    np.testing.assert_allclose(lifted, 1e5, rtol=1e-5)
+    assert ms.axle(track(), pose, 0.0)[:2] == ([], [])
+
+
 def test_two_patches_share_the_vertical_force_by_their_stiffness() -> None:
     """A rail with two equal crowns below a flat wheel: half each, and Hertz' force of the approach in both."""
     y = np.linspace(-0.03, 0.03, 1201)

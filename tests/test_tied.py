@@ -204,6 +204,8 @@ def test_random_constraints_are_those_of_dense_algebra(data):
         (["*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1.", "2", "{A}, 1, 1., {C}, 1, -1."], "gives already"),
         (["*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1.", "2", "{B}, 1, 1., {A}, 1, 2."], "leads in a circle"),
         (["*EQUATION", "3", "{A}, 1, 1., {B}, 1, -1."], "announces 3 terms"),
+        (["*TRANSFORM, NSET=z1", "0,1,0,1,0,0", "*EQUATION", "2", "{A}, 1, 1., {B}, 1, -1."], "beside a *TRANSFORM"),
+        (["*MPC", "PIN, {A}, Nobody"], "'Nobody', which is not defined"),
         (["*EQUATION", "2", "{A}, 7, 1., {B}, 1, -1."], "'7' is no degree of freedom"),
         (["*EQUATION", "2", "{A}, 5, 1., {B}, 1, -1."], "takes in the rotation of node {A}, which has none"),
         (["*EQUATION", "2", "{A}, 1, 1., Nobody, 1, -1."], "'Nobody', which is not defined"),

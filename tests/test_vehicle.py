@@ -55,7 +55,8 @@ def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: 
         np.testing.assert_allclose([found.a[k], found.b[k]], [p.a, p.b], rtol=2e-3)
         np.testing.assert_allclose(found.on_wheel[k], p.on_wheel, atol=2e-5)
         np.testing.assert_allclose([found.xi[k], found.eta[k]], [p.xi, p.eta], atol=1.2e-5)  # yaw^2/2 is 8e-6
-        assert float(found.phi[k]) == pytest.approx(p.phi, rel=1e-3)
+        # the place moves with the square of the yaw, by 15 um and 3e-5 rad here, which the motion leaves out
+        assert float(found.phi[k]) == pytest.approx(p.phi, abs=2 * x[3] ** 2 / 0.46)
 
 
 def test_slow_hunting_has_the_wave_of_klingel(vehicle: motion.Vehicle) -> None:
@@ -114,7 +115,7 @@ def test_energy_of_a_turn_balances(rolling: wearing.Rolling) -> None:
 def test_the_table_goes_the_way_of_the_strips(rolling: wearing.Rolling) -> None:
     """A turn with forces read from a table and with the strips themselves: apart by the error of the table at most."""
     how = {"elements": (8, 8)}
-    table = creep_table(rolling.vehicle.poisson, points=(33, 33, 25, 9), checked=2000, **how)
+    table = creep_table(rolling.vehicle.poisson, points=(8, 10, 17, 17, 7), checked=2000, **how)
     x = motion.steady(rolling.vehicle)
     x[0] += 1e-3
     out, rise = motion.resampled(rolling.shape, 2 * rolling.steps)

@@ -35,7 +35,7 @@ PUBLIC = {
     "rolling.laws": "forces_by_characteristic",
     "rolling.fastsim": "fastsim",
     "rolling.table": "creep_table write_creep_table read_creep_table",
-    "rolling.wheelset": "Track Pose patches",
+    "rolling.wheelset": "Track Pose patches axle",
 }
 """Module -> the names of it that are public."""
 

@@ -129,6 +129,18 @@ def test_manchester_benchmark(row: str) -> None:
     assert 1e3 * (p.axle[1] + 0.46) == pytest.approx(HEIGHT[int(pose[0])], abs=0.02)
 
 
+@pytest.mark.parametrize("row", MANCHESTER.strip().splitlines(), ids=lambda row: f"{row.split()[0]} mm")
+def test_manchester_roll_is_that_of_equal_forces(row: str) -> None:
+    """The benchmark turned the axle until both wheels carried 10 kN, friction included, which is left out here: 3e-6
+    rad and 0.1 %."""
+    lateral, yaw, roll, _ = (float(v) for v in row.split("|")[0].split())
+    track = Track(ms.read_profile(PROFILES / "MBench_S1002_v3.prw"), ms.read_profile(PROFILES / "MBench_UIC60_v3.prr"),
+                  0.46, 0.75, 0.7605326, ELASTIC)  # fmt: skip
+    left, right, pose = ms.axle(track, ms.Pose(lateral / 1e3, yaw / 1e3), 2e4, even=True)
+    assert pose.roll == pytest.approx(roll, rel=1e-3, abs=3e-6)
+    np.testing.assert_allclose([p.normal_force * np.cos(p.angle) for p in (*left, *right)], 1e4, rtol=1e-4)
+
+
 # F_n N, friction included; M_n N mm; touching, sticking elements; friction power W
 EXACT = """
 9997  4605  1291 943 -0.4677

@@ -174,9 +174,9 @@ class Joints:
             ends = np.cumsum([len(a) for a in feel])[:-1]
             for n, by in enumerate(sides[0]):
                 S = np.array([self._felt_slopes[own[n].contact] for own in sides])
-                moved = applied(loose[..., by.at], S.reshape(len(parts), W, -1, S.shape[2]))
+                moved = applied(loose[..., by.at], S.reshape(len(parts), W, S.shape[1] // W, S.shape[2]))
                 for m, block in enumerate(np.split(moved, ends, axis=2)):
-                    block = block.reshape(len(parts), -1, S.shape[2])
+                    block = block.reshape(len(parts), W * len(feel[m]), S.shape[2])
                     for own, one in zip(sides, block, strict=True):
                         key = own[m].contact, own[n].contact
                         one = one if own[m].sign == own[n].sign else -one

@@ -201,11 +201,11 @@ def from_rest(problem: Problem, Omega: float, most: int = 60) -> Point:
     Args:
         most: steps of pseudo-time.
     """
-    at, spent, rate = problem.at(Omega), 0, FIRST * Omega
+    at, spent, rate, rises = problem.at(Omega), 0, FIRST * Omega, _rises(problem)
     q, point = pseudo_transient.at_rest(problem), Point(Omega, np.zeros(problem.size), "", np.inf, 0)
     for count in range(most):
         step = pseudo_transient.slowly(at, rate, q)
-        trial = newton(step, point.x, TOLERANCE, most=20, slope=point.slope, rises=_rises(problem))
+        trial = newton(step, point.x, TOLERANCE, most=20 if rises else 10, slope=point.slope, rises=rises)
         spent += trial.iterations
         if not trial.converged:
             rate, point = 4 * rate, replace(point, slope=None)

@@ -109,6 +109,8 @@ def _number(word: str, what: str) -> float:
 
 
 def _equations(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
+    if reading.deck.turned:
+        raise Damaged("*EQUATION beside a *TRANSFORM may act in local directions; write global ones without it")
     words = [word.strip() for line in card.lines for word in line.rstrip().rstrip(",").split(",")]
     while words:
         if not is_number(words[0]) or int(words[0]) < 1:

@@ -22,7 +22,7 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
     figure, axes = single_panel(8.0, 4.8)
     a = found.amplification[found.solved]
     counts, edges, _ = axes.hist(a, bins=min(max(10, int(np.sqrt(len(a)))), 80), color="#9ec5e8", edgecolor="white")
-    q, top = found.quantile(0.95), 1.05 * counts.max()
+    q, top = found.quantile(0.95), 1.05 * float(np.max(counts))
     if np.isfinite(q.high) and q.low > 0:
         axes.fill_betweenx([0, top], q.low, q.high, color=COLOURS[1], alpha=0.15, linewidth=0)
     axes.vlines(q.value, 0, top, color=COLOURS[1], label=f"95 % quantile: {q}")
@@ -32,7 +32,8 @@ def amplification_picture(found: Ensemble, path: Path, title: str) -> Path:
         x = np.linspace(edges[0], edges[-1], 300)
         y = scipy.stats.genextreme.pdf(x, p["shape"], p["location"], p["scale"]) * len(a) * (edges[1] - edges[0])
         axes.plot(x, y, color=COLOURS[0], label=f"{fit.name}, misfit {fit.distance:.2g}")
-    axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title, ylim=(0, 1.3 * top))
+    axes.set(xlabel="amplification: highest blade over the tuned ring's highest", ylabel="samples", title=title)
+    axes.set_ylim(0, 1.3 * top)
     axes.legend(fontsize=9, loc="upper center", ncols=2)  # above all that is drawn
     return save_figure(figure, path)
 

@@ -29,8 +29,8 @@ FAST = 5.0
 """V a/(2 kappa) from which on heat flows across the surface alone (Johnson, Contact Mechanics, 12.1)."""
 
 
-ROUNDING, SETTLED = 1e-10, 1e-6
-"""Of mu F_N: less is no force, of the strips and of the half-spaces, whose tractions settle to 1e-7."""
+ROUNDING, SETTLED = 1e-10, 1e-5
+"""Of mu F_N: less is no force, of the strips and of the half-spaces, which are solved to 1e-7 at each element."""
 
 
 def without_rounding(values: Array, least: float) -> Array:

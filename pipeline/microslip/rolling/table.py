@@ -95,7 +95,7 @@ class CreepTable:
             raise UserError(f"a, b: a/b is {worst:.4g}, and the table goes from {least:.4g} to {most:.4g}")
         p = Poses(*map(np.asarray, poses(x, y, turn, a, b, held, np.ones_like(a), shear, self.poisson, **self.how)))
         stiff = p.stiffness_x * c**2 / held
-        at, signs = _place(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
+        at, signs = placed(np.stack([x, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * stiff, ratio)
         at = np.stack([*at, np.log(ratio), np.log(p.stiffness_y / p.stiffness_x)]).reshape(5, -1)
         found = np.concatenate([self._between(at[:, i : i + BLOCK]) for i in range(0, at.shape[1], BLOCK)], axis=1)
         return found.reshape(3, *x.shape) * signs * held * np.stack([np.ones_like(c), np.ones_like(c), c])
@@ -133,15 +133,16 @@ def _weights(axis: Array, v: Array, ridge: int = 0) -> tuple[Array, Array]:
     return first, weight
 
 
-def _place(pull: Array, ratio: Array) -> tuple[Array, Array]:
-    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it."""
+def placed(pull: Any, ratio: Any, xp: Any = np) -> tuple[Any, Any]:
+    """Size, azimuth and polar angle of a (3, n) pull, and the signs of the forces that are tabulated for it; xp: numpy,
+    or jax.numpy in what is traced."""
     u, v, w = pull
-    r = np.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
-    forward, turned = np.where(u < 0, -1.0, 1.0), np.where(w < 0, -1.0, 1.0)
+    r = xp.sqrt(u**2 + v**2 + ratio * w**2) / SATURATED
+    forward, turned = xp.where(u < 0, -1.0, 1.0), xp.where(w < 0, -1.0, 1.0)
     root = ratio**0.25  # sqrt(a) where a b = 1, and 1/sqrt(b)
-    polar = np.arctan2(np.hypot(u * root**2, v / root**2), np.abs(w))
-    azimuth = np.arctan2(turned * v / root, np.abs(u) * root)
-    return np.stack([r / (1 + r), azimuth, polar]), np.stack([forward, turned, turned])
+    polar = xp.arctan2(xp.hypot(u * root**2, v / root**2), xp.abs(w))
+    azimuth = xp.arctan2(turned * v / root, xp.abs(u) * root)
+    return xp.stack([r / (1 + r), azimuth, polar]), xp.stack([forward, turned, turned])
 
 
 FAR = 1e4

@@ -54,8 +54,10 @@ def deposited(depth: Array, dy: float | Array, middle: float, y: Array) -> Array
     """
     width = y[1] - y[0]
     ends = np.append(y - width / 2, y[-1] + width / 2)
-    own = np.append(0, np.cumsum(np.broadcast_to(dy, depth.shape)))
-    own = middle + own - own[-1] / 2
+    if np.ndim(dy):
+        own = np.append(0, np.cumsum(dy)) - np.sum(dy) / 2 + middle
+    else:
+        own = middle + dy * (np.arange(len(depth) + 1) - len(depth) / 2)
     worn = np.flatnonzero(depth)
     if worn.size and not (ends[0] <= own[worn[0]] and own[worn[-1] + 1] <= ends[-1]):
         raise UserError("y: the contact wears beyond the ends of the profile; take a wider one")

@@ -105,30 +105,80 @@ def patches(track: Track, pose: Pose, side: str, vertical: float) -> list[Patch]
     Raises:
         UserError: wheel and rail lie nowhere above each other.
     """
-    left = side == "left"
-    seen = pose.mirrored() if left else pose
-    gap = _gap(track, seen)
+    gap = _gap(track, _seen(pose, side))
+    return _carried(track, pose, side, gap, _height(track, [gap], vertical)) if vertical > 0 else []
+
+
+def axle(track: Track, pose: Pose, vertical: float, even: bool = False) -> tuple[list[Patch], list[Patch], Pose]:
+    """Contacts of the left and of the right wheel of an axle, as `patches`, and its pose.
+
+    Args:
+        vertical: N, on both wheels together; the roll of the pose shares it, and a wheel may be off its rail. even: the
+            axle rolls until both carry the same, whatever the roll of the pose.
+
+    Raises:
+        UserError: wheel and rail lie nowhere above each other; no roll within 0.05 rad shares the force evenly.
+    """
+
+    def at(pose: Pose) -> tuple[list[Patch], list[Patch]]:
+        gaps = [_gap(track, _seen(pose, side)) for side in SIDES]
+        height = _height(track, gaps, vertical)
+        left, right = (_carried(track, pose, side, g, height) for side, g in zip(SIDES, gaps, strict=True))
+        return left, right
+
+    def uneven(roll: float) -> float:
+        left, right = (sum(p.normal_force * np.cos(p.angle) for p in of) for of in at(replace(pose, roll=roll)))
+        return float(right - left)
+
     if not vertical > 0:
-        return []
+        return [], [], pose
+    if even:
+        near, far = 0.0, -1e-3 if uneven(0.0) > 0 else 1e-3
+        while uneven(far) * far < 0:
+            near, far = far, 2 * far
+            if abs(far) > STEEPEST:
+                raise UserError(
+                    f"pose: no roll below {STEEPEST:g} rad shares the vertical force evenly; correct the pose"
+                )
+        pose = replace(pose, roll=brentq(uneven, near, far, xtol=1e-10))
+    return *at(pose), pose
+
+
+SIDES = ("left", "right")
+STEEPEST = 0.05
+"""rad, of roll."""
+
+
+def _seen(pose: Pose, side: str) -> Pose:
+    return pose.mirrored() if side == "left" else pose
+
+
+def _height(track: Track, gaps: list[Gap], vertical: float) -> float:
+    """z of the axle's middle, below that of the nominal radius, where the patches carry a force (N) together, m."""
+    touch = min(float(np.nanmin(g.gap)) for g in gaps)
 
     def missing(down: float) -> float:
-        return float(vertical ** (2 / 3) - sum(_lifted(p) for p in _pressed(track, gap, down)) ** (2 / 3))
+        lifted = sum(_lifted(p) for g in gaps for p in _pressed(track, g, touch + down))
+        return float(vertical ** (2 / 3) - lifted ** (2 / 3))
 
     deep = 1e-4
     while missing(deep) > 0:
         deep *= 4
         if deep > 0.05:
             raise UserError("vertical_force: presses the wheel 50 mm into the rail; give it in N")
-    down = brentq(missing, 0.0, deep, xtol=1e-12, rtol=1e-10) if missing(0.0) > 0 else 0.0
-    found = sorted(_pressed(track, gap, down), key=lambda p: -p.force)
-    axle = np.array([pose.lateral, np.nanmin(gap.gap) + down - track.radius])
-    return [_patch(track, seen, gap, p, left, axle) for p in found]
+    return touch + (brentq(missing, 0.0, deep, xtol=1e-12, rtol=1e-10) if missing(0.0) > 0 else 0.0)
+
+
+def _carried(track: Track, pose: Pose, side: str, gap: Gap, height: float) -> list[Patch]:
+    found = sorted(_pressed(track, gap, height), key=lambda p: -p.force)
+    middle = np.array([pose.lateral, height - track.radius])
+    return [_patch(track, _seen(pose, side), gap, p, side == "left", middle) for p in found]
 
 
 def across(track: Track, pose: Pose, side: str, patch: Patch) -> tuple[Array, Array]:
     """(k,) places across a patch, ascending in its y, and the distances of both surfaces there along its normal, m."""
     left = side == "left"
-    gap = _gap(track, pose.mirrored() if left else pose)
+    gap = _gap(track, _seen(pose, side))
     known = np.isfinite(gap.gap)
     y_w, arc, opened = gap.on_wheel[known], np.cumsum(gap.arc[known]), gap.gap[known]
     place = arc - np.interp(patch.on_wheel, y_w, arc)
@@ -195,12 +245,12 @@ class Pressed(NamedTuple):
     pressure: float
 
 
-def _pressed(track: Track, gap: Gap, down: float) -> list[Pressed]:
-    """Stretches of the wheel, lowered by ``down`` (m) from where it touches first."""
+def _pressed(track: Track, gap: Gap, height: float) -> list[Pressed]:
+    """Stretches of the wheel, lowered by a height (m) from where its axle is as high as the nominal radius."""
     open_ = np.nan_to_num(gap.gap, nan=np.inf)
-    below = np.flatnonzero(open_ < open_.min() + down)
+    below = np.flatnonzero(open_ < height)
     runs = np.split(below, np.flatnonzero(np.diff(below) > 1) + 1)
-    return [_stretch(track, gap, run, open_.min() + down) for run in runs if len(run)]
+    return [_stretch(track, gap, run, height) for run in runs if len(run)]
 
 
 def _stretch(track: Track, gap: Gap, run: Array, level: float) -> Pressed:

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..basis import write_basis
 from ..data import Mesh, UserError
-from ..exchange.measured import holds_modes, read_measured
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances
@@ -59,7 +58,7 @@ def import_file(file: Path, folder: Path | None, unit: str, instances: Sequence[
     if not ordinary(file).is_file():
         raise UserError(f"{file}: there is no such file; correct the path")
     name = body_name((folder.resolve().name if folder else "") or file.stem)
-    if file.suffix.lower() in _UNIVERSAL and holds_modes(file):
+    if file.suffix.lower() in _UNIVERSAL and _holds_modes(file):
         return _measured(file, (folder or Path(name)) / "basis.h5", unit, name)
     target = (folder or Path(name)) / "body.toml"
     if target.exists():
@@ -82,8 +81,16 @@ def body_name(stem: str) -> str:
 _UNIVERSAL = (".uff", ".uf", ".unv", ".u")
 
 
+def _holds_modes(file: Path) -> bool:
+    from ..exchange.measured import holds_modes
+
+    return holds_modes(file)
+
+
 def _measured(file: Path, target: Path, unit: str, name: str) -> Imported:
     """Modes of a test become a modal file at once: nothing is left to solve."""
+    from ..exchange.measured import read_measured
+
     if target.exists():
         raise UserError(f"{target}: is there already; give another folder as second argument (nothing was changed)")
     basis, told = read_measured(file, unit, name)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import jax.numpy as jnp
+from jax import lax
 
 from ..rolling import strips
 from ..rolling.kalker import creep_coefficients
-from ..rolling.table import CreepTable
+from ..rolling.table import CreepTable, placed
 
 Array = Any
 Creep = Callable[..., tuple[Array, Array, Array]]
@@ -38,40 +41,42 @@ def of_strips(**how: Any) -> Creep:
 
 
 def of_table(table: CreepTable) -> Creep:
-    """What `CreepTable.forces` reads, in a compiled loop; poisson is that of the table."""
-    scales, values = jnp.asarray(table.coefficients), jnp.asarray(table.values)
-    ends = [(float(v[0]), float(v[-1]), len(v)) for v in (table.size, table.azimuth, table.polar)]
-    ends.append((float(jnp.log(table.ratio[0])), float(jnp.log(table.ratio[-1])), len(table.ratio)))
+    """What `CreepTable.forces` reads, in a compiled loop; poisson is that of the table, a/b beyond it is its end."""
+    axes, values = [jnp.asarray(axis) for axis in table.axes], jnp.asarray(table.values)
+    ridge = int(jnp.searchsorted(axes[0], 0.5))
+    least, most = float(table.ratio[0]), float(table.ratio[-1])
 
     def forces(
         xi: Array, eta: Array, phi: Array, a: Array, b: Array, force: Array, friction: Array, shear: Array, _: Array
     ) -> tuple[Array, Array, Array]:  # fmt: skip
-        area, held = a * b, friction * force
-        ratio = jnp.clip(jnp.log(a / b), ends[3][0], ends[3][1])
-        scale = jnp.stack([jnp.interp(ratio, jnp.log(jnp.asarray(table.ratio)), c) for c in scales])
-        r = shear * area / held * scale * jnp.stack([xi, eta, jnp.sqrt(area) * phi])
-        r = jnp.sqrt(jnp.sum(r**2, axis=0) + 1e-30)
-        forward, turned = jnp.where(xi < 0, -1.0, 1.0), jnp.where(phi < 0, -1.0, 1.0)
-        flat = jnp.sqrt((xi / b) ** 2 + (eta / a) ** 2)
-        azimuth = jnp.arctan2(turned * eta * jnp.sqrt(b), jnp.abs(xi) * jnp.sqrt(a))
-        x, y, moment = _straight(values, ends, (r / (1 + r), azimuth, jnp.arctan2(flat, jnp.abs(phi)), ratio))
-        return forward * held * x, turned * held * y, turned * held * jnp.sqrt(area) * moment
+        held, c, ratio = friction * force, jnp.sqrt(a * b), jnp.clip(a / b, least, most)
+        p = strips.poses(xi, eta, phi, a, b, held, jnp.ones_like(a), shear, table.poisson, **table.how)
+        pull = jnp.stack([xi, p.eta * p.stiffness_y / p.stiffness_x, c * p.phi_x]) * p.stiffness_x * c**2 / held
+        three, signs = placed(pull, ratio, jnp)
+        at = [*three, jnp.log(ratio), jnp.log(p.stiffness_y / p.stiffness_x)]
+        weights = [_cubic(axis, v, ridge if k == 0 else 0) for k, (axis, v) in enumerate(zip(axes, at, strict=True))]
+        x, y, moment = jnp.stack([_between(values, weights, i) for i in range(len(xi))], axis=1) * signs * held
+        return x, y, c * moment
 
     return forces
 
 
-def _straight(values: Array, ends: list[tuple[float, float, int]], at: tuple[Array, ...]) -> Array:
-    """(3, n) of (3, ...) values on equal steps, straight between them."""
-    lows, shares = [], []
-    for (low, high, count), v in zip(ends, at, strict=True):
-        place = jnp.clip((v - low) / (high - low), 0.0, 1.0) * (count - 1)
-        lows.append(jnp.clip(jnp.floor(place).astype(int), 0, count - 2))
-        shares.append(place - lows[-1])
-    total: Array = 0.0
-    for corner in range(2 ** len(at)):
-        up = [corner >> k & 1 for k in range(len(at))]
-        weight: Array = 1.0
-        for share, one in zip(shares, up, strict=True):
-            weight = weight * (share if one else 1 - share)
-        total = total + weight * values[(slice(None), *(low + one for low, one in zip(lows, up, strict=True)))]
-    return total
+def _cubic(axis: Array, v: Array, ridge: int) -> tuple[Array, Array]:
+    """First of the points about each place, on one side of a ridge, and Lagrange's weights of them, (n,) and (n, 4)."""
+    many = min(4, len(axis))
+    i = jnp.clip(jnp.searchsorted(axis, v, side="right") - 1, 0, len(axis) - 2)
+    low, high = jnp.where(i >= ridge, ridge, 0), jnp.where(i >= ridge, len(axis) - 1, ridge)
+    first = jnp.clip(i - (many - 1) // 2, low, jnp.maximum(high - many + 1, low))
+    x = axis[first[:, None] + jnp.arange(many)]
+    ways = v[:, None] - x
+    parts = [[ways[:, k] / (x[:, j] - x[:, k]) for k in range(many) if k != j] for j in range(many)]
+    return first, jnp.stack([reduce(mul, part) for part in parts], axis=1)
+
+
+def _between(values: Array, weights: list[tuple[Array, Array]], i: int) -> Array:
+    """(3,) values at the place i."""
+    first = [jnp.int32(0), *(first[i].astype(jnp.int32) for first, _ in weights)]
+    found = lax.dynamic_slice(values, first, [len(values), *(w.shape[1] for _, w in weights)])
+    for _, weight in reversed(weights):
+        found = found @ weight[i]
+    return found

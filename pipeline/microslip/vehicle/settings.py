@@ -119,7 +119,7 @@ class VehicleCase(Model):
     unround: Annotated[tuple[Unround, ...], BeforeValidator(_tuple)] = ()
     wear: WearOfVehicle
     model: ModelOfCase = ModelOfCase(exact=0)
-    table: TableOfCase = TableOfCase(points=(33, 33, 25, 9))
+    table: TableOfCase = TableOfCase(points=(8, 10, 17, 17, 7), elements=(20, 20))
 
     @model_validator(mode="after")
     def _fits(self) -> VehicleCase:

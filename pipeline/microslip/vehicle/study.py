@@ -176,7 +176,8 @@ def _creep(case: VehicleCase, v: Vehicle, report: Callable[[str], None]) -> tupl
     if case.running.creep == "strips":
         return of_strips(**case.how), None
     report("table of creep forces")
-    table = creep_table(float(v.poisson), points=case.table.points, checked=2000, **case.how)
+    how = {k: v for k, v in case.how.items() if k in ("distribution", "coefficients")}
+    table = creep_table(float(v.poisson), checked=2000, **case.table.model_dump(), **how)
     return of_table(table), table
 
 
