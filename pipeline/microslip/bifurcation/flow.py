@@ -117,6 +117,12 @@ def _parts(x: Any) -> list[tuple[Any, Any]]:
 
 
 @cache
+def rates(system: Dynamics) -> Callable[..., Any]:
+    """Compiled function of x (m, n), p and the angle of what drives: x' (m, n)."""
+    return program(jax.vmap(system.rate, (0, None, None)))
+
+
+@cache
 def _pieces(system: Dynamics, relative: float = 1e-11) -> Callable[..., Pieces]:
     """Compiled function of x (b, n), when they begin and how long they last in periods, p, the period, the turns."""
 

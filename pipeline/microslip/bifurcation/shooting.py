@@ -45,7 +45,7 @@ class Orbit:
     @cached_property
     def slope(self) -> Array:
         """(n,) x' at the first node."""
-        return np.asarray(self.system.rate(self.x[0], self.p, 0.0))
+        return np.asarray(flow.rates(self.system)(self.x, self.p, 0.0))[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +82,7 @@ class Shooting:
     @cached_property
     def _moving(self) -> Array:
         """(m n,) x' at the nodes of the reference, scaled."""
-        rate = jax.vmap(self.system.rate, (0, None, None))
-        slopes = np.asarray(rate(self.reference.x, self.reference.p, 0.0))
+        slopes = np.asarray(flow.rates(self.system)(self.reference.x, self.reference.p, 0.0))
         return (slopes / np.asarray(self.system.scale) ** 2).ravel()
 
     def unknowns(self, orbit: Orbit) -> Array:
