@@ -338,6 +338,9 @@ def test_profiles_of_miniprof(tmp_path: Path) -> None:
     assert len(found.y) == 50 and found.y[0] == -0.02  # one of 51 is left out
     np.testing.assert_allclose(found.height([-0.0185, 0.0205]), np.array([-0.0185, 0.0205]) ** 2 / 0.6, atol=1e-9)
     (tmp_path / "r.ban").write_text(head.replace("0.0000", "1.5") + points)
+    (tmp_path / "w.csv").write_text("\n".join(f"{a},{b}" for a, b in zip(y, -(y**2) / 30, strict=True)))
+    with pytest.raises(UserError, match="upside down"):
+        ms.read_profile(tmp_path / "w.csv")
     with pytest.raises(UserError, match="XOffset"):
         ms.read_profile(tmp_path / "r.ban")
 
@@ -385,6 +388,8 @@ WRONG = {
     "no file": ('rail.profile="none.prr"; rail.at=0.76; wheel.at=0.75', "none.prr"),
     "friction in percent": ("friction=30", "friction"),
     "flat": ("rail.width=1.0", "radius"),
+    "a track in millimetres": ("rail.at=750", "rail.at"),
+    "coefficients of another unit": ("rail.profile=[1e9]", "rail: a profile of coefficients"),
     "no radius": ("wheel.profile=0", "wheel: a profile of radius 0 m"),
     "a measured profile that stands anywhere": ('rail.profile="UIC60.prr"; wheel.at=0.75', "rail.at"),
     "files exchanged": ('rail.profile="S1002.prw"; rail.at=0.75; wheel.at=0.75', "exchange wheel and rail"),

@@ -93,6 +93,8 @@ def circle(radius: float, width: float = WIDTH) -> Profile:
 
 Mirror = Literal["", "y", "z", "yz"]
 MINIPROF = (".ban", ".whl")
+DEEP = 0.015
+"""m, that a profile is high if it has a flange, or is that of a rail with its sides."""
 
 
 def read_profile(
@@ -136,6 +138,11 @@ def read_profile(
     if kept.sum() < 5:
         raise UserError(f"{path}: has no five points between {between[0]:g} and {between[1]:g} m; correct that")
     y, z = y[kept], z[kept]
+    middle = float(np.median(z))
+    if np.ptp(z) > DEEP and middle - z.min() > z.max() - middle:
+        raise UserError(
+            f'{path}: lies upside down, as flanges and sides of a head reach down and z with them; set mirror = "z"'
+        )
     return _checked(y, z, str(path), noise)
 
 

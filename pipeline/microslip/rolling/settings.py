@@ -44,7 +44,7 @@ SUFFIXES = {"wheel": (".prw", ".whl"), "rail": (".prr", ".ban")}
 MIDDLES = {"wheel": "axle", "rail": "track"}
 
 BIGGEST = 5.0
-"""m: a wheel's radius above this is given in another unit."""
+"""m: a wheel's radius, or half a track, above this is given in another unit."""
 
 
 class Section(Model):
@@ -62,7 +62,7 @@ class Section(Model):
     noise: Annotated[NotNegative, Field(le=1e-3)] = 0.0
     mirror: Mirror = ""
     between: Annotated[tuple[Number, Number], BeforeValidator(_finite_vector)] | None = None
-    at: Positive = 0.75
+    at: Annotated[Positive, Field(le=BIGGEST)] = 0.75
     young: Positive = 2.1e11
     poisson: Poisson = 0.28
 
@@ -71,6 +71,11 @@ class Section(Model):
         if isinstance(self.profile, float) and not has_arc(self.profile, self.width):
             raise ValueError(
                 f"a profile of radius {self.profile:g} m has no arc {self.width:g} m wide; correct profile or width"
+            )
+        if isinstance(self.profile, tuple) and np.ptp(polynomial(self.profile, self.width).z) > self.width:
+            raise ValueError(
+                f"a profile of coefficients {list(self.profile)} is higher than its {self.width:g} m of width; they "
+                "are in 1/m, 1/m^2, ..."
             )
         return self
 
