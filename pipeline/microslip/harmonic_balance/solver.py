@@ -177,7 +177,7 @@ def _cause(at: AtFrequency, point: Point) -> str:
 
 def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) -> Iterator[Callable[[], Point]]:
     rises = _rises(problem)
-    most = 60 if rises else AMONG
+    most = 60 if rises or not pseudo_transient.serves(problem) else AMONG
     yield from (partial(newton, at, x, most=most, slope=slope, rises=rises) for x in starts)
     if pseudo_transient.serves(problem):
         yield partial(from_rest, problem, at.Omega)
@@ -185,7 +185,7 @@ def _ways(problem: Problem, at: AtFrequency, starts: list[Array], slope: Any) ->
 
 
 AMONG = 20
-"""Steps of Newton's method at most among many bodies: what arrives takes some five."""
+"""Steps of Newton's method at most among many bodies, where pseudo-time serves: what arrives takes some five."""
 
 
 def _rises(problem: Problem) -> int:

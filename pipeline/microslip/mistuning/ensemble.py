@@ -214,7 +214,7 @@ def _read(file: Path | None, inputs: str) -> Array:
 
 def _missed(share: float) -> str:
     why = "it jumps or bends there, or the sweep is coarse; give the sweep more points"
-    return f"{percent(share)} higher between two points: {why}."
+    return f"up to {percent(share)} higher between two points: {why}."
 
 
 def _row(one: Sample) -> list[float]:
