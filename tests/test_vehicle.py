@@ -39,6 +39,14 @@ def rolling(case: VehicleCase, vehicle: motion.Vehicle) -> wearing.Rolling:
     return wearing.Rolling.of(vehicle, linear, t, case.shape())
 
 
+def test_rails_carry_the_load_of_the_axle_whatever_the_suspension() -> None:
+    """The wheelset has sunk by rail and contact where it stands, and the suspension with it."""
+    for stiffness in (1e4, 1e7):
+        v = load_vehicle(CASE, [f"vehicle.suspension_stiffness=[1e7, 5e6, {stiffness}]"])[0].made(CASE.parent)
+        carried = motion.contacts(v, motion.steady(v), np.zeros(2)).vertical
+        np.testing.assert_allclose(carried, 0.5 * 1.5e5, rtol=1e-3)
+
+
 @pytest.mark.slow
 def test_contacts_of_the_motion_are_those_of_a_pose(case: VehicleCase, vehicle: motion.Vehicle) -> None:
     """Force, place, creepages of a turned wheelset against `rolling.wheelset.patches` under the same vertical force."""

@@ -69,7 +69,8 @@ def growth_picture(found: Studied, path: Path, title: str) -> Path:
     for i, n in enumerate(np.sort(np.argsort(-amplitudes[-1])[:SHOWN])):
         panels[0].plot(km, amplitudes[:, n], color=COLOURS[i % len(COLOURS)], label=f"order {n + 1}")
     low = max(1e-4, 1e-3 * float(amplitudes[-1].max()))
-    panels[0].set(xlabel="distance in km", ylabel="amplitude in µm", yscale="log", ylim=(low, None), title=title)
+    panels[0].set(xlabel="distance in km", ylabel="amplitude in µm", yscale="log", ylim=(low, None))
+    panels[0].set_title(f"{title}: {WHEELS[found.wheel]} wheel")
     figure.legend(fontsize=9, loc="outside lower center", ncols=SHOWN)
     if len(found.speeds):
         _over_speed(found, figure, panels[1])
@@ -80,7 +81,10 @@ def _over_speed(found: Studied, figure: Figure, axes: Axes) -> None:
     grown = 1e6 / found.way * found.grown
     most = float(np.abs(grown).max())
     orders = np.arange(1, found.orders + 1)
-    image = axes.pcolormesh(found.speeds, orders, grown.T, cmap="RdBu_r", vmin=-most, vmax=most, shading="nearest")
+    wide = 0.5 if len(found.speeds) == 1 else 0.0  # one speed has no neighbours to tell how wide its column is
+    speeds = [found.speeds[0] - wide, found.speeds[0] + wide] if wide else found.speeds
+    seen = np.repeat(grown, 2, axis=0) if wide else grown
+    image = axes.pcolormesh(speeds, orders, seen.T, cmap="RdBu_r", vmin=-most, vmax=most, shading="nearest")
     axes.set(xlabel="speed in m/s", ylabel="order", title="growth per 1000 km")
     axes.set_yticks(orders[4::5])
     figure.colorbar(image, ax=axes)

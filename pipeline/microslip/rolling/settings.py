@@ -129,6 +129,9 @@ class Creep(Model):
     def _runs(self) -> Creep:
         if self.start == self.stop:
             raise ValueError("creep.stop: must differ from start")
+        low, high = sorted((self.start, self.stop))
+        if self.shown is not None and not low <= self.shown <= high:
+            raise ValueError(f"creep.shown: {self.shown:g} is not between start and stop, {low:g} to {high:g}")
         return self
 
 

@@ -86,6 +86,11 @@ class Row:
     force: float
     area: float
 
+    @property
+    def spacing(self) -> float:
+        """m, the largest step from one point that is pressed to the next."""
+        return float(np.diff(self.x[self.pressure > 1e-6 * self.pressure.max()]).max())
+
 
 def row(state: ContactState, along: Array, elements: int) -> Row:
     """Of a static contact, pressures of points that lie side by side taken together.
@@ -184,7 +189,8 @@ class Studied:
         up, down = c["up_fitted_s"], c["down_fitted_s"]
         return [
             f"The wheel stands with {r.force:.4g} N on a patch {1e3 * r.length:.3g} mm long, at most "
-            f"{r.smooth[:, 1].max() / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s.",
+            f"{r.smooth[:, 1].max() / 1e3:.3g} kPa in the mean over its width; it is passed in {pass_time:.3g} s. "
+            f"Points of the mesh stand up to {1e3 * r.spacing:.2g} mm apart there, which the length is known to.",
             f"After a jump of the slip from 0 the force follows with a time constant of {up[0]:.3g} s at a target of "
             f"{c['slip'][0]:g} and {up[-1]:.3g} s at {c['slip'][-1]:g}.",
             f"After a jump back to 0 it is {down.min():.3g} to {down.max():.3g} s.",

@@ -8,7 +8,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from ..contact.solids import Solid
+from ..contact.solids import Solid, mismatch
 from ..data import Array, UserError
 from .exact import Exact, exact
 from .fastsim import fastsim
@@ -20,6 +20,9 @@ from .wear import strip_depth
 from .wheelset import Patch, Track, across, patches
 
 UNITS = {"longitudinal": "1", "lateral": "1", "spin": "1_per_m"}
+UNLIKE = 0.02
+"""Dundurs' beta from which it is told that the bodies are unlike; 0.17 pull with 0.35 mu F_N at no creepage."""
+
 STEEPEST = 1.5
 """Coefficient of friction above which a warning is due: nothing that rolls on rails is held so well."""
 
@@ -187,6 +190,12 @@ class Studied:
         told = []
         if self.highest > STEEPEST:
             told.append(f"warning: friction is {self.highest:g}; steel on steel has 0.05 to 0.6.")
+        beta = mismatch(*(Solid(s.young, s.poisson) for s in (self.case.wheel, self.case.rail)))
+        if abs(beta) > UNLIKE:
+            told.append(
+                f"warning: wheel and rail are unlike (Dundurs' beta {beta:.2g}): their pressure alone shears them, "
+                "which strips, FASTSIM and Kalker's coefficients leave out and exact half-spaces do not."
+            )
         if self.of_pose is not None and (self.case.heat or self.case.wear):
             told += [*self._slow(), *self._unbalanced()]
         for k, p in enumerate(self.patches):

@@ -29,8 +29,9 @@ class Vehicle(NamedTuple):
 
     Attributes:
         mass, damping, stiffness: (6, 6) of q. spin_inertia: of the wheelset about its axle, kg m2. load: on the
-            wheelset, its weight included, N. torque: that drives it, N m. speed: V. over, reach: see `touch.Touching`.
-            each: load of each wheel by which the half axes of `over` are, N. friction, shear, poisson: of the contact.
+            wheelset without what the suspension takes as it sinks, its weight included, N. torque: that drives it, N m.
+            speed: V. over, reach: see `touch.Touching`. each: load of each wheel as it stands, by which the half axes
+            of `over` are, N. friction, shear, poisson: of the contact.
     """
 
     mass: Array
@@ -186,13 +187,17 @@ def _linearised(v: Vehicle, creep: Creep, x: Array) -> tuple[Array, Array]:
     return rates(v, creep, x, none, none)[0], jax.jacfwd(lambda x: rates(v, creep, x, none, none)[0])(x)
 
 
+def sunk(t: Touch, each: float, stiffness: Array) -> tuple[float, float]:
+    """How deep, m, wheelset and rails stand under the load of each wheel, where `t` is that of no shift."""
+    rail = each / float(stiffness[4, 4])
+    return float(t.height[0]) + (each / float(t.spring[0])) ** (2 / 3) + rail, rail
+
+
 def steady(v: Vehicle) -> Array:
     """(13,) of round wheels that run straight, by Kalker's linear theory."""
     t = at(v.over, v.reach, jnp.zeros(()))
-    half = 0.5 * v.load
     x = np.zeros(STATES)
-    rail = half / float(v.stiffness[4, 4])
-    x[1] = float(t.height[0]) + (half / float(t.spring[0])) ** (2 / 3) + rail
+    x[1], rail = sunk(t, v.each, v.stiffness)
     x[4:6], x[2 * Q] = rail, v.speed / float(t.radius[0])
     for _ in range(30):
         f, J = map(np.asarray, _linearised(v, linear, x))

@@ -17,8 +17,8 @@ from ..rolling.wheelset import Track
 from ..settings.body import Model, Name, NotNegative, Number, Positive, _tuple, load_toml, override
 from ..settings.mistakes import validate
 from ..system.lumped import Body, Link, System
-from .motion import Vehicle
-from .touch import touching
+from .motion import Vehicle, sunk
+from .touch import at, touching
 
 Three = Annotated[tuple[NotNegative, NotNegative, NotNegative], BeforeValidator(_tuple)]
 Inertia = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
@@ -28,9 +28,9 @@ class VehicleOfCase(Model):
     """A wheelset and its primary suspension to a frame that moves straight on.
 
     Attributes:
-        load: of the axle on both rails, its own weight included, N. mass: of the wheelset, kg. inertia: of roll, spin
-            and yaw, kg m2. suspension_stiffness, suspension_damping: of each side, along x, y, z, N/m and N s/m.
-            suspension_at: of each side from the middle, m.
+        load: of the axle on both rails as it stands, its own weight included, N. mass: of the wheelset, kg. inertia:
+            of roll, spin and yaw, kg m2. suspension_stiffness, suspension_damping: of each side, along x, y, z, N/m and
+            N s/m. suspension_at: of each side from the middle, m.
     """
 
     load: Positive
@@ -124,6 +124,8 @@ class VehicleCase(Model):
     @model_validator(mode="after")
     def _fits(self) -> VehicleCase:
         most = max((u.order for u in self.unround), default=1)
+        if most > self.running.orders:
+            raise ValueError(f"running.orders: {self.running.orders} leave out order {most}; give that or more")
         if self.running.places < 8 * max(most, self.running.orders):
             raise ValueError(
                 f"running.places: {self.running.places} do not show waves of order {max(most, self.running.orders)}; "
@@ -148,7 +150,8 @@ class VehicleCase(Model):
         found = touching(track, each, self.running.reach)
         M, C, K = self.lumped().matrices()
         _, spin, _ = self.vehicle.inertia
-        return Vehicle(M, C, K, spin, self.vehicle.load, self.running.torque, self.running.speed, found.over,
+        held = K[1, 1] * sunk(at(found.over, found.reach, 0.0), each, K)[0]  # of the suspension, as it has sunk
+        return Vehicle(M, C, K, spin, self.vehicle.load + held, self.running.torque, self.running.speed, found.over,
                        found.reach, each, self.friction, elastic.shear, elastic.poisson)  # fmt: skip
 
     def lumped(self) -> System:

@@ -127,12 +127,18 @@ class Studied:
         n = int(np.abs(shape[1:]).argmax()) + 1
         if not np.abs(shape[n]) > 1e-9:
             return []
+        part, depth = 360 / n, self.rolling.tread.seen(now.taken, now.one.on)[:, k]
+        crest = -np.rad2deg(np.angle(shape[n])) / n
+        most = (360 * int(depth.argmax()) / len(depth) - crest + part / 2) % part - part / 2
         behind = np.rad2deg(np.angle(shape[n] / worn[n])) / n
         double = np.abs(worn[2 * n]) / np.abs(worn[n])
+
+        def lies(angle: float) -> str:
+            return f"{abs(angle):.3g} degrees {'behind' if angle > 0 else 'before'}"
+
         return [
-            f"A new {WHEELS[k]} wheel with {n} crests wears most {abs(behind):.3g} degrees "
-            f"{'behind' if behind > 0 else 'before'} them; waves of order {2 * n} of the wear are {double:.2g} times "
-            f"those of order {n}."
+            f"A new {WHEELS[k]} wheel with {n} crests wears most {lies(most)} them. Of its wear, the waves of order "
+            f"{n} lie {lies(behind)} them; those of order {2 * n} are {double:.2g} times as large."
         ]
 
     def _hunts(self) -> str:
