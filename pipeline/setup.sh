@@ -137,4 +137,5 @@ pyvista_works() {
 if ! { gmsh_works && pyvista_works; } && has_apt; then install $LIBRARIES; fi
 gmsh_works || stop "gmsh does not start, a system library is missing: $("$INSIDE" -c 'import gmsh' 2>&1 | tail -n 1)"
 pyvista_works || say "warning: PyVista cannot draw on this machine; all else works, reports go without pictures of bodies"
+rm -f "$VENV/.ready" # a copy of the environment may share the file with the one it was copied from
 printf '%s\n' "$(pwd -P)" >"$VENV/.ready"

@@ -52,22 +52,35 @@ def read_kinematics(path: Path) -> Kinematics:
     """
     try:
         text = store.ordinary(path).read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: there is no such table of kinematics; correct kinematics.file") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as kinematics ({error}); correct the path") from error
+        raise UserError(f"{path}: cannot be read as a table of kinematics; correct kinematics.file") from error
     rows = list(csv.reader(text.splitlines()))
     head = [h.strip() for h in rows[0]] if rows else []
     if missing := [c for c in (*NEEDED, *GIVEN) if c not in head]:
         raise UserError(
             f"{path}: has no column {missing[0]}; its first line names the columns {', '.join(head) or '-'}"
         )
-    try:
-        table = np.array([[float(r[head.index(c)]) for c in (*NEEDED, *GIVEN)] for r in rows[1:] if r]).T
-    except (ValueError, IndexError) as error:
-        raise UserError(f"{path}: {error}; every row needs a number in every column") from error
-    if table.ndim != 2 or table.shape[1] < 8 or not np.isfinite(table).all():
-        raise UserError(f"{path}: has no eight rows of finite numbers; write what is not known as no row at all")
-    found = Kinematics(*table)
+    numbers = [_numbers(row, head, f"{path}: row {n}") for n, row in enumerate(rows[1:], 2) if row]
+    if len(numbers) < 8:
+        raise UserError(f"{path}: has {len(numbers)} rows of numbers; give eight at the least")
+    found = Kinematics(*np.array(numbers).T)
     _sound(found, path)
+    return found
+
+
+def _numbers(row: list[str], head: list[str], where: str) -> list[float]:
+    """Of the columns that are known, in their order."""
+    found = []
+    for column in (*NEEDED, *GIVEN):
+        cell = row[head.index(column)] if head.index(column) < len(row) else ""
+        try:
+            found.append(float(cell))
+        except ValueError:
+            found.append(np.nan)
+        if not np.isfinite(found[-1]):
+            raise UserError(f"{where}: {column}: '{cell.strip()}' is no finite number; leave out what is not known")
     return found
 
 
@@ -104,7 +117,14 @@ def contacts_of(k: Kinematics, track: Track, side: str, places: int) -> list[Con
     """
     load = float(np.mean(k.normal_force))
     lateral = np.linspace(k.lateral.min() - 1e-6, k.lateral.max() + 1e-6, POSES)
-    poses = [patches(track, Pose(float(y)), side, load)[0] for y in lateral]
+    try:
+        poses = [patches(track, Pose(float(y)), side, load)[0] for y in lateral]
+    except UserError as error:
+        far = int(np.abs(k.lateral).argmax())
+        raise UserError(
+            f"kinematics.file: the {side} wheel does not stay on its rail between {k.lateral.min():.4g} and "
+            f"{k.lateral.max():.4g} m of lateral_m (row {far + 2} is farthest): {error}"
+        ) from error
     shape = np.array([[p.a, p.b, p.on_wheel, p.angle, p.normal_force] for p in poses]).T
     turns = []
     for n in range(k.turns):

@@ -13,6 +13,7 @@ from ..rolling.table import CreepTable, creep_table
 from .creep import Creep, linear, of_strips, of_table
 from .motion import Vehicle, critical_speed, hunting, roots, steady
 from .settings import VehicleCase
+from .touch import at
 from .wearing import Jump, LeavesTheRail, Now, Rolling, growth, jumps, orders_of, tread
 
 WHEELS = ("right", "left")
@@ -113,7 +114,7 @@ class Studied:
             f"{len(self.history) - 1} jumps: their errors, each less than its difference to a jump of first order, "
             f"are together below {1e6 * error:.2g} um of the radius."
         )
-        told.append(self._hunts())
+        told += [self._hunts(), *self._deep()]
         if self.table is not None:
             told.append(f"Creep forces of the motion are read from a table, {100 * self.table.error[:, 0].max():.2g} % "
                         "of mu F_N off in the mean; those of the wear are not.")  # fmt: skip
@@ -140,6 +141,17 @@ class Studied:
             f"A new {WHEELS[k]} wheel with {n} crests wears most {lies(most)} them. Of its wear, the waves of order "
             f"{n} lie {lies(behind)} them; those of order {2 * n} are {double:.2g} times as large."
         ]
+
+    def _deep(self) -> list[str]:
+        """What is worn may be deeper than the bodies approach."""
+        v = self.vehicle
+        t = at(v.over, v.reach, 0.0)
+        approach = float((v.each / t.spring[0]) ** (2 / 3))
+        deepest = float(self.history[-1][0].depth.max())
+        return [
+            f"warning: a groove of {1e3 * deepest:.3g} mm is deeper than wheel and rail approach, {1e3 * approach:.2g} "
+            "mm, and the profile across is not renewed: what follows from there on is a guess."
+        ] if deepest > approach else []  # fmt: skip
 
     def _hunts(self) -> str:
         root = hunting(self.vehicle)

@@ -65,7 +65,13 @@ def touching(track: Track, load: float, reach: float, points: int = 33) -> Touch
         UserError: a wheel that leaves the profile of its rail within the reach; in two patches under half the load.
     """
     y = np.linspace(-reach, reach, points)
-    half = [_standing(track, load, v) for v in y[points // 2 :]]
+    half = []
+    for v in y[points // 2 :]:
+        try:
+            half.append(_standing(track, load, v))
+        except UserError as error:
+            less = "" if str(error).startswith("running.reach") else "; or take a smaller running.reach"
+            raise UserError(f"at {1e3 * v:.3g} mm of lateral displacement: {error}{less}") from error
     # what the right wheel has at y the left one has at -y, mirrored
     right = [_mirrored(one[1]) for one in half[:0:-1]] + [one[0] for one in half]
     left = [_mirrored(one) for one in right[::-1]]
