@@ -115,14 +115,14 @@ class AverageLink:
     """A reference node that follows nodes in the mean: the rigid motion that fits theirs best, by weights.
 
     Attributes:
-        reference: node. members: nodes, or the face or point set that has them. weights: (m,) of the members, or one
-            for all. directions: which of the reference node's x, y, z and rotations a, b, c follow.
+        reference: node. members: nodes, or the face that has them. weights: (m,) of the members; None: their tributary
+            areas of the face. directions: which of the reference node's x, y, z and rotations a, b, c follow.
     """
 
     where: str
     reference: int
     members: Indices | str
-    weights: Array
+    weights: Array | None
     directions: str = "xyzabc"
 
 

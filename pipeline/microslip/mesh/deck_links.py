@@ -196,7 +196,7 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
     if "INFLUENCE RADIUS" in card.parameters:
         raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    members = reading.surface(card.parameters.get("SURFACE", ""), card, space)
+    members, weights = _weighed(reading, card, reading.surface(card.parameters.get("SURFACE", ""), card, space))
     moves, every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
     if "ORIENTATION" in card.parameters and (len(moves) < 3 or len(every) < 6):
         raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
@@ -205,7 +205,19 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
         return
     if following.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
         raise Damaged("*DISTRIBUTING is read with WEIGHTING METHOD=UNIFORM alone")
-    yield AverageLink(_where(card), reference, members, np.ones(1), every)
+    yield AverageLink(_where(card), reference, members, weights, every)
+
+
+def _weighed(reading: _Reading, card: Card, surface: str) -> tuple[Indices | str, Array | None]:
+    """By the areas of a surface of facets, by the numbers that a surface of nodes has beside them (1 if none)."""
+    _, kind, rows, space = next(s for s in reading.deck.surfaces if s[0] == surface)
+    if kind != "NODE":
+        return surface, None
+    weights: dict[int, float] = {}
+    for name, weight in ([*row, ""][:2] for row in rows):
+        number = _number(weight, f"a weight of the surface '{surface}'") if weight else 1.0
+        weights.update(dict.fromkeys(reading.nodes(name, card, space).tolist(), number))
+    return np.array(list(weights), dtype=np.int64), np.array(list(weights.values()))
 
 
 def _nothing(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:

@@ -72,5 +72,8 @@ class _References:
         if isinstance(link.members, str):
             return link.members
         there = self.number[link.members] >= 0
-        others = [self._reference(int(p)) for p in link.members[~there] if isinstance(link, RigidLink)]
+        if isinstance(link, AverageLink) and not there.all():
+            loose = self.raw.node_id[link.members[~there][0]]
+            raise Damaged(f"{link.where} takes in node {loose}, which no solid cell uses; name nodes of cells")
+        others = [self._reference(int(p)) for p in link.members[~there]]
         return np.concatenate([self.number[link.members[there]], np.array(others, dtype=np.int64)])
