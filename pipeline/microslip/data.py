@@ -209,6 +209,7 @@ class Mesh:
         inner: name of a set of facets that cannot serve as a face -> (facets inside the volume, all of them).
         supports: point set -> directions that the file holds at zero, like ``xyz``. not_held: the file's constraints
             that are not among them, in words. unended: what the file lacks at its end, in words, or nothing.
+        lost: what carries mass, stiffness or a constraint in the file and is not read, in words.
         remarks: what of the file is read as something else or not used, in words. instances: name -> points.
         joints: faces that the file lets touch. preloads: of its bolts: where it stands, force in the file's unit.
         links: constraints of the file, and ties: the equations that `fem.links.linked` makes of them, or None.
@@ -227,6 +228,7 @@ class Mesh:
     supports: Mapping[str, str] = field(default_factory=dict)
     not_held: tuple[str, ...] = ()
     unended: str = ""
+    lost: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     instances: Mapping[str, Indices] = field(default_factory=dict)
     joints: tuple[Joint, ...] = ()

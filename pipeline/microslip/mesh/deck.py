@@ -50,6 +50,7 @@ class Deck:
     Attributes:
         spaces: instance in capitals -> its place; "" is the assembly's own (or the whole of a flat file).
         links: constraints, contacts and loads, each with the instance it stands in, resolved at the end.
+        lost: what counts and is not read, in words.
         system: (4, 3) axes and origin in which nodes are written, or None. ignored: keywords that are not used.
     """
 
@@ -75,6 +76,7 @@ class Deck:
     links: list[tuple[Card, str]] = field(default_factory=list)
     system: Array | None = None
     ignored: list[str] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
 
     def place(self, word: str, space: str = "") -> tuple[Space, str]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Array, AverageLink, Equation, FaceTie, Indices, Link, RigidLink
 from .cards import Card, fields
 from .deck import Deck
-from .raw import Damaged, Numbering, is_number
+from .raw import Damaged, Numbering, is_number, lost
 
 KEYWORDS = (
     "TIE", "EQUATION", "MPC", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "COUPLING", "KINEMATIC", "DISTRIBUTING",
@@ -89,7 +89,7 @@ def _where(card: Card) -> str:
 
 def _tie(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
     if "CYCLIC SYMMETRY" in card.parameters:
-        reading.left_out.append(f"{_where(card)} of cyclic symmetry; write [cyclic] in body.toml")
+        reading.left_out.append(lost(card.where, "*TIE of CYCLIC SYMMETRY (write [cyclic] in body.toml)"))
         return
     text = card.parameters.get("POSITION TOLERANCE", "")
     tolerance = _number(text, "POSITION TOLERANCE") if text else None
@@ -139,9 +139,10 @@ def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> I
     for line in card.lines:
         kind, *words = [*fields(line), ""]
         words = [word for word in words if word]
-        if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK") or len(words) < 2:
-            reading.left_out.append(f"{card.where}: *MPC of the kind {kind}")
-            continue
+        if kind.upper() not in ("PIN", "TIE", "BEAM", "LINK"):
+            raise Damaged(f"*MPC of the kind '{kind}' is not read; PIN, TIE, BEAM and LINK are")
+        if len(words) < 2:
+            raise Damaged(f"*MPC {kind} names fewer than two nodes")
         members, other = reading.nodes(words[0], card, space), reading.nodes(words[1], card, space)
         if len(other) not in (1, len(members)):
             raise Damaged(f"*MPC {kind} names {len(members)} and {len(other)} nodes; give one to each, or one to all")
@@ -168,13 +169,15 @@ def _old_coupling(reading: _Reading, card: Card, space: str, following: Card | N
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
-        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), _ways([words[1:]])[0])
+        moves, every = _ways([words[1:]])
+        _refuse_turned(reading, every)
+        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), moves)
     if not card.lines:
         raise Damaged("*KINEMATIC COUPLING couples no nodes to its reference node; add them")
 
 
 def _not_read(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
-    reading.left_out.append(f"{_where(card)} of elements DCOUP3D; write *COUPLING with *DISTRIBUTING")
+    reading.left_out.append(lost(card.where, "*DISTRIBUTING COUPLING (write *COUPLING with *DISTRIBUTING)"))
     return iter(())
 
 
@@ -190,6 +193,11 @@ def _ways(lines: list[list[str]]) -> tuple[str, str]:
     return "".join(w for w in every if w in "xyz"), every
 
 
+def _refuse_turned(reading: _Reading, every: str) -> None:
+    if reading.deck.turned and every not in ("xyz", "xyzabc", "abc"):
+        raise Damaged("a coupling in single directions beside a *TRANSFORM may mean local ones; write global ones")
+
+
 def _coupling(reading: _Reading, card: Card, space: str, following: Card | None) -> Iterator[Link]:
     if following is None or following.keyword not in ("KINEMATIC", "DISTRIBUTING"):
         raise Damaged("*COUPLING is followed by neither *KINEMATIC nor *DISTRIBUTING; say which it is")
@@ -200,6 +208,7 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
     moves, every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
     if "ORIENTATION" in card.parameters and (len(moves) < 3 or len(every) < 6):
         raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
+    _refuse_turned(reading, every)
     if following.keyword == "KINEMATIC":
         yield RigidLink(_where(card), reference, members, moves)
         return

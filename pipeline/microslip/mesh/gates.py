@@ -26,7 +26,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
-    examined at the quadrature points when they are assembled). Warnings: a file without its end, first-order cells,
+    examined at the quadrature points when they are assembled). Warnings: a file without its end, what of it is not read, first-order cells,
     sets of facets that cannot serve as faces, parts that share no points (`modes.unconstrained` refuses those that
     nothing holds).
     """
@@ -57,6 +57,7 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
             )
     if mesh.unended:
         warnings.append(f"the file has {mesh.unended}, so it may be cut; write it again, or add that if it is whole")
+    warnings += mesh.lost
     warnings += [
         f"{inside} of {count} facets of the set '{name}' are not on the surface of the volume mesh; it is no face"
         for name, (inside, count) in mesh.inner.items()

@@ -24,7 +24,7 @@ from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .instances import local_system, numbered, outline, place, placement, places
 from .materials import isotropic_rows, orthotropic_row
-from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, refuse_twice
+from .raw import Damaged, DeckMaterial, Numbering, RawMesh, joined, lost, refuse_twice
 from .supports import Constraints, add_supports
 
 _SOLIDS = {
@@ -135,10 +135,15 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
         if card.keyword in (*LINKS, *JOINTS):
             deck.links.append((card, ""))
         if card.keyword not in _READERS:
-            if card.keyword not in (*_SILENT, *LINKS, *JOINTS):
+            if _COUNTS.fullmatch(card.keyword):
+                deck.lost.append(lost(card.where, f"*{card.keyword}"))
+            elif card.keyword not in (*_SILENT, *LINKS, *JOINTS):
                 deck.ignored.append(card.keyword)
             continue
         _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
+        kind = card.parameters.get("TYPE", "").upper()
+        if card.keyword == "ELEMENT" and card.lines and not _cell_type(kind) and kind != "DCOUP3D":
+            deck.lost.append(lost(card.where, f"*ELEMENT, TYPE={kind}"))
 
 
 def _told(card: Card, work: Callable[[Card], Any]) -> Any:
@@ -191,9 +196,14 @@ def _read_system(deck: Deck, parameters: dict[str, str], lines: list[str]) -> No
     deck.system = local_system(_table(lines, "*SYSTEM"))
 
 
+def _cell_type(kind: str) -> re.Match[str] | None:
+    """Family and number of nodes of a solid or a facet; None of other elements."""
+    return re.match(r"(D?C3D|AC3D|CPS|CPE|CAX|M3D|SFM3D|R3D|STRI|DS|S|DC2D)(\d+)", kind)
+
+
 def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     kind = parameters.get("TYPE", "").upper()
-    match = re.match(r"(D?C3D|AC3D|CPS|CPE|CAX|M3D|SFM3D|R3D|STRI|DS|S|DC2D)(\d+)", kind)
+    match = _cell_type(kind)
     if match is None:
         return  # beams, springs, masses and the like
     solid = match[1] in ("C3D", "DC3D", "AC3D")
@@ -414,6 +424,14 @@ _SILENT = {
 }  # fmt: skip
 """Keywords that say nothing of the body."""
 
+_COUNTS = re.compile(
+    "MASS|ROTARY INERTIA|NONSTRUCTURAL MASS|SPRING|DASHPOT|GAP|JOINT|CONNECTOR [A-Z]+|EMBEDDED ELEMENT|"
+    "SHELL TO SOLID COUPLING|FASTENER|MATRIX (INPUT|ASSEMBLE)|SUBSTRUCTURE [A-Z]+|USER ELEMENT|UEL PROPERTY|"
+    "CONTACT|CYCLIC SYMMETRY MODEL|HYPERELASTIC|HYPERFOAM|MODEL CHANGE|FOUNDATION|"
+    "(BEAM|BEAM GENERAL|SHELL|SHELL GENERAL|MEMBRANE|FRAME|COHESIVE|GASKET|CONNECTOR) SECTION"
+)
+"""Keywords that add mass, stiffness or constraints and are not read."""
+
 _READERS: dict[str, Callable[[Deck, dict[str, str], list[str]], None]] = {
     "SYSTEM": _read_system,
     "BOUNDARY": _read_boundary,
@@ -457,9 +475,9 @@ def _assembled(deck: Deck) -> RawMesh:
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
     raw.links, left_out = links_of(deck, numbering, points)
+    raw.lost = [*deck.lost, *left_out]
     raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
-    deck.not_held += left_out
     add_supports(raw, _constraints(deck), numbering)
     for cells in deck.facets:
         cells.nodes = numbering.positions(cells.nodes[:, : _CORNERS[cells.nodes.shape[1]]], "*ELEMENT names")

@@ -146,3 +146,8 @@ def place(whole: Deck, part: Deck, name: str, at: Placement, space: Space) -> No
     whole.surfaces += [(space.prefix + surface[0], *surface[1:3], key) for surface in part.surfaces]
     whole.links += [(card, key) for card, _ in part.links]
     whole.ignored += part.ignored
+    whole.lost += [text for text in part.lost if text not in whole.lost]
+    whole.held += [(f"{name}.{word}", directions) for word, directions in part.held]
+    whole.temperatures += [(column, f"{name}.{word}", value) for column, word, value in part.temperatures]
+    whole.not_held += part.not_held
+    whole.turned |= part.turned

@@ -55,6 +55,7 @@ class RawMesh:
         supports: point set -> directions out of x, y, z held at zero. not_held: constraints not read, in words.
         links: constraints between nodes, by positions in `points`, tolerances in the file's unit.
         unended: what the file lacks at its end, in words: it may be cut there. Nothing if it tells that it is whole.
+        lost: what carries mass, stiffness or a constraint and is not read, in words.
         remarks: what was read as something else or not used, in words. instances: name -> positions. joints: pairs of
             faces in contact. preloads: of bolts: where it stands, force in the file's unit.
     """
@@ -72,6 +73,7 @@ class RawMesh:
     not_held: list[str] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     unended: str = ""
+    lost: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     instances: dict[str, Indices] = field(default_factory=dict)
     joints: list[Joint] = field(default_factory=list)
@@ -96,6 +98,11 @@ class RawMesh:
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id, "element")
+
+
+def lost(where: str, what: str) -> str:
+    """What is said of something that is not read although it counts; `where`: file and line."""
+    return f"{where}: {what} is not read: the mass, stiffness or constraint is missing, so frequencies will differ"
 
 
 def joined(parts: Iterable[Indices]) -> Indices:
