@@ -16,6 +16,7 @@ import numpy as np
 
 from ..data import Array, Indices
 from ..elasticity import turned, turned_strain
+from ..frames import rotation
 from .cards import Card, data_of, fields, read_cards
 from .deck import Cells, Deck, DeckConstants
 from .deck_joints import KEYWORDS as JOINTS
@@ -349,9 +350,6 @@ def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) 
         deck.orientations[key] = f"*ORIENTATION, NAME={name} of the system {system}"
         return
     rows = _table(lines, f"*ORIENTATION, NAME={name}")
-    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
-        deck.orientations[key] = f"*ORIENTATION, NAME={name} with an additional rotation"
-        return
     if not rows or len(rows[0]) not in (6, 9):
         raise Damaged(f"*ORIENTATION, NAME={name} needs the six coordinates of two points")
     origin = np.array(rows[0][6:9]) if len(rows[0]) == 9 else np.zeros(3)
@@ -360,7 +358,12 @@ def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) 
     if not np.linalg.norm(normal) > 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
         raise Damaged(f"the points of *ORIENTATION, NAME={name} lie on a line")
     x, z = a / np.linalg.norm(a), normal / np.linalg.norm(normal)
-    deck.orientations[key] = np.array([x, np.cross(z, x), z])
+    axes = np.array([x, np.cross(z, x), z])
+    if len(rows) > 1 and len(rows[1]) > 1 and rows[1][1]:
+        if rows[1][0] not in (1, 2, 3):
+            raise Damaged(f"*ORIENTATION, NAME={name} turns about the axis {rows[1][0]:g}, which is none of 1, 2, 3")
+        axes = axes @ rotation(axes[int(rows[1][0]) - 1], np.radians(rows[1][1])).T
+    deck.orientations[key] = axes
 
 
 def _read_temperature(deck: Deck, parameters: dict[str, str], lines: list[str], column: int = 1) -> None:
@@ -542,8 +545,8 @@ def _deck_material(deck: Deck, key: tuple[str, str], where: str) -> DeckMaterial
     turn = deck.orientations[key[1]] if key[1] else None
     axes = None if isinstance(turn, str) else turn
     if refused := found.refused or (turn if isinstance(turn, str) else ""):
-        name = f"{found.name} ({refused}, which is not read)"
-        return DeckMaterial(name, None, found.density, np.zeros(6), None, where)
+        text = f"{refused}, which is not read; write another form, or give density and stiffness in a body.toml"
+        return DeckMaterial(found.name, None, found.density, np.zeros(6), None, where, text)
     C, table = None, None
     if found.isotropic is not None:
         C, table = isotropic_rows(found.name, found.isotropic)

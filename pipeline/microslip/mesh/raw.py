@@ -21,6 +21,10 @@ class Damaged(ValueError):
     """A mesh file that contradicts itself or ends too early. The text says how, without the file's name."""
 
 
+class Unread(Damaged):
+    """A material of a kind that is not read. Another one in its place would be wrong."""
+
+
 @dataclass(frozen=True)
 class DeckMaterial:
     """A material as a file writes it, in the file's units.
@@ -28,7 +32,8 @@ class DeckMaterial:
     Attributes:
         name: as in the file. elasticity: (6, 6) Hooke matrix in the order `VOIGT`, in body axes; None: missing.
         density: None: missing. expansion: (6,) thermal strain per degree. temperature: (t, 2) temperature and factor on
-            the elasticity, or None. where: the set of cells that it was given to.
+            the elasticity, or None. where: the set of cells that it was given to. refused: what of it is not read, in
+            words, and what to do.
     """
 
     name: str
@@ -37,6 +42,7 @@ class DeckMaterial:
     expansion: Array
     temperature: Array | None = None
     where: str = ""
+    refused: str = ""
 
 
 @dataclass

@@ -19,6 +19,7 @@ from ..data import Mesh, UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances
+from ..mesh.raw import Unread
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -254,6 +255,8 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     try:
         mesh = read_mesh(file, unit, system)
     except UserError as error:
+        if isinstance(error.__cause__, Unread):  # steel in its place would be wrong
+            raise
         mesh = read_mesh(file, unit)  # its materials alone may be at fault
         told.append(f"warning: {error}")
     joints = [f"{j.where}: '{j.slave}' on '{j.master}': make them interfaces and a contact" for j in mesh.joints]
