@@ -255,7 +255,9 @@ def test_constraints_of_nastran_and_ansys_are_those_of_abaqus(tmp_path):
         *grid, *_listed("RBE2,1,901,123456", top), *_listed("RBE3,2,,902,123456,1.0,123", free),
         f"MPC,3,{free[0]},1,2.0,{free[1]},2,-1.0", "MPC,3,901,5,1.0,902,4,-0.5",
     ]  # fmt: skip
-    bulk = test_bdf.bulk(BEAM).replace("ENDDATA\n", "\n".join([*cards, "ENDDATA"]) + "\n")
+    bulk = (
+        test_bdf.bulk(BEAM).replace("CEND", "CEND\nMPC = 3").replace("ENDDATA\n", "\n".join([*cards, "ENDDATA"]) + "\n")
+    )
     (tmp_path / "a.bdf").write_text(bulk)
     two = linked(read_mesh(tmp_path / "a.bdf", "m"))[0]
     ours, theirs = solved(one, fixed, 6), solved(two, fixed, 6)

@@ -26,9 +26,9 @@ def mesh_problems(mesh: Mesh) -> tuple[list[str], list[str]]:
     """Look for what would spoil a solution: (errors, warnings), each a sentence without the file's name.
 
     Errors: coincident points, repeated points in a cell, inside-out cells (by their corners; curved cells are
-    examined at the quadrature points when they are assembled). Warnings: a file without its end, what of it is not read, first-order cells,
-    sets of facets that cannot serve as faces, parts that share no points (`modes.unconstrained` refuses those that
-    nothing holds).
+    examined at the quadrature points when they are assembled). Warnings: a file without its end, what of it is not
+    read, first-order cells, sets of facets that cannot serve as faces, parts that share no points
+    (`modes.unconstrained` refuses those that nothing holds).
     """
     errors, warnings = [], []
     for cell_type, cells in mesh.cells.items():

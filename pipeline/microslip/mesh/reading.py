@@ -259,7 +259,8 @@ def _assemble_mesh(raw: RawMesh, points: Array, cells: dict[str, Indices], metre
     supports = {n: directions for n, directions in raw.supports.items() if n in known}
     return replace(
         mesh, faces=faces, inner=inner, supports=supports, not_held=tuple(raw.not_held), unended=raw.unended,
-        links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints), preloads=tuple(raw.preloads),
+        links=links, lost=tuple(raw.lost), remarks=tuple(raw.remarks), joints=tuple(raw.joints),
+        preloads=tuple(raw.preloads),
         instances={n: kept for n, s in raw.instances.items() if len(kept := _kept(renumber[s]))},
     )  # fmt: skip
 
