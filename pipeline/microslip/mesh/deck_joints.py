@@ -56,6 +56,15 @@ def preloads_of(deck: Deck) -> list[tuple[str, float]]:
     return found
 
 
+def unpressed(deck: Deck) -> list[str]:
+    """What is said of sections without such a force."""
+    pressed = {where for where, _ in preloads_of(deck)}
+    every = [f"{card.where}: *PRE-TENSION SECTION" for card, _ in deck.links if card.keyword == "PRE-TENSION SECTION"]
+    return [
+        f"{w} has no *CLOAD on its node: its preload is not taken, write it yourself" for w in every if w not in pressed
+    ]
+
+
 def unused_loads(deck: Deck) -> list[str]:
     """Keywords of loads that are no preloads of bolts."""
     sections = [card.parameters.get("NODE", "-") for card, _ in deck.links if card.keyword == "PRE-TENSION SECTION"]

@@ -20,7 +20,7 @@ from ..frames import rotation
 from .cards import Card, data_of, fields, read_cards
 from .deck import Cells, Deck, DeckConstants
 from .deck_joints import KEYWORDS as JOINTS
-from .deck_joints import joints_of, preloads_of, unused_loads
+from .deck_joints import joints_of, preloads_of, unpressed, unused_loads
 from .deck_links import KEYWORDS as LINKS
 from .deck_links import links_of
 from .instances import local_system, numbered, outline, place, placement, places
@@ -478,7 +478,7 @@ def _assembled(deck: Deck) -> RawMesh:
             name = deck.written[key]
             raw.add_points(name, numbering.positions(members, f"the node set '{name}' names"))
     raw.links, left_out = links_of(deck, numbering, points)
-    raw.lost = [*deck.lost, *left_out]
+    raw.lost = [*deck.lost, *left_out, *unpressed(deck)]
     raw.joints, raw.preloads = joints_of(deck), preloads_of(deck)
     raw.instances = {name: numbering.positions(np.unique(ids), "") for name, ids in deck.instances.items()}
     add_supports(raw, _constraints(deck), numbering)

@@ -266,7 +266,7 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
     told.insert(0, f"{file}: {mesh.n_points} points, {kinds}")
     told += [f"warning: {text}" for texts in mesh_problems(mesh) for text in texts]
     told += [f"note: {text}" for text in mesh.remarks]
-    told += [*ties, *(joints if not instances else ())]
+    told += [*ties, *((*joints, *_pressed(mesh)) if not instances else ())]
     held, said = _supports(mesh)
     told += said
     lines = [] if "[[supports]]" in held else ["free = true               # nothing is held yet"]
@@ -285,6 +285,15 @@ def _mesh(file: Path, folder: Path, unit: str, instances: Sequence[str] = ()) ->
         lines += ["", "#[temperature]", '#from = "mesh"', '#scale = "C"']
         told.append("temperatures: used only once [temperature] of body.toml is uncommented")
     return [*lines, *held, *_sets(mesh, bool(held)), *_END], told
+
+
+def _pressed(mesh: Mesh) -> list[str]:
+    """Preloads of bolts that are one body with all that they hold: no contact takes them."""
+    return [
+        f"warning: {where}: the preload of {force:g} N is not used: the bolt and all that it holds are one "
+        "body; tie it to one side alone, with a *CONTACT PAIR on the other"
+        for where, force in mesh.preloads
+    ]
 
 
 def _matrices(file: Path, folder: Path, unit: str) -> tuple[list[str], list[str]]:

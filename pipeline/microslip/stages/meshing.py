@@ -187,7 +187,7 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
             raise UserError(f"{job.path}: geometry.instances: {path} {error}") from None
     if job.settings.geometry.mesh is not None:
         mesh = _faces_by_rule(job, mesh)
-    mesh = _linked(path, mesh)
+    mesh = linked_mesh(path, mesh)
     errors, warnings = mesh_problems(mesh)
     if job.settings.cyclic is not None and part_numbers(mesh, tied=True).max() > 0:
         errors.append("the mesh of a cyclic sector falls into parts that share no points; join them")
@@ -199,7 +199,7 @@ def load_mesh(job: Job, path: Path | None = None) -> tuple[Mesh, list[str]]:
     return mesh, warnings
 
 
-def _linked(path: Path, mesh: Mesh) -> Mesh:
+def linked_mesh(path: Path, mesh: Mesh) -> Mesh:
     """The mesh with the equations that its file ties it by.
 
     Raises:
