@@ -107,6 +107,12 @@ def test_first_order_bricks_lock_as_far_as_is_told(tmp_path, monkeypatch, capsys
         ("*End Assembly", "*Include, input=two.inp\n*End Assembly", "includes itself by way of two.inp"),
         ("*End Assembly", "*Include, input=none.inp\n*End Assembly", "none.inp cannot be read"),
         ("*Part, name=Vane", "*Part, name=Root", "the *PART 'Root' is there twice"),
+        ("*End Part\n", "", "the *PART has no *END PART before two.inp, line "),
+        ("*End Instance\n", "", "the *INSTANCE has no *END INSTANCE before two.inp, line "),
+        ("*End Assembly\n", "", "the *ASSEMBLY has no *END ASSEMBLY before the end"),
+        ("*Assembly, name=Assembly\n", "", "the *INSTANCE stands outside of an *ASSEMBLY"),
+        ("name=Root-1, part=Root", "name=Root-1", "names no PART and has no nodes"),
+        ("40.0, 5.0, 1.0", "40.0, nan, 1.0", "a number that is not finite"),
     ],
 )
 def test_wrong_assemblies_are_told_with_file_and_line(tmp_path, monkeypatch, capsys, old, new, text):

@@ -219,7 +219,7 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
 
 def _weighed(reading: _Reading, card: Card, surface: str) -> tuple[Indices | str, Array | None]:
     """By the areas of a surface of facets, by the numbers that a surface of nodes has beside them (1 if none)."""
-    _, kind, rows, space = next(s for s in reading.deck.surfaces if s[0] == surface)
+    _, kind, rows, space, _ = next(s for s in reading.deck.surfaces if s[0] == surface)
     if kind != "NODE":
         return surface, None
     weights: dict[int, float] = {}

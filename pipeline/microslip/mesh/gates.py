@@ -147,9 +147,9 @@ def _meant(mesh: Mesh, pairs: Indices) -> NDArray[np.bool_]:
         of[points] = number
     apart = (of[pairs] >= 0).all(axis=1) & (of[pairs[:, 0]] != of[pairs[:, 1]])
     ties = [item for item in (mesh.links.items if mesh.links else ()) if isinstance(item, FaceTie)]
-    for two in (*ties, *mesh.joints):
-        if {two.slave, two.master} <= {*mesh.faces, *mesh.point_sets}:
-            one, other = (np.isin(pairs, mesh.set_points(name)) for name in (two.slave, two.master))
+    for names in [(tie.slave, tie.master) for tie in ties] + [(j.slave, j.master) for j in mesh.joints]:
+        if {*names} <= {*mesh.faces, *mesh.point_sets}:
+            one, other = (np.isin(pairs, mesh.set_points(name)) for name in names)
             apart |= (one & other[:, ::-1]).any(axis=1)
     return apart
 

@@ -121,6 +121,8 @@ def _part(path: Path, parts: dict[str, list[Card]], instance: Card, own: list[Ca
     name = instance.parameters.get("PART", "")
     if "LIBRARY" in instance.parameters or name.upper() not in {*parts, ""}:
         raise Damaged(f"{instance.where}: *INSTANCE names the part '{name}', which the file does not define")
+    if not name and not any(card.keyword == "NODE" for card in own):
+        raise Damaged(f"{instance.where}: the *INSTANCE names no PART and has no nodes of its own")
     deck = Deck()
     _read(path, deck, [*parts.get(name.upper(), ()), *own])
     return deck
@@ -141,6 +143,7 @@ def _read(path: Path, deck: Deck, cards: list[Card]) -> None:
             elif card.keyword not in (*_SILENT, *LINKS, *JOINTS):
                 deck.ignored.append(card.keyword)
             continue
+        deck.where = card.where
         _told(card, lambda c: _READERS[c.keyword](deck, c.parameters, c.lines))
         kind = card.parameters.get("TYPE", "").upper()
         if card.keyword == "ELEMENT" and card.lines and not _cell_type(kind) and kind != "DCOUP3D":
@@ -205,7 +208,9 @@ def _cell_type(kind: str) -> re.Match[str] | None:
 def _read_elements(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     kind = parameters.get("TYPE", "").upper()
     match = _cell_type(kind)
+    deck.kinds.append(kind)
     if match is None:
+        deck.add(deck.cell_sets, parameters.get("ELSET", ""))
         return  # beams, springs, masses and the like
     solid = match[1] in ("C3D", "DC3D", "AC3D")
     count = 6 if match[0] == "STRI65" else int(match[2])
@@ -252,7 +257,9 @@ def _read_set(
         for word in words:
             if not word.isdecimal():
                 found = deck.cells(word, space) if of_cells else deck.nodes(word, space)
-                members += [] if found is None else [found]
+                if found is None:
+                    raise Damaged(f"{what} names the set '{word}', which is not defined")
+                members.append(found)
 
 
 def _generated(words: list[str], known: Indices, what: str) -> Indices:
@@ -269,7 +276,10 @@ def _read_surface(deck: Deck, parameters: dict[str, str], lines: list[str]) -> N
     if name:
         kind = parameters.get("COMBINE", kind).upper()
         rows = [words for line in lines if (words := [w.strip() for w in line.split(",")]) and any(words)]
-        deck.surfaces.append((name, kind, rows, ""))
+        for row in rows if kind == "ELEMENT" else ():
+            if not re.fullmatch("|S[1-6]|SPOS|SNEG|E[1-4]|END[12]|EDGE", (side := [*row, ""][1]).upper()):
+                raise Damaged(f"*SURFACE, NAME={name} names the side '{side}', which no cell has")
+        deck.surfaces.append((name, kind, rows, "", deck.where))
         deck.written.setdefault(name.upper(), name)
 
 
@@ -340,7 +350,7 @@ def _read_expansion(deck: Deck, parameters: dict[str, str], lines: list[str]) ->
 def _read_section(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
     keys = ("ELSET", "MATERIAL", "ORIENTATION")
     words = [parameters.get(key, "") for key in keys]
-    deck.sections.append((words[0], words[1], words[2], ""))
+    deck.sections.append((words[0], words[1], words[2], "", deck.where))
 
 
 def _read_orientation(deck: Deck, parameters: dict[str, str], lines: list[str]) -> None:
@@ -402,7 +412,7 @@ def _read_boundary(deck: Deck, parameters: dict[str, str], lines: list[str]) -> 
         words = [word.strip() for word in line.split(",")] + 3 * [""]
         try:
             directions = _HELD.get(words[1].upper()) or _zeros(words)
-            deck.held.append((words[0].strip('"'), directions))
+            deck.held.append((words[0].strip('"'), directions, deck.where))
         except ValueError:
             deck.not_held.append(f"the line '{line[:60]}' of *BOUNDARY")
 
@@ -465,6 +475,9 @@ def _assembled(deck: Deck) -> RawMesh:
     node_id, points = _unique_nodes(np.concatenate(deck.node_id), np.concatenate(deck.points))
     numbering = Numbering(node_id)
     raw = RawMesh(points, node_id)
+    if deck.kinds and not deck.solids:
+        kinds = ", ".join(dict.fromkeys(deck.kinds))
+        raise Damaged(f"it holds no volume cells (C3D4 to C3D27), only {kinds}; mesh the volume first")
     for cells in deck.solids:
         cells.nodes = numbering.positions(cells.nodes, "*ELEMENT names")
         raw.blocks.append((cells.kind, cells.nodes))
@@ -489,11 +502,11 @@ def _assembled(deck: Deck) -> RawMesh:
         for cells in deck.facets:
             if (inside := np.isin(cells.ids, chosen)).any():
                 raw.facets.setdefault(deck.written[key], []).append(cells.nodes[inside])
-    for name, kind, rows, space in deck.surfaces:
+    for name, kind, rows, space, where in deck.surfaces:
         if kind == "NODE":
-            _node_surface(deck, raw, numbering, name, rows, space)
+            _node_surface(deck, raw, numbering, name, rows, space, where)
         elif kind == "ELEMENT":
-            _element_surface(deck, raw, name, rows, space)
+            _element_surface(deck, raw, name, rows, space, where)
         elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
             _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
     return raw
@@ -515,13 +528,16 @@ def _assign_materials(deck: Deck, raw: RawMesh) -> None:
         return
     raw.regions = [np.full(len(cells.ids), -1) for cells in deck.solids]
     known: dict[tuple[str, str], int] = {}
-    for name_of_set, material, orientation, space in deck.sections:
+    for name_of_set, material, orientation, space, where in deck.sections:
         if material.upper() not in deck.materials:
-            raise Damaged(f"*SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined")
+            raise Damaged(
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the material '{material}', which is not defined"
+            )
         axes = deck.key(deck.orientations, orientation, space) if orientation else ""
         if axes is None:
             raise Damaged(
-                f"*SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not defined"
+                f"{where}: *SOLID SECTION, ELSET={name_of_set} names the orientation '{orientation}', which is not "
+                "defined"
             )
         key = (material.upper(), axes)
         if key not in known:
@@ -529,7 +545,7 @@ def _assign_materials(deck: Deck, raw: RawMesh) -> None:
             raw.materials.append(_deck_material(deck, key, name_of_set))
         chosen = deck.cells(name_of_set, space)
         if chosen is None:
-            raise Damaged(f"*SOLID SECTION names the element set '{name_of_set}', which is not defined")
+            raise Damaged(f"{where}: *SOLID SECTION names the element set '{name_of_set}', which is not defined")
         for cells, region in zip(deck.solids, raw.regions, strict=True):
             region[np.isin(cells.ids, chosen)] = known[key]
     bare = [cells.ids[region < 0] for cells, region in zip(deck.solids, raw.regions, strict=True)]
@@ -584,20 +600,28 @@ def _assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None
 def _constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
-    for word, directions in deck.held:
+    known = joined(deck.node_id)
+    for word, directions, where in deck.held:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
-            held.left_out.append(f"*BOUNDARY names the node set '{word}', which is not defined")
-        elif key is not None:
+            raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
+        if not np.isin(found, known).all():
+            raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
+        if key is not None:
             held.hold(deck.written[key], directions)
         else:
             held.hold(int(found[0]), directions)
     return held
 
 
-def _node_surface(deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str) -> None:
+def _node_surface(
+    deck: Deck, raw: RawMesh, numbering: Numbering, name: str, rows: list[list[str]], space: str, where: str
+) -> None:
     for row in rows:
-        if (found := deck.nodes(row[0], space)) is not None:
+        found = deck.nodes(row[0], space)
+        if found is None:
+            raise Damaged(f"{where}: the surface '{name}' names the node set '{row[0]}', which is not defined")
+        if len(found):
             raw.add_points(name, numbering.positions(found, f"the surface '{name}' names"))
 
 
@@ -616,20 +640,22 @@ def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -
         raw.facets.setdefault(name, []).append(block[inside if way == "INTERSECTION" else ~inside])
 
 
-def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str) -> None:
+def _element_surface(deck: Deck, raw: RawMesh, name: str, rows: list[list[str]], space: str, where: str) -> None:
     """Faces S1 ... S6 of cells given by number or set; without a face the free ones."""
     for row in rows:
         everything = joined(c.ids for c in (*deck.solids, *deck.facets))
         chosen = deck.cells(row[0], space) if row[0] else everything
         face = row[1].upper() if len(row) > 1 else ""
         if chosen is None:
-            continue
+            raise Damaged(f"{where}: the surface '{name}' names the element set '{row[0]}', which is not defined")
         for cells in deck.solids:
             nodes = cells.nodes[np.isin(cells.ids, chosen)]
             sides = _sides(cells.kind)
             if not len(nodes) or not sides:
                 continue
-            if re.fullmatch(r"S[1-6]", face) and int(face[1]) <= len(sides):
+            if re.fullmatch(r"S[1-6]", face):
+                if int(face[1]) > len(sides):
+                    raise Damaged(f"{where}: the surface '{name}' names the side {face} of cells {cells.written}")
                 raw.facets.setdefault(name, []).append(nodes[:, list(sides[int(face[1]) - 1])])
             elif not face:
                 for corners in sorted({len(side) for side in sides}):

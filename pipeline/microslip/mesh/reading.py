@@ -67,9 +67,16 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
         mesh = _mesh_of(raw, UNITS[unit], path)
         return replace(mesh, materials=materials, regions=mesh.regions if materials else {})
     except Damaged as error:
-        raise UserError(f"{path}: is damaged or cannot be used ({error}); write it again") from error
+        raise UserError(_refused(path, str(error))) from error
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); correct the path") from error
+
+
+def _refused(path: Path, text: str) -> str:
+    """What is wrong with a file, its name once before the line, and what to do."""
+    before = f"{path}" if text.startswith(f"{path.name}, line ") else f"{path}: "
+    text = text.removeprefix(path.name) if not before.endswith(": ") else f"cannot be used: {text}"
+    return before + text + ("" if "; " in text else "; correct it or write it again")
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {

@@ -163,7 +163,7 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
     Raises:
         UserError: with file and line, what is wrong with one.
     """
-    if mesh.links is None:
+    if (links := mesh.links) is None:
         return mesh, []
     from ..fem.discretise import discretise
     from ..fem.links import linked
@@ -174,6 +174,10 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
     except UserError as error:
         raise UserError(f"{file}: {error}") from None
+    said: dict[str, list[str]] = {}
+    for link, text in zip(links.items, told, strict=True):
+        said.setdefault(link.where, []).append(text)
+    told = [texts[0] if len(texts) == 1 else f"{where}: {len(texts)} constraints" for where, texts in said.items()]
     return mesh, told if len(told) <= 12 else [*told[:10], f"and {len(told) - 10} constraints more"]
 
 
