@@ -245,6 +245,26 @@ def test_wrong_constraints_are_told_with_file_and_line(tmp_path, monkeypatch, ca
     assert not (tmp_path / "part").exists()
 
 
+CHAINS = {
+    "kinematic": ["*KINEMATIC COUPLING, REF NODE=9002", "9001, 1, 6"],
+    "beam": ["*MPC", "BEAM, 9001, 9002"],
+    "rigid": ["*NSET, NSET=TIED", "9001,", "*RIGID BODY, TIE NSET=TIED, REF NODE=9002"],
+}
+
+
+@pytest.mark.parametrize("kind", CHAINS)
+def test_a_reference_node_that_follows_another_one_turns_with_it(tmp_path, kind):
+    """Rigid on rigid is rigid: the end held through a chain of two is the end held."""
+    found = []
+    for chain in ([], CHAINS[kind]):
+        lines = [*base(), *REF, "*NODE", "9002, 30., 0., 80.", *COUPLED, *chain]
+        (tmp_path / "a.inp").write_text("\n".join([line.format("S-z1") for line in lines]) + "\n")
+        mesh = linked(read_mesh(tmp_path / "a.inp", "mm"))[0]
+        last = 3 * mesh.n_points + 6 * (len(mesh.links.references) - 1) + np.arange(6)
+        found.append(solved(mesh, last, 6))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
 WEIGHTS = ["*COUPLING, REF NODE=9001, SURFACE={}", "*DISTRIBUTING", "*BOUNDARY", "9001, 1, 3"]
 
 

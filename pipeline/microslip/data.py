@@ -101,7 +101,8 @@ class RigidLink:
     """Nodes that follow a reference node as a rigid body: u = u_r + theta_r x (x - x_r), in some directions.
 
     Attributes:
-        reference: node. members: nodes, or the face or point set that has them. directions: out of x, y, z.
+        reference: node. members: nodes, or the face that has them. directions: out of x, y, z, and of a, b, c
+            for members that are reference nodes and turn with it.
     """
 
     where: str

@@ -123,12 +123,16 @@ def _equation(mesh: Mesh, link: Equation, rows: _Rows, number: int) -> str:
 def _rigid(mesh: Mesh, link: RigidLink, rows: _Rows, number: int) -> str:
     members = _members(mesh, link)
     r = _position(mesh, members) - _position(mesh, np.array([link.reference]))
-    for way in ["xyz".index(c) for c in link.directions]:
+    for way in ["xyz".index(c) for c in link.directions if c in "xyz"]:
         own = rows.dof(members, way)
         a, b = (way + 1) % 3, (way + 2) % 3  # (theta x r)_way = theta_a r_b - theta_b r_a
         base = [np.full(len(members), rows.dof(np.array(link.reference), c)) for c in (way, 3 + a, 3 + b)]
         factors = np.column_stack([np.ones(len(members)), -np.ones(len(members)), -r[:, b], r[:, a]])
         rows.add(number, np.column_stack([own, *base]), factors, own)
+    turning = members[members >= mesh.n_points]
+    for way in ["xyzabc".index(c) for c in link.directions if c in "abc"]:
+        given, leading = rows.dof(turning, way), np.full(len(turning), rows.dof(np.array(link.reference), way))
+        rows.add(number, np.column_stack([given, leading]), np.tile([1.0, -1.0], (len(turning), 1)), given)
     return f"{link.where}: {len(members)} nodes follow node {_number(mesh, link.reference)}"
 
 

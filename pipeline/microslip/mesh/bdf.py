@@ -36,7 +36,7 @@ _READ = {
 }  # fmt: skip
 _COUNTS = re.compile(
     r"C(?!ORD|END)[A-Z]+\d?|R(?!FORCE|LOAD|AND|ING)[A-Z]+\d?|SUPORT1?|GENEL|DMIG|NSM[A-Z]*\d?|GRDSET|"
-    r"MATT\d+|BCTSET|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
+    r"MATT\d+|BCTSET|PSHELL|PCOMPG?|BCONTACT|BOLT|SPCOFF1?|SPCR|SPLINE\d|ASET1?|AEQUAD4"
 )
 """Cards that add mass, stiffness or constraints; those beside `_READ` are not read."""
 
@@ -309,9 +309,8 @@ def _rigid(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> 
         ways = _directions(_at(card, 3))
         if ways not in _EVERY:
             _refuse_turned(where, [_whole(card, 2), *members], held)
-        moves = "".join(c for c in ways if c in "xyz")
         positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
-        yield RigidLink(where, int(reference[0]), positions, moves)
+        yield RigidLink(where, int(reference[0]), positions, ways)
 
 
 def _averages(cards: Cards, name: str, numbering: Numbering, held: Constraints) -> Iterator[Link]:

@@ -326,7 +326,9 @@ def _read_coupled(archive: _Archive, words: list[str]) -> None:
 def _read_rigid(archive: _Archive, words: list[str]) -> None:
     """CERIG, master, slave node or component, directions."""
     master, slave, label = [*words[1:4], "", "", ""][:3]
-    ways = {"": "xyz", "ALL": "xyz", "UXYZ": "xyz", "RXYZ": ""}.get(label.upper(), _LABELS.get(label.upper(), "?"))
+    ways = {"": "xyzabc", "ALL": "xyzabc", "UXYZ": "xyz", "RXYZ": "abc"}.get(
+        label.upper(), _LABELS.get(label.upper(), "?")
+    )
     if ways == "?" or slave.upper() in ("ALL", ""):
         raise Damaged(f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX")
     archive.rigid.append((_whole(master, "CERIG"), slave, ways))
@@ -390,7 +392,7 @@ def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
             raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
         reference = numbering.positions(np.array([master]), f"{where} names")
         positions = numbering.positions(np.array(members, dtype=np.int64), f"{where} names")
-        if moves != "xyz":
+        if moves not in ("xyz", "abc", "xyzabc"):
             _refuse_turned(archive, where, [master, *members])
         if moves:
             found.append(RigidLink(where, int(reference[0]), positions, moves))

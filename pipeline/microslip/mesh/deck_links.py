@@ -153,7 +153,7 @@ def _mpc(reading: _Reading, card: Card, space: str, following: Card | None) -> I
 
 def _pair(kind: str, where: str, a: int, b: int, along: Array) -> Iterator[Link]:
     if kind == "BEAM":
-        yield RigidLink(where, b, np.array([a]))
+        yield RigidLink(where, b, np.array([a]), _WAYS)
     elif kind == "LINK":
         if not along.any():
             raise Damaged("*MPC LINK between two nodes at one place has no direction; use PIN")
@@ -169,9 +169,9 @@ def _old_coupling(reading: _Reading, card: Card, space: str, following: Card | N
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
     for line in card.lines:
         words = [word.strip() for word in line.split(",")]
-        moves, every = _ways([words[1:]])
+        every = _ways([words[1:]])
         _refuse_turned(reading, every)
-        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), moves)
+        yield RigidLink(_where(card), reference, reading.nodes(words[0], card, space), every)
     if not card.lines:
         raise Damaged("*KINEMATIC COUPLING couples no nodes to its reference node; add them")
 
@@ -181,7 +181,7 @@ def _not_read(reading: _Reading, card: Card, space: str, following: Card | None)
     return iter(())
 
 
-def _ways(lines: list[list[str]]) -> tuple[str, str]:
+def _ways(lines: list[list[str]]) -> str:
     """Directions x, y, z and rotations a, b, c of lines (first, last); all without any."""
     found: set[str] = set()
     for words in lines:
@@ -189,8 +189,7 @@ def _ways(lines: list[list[str]]) -> tuple[str, str]:
         if given:
             first = _direction(given[0])
             found |= set(_WAYS[first : _direction(given[-1]) + 1])
-    every = "".join(w for w in _WAYS if w in found) or _WAYS
-    return "".join(w for w in every if w in "xyz"), every
+    return "".join(w for w in _WAYS if w in found) or _WAYS
 
 
 def _refuse_turned(reading: _Reading, every: str) -> None:
@@ -205,12 +204,12 @@ def _coupling(reading: _Reading, card: Card, space: str, following: Card | None)
         raise Damaged("*COUPLING with INFLUENCE RADIUS is not read; name a surface of the nodes that it takes in")
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
     members, weights = _weighed(reading, card, reading.surface(card.parameters.get("SURFACE", ""), card, space))
-    moves, every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
-    if "ORIENTATION" in card.parameters and (len(moves) < 3 or len(every) < 6):
+    every = _ways([[word.strip() for word in line.split(",")] for line in following.lines])
+    if "ORIENTATION" in card.parameters and len(every) < 6:
         raise Damaged("*COUPLING in single directions of an ORIENTATION is not read; write *EQUATIONs")
     _refuse_turned(reading, every)
     if following.keyword == "KINEMATIC":
-        yield RigidLink(_where(card), reference, members, moves)
+        yield RigidLink(_where(card), reference, members, every)
         return
     if following.parameters.get("WEIGHTING METHOD", "UNIFORM").upper() != "UNIFORM":
         raise Damaged("*DISTRIBUTING is read with WEIGHTING METHOD=UNIFORM alone")
@@ -244,7 +243,12 @@ def _rigid_body(reading: _Reading, card: Card, space: str, following: Card | Non
             members.append(np.unique(cells.nodes[np.isin(cells.ids, chosen)]))
     every = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *members]))
     reference = reading.node(card.parameters.get("REF NODE", ""), card, space)
-    yield RigidLink(_where(card), reference, every[every != reference])
+    pinned = set() if "PIN NSET" not in card.parameters else {*reading.nodes(card.parameters["PIN NSET"], card, space)}
+    tied = np.array([node for node in every if node != reference and node not in pinned], dtype=np.int64)
+    if len(tied) or not pinned:
+        yield RigidLink(_where(card), reference, tied, _WAYS)
+    if pinned:
+        yield RigidLink(_where(card), reference, np.array(sorted(pinned), dtype=np.int64))
     if "ROT NODE" in card.parameters:
         turns = reading.node(card.parameters["ROT NODE"], card, space)
         for way in range(3):
