@@ -244,7 +244,7 @@ def _density(cards: Cards, card: list[str]) -> float | None:
 
 
 def _constraints(cards: Cards, text: str) -> Constraints:
-    """Zero displacements: GRID's own, and those of the sets that the case control chooses, or of the only one."""
+    """Zero displacements: GRID's own, and those of the sets that the case control chooses, or the only one."""
     held = Constraints(turned={_whole(c, 1) for c in cards["GRID"] if _whole(c, 6, 0) != 0})
     for card in cards["GRID"]:
         held.hold(_whole(card, 1), _directions(_at(card, 7)))
