@@ -76,11 +76,11 @@ def constrained(folder, cards, control=()):
 def test_equations_hold_where_the_case_control_chooses_them(tmp_path):
     cards = ["MPC,5,9,1,1.0,10,1,-1.0"]
     assert constrained(tmp_path, cards, ["MPC = 5"]).links is not None
+    both = constrained(tmp_path, [*cards, "MPC,6,11,1,1.0,12,1,-1.0"], ["SUBCASE 1", "MPC = 5", "SUBCASE 2", "MPC = 6"])
+    assert "subcases choose several sets of MPC (5, 6)" in both.lost[0]
     left = constrained(tmp_path, cards)
     assert left.links is None and "the only set of MPC, of which the case control chooses none" in left.lost[0]
-    assert (
-        "MPC = 6 of the case control, which the file does not define" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
-    )
+    assert "MPC = 6 of the case control is not defined" in constrained(tmp_path, [], ["MPC = 6"]).lost[0]
 
 
 @pytest.mark.parametrize(

@@ -275,15 +275,21 @@ def _chosen(cards: Cards, text: str, held: Constraints, kind: str = "SPC") -> se
     every = {_whole(c, 1) for name in (kind, f"{kind}1") for c in cards.get(name, [])}
     if not named and every and len(control) > 1:
         sets = "the only set" if len(every) == 1 else "several sets"
-        held.left_out.append(f"{sets} of {kind}, of which the case control chooses none (write {kind} = {min(every)})")
+        held.left_out.append(
+            f"{sets} of {kind}, of which the case control chooses none: not held (write {kind} = {min(every)})"
+        )
         return set()
     if not named and len(every) > 1:
         held.left_out.append(f"several sets of {kind} without a case control that chooses")
         return set()
     chosen = {int(n) for n in named} if named else every
+    if len(set(named)) > 1:
+        held.left_out.append(
+            f"subcases choose several sets of {kind} ({', '.join(named)}); all of them hold here at once"
+        )
     known = every | {_whole(c, 1) for c in cards.get(f"{kind}ADD", [])}
     if unknown := sorted(chosen - known):
-        held.left_out.append(f"the set {kind} = {unknown[0]} of the case control, which the file does not define")
+        held.left_out.append(f"the set {kind} = {unknown[0]} of the case control is not defined, so it does not hold")
     for card in cards.get(f"{kind}ADD", []):
         if _whole(card, 1) in chosen:
             chosen |= set(_listed(card, 2))
@@ -350,7 +356,7 @@ def _equations(
     """MPC of the sets that the case control chooses, or of the only one of a file without case control."""
     own = Constraints()
     chosen = _chosen(cards, text, own, "MPC")
-    left_out += [f"{name}: {told}, so it does not hold" for told in own.left_out]
+    left_out += [f"{name}: {told}" for told in own.left_out]
     for card in cards.get("MPC", []):
         if _whole(card, 1) not in chosen:
             continue

@@ -508,7 +508,7 @@ def _assembled(deck: Deck) -> RawMesh:
         elif kind == "ELEMENT":
             _element_surface(deck, raw, name, rows, space, where)
         elif kind in ("UNION", "INTERSECTION", "DIFFERENCE"):
-            _combined(raw, deck, name, kind, [word for row in rows for word in row if word])
+            _combined(raw, deck, name, kind, [word for row in rows for word in row if word], where)
     return raw
 
 
@@ -625,11 +625,13 @@ def _node_surface(
             raw.add_points(name, numbering.positions(found, f"the surface '{name}' names"))
 
 
-def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str]) -> None:
+def _combined(raw: RawMesh, deck: Deck, name: str, way: str, words: list[str], where: str) -> None:
     """A surface of others: all of their facets, those that they have in common, or those of the first alone."""
     parts = []
     for word in words:
         at, tail = deck.place(word)
+        if not {at.prefix + tail, tail} & {known for known, *_ in deck.surfaces}:
+            raise Damaged(f"{where}: the surface '{name}' names the surface '{word}', which is not defined")
         parts.append(raw.facets.get(at.prefix + tail) or raw.facets.get(tail) or [])
     if way == "UNION":
         raw.facets[name] = [block for part in parts for block in part]

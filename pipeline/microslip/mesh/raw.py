@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -104,6 +105,11 @@ class RawMesh:
             self.cell_id.append(ids)
             self.regions.append(regions)
         refuse_twice(self.cell_id, "element")
+
+
+def in_file(path: Path, text: str) -> str:
+    """A sentence about a file, with its name once: ``deck/a.inp, line 3: ...`` of ``a.inp, line 3: ...``."""
+    return f"{path}{text.removeprefix(path.name)}" if text.startswith(f"{path.name}, ") else f"{path}: {text}"
 
 
 def lost(where: str, what: str) -> str:

@@ -28,7 +28,7 @@ from .linking import renumbered
 from .materials import in_si
 from .med import read_med
 from .msh import is_msh41, read_msh41
-from .raw import NODES, Damaged, RawMesh
+from .raw import NODES, Damaged, RawMesh, in_file
 from .surface import boundary_facets, faces_from_points, match_facets
 from .unv import read_unv
 
@@ -74,9 +74,8 @@ def read_mesh(path: Path | str, unit: str, system: str | None = None, zero: floa
 
 def _refused(path: Path, text: str) -> str:
     """What is wrong with a file, its name once before the line, and what to do."""
-    before = f"{path}" if text.startswith(f"{path.name}, line ") else f"{path}: "
-    text = text.removeprefix(path.name) if not before.endswith(": ") else f"cannot be used: {text}"
-    return before + text + ("" if "; " in text else "; correct it or write it again")
+    told = text if text.startswith(f"{path.name}, ") else f"cannot be used: {text}"
+    return in_file(path, told) + ("" if "; " in text else "; correct it or write it again")
 
 
 _READERS: dict[str, Callable[[Path], RawMesh]] = {

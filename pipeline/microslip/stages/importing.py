@@ -19,7 +19,7 @@ from ..data import Mesh, UserError
 from ..files.store import ordinary, write_text
 from ..mesh import UNITS, mesh_problems, read_mesh
 from ..mesh.chosen import of_instances
-from ..mesh.raw import Unread
+from ..mesh.raw import Unread, in_file
 from ..units import SYSTEMS, usual_system
 from .meshing import run_apart
 
@@ -173,7 +173,7 @@ def _tied(file: Path, mesh: Mesh) -> tuple[Mesh, list[str]]:
         mesh, told = linked(mesh)
         tied_upper(discretise(mesh).pattern, np.zeros(0, dtype=np.int64), mesh.ties)
     except UserError as error:
-        raise UserError(f"{file}: {error}") from None
+        raise UserError(in_file(file, str(error))) from None
     said: dict[str, list[str]] = {}
     for link, text in zip(links.items, told, strict=True):
         said.setdefault(link.where, []).append(text)
