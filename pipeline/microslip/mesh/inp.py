@@ -600,12 +600,12 @@ def _assign_temperatures(deck: Deck, raw: RawMesh, numbering: Numbering) -> None
 def _constraints(deck: Deck) -> Constraints:
     """What *BOUNDARY holds, its sets by the names they were written with."""
     held = Constraints(all_turned=deck.turned, left_out=list(deck.not_held))
-    known = joined(deck.node_id)
+    known = set(joined(deck.node_id).tolist())
     for word, directions, where in deck.held:
         key, found = deck.key(deck.node_sets, word), deck.nodes(word)
         if found is None:
             raise Damaged(f"{where}: *BOUNDARY names the node set '{word}', which is not defined")
-        if not np.isin(found, known).all():
+        if not known.issuperset(found.tolist()):
             raise Damaged(f"{where}: *BOUNDARY names the node {word}, which is not defined")
         if key is not None:
             held.hold(deck.written[key], directions)
