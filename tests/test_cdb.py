@@ -250,7 +250,7 @@ def test_turned_nodes_in_constraints_are_refused(tmp_path, command):
     at = next(i for i, line in enumerate(lines) if line.startswith(f"{9:9d}"))
     lines[at] += f"{90.0:21.13E}"
     written(tmp_path, "\n".join(lines).replace("FINISH", f"{command}\nFINISH"))
-    with pytest.raises(UserError, match="directions of node 9, which are turned in NBLOCK"):
+    with pytest.raises(UserError, match=r"part.cdb, line \d+: .*directions of node 9, which are turned in NBLOCK"):
         read_mesh(tmp_path / "part.cdb", "mm")
 
 

@@ -40,7 +40,7 @@ _FORMS: dict[int, dict[str, Sequence[int]]] = {
 
 @dataclass
 class _Archive:
-    """What the commands have said. elements: (number, material, type, system, nodes)."""
+    """What the commands have said. elements: (number, material, type, system, nodes). places: of equations, by name."""
 
     node_id: list[int] = field(default_factory=list)
     points: list[list[float]] = field(default_factory=list)
@@ -55,8 +55,10 @@ class _Archive:
     nodal: dict[int, float] = field(default_factory=dict)
     held: Constraints = field(default_factory=Constraints)
     equations: dict[str, list[tuple[int, str, float]]] = field(default_factory=dict)
-    rigid: list[tuple[int, str, str]] = field(default_factory=list)
+    rigid: list[tuple[int, str, str, str]] = field(default_factory=list)
     open: str = ""
+    where: str = ""
+    places: dict[str, str] = field(default_factory=dict)
     lost: list[str] = field(default_factory=list)
 
 
@@ -74,13 +76,14 @@ def read_cdb(path: Path) -> RawMesh:
         if command in ("NBLOCK", "EBLOCK", "CMBLOCK"):
             at = _BLOCKS[command](archive, words, lines, at + 1)
             continue
+        archive.where = f"{path.name}, line {at + 1}"
         try:
             if command in _COMMANDS:
                 _COMMANDS[command](archive, words)
         except Damaged as error:
-            raise Damaged(f"{path.name}, line {at + 1}: {error}") from None
+            raise Damaged(f"{archive.where}: {error}") from None
         if command in _NOT_READ:
-            archive.lost.append(lost(f"{path.name}, line {at + 1}", command))
+            archive.lost.append(lost(archive.where, command))
         at += 1
     raw = _assembled(archive)
     raw.lost = [*archive.lost, *_other_elements(archive, path.name)]
@@ -302,7 +305,8 @@ def _read_equation(archive: _Archive, words: list[str]) -> None:
         number, constant, terms = (words[1:2] or [""])[0], (words[2:3] or [""])[0], words[3:]
     if constant and _number(constant, "CE") != 0:
         raise Damaged(f"the constraint equation CE {number} has the constant {constant}; only 0 is read")
-    found = archive.equations.setdefault(number, [])
+    archive.places.setdefault(f"CE {number}", f"{archive.where}: CE {number}")
+    found = archive.equations.setdefault(f"CE {number}", [])
     for place in range(0, len(terms) - 2, 3):
         node, label, factor = terms[place : place + 3]
         if node:
@@ -320,7 +324,8 @@ def _read_coupled(archive: _Archive, words: list[str]) -> None:
     for node in nodes[1:]:
         for way in ways:
             terms = [(_whole(nodes[0], "CP"), way, 1.0), (_whole(node, "CP"), way, -1.0)]
-            archive.equations[f"CP {number}, {label} of node {node}, {way}"] = terms
+            name = f"CP {number}, {label} of node {node}, {way}"
+            archive.places[name], archive.equations[name] = f"{archive.where}: CP {number}", terms
 
 
 def _read_rigid(archive: _Archive, words: list[str]) -> None:
@@ -331,7 +336,7 @@ def _read_rigid(archive: _Archive, words: list[str]) -> None:
     )
     if ways == "?" or slave.upper() in ("ALL", ""):
         raise Damaged(f"CERIG,{master},{slave},{label} is not read; name one node or component, and ALL, UXYZ or UX")
-    archive.rigid.append((_whole(master, "CERIG"), slave, ways))
+    archive.rigid.append((_whole(master, "CERIG"), slave, ways, f"{archive.where}: CERIG,{master},{slave}"))
 
 
 _COMMANDS = {
@@ -377,16 +382,16 @@ def _assembled(archive: _Archive) -> RawMesh:
 def _links(archive: _Archive, numbering: Numbering) -> list[Link]:
     """Constraint equations, and nodes that follow one rigidly."""
     found: list[Link] = []
-    for where, terms in archive.equations.items():
-        where = where if where.startswith("CP") else f"CE {where}"
+    for name, terms in archive.equations.items():
+        where = archive.places[name]
         if not terms:
             raise Damaged(f"the constraint equation {where} has no terms")
         nodes = numbering.positions(np.array([t[0] for t in terms], dtype=np.int64), f"{where} names")
         _refuse_turned(archive, where, [t[0] for t in terms])
         ways = np.array(["xyzabc".index(t[1]) for t in terms])
         found.append(Equation(where, nodes, ways, np.array([t[2] for t in terms])))
-    for master, slave, moves in archive.rigid:
-        where, members = f"CERIG,{master},{slave}", archive.components.get(slave, [])
+    for master, slave, moves, where in archive.rigid:
+        members = archive.components.get(slave, [])
         members = [int(slave)] if is_number(slave) else members
         if not members:
             raise Damaged(f"{where} couples no nodes: '{slave}' is no node and no component of nodes")
